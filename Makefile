@@ -1,0 +1,41 @@
+# Everything a user or CI runs. Needs Python 3.11 to 3.13 and make, nothing else.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: setup demo test check bench train lock clean
+
+setup: $(VENV)/.installed
+
+$(VENV)/.installed: requirements.lock pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14) and "ESC needs Python 3.11, 3.12 or 3.13; try: make PYTHON=python3.12 " or 0)'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --editable .
+	touch $@
+
+demo: setup
+	$(BIN)/python -m tests.demo
+
+test: setup
+	$(BIN)/pytest
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/deptry .
+
+$(VENV)/.train: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check '.[train]'
+	touch $@
+
+train: $(VENV)/.train
+	$(BIN)/python -m models.training.train
+
+lock:
+	uv pip compile --universal --python-version 3.11 --generate-hashes --group dev -o requirements.lock pyproject.toml
+
+clean:
+	rm -rf $(VENV) build *.egg-info

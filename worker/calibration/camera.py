@@ -1,0 +1,263 @@
+"""Cameras: intrinsics with OpenCV's distortion, poses, and the projection of many points by many poses at once.
+
+World: right-handed, metres, z up. Camera: OpenCV (x right, y down, z forward; pixel centres at integers).
+A pose is the rotation vector world to camera and the camera's centre in the world, so that a change of rotation turns
+the view and does not swing the camera around the pitch: P = K R [I | -C].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+NEAREST_DEPTH_M = 0.1
+
+
+def rotation_matrices(vectors: ArrayLike) -> Array:
+    """Rodrigues: rotation vectors (..., 3) in radians to matrices (..., 3, 3)."""
+    v = np.asarray(vectors, dtype=float)
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    cross = cross_matrices(v)
+    # sin(a)/a and (1-cos(a))/a², both finite at a = 0; np.sinc(x) is sin(pi x)/(pi x).
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    return np.eye(3) + a * cross + b * (cross @ cross)
+
+
+def rotation_vectors(matrices: ArrayLike) -> Array:
+    """Inverse Rodrigues: matrices (..., 3, 3) to vectors (..., 3) of length 0..pi.
+
+    Goes through the unit quaternion of largest component, which stays exact near 0 and near pi.
+    """
+    m = np.asarray(matrices, dtype=float)
+    trace = np.trace(m, axis1=-2, axis2=-1)
+    # Four times the outer product of the quaternion (w, x, y, z) with itself; its best-conditioned row is taken.
+    q = np.empty((*m.shape[:-2], 4, 4))
+    q[..., 0, 0] = 1 + trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q[..., i + 1, i + 1] = 1 + 2 * m[..., i, i] - trace
+        q[..., 0, i + 1] = q[..., i + 1, 0] = m[..., k, j] - m[..., j, k]
+        q[..., j + 1, k + 1] = q[..., k + 1, j + 1] = m[..., k, j] + m[..., j, k]
+    best = np.argmax(np.diagonal(q, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(q, best[..., None, None], axis=-2)[..., 0, :]
+    row = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    row = np.where(row[..., :1] < 0, -row, row)
+    sine = np.linalg.norm(row[..., 1:], axis=-1, keepdims=True)
+    half = np.arctan2(sine, row[..., :1])
+    # half / sin(half) -> 1 for small angles.
+    return 2 * row[..., 1:] * np.where(sine > 1e-12, half / np.maximum(sine, 1e-300), 1.0)
+
+
+def cross_matrices(vectors: Array) -> Array:
+    """Matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors.shape, 3)
+
+
+def rotation_angles_deg(a: ArrayLike, b: ArrayLike) -> Array:
+    """Angle in degrees of the rotation between rotation vectors (..., 3) and (..., 3)."""
+    relative = rotation_matrices(a) @ np.swapaxes(rotation_matrices(b), -1, -2)
+    return np.degrees(np.linalg.norm(rotation_vectors(relative), axis=-1))
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a camera stands and looks: `rotation` (3,) rad, world to camera; `position` (3,) m in the world."""
+
+    rotation: Array
+    position: Array
+
+    @classmethod
+    def from_translation(cls, rotation: ArrayLike, translation: ArrayLike) -> Pose:
+        """From OpenCV's rvec and tvec (tvec = -R position)."""
+        rvec = np.asarray(rotation, dtype=float)
+        return cls(rvec, -rotation_matrices(rvec).T @ np.asarray(translation, dtype=float))
+
+    @classmethod
+    def looking_at(cls, position: ArrayLike, target: ArrayLike, roll_deg: float = 0.0) -> Pose:
+        """A camera at `position` that sees `target` in its principal point, horizon level but for `roll_deg`."""
+        centre = np.asarray(position, dtype=float)
+        forward = np.asarray(target, dtype=float) - centre
+        forward = forward / np.linalg.norm(forward)
+        right = np.cross(forward, [0.0, 0.0, 1.0])
+        right = right / np.linalg.norm(right)
+        upright = np.stack([right, np.cross(forward, right), forward])
+        roll = rotation_matrices(np.array([0.0, 0.0, np.radians(roll_deg)]))
+        return cls(rotation_vectors(roll @ upright), centre)
+
+    @property
+    def matrix(self) -> Array:
+        """Rotation matrix (3, 3), world to camera."""
+        return rotation_matrices(self.rotation)
+
+    @property
+    def translation(self) -> Array:
+        """OpenCV's tvec (3,), metres."""
+        return -self.matrix @ self.position
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """`matrix` (3, 3) in pixels, `distortion` in OpenCV's order (`DISTORTION_LENGTHS`), `size` (width, height)."""
+
+    matrix: Array
+    distortion: Array
+    size: tuple[int, int]
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """The 14 coefficients k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y, absent ones zero."""
+        padded = np.zeros(14)
+        padded[: len(self.distortion)] = self.distortion
+        return padded
+
+    @cached_property
+    def tilt(self) -> Array:
+        """Homography (3, 3) of a tilted sensor (tau_x, tau_y), identity without tilt; as in OpenCV's documentation."""
+        tau_x, tau_y = self.coefficients[12:]
+        if tau_x == 0 and tau_y == 0:
+            return np.eye(3)
+        cx, sx, cy, sy = np.cos(tau_x), np.sin(tau_x), np.cos(tau_y), np.sin(tau_y)
+        rot = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+        return np.array([[rot[2, 2], 0, -rot[0, 2]], [0, rot[2, 2], -rot[1, 2]], [0, 0, 1]]) @ rot
+
+    @cached_property
+    def largest_radius(self) -> float:
+        """Undistorted radius (at depth 1) up to which the radial model grows.
+
+        Beyond it the polynomial folds back and would put points from far outside the view into the picture.
+        """
+        k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8]
+        radii = np.linspace(0.0, 20.0, 20001)
+        r2 = radii**2
+        denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / np.where(denominator > 0, denominator, np.nan)
+        growing = np.diff(radii * radial) > 0
+        return float(radii[-1] if growing.all() else radii[np.argmin(growing)])
+
+    def distort(self, rays: Array) -> Array:
+        """Undistorted image coordinates at depth 1, (..., 2), to pixels (..., 2); NaN beyond `largest_radius`."""
+        k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = self.coefficients[:12]
+        x, y = rays[..., 0], rays[..., 1]
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        if k4 or k5 or k6:
+            radial = radial / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        xd = x * radial
+        yd = y * radial
+        if p1 or p2 or s1 or s2 or s3 or s4:
+            xd = xd + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (s1 + s2 * r2)
+            yd = yd + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (s3 + s4 * r2)
+        if self.coefficients[12] or self.coefficients[13]:
+            homogeneous = np.stack([xd, yd, np.ones_like(xd)], axis=-1) @ self.tilt.T
+            xd = homogeneous[..., 0] / homogeneous[..., 2]
+            yd = homogeneous[..., 1] / homogeneous[..., 2]
+        (fx, skew, cx), (_, fy, cy) = self.matrix[0], self.matrix[1, 0:3]
+        pixels = np.stack([fx * xd + skew * yd + cx, fy * yd + cy], axis=-1)
+        pixels[r2 > self.largest_radius**2] = np.nan
+        return pixels
+
+    def undistort(self, pixels: ArrayLike, iterations: int = 20) -> Array:
+        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
+
+        NaN where no ray of the model ends at the pixel.
+        """
+        target = np.asarray(pixels, dtype=float)
+        linear = self.matrix[:2, :2]
+        rays = (target - self.matrix[:2, 2]) @ np.linalg.inv(linear).T
+        rays = rays * self._undistorted_scale(np.linalg.norm(rays, axis=-1))[..., None]
+        step = 1e-6
+        for _ in range(iterations):
+            here = self.distort(rays)
+            jacobian = np.stack(
+                [
+                    (self.distort(rays + [step, 0.0]) - here) / step,
+                    (self.distort(rays + [0.0, step]) - here) / step,
+                ],
+                axis=-1,
+            )
+            determinant = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+            miss = target - here
+            move = np.stack(
+                [
+                    jacobian[..., 1, 1] * miss[..., 0] - jacobian[..., 0, 1] * miss[..., 1],
+                    jacobian[..., 0, 0] * miss[..., 1] - jacobian[..., 1, 0] * miss[..., 0],
+                ],
+                axis=-1,
+            )
+            with np.errstate(divide="ignore", invalid="ignore"):
+                move = move / determinant[..., None]
+            rays = rays + move
+            if np.nanmax(np.abs(move), initial=0.0) < 1e-12:
+                break
+        with np.errstate(invalid="ignore"):
+            off = ~(np.linalg.norm(self.distort(rays) - target, axis=-1) < 1e-3)
+        rays[off] = np.nan
+        return rays
+
+    def _undistorted_scale(self, distorted_radius: Array) -> Array:
+        """Ratio of undistorted to distorted radius by the radial terms alone: a start for Newton."""
+        k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8]
+        radii = np.linspace(1e-6, min(self.largest_radius, 20.0), 4000)
+        r2 = radii**2
+        distorted = radii * (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        return np.interp(distorted_radius, distorted, radii) / np.maximum(distorted_radius, 1e-6)
+
+    def scaled(self, factor: float) -> Intrinsics:
+        """The same lens on a picture resized by `factor`, pixel centres at integers before and after."""
+        width, height = round(self.size[0] * factor), round(self.size[1] * factor)
+        matrix = self.matrix.copy()
+        for axis, ratio in ((0, width / self.size[0]), (1, height / self.size[1])):
+            matrix[axis] *= ratio
+            matrix[axis, 2] = (self.matrix[axis, 2] + 0.5) * ratio - 0.5
+        return Intrinsics(matrix, self.distortion, (width, height))
+
+
+@dataclass(frozen=True)
+class Camera:
+    """One camera of an installation: its lens and its pose."""
+
+    id: str
+    intrinsics: Intrinsics
+    pose: Pose
+
+    def project(self, points: Array) -> Array:
+        """World points (N, 3) to pixels (N, 2); NaN behind the camera and outside what the lens model covers."""
+        return project(points, self.pose.rotation[None], self.pose.position[None], self.intrinsics)[0]
+
+    def rays(self, pixels: ArrayLike) -> Array:
+        """Directions in the world (..., 3), not normalised (depth 1), through pixels (..., 2)."""
+        plane = self.intrinsics.undistort(pixels)
+        return np.concatenate([plane, np.ones_like(plane[..., :1])], axis=-1) @ self.pose.matrix
+
+    def with_pose(self, pose: Pose) -> Camera:
+        """The same lens elsewhere."""
+        return Camera(self.id, self.intrinsics, pose)
+
+
+def project(points: Array, rotations: Array, positions: Array, intrinsics: Intrinsics) -> Array:
+    """Project N points by each of P poses in one array operation.
+
+    points (N, 3) metres; rotations (P, 3) rad; positions (P, 3) metres. Returns pixels (P, N, 2), NaN where a point is
+    behind the camera or outside what the lens model covers.
+    """
+    matrices = rotation_matrices(rotations)
+    # R (X - C) as R X - R C: one product for the whole population.
+    in_camera = np.einsum("pij,nj->pin", matrices, points) - (matrices @ positions[..., None])
+    depth = in_camera[:, 2]
+    depth = np.where(depth > NEAREST_DEPTH_M, depth, np.nan)
+    return intrinsics.distort(np.stack([in_camera[:, 0] / depth, in_camera[:, 1] / depth], axis=-1))
+
+
+def inside(pixels: Array, size: tuple[int, int], margin: float = 0.0) -> NDArray[np.bool_]:
+    """Which pixels (..., 2) lie in a picture of `size` (width, height), at least `margin` from its border."""
+    x, y = pixels[..., 0], pixels[..., 1]
+    return (x >= margin) & (y >= margin) & (x <= size[0] - 1 - margin) & (y <= size[1] - 1 - margin)

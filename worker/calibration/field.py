@@ -1,0 +1,218 @@
+"""The pitch: its markings by the Laws of the Game, and the roof they lie on.
+
+Dimensions are those of IFAB, Laws of the Game, Law 1. Lines belong to the areas they bound, so the outer edge of a
+boundary line is the nominal distance and its centre lies half a line width inside. Everything here describes the
+*centres* of lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.camera import Array
+
+CENTRE_CIRCLE_RADIUS_M = 9.15
+PENALTY_AREA_DEPTH_M = 16.5
+PENALTY_AREA_HALF_WIDTH_M = 20.16
+GOAL_AREA_DEPTH_M = 5.5
+GOAL_AREA_HALF_WIDTH_M = 9.16
+PENALTY_MARK_DISTANCE_M = 11.0
+CORNER_ARC_RADIUS_M = 1.0
+GOAL_HALF_WIDTH_M = 3.66
+GOAL_HEIGHT_M = 2.44
+SPOT_RADIUS_M = 0.11
+ARC_STEP_M = 0.05
+
+
+@dataclass(frozen=True)
+class Marking:
+    """A painted line of constant width: its name and the polyline (n, 2) of its centre, metres on the pitch."""
+
+    name: str
+    centre: Array
+    width: float
+
+    @property
+    def closed(self) -> bool:
+        """Whether the line ends where it begins."""
+        return bool(np.allclose(self.centre[0], self.centre[-1]))
+
+
+@dataclass(frozen=True)
+class LinePoints:
+    """Points on the centres of markings, N of them.
+
+    `position` (N, 3) metres; unit `tangent` (N, 3) along the line and unit `normal` (N, 3) across it in the surface;
+    `width` (N,) of the line; `marking` (N,) which of `Field.markings()`; `spacing` along the line.
+    """
+
+    position: Array
+    tangent: Array
+    normal: Array
+    width: Array
+    marking: NDArray[np.intp]
+    spacing: float
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> LinePoints:
+        return LinePoints(
+            self.position[chosen],
+            self.tangent[chosen],
+            self.normal[chosen],
+            self.width[chosen],
+            self.marking[chosen],
+            self.spacing,
+        )
+
+
+@dataclass(frozen=True)
+class Field:
+    """A football pitch. `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat."""
+
+    length: float
+    width: float
+    line_width: float = 0.12
+    ridge: Array | None = None
+
+    def flat(self) -> Field:
+        """The same pitch on a plane."""
+        return Field(self.length, self.width, self.line_width, None)
+
+    def height(self, xy: Array) -> Array:
+        """Height (...) of the surface at (..., 2): the four-plane hip roof of the paper, section III; 0 off the pitch."""
+        if self.ridge is None:
+            return np.zeros(xy.shape[:-1])
+        start, end = self.ridge[np.argsort(self.ridge[:, 0])]
+        top, ridge_y = start[2], start[1]
+        half_length, half_width = self.length / 2, self.width / 2
+        x, y = xy[..., 0], xy[..., 1]
+        # Each plane goes through two corners at z = 0 and the ridge (or one of its ends): relative height 0..1.
+        planes = np.stack(
+            [
+                (half_width + y) / (half_width + ridge_y),
+                (half_width - y) / (half_width - ridge_y),
+                (half_length + x) / (half_length + start[0]),
+                (half_length - x) / (half_length - end[0]),
+            ]
+        )
+        return top * np.clip(planes.min(axis=0), 0.0, 1.0)
+
+    def lift(self, xy: Array) -> Array:
+        """Points (..., 2) on the pitch to the surface (..., 3)."""
+        return np.concatenate([xy, self.height(xy)[..., None]], axis=-1)
+
+    def markings(self) -> list[Marking]:
+        """All markings of Law 1, as centre lines."""
+        half_line = self.line_width / 2
+        x_goal = self.length / 2 - half_line
+        y_touch = self.width / 2 - half_line
+        lines = [
+            self._line("near touchline", (-x_goal, -y_touch), (x_goal, -y_touch)),
+            self._line("far touchline", (-x_goal, y_touch), (x_goal, y_touch)),
+            self._line("halfway line", (0, -y_touch), (0, y_touch)),
+            self._arc("centre circle", (0, 0), CENTRE_CIRCLE_RADIUS_M - half_line, 0, 2 * np.pi),
+            self._spot("centre mark", (0, 0)),
+        ]
+        for side, name in ((-1, "left"), (1, "right")):
+            lines += self._end(side, name)
+        return lines
+
+    def _end(self, side: int, name: str) -> list[Marking]:
+        """The markings of one half: goal line, both areas, mark, arc and corner arcs."""
+        half_line = self.line_width / 2
+        goal = self.length / 2
+        y_touch = self.width / 2 - half_line
+
+        def area(label: str, depth: float, half_width: float) -> list[Marking]:
+            x_back, x_front = side * (goal - half_line), side * (goal - depth + half_line)
+            y = half_width - half_line
+            return [
+                self._line(f"{name} {label}, near side", (x_back, -y), (x_front, -y)),
+                self._line(f"{name} {label}, front", (x_front, -y), (x_front, y)),
+                self._line(f"{name} {label}, far side", (x_front, y), (x_back, y)),
+            ]
+
+        mark = side * (goal - PENALTY_MARK_DISTANCE_M)
+        radius = CENTRE_CIRCLE_RADIUS_M - half_line
+        # The arc begins where it leaves the penalty area, and points to the pitch centre.
+        opening = np.arccos((PENALTY_AREA_DEPTH_M - half_line - PENALTY_MARK_DISTANCE_M) / radius)
+        towards_centre = np.pi if side > 0 else 0.0
+        corner = CORNER_ARC_RADIUS_M - half_line
+        lines = [
+            self._line(
+                f"{name} goal line",
+                (side * (goal - half_line), -y_touch),
+                (side * (goal - half_line), y_touch),
+            ),
+            *area("penalty area", PENALTY_AREA_DEPTH_M, PENALTY_AREA_HALF_WIDTH_M),
+            *area("goal area", GOAL_AREA_DEPTH_M, GOAL_AREA_HALF_WIDTH_M),
+            self._spot(f"{name} penalty mark", (mark, 0)),
+            self._arc(f"{name} penalty arc", (mark, 0), radius, towards_centre - opening, towards_centre + opening),
+        ]
+        for y_side, label in ((-1, "near"), (1, "far")):
+            # A quarter circle around the corner flag, inside the pitch.
+            facing = np.arctan2(-y_side, -side)
+            centre = (side * goal, y_side * self.width / 2)
+            lines.append(
+                self._arc(f"{name} {label} corner arc", centre, corner, facing - np.pi / 4, facing + np.pi / 4)
+            )
+        return lines
+
+    def _line(self, name: str, start: tuple[float, float], end: tuple[float, float]) -> Marking:
+        return Marking(name, np.array([start, end], dtype=float), self.line_width)
+
+    def _arc(self, name: str, centre: tuple[float, float], radius: float, start: float, end: float) -> Marking:
+        count = max(8, int(np.ceil(abs(end - start) * radius / ARC_STEP_M)))
+        angle = np.linspace(start, end, count + 1)
+        return Marking(
+            name,
+            np.stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)], -1),
+            self.line_width,
+        )
+
+    def _spot(self, name: str, centre: tuple[float, float]) -> Marking:
+        # A spot is a line as wide as itself and next to nothing long.
+        offset = np.array([SPOT_RADIUS_M / 4, 0.0])
+        return Marking(name, np.array([centre - offset, centre + offset]), 2 * SPOT_RADIUS_M)
+
+    def line_points(self, spacing: float = 0.25) -> LinePoints:
+        """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
+        positions, tangents, widths, index = [], [], [], []
+        for number, marking in enumerate(self.markings()):
+            xy, along = resample(marking.centre, spacing)
+            positions.append(xy)
+            tangents.append(along)
+            widths.append(np.full(len(xy), marking.width))
+            index.append(np.full(len(xy), number))
+        xy, along = np.concatenate(positions), np.concatenate(tangents)
+        across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
+        return LinePoints(
+            self.lift(xy),
+            self._in_surface(xy, along),
+            self._in_surface(xy, across),
+            np.concatenate(widths),
+            np.concatenate(index),
+            spacing,
+        )
+
+    def _in_surface(self, xy: Array, direction: Array, step: float = 0.01) -> Array:
+        """Unit vectors (N, 3) that follow the surface from xy (N, 2) in horizontal directions (N, 2)."""
+        move = self.lift(xy + step * direction) - self.lift(xy - step * direction)
+        return move / np.linalg.norm(move, axis=-1, keepdims=True)
+
+
+def resample(polyline: Array, spacing: float) -> tuple[Array, Array]:
+    """Points about every `spacing` along a polyline (n, 2), in the middle of equal pieces, and unit tangents there."""
+    pieces = np.diff(polyline, axis=0)
+    lengths = np.linalg.norm(pieces, axis=1)
+    reached = np.concatenate([[0.0], np.cumsum(lengths)])
+    count = max(1, round(reached[-1] / spacing))
+    at = (np.arange(count) + 0.5) * reached[-1] / count
+    piece = np.clip(np.searchsorted(reached, at, side="right") - 1, 0, len(pieces) - 1)
+    unit = pieces[piece] / lengths[piece, None]
+    return polyline[piece] + (at - reached[piece])[:, None] * unit, unit
