@@ -2,19 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.camera import Camera, Pose
 from worker.calibration.field import Field
+from worker.calibration.linemeasurement import whiteness
+from worker.calibration.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
+from worker.calibration.refinement import Refined, refine
+from worker.calibration.registration import stitch_error_px
+from worker.calibration.search import Strategy, search
+from worker.calibration.segmentation import fuse, reachable_tiles
+from worker.calibration.visibility import SeenLines
 
 Frame = NDArray[np.uint8]
+Response = NDArray[np.float32]
 Preset = Literal["esc", "paper", "scpr"]
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
+
+CAPTURE_RAD = 0.1
+"""How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
+FEWEST_VISIBLE_POINTS = 60
+"""Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""
+SHARE_OF_JOB = {"segmentation": (0.0, 0.65), "evolution": (0.65, 0.85), "refinement": (0.85, 0.92)}
+"""Where on the way of a whole job each stage begins and ends; the pictures are the rest."""
+
+
+class Segment(Protocol):
+    """Probability (H, W) in 0..255 of a marking for a BGR frame, on the wanted tiles; see `segmentation.Segmenter`."""
+
+    def __call__(self, frame: Frame, wanted: NDArray[np.bool_]) -> NDArray[np.uint8]:
+        """Look at the tiles that are `wanted`."""
 
 
 @dataclass(frozen=True)
@@ -41,25 +65,8 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class Sigma:
-    """One standard deviation of a pose: degrees and metres, None where it could not be told."""
-
-    rotation_deg: float
-    position_m: float
-
-
-@dataclass(frozen=True)
-class Movement:
-    """From the stored pose to the new one: degrees, metres, and the mean shift of the visible pitch in pixels."""
-
-    rotation_deg: float
-    position_m: float
-    pixels: float
-
-
-@dataclass(frozen=True)
 class CameraResult:
-    """One camera's answer."""
+    """One camera's answer. `sigma` and `residual_px` are None where too few lines could be measured."""
 
     id: str
     pose: Pose
@@ -105,7 +112,7 @@ def calibrate(
     pitch: Field,
     cameras: Sequence[Camera],
     frames: Mapping[str, Sequence[Frame]],
-    segment: Callable[..., NDArray[np.float32]],
+    segment: Segment,
     options: Options,
     report: Callable[[Progress], None] = lambda _: None,
     stop: Callable[[], bool] = lambda: False,
@@ -113,6 +120,126 @@ def calibrate(
     """Find the poses of all cameras at once.
 
     `cameras` carry their stored poses; `frames[camera.id]` are one or more BGR frames (height, width, 3) of the size of
-    the intrinsics. Deterministic for `options.seed`, whatever the number of threads.
+    the intrinsics. Deterministic for `options.seed`, whatever the number of threads. Raises `CalibrationError` when a
+    stored pose sees no markings, `Stopped` soon after `stop()` turns true.
     """
-    raise NotImplementedError
+    pitch = pitch.flat() if options.flat else pitch
+    clock = Clock()
+    journey = Journey(report, stop)
+    require_markings_in_view(pitch, cameras)
+    with clock.measuring("segmentation"):
+        responses = _segment_all(pitch, cameras, frames, segment, journey)
+    with clock.measuring("evolution"):
+        strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
+        rng = np.random.default_rng(options.seed)
+        found = search(pitch, cameras, responses, strategy, rng, journey.evolution(options.generations))
+    with clock.measuring("refinement"):
+        journey.at("refinement", 0.0)
+        brightness = [_still([whiteness(frame) for frame in frames[camera.id]]) for camera in cameras]
+        refined = refine(pitch, found.cameras, brightness, responses, options.stitch_weight)
+        by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
+        stitch = stitch_error_px(pitch, refined.cameras, by_id)
+        stitch_before = stitch_error_px(pitch, cameras, by_id)
+        qualities = _qualities(pitch, cameras, refined, responses)
+        journey.at("refinement", 1.0)
+    return Calibration(
+        [CameraResult(q.camera.id, q.camera.pose, q.sigma, q.moved, q.iou, q.residual_px) for q in qualities],
+        rejection(qualities, stitch, Gate()),
+        stitch,
+        stitch_before,
+        found.loss,
+        found.generations,
+        clock.seconds,
+    )
+
+
+def require_markings_in_view(pitch: Field, cameras: Sequence[Camera]) -> None:
+    """Raise for a stored pose from which no pitch can be seen: nothing that follows could find it."""
+    lines = pitch.line_points()
+    for camera in cameras:
+        visible = len(SeenLines.from_camera(lines, camera))
+        if visible < FEWEST_VISIBLE_POINTS:
+            raise CalibrationError(
+                camera.id,
+                "no-markings-in-view",
+                f"the stored pose of camera {camera.id} sees {visible * lines.spacing:.0f} m of markings, at least "
+                f"{FEWEST_VISIBLE_POINTS * lines.spacing:.0f} m are needed; store a first pose that looks at the pitch",
+            )
+
+
+def _segment_all(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    frames: Mapping[str, Sequence[Frame]],
+    segment: Segment,
+    journey: Journey,
+) -> list[Response]:
+    """The fused segmentation (H, W) of each camera, where its markings can be."""
+    total = sum(len(frames[camera.id]) for camera in cameras)
+    done = 0
+    responses = []
+    for camera in cameras:
+        wanted = reachable_tiles(pitch, camera, CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
+        seen = []
+        for frame in frames[camera.id]:
+            journey.at("segmentation", done / total)
+            seen.append(segment(frame, wanted))
+            done += 1
+        responses.append(fuse(seen))
+    return responses
+
+
+def _still(brightness: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
+    """What stays (H, W) in all frames of one camera: the median."""
+    return brightness[0] if len(brightness) == 1 else np.median(np.stack(brightness), axis=0).astype(np.float32)
+
+
+def _qualities(
+    pitch: Field, stored: Sequence[Camera], refined: Refined, responses: Sequence[Response]
+) -> list[CameraQuality]:
+    return [
+        CameraQuality(
+            after,
+            markings_iou(pitch, after, response),
+            markings_iou(pitch, before, response),
+            residual,
+            Sigma.from_covariance(covariance) if covariance is not None else None,
+            Movement.between(pitch, before, after),
+        )
+        for before, after, response, residual, covariance in zip(
+            stored, refined.cameras, responses, refined.residual_px, refined.covariance, strict=True
+        )
+    ]
+
+
+class Clock:
+    """Seconds per stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def measuring(self, stage: str) -> Iterator[None]:
+        """Measure what is done inside."""
+        begin = time.perf_counter()
+        yield
+        self.seconds[stage] = time.perf_counter() - begin
+
+
+class Journey:
+    """Reports where a job stands, and ends it when its caller wants it to stop."""
+
+    def __init__(self, report: Callable[[Progress], None], stop: Callable[[], bool]) -> None:
+        self.report = report
+        self.stop = stop
+
+    def at(self, stage: Stage, share: float, generation: int | None = None, loss: float | None = None) -> None:
+        """Report `share` 0..1 of `stage`; raise `Stopped` when asked to stop."""
+        if self.stop():
+            raise Stopped
+        begin, end = SHARE_OF_JOB[stage]
+        self.report(Progress(stage, begin + share * (end - begin), generation, loss))
+
+    def evolution(self, generations: int) -> Callable[[int, float], None]:
+        """What the search calls after each generation."""
+        return lambda number, loss: self.at("evolution", number / generations, number, loss)

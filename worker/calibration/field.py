@@ -84,7 +84,7 @@ class Field:
         return Field(self.length, self.width, self.line_width, None)
 
     def height(self, xy: Array) -> Array:
-        """Height (...) of the surface at (..., 2): the four-plane hip roof of the paper, section III; 0 off the pitch."""
+        """Height (...) of the surface at (..., 2): the paper's four-plane hip roof; 0 off the pitch."""
         if self.ridge is None:
             return np.zeros(xy.shape[:-1])
         start, end = self.ridge[np.argsort(self.ridge[:, 0])]

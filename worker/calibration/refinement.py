@@ -1,0 +1,221 @@
+"""The finish: all cameras at once onto the measured lines, by a robust Levenberg-Marquardt, and how sure that is.
+
+Residuals are distances across lines. A single residual is how far a camera puts a marking from where it sees it, a
+stitch residual how far apart two cameras put the same piece of line on the ground. Both are divided by their expected
+errors; at `stitch_weight` 0.5 they count as these say. Paint and ground that are not where the model has them move
+both cameras' views of a line alike, so the stitch residual has only the error of the measurement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.camera import Array, Camera, Pose, project, rotation_matrices, rotation_vectors
+from worker.calibration.field import Field
+from worker.calibration.linemeasurement import NOISE_PX, Measurements, measure_lines
+
+SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0)
+"""How far from where the pose expects it a line is looked for, round by round, in a picture 3840 px wide."""
+STEPS_PER_ROUND = 4
+TUKEY = 4.685
+LEAST_SINGLE_WEIGHT = 0.02
+FEWEST_MEASUREMENTS = 30
+CLUSTER_POINTS = 20
+"""Line points (25 cm apart) whose errors are taken as one: paint and ground keep their error over some metres."""
+DAMPING = 1e-6
+JACOBIAN_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Refined:
+    """The finished cameras; per camera, None where it had too few measurements and stayed where it was:
+
+    `covariance` (6, 6) of (rotation in the camera's frame rad, position m), `residual_px` the rms of its lines.
+    """
+
+    cameras: list[Camera]
+    covariance: list[Array | None]
+    residual_px: list[float | None]
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Rows of the least squares: `value` (M,), `jacobian` (M, 6 N), `weight` (M,), `cluster` (M,) of shared error."""
+
+    value: Array
+    jacobian: Array
+    weight: Array
+    cluster: NDArray[np.intp]
+
+
+def refine(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    brightness: Sequence[NDArray[np.float32]],
+    responses: Sequence[NDArray[np.float32]],
+    stitch_weight: float,
+) -> Refined:
+    """Measure the lines and move the cameras onto them, round by round with a narrower search.
+
+    `brightness` (H, W) of each frame (`linemeasurement.whiteness`); `responses` (H, W): segmentations in 0..1.
+    """
+    lines = pitch.line_points()
+    here = list(cameras)
+    measured: list[Measurements] = []
+    for search in SEARCH_PX:
+        measured = [
+            measure_lines(lines, camera, bright, response, search * camera.intrinsics.size[0] / 3840)
+            for camera, bright, response in zip(here, brightness, responses, strict=True)
+        ]
+        for _ in range(STEPS_PER_ROUND):
+            here = _step(here, measured, stitch_weight)
+    return Refined(
+        here,
+        _covariances(here, measured, stitch_weight),
+        [_residual_px(camera, found) for camera, found in zip(here, measured, strict=True)],
+    )
+
+
+def _step(cameras: list[Camera], measured: Sequence[Measurements], stitch_weight: float) -> list[Camera]:
+    """One damped Gauss-Newton step for all cameras together."""
+    rows = _all_residuals(cameras, measured, stitch_weight)
+    weighted = rows.jacobian * rows.weight[:, None]
+    # einsum rather than BLAS: the same sum to the last digit whatever the number of threads.
+    normal = np.einsum("mi,mj->ij", weighted, rows.jacobian)
+    gradient = np.einsum("mi,m->i", weighted, rows.value)
+    free = np.flatnonzero(np.diag(normal) > 0)
+    if len(free) == 0:
+        return cameras
+    damped = normal[np.ix_(free, free)]
+    damped = damped + DAMPING * np.diag(np.diag(damped))
+    move = np.zeros(len(normal))
+    move[free] = np.linalg.solve(damped, -gradient[free])
+    return [moved(camera, change) for camera, change in zip(cameras, move.reshape(-1, 6), strict=True)]
+
+
+def moved(camera: Camera, change: Array) -> Camera:
+    """The camera turned by change[:3] (rad, in its own frame) and shifted by change[3:] (m, in the world)."""
+    rotation = rotation_vectors(rotation_matrices(change[:3]) @ camera.pose.matrix)
+    return camera.with_pose(Pose(rotation, camera.pose.position + change[3:]))
+
+
+def _all_residuals(cameras: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float) -> Residuals:
+    """Single and stitch residuals of all cameras that have enough measurements, weighted robustly."""
+    views = [_LineView.build(camera, found) for camera, found in zip(cameras, measured, strict=True)]
+    singles = [
+        _single(view, index, len(cameras), max(2 * (1 - stitch_weight), LEAST_SINGLE_WEIGHT))
+        for index, view in enumerate(views)
+        if len(view.measured) >= FEWEST_MEASUREMENTS
+    ]
+    pairs = [
+        _stitch(views[i], views[j], i, j, len(cameras), 2 * stitch_weight)
+        for i, j in combinations(range(len(cameras)), 2)
+        if min(len(views[i].measured), len(views[j].measured)) >= FEWEST_MEASUREMENTS
+    ]
+    parts = [*singles, *pairs, _nothing(len(cameras))]
+    return Residuals(
+        np.concatenate([p.value for p in parts]),
+        np.concatenate([p.jacobian for p in parts]),
+        np.concatenate([p.weight for p in parts]),
+        np.concatenate([p.cluster for p in parts]),
+    )
+
+
+@dataclass(frozen=True)
+class _LineView:
+    """Measurements against a pose: `offset` (M,) px, measured minus expected, and its `jacobian` (M, 6)."""
+
+    measured: Measurements
+    offset: Array
+    jacobian: Array
+
+    @classmethod
+    def build(cls, camera: Camera, measured: Measurements) -> _LineView:
+        changes = np.concatenate([JACOBIAN_STEP * np.eye(6), -JACOBIAN_STEP * np.eye(6), np.zeros((1, 6))])
+        poses = [moved(camera, change).pose for change in changes]
+        rotations = np.stack([pose.rotation for pose in poses])
+        positions = np.stack([pose.position for pose in poses])
+        pixels = project(measured.points.position, rotations, positions, camera.intrinsics)
+        expected = np.einsum("pmi,mi->pm", pixels, measured.normal)
+        slope = (expected[:6] - expected[6:12]).T / (2 * JACOBIAN_STEP)
+        offset = np.sum(measured.pixel * measured.normal, axis=1) - expected[12]
+        known = np.isfinite(offset) & np.isfinite(slope).all(axis=1)
+        return cls(measured[known], offset[known], -slope[known])
+
+
+def _single(view: _LineView, index: int, count: int, share: float) -> Residuals:
+    """How far one camera puts the markings from where it sees them."""
+    sigma = view.measured.sigma_px
+    value = view.offset / sigma
+    jacobian = np.zeros((len(value), 6 * count))
+    jacobian[:, 6 * index : 6 * index + 6] = view.jacobian / sigma[:, None]
+    return Residuals(value, jacobian, share * tukey_weights(value), view.measured.index // CLUSTER_POINTS)
+
+
+def _stitch(first: _LineView, second: _LineView, i: int, j: int, count: int, share: float) -> Residuals:
+    """How far apart two cameras put the same pieces of line on the ground."""
+    index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
+    if share == 0 or len(index) == 0:
+        return _nothing(count)
+    scale_a, scale_b = first.measured.px_per_metre[a], second.measured.px_per_metre[b]
+    sigma_m = NOISE_PX * np.hypot(1 / scale_a, 1 / scale_b)
+    value = (first.offset[a] / scale_a - second.offset[b] / scale_b) / sigma_m
+    jacobian = np.zeros((len(index), 6 * count))
+    jacobian[:, 6 * i : 6 * i + 6] = first.jacobian[a] / (scale_a * sigma_m)[:, None]
+    jacobian[:, 6 * j : 6 * j + 6] = -second.jacobian[b] / (scale_b * sigma_m)[:, None]
+    return Residuals(value, jacobian, share * tukey_weights(value), index // CLUSTER_POINTS)
+
+
+def _nothing(count: int) -> Residuals:
+    return Residuals(np.empty(0), np.empty((0, 6 * count)), np.empty(0), np.empty(0, dtype=np.intp))
+
+
+def robust_scale(values: Array) -> float:
+    """Standard deviation by the median absolute value, at least 1: expected errors are not doubted downwards."""
+    return max(1.0, 1.4826 * float(np.median(np.abs(values)))) if len(values) else 1.0
+
+
+def tukey_weights(values: Array) -> Array:
+    """Tukey's biweight (M,) at the scale of the values themselves: 1 at zero, 0 for what cannot be this line."""
+    scale = robust_scale(values)
+    return np.maximum(0.0, 1 - (values / (TUKEY * scale)) ** 2) ** 2 / scale**2
+
+
+def _covariances(
+    cameras: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float
+) -> list[Array | None]:
+    """Covariance (6, 6) per camera from the normal matrix, with the errors of a few metres of line taken as one.
+
+    The sandwich H^-1 (sum over clusters of g g') H^-1 of a clustered regression; where the lines are so few that it
+    cannot be told, the plain H^-1 holds from below.
+    """
+    rows = _all_residuals(cameras, measured, stitch_weight)
+    weighted = rows.jacobian * rows.weight[:, None]
+    normal = np.einsum("mi,mj->ij", weighted, rows.jacobian)
+    free = np.flatnonzero(np.diag(normal) > 0)
+    inverse = np.linalg.pinv(normal[np.ix_(free, free)], hermitian=True)
+    _, member = np.unique(rows.cluster, return_inverse=True)
+    gradients = np.zeros((member.max(initial=-1) + 1, len(free)))
+    np.add.at(gradients, member, weighted[:, free] * rows.value[:, None])
+    meat = np.einsum("ci,cj->ij", gradients, gradients)
+    sandwich = inverse @ meat @ inverse
+    # Per number the larger of the two, so that no number is surer than its own measurements allow.
+    growth = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.maximum(np.diag(sandwich), 1e-300)))
+    full = np.zeros(normal.shape)
+    full[np.ix_(free, free)] = sandwich * growth[:, None] * growth[None, :]
+    blocks = [full[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] for i in range(len(cameras))]
+    return [block if np.diag(block).all() else None for block in blocks]
+
+
+def _residual_px(camera: Camera, measured: Measurements) -> float | None:
+    """Rms (px) of the lines of one camera that are not outliers."""
+    view = _LineView.build(camera, measured)
+    if len(view.measured) < FEWEST_MEASUREMENTS:
+        return None
+    counted = tukey_weights(view.offset / view.measured.sigma_px) > 0
+    return float(np.sqrt(np.mean(view.offset[counted] ** 2)))

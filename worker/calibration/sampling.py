@@ -1,0 +1,26 @@
+"""Reading pictures between pixels."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.camera import Array
+
+ROW = 1024
+"""cv2.remap takes maps of at most 32767 rows and columns: any number of points is laid out in rows of this length."""
+FAR_OUTSIDE = -1e6
+
+
+def bilinear(image: NDArray[np.float32], pixels: Array, outside: float = 0.0) -> NDArray[np.float32]:
+    """Values (...) of an image (H, W) at pixels (..., 2); `outside` where a pixel is not in the picture or NaN."""
+    flat = pixels.reshape(-1, 2)
+    if len(flat) == 0:
+        return np.empty(pixels.shape[:-1], dtype=np.float32)
+    rows = -(-len(flat) // ROW)
+    where = np.full((rows * ROW, 2), FAR_OUTSIDE, dtype=np.float32)
+    where[: len(flat)] = np.nan_to_num(flat, nan=FAR_OUTSIDE, posinf=-FAR_OUTSIDE, neginf=FAR_OUTSIDE)
+    x, y = where.reshape(rows, ROW, 2).transpose(2, 0, 1).clip(FAR_OUTSIDE, -FAR_OUTSIDE)
+    values = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=outside)
+    return values.reshape(-1)[: len(flat)].reshape(pixels.shape[:-1]).astype(np.float32)

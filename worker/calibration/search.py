@@ -1,0 +1,98 @@
+"""From stored poses to poses near enough for the finish: the evolution strategy over the levels of a preset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.camera import Array, Camera, Pose
+from worker.calibration.evolution import EvolutionStrategy, exponential_decay
+from worker.calibration.field import Field
+from worker.calibration.objective import GENES, Objective
+
+MUTATION_RAD = 0.005
+MUTATION_M = 0.1
+DECAY = 0.95
+
+
+@dataclass(frozen=True)
+class Level:
+    """A stretch of generations with one objective: blur in px of a picture 3840 px wide, and strength of mutation."""
+
+    blur_px: float
+    mutation: float
+
+
+COARSE_TO_FINE = (Level(48, 4), Level(16, 1.5), Level(6, 0.5), Level(2, 0.2), Level(0.8, 0.1))
+"""Each level pulls from about one blur away, and hands over within the next one's."""
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """The numbers of the paper's strategy: mu parents, lambda offspring, G generations in all, and the trade-off w."""
+
+    parents: int
+    offspring: int
+    generations: int
+    stitch_weight: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where the search ended."""
+
+    cameras: list[Camera]
+    loss: float
+    generations: int
+
+
+def search(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    responses: Sequence[NDArray[np.float32]],
+    strategy: Strategy,
+    rng: np.random.Generator,
+    on_generation: Callable[[int, float], None],
+) -> Found:
+    """Evolve the poses of all cameras together, coarse to fine.
+
+    `responses` (H, W): segmentations in 0..1. `on_generation(number, loss)` is called after each generation and may
+    raise to stop.
+    """
+    decay = exponential_decay(DECAY)
+    mutation = np.tile([MUTATION_RAD] * 3 + [MUTATION_M] * 3, len(cameras))
+    evolution = EvolutionStrategy(strategy.parents, strategy.offspring, mutation, rng)
+    candidates = evolution.first_parents(genome_of(cameras), COARSE_TO_FINE[0].mutation)
+    here = list(cameras)
+    done = 0
+    for level, generations in zip(COARSE_TO_FINE, _shares(strategy.generations, len(COARSE_TO_FINE)), strict=True):
+        objective = Objective(pitch, here, responses, level.blur_px, strategy.stitch_weight)
+        evolution.tell(candidates, objective.losses(candidates))
+        for generation in range(generations):
+            children = evolution.ask(level.mutation * decay(generation))
+            evolution.tell(children, objective.losses(children))
+            done += 1
+            on_generation(done, evolution.best_loss)
+        here = with_genome(cameras, evolution.best)
+        loss = evolution.best_loss
+        candidates = evolution.forget_losses()
+    return Found(here, loss, done)
+
+
+def genome_of(cameras: Sequence[Camera]) -> Array:
+    """Poses as one vector (6 N,): per camera rotation vector, position."""
+    return np.concatenate([[*camera.pose.rotation, *camera.pose.position] for camera in cameras])
+
+
+def with_genome(cameras: Sequence[Camera], genome: Array) -> list[Camera]:
+    """The cameras at the poses of a genome (6 N,)."""
+    poses = genome.reshape(-1, GENES)
+    return [camera.with_pose(Pose(pose[:3], pose[3:])) for camera, pose in zip(cameras, poses, strict=True)]
+
+
+def _shares(total: int, parts: int) -> list[int]:
+    """`total` in `parts` whole numbers as equal as possible, larger ones first."""
+    return [total // parts + (index < total % parts) for index in range(parts)]
