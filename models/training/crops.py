@@ -1,0 +1,52 @@
+"""Training data: windows of random frames of random venues, drawn where there is something to learn."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.training.render import Conditions, Rendering, render_window
+from models.training.scene import random_camera, random_field
+from worker.calibration.camera import Array, Camera, inside
+from worker.calibration.field import Field
+
+CROP_SIZE = 288
+
+
+def random_crop(rng: np.random.Generator, size: int = CROP_SIZE) -> Rendering:
+    """A square window of `size` pixels of a frame that exists nowhere else."""
+    while True:
+        field = random_field(rng)
+        camera = random_camera(rng, field)
+        middle = _interesting(rng, field, camera)
+        if middle is not None:
+            break
+    corner = np.round(middle + rng.uniform(-0.45, 0.45, 2) * size - size / 2).astype(int)
+    corner = np.clip(corner, 0, np.array(camera.intrinsics.size) - size)
+    return render_window(field, camera, Conditions.random(rng), (int(corner[0]), int(corner[1]), size, size), rng)
+
+
+def _interesting(rng: np.random.Generator, field: Field, camera: Camera) -> NDArray[np.float64] | None:
+    """A pixel (2,): on a marking, on the grass, just outside the pitch, or anywhere; None if the camera sees none."""
+    kind = rng.choice(["marking", "near marking", "pitch", "outside", "frame"], p=[0.3, 0.2, 0.15, 0.25, 0.1])
+    if kind == "frame":
+        return rng.uniform(0, 1, 2) * camera.intrinsics.size
+    half = np.array([field.length, field.width]) / 2
+    if kind in ("marking", "near marking"):
+        points = field.line_points(0.5).position
+    elif kind == "pitch":
+        points = field.lift(rng.uniform(-1, 1, (50, 2)) * half)
+    else:
+        xy = rng.uniform(-1, 1, (400, 2)) * (half + 15)
+        points = field.lift(xy[(np.abs(xy) > half).any(axis=1)])
+    pixels = camera.project(points)
+    seen = np.flatnonzero(inside(pixels, camera.intrinsics.size))
+    if len(seen) == 0:
+        return None
+    # Weighted by size in the picture, or else nearly all of a line is far away.
+    weight = _nearness(camera, points[seen]) if kind == "near marking" else np.ones(len(seen))
+    return pixels[rng.choice(seen, p=weight / weight.sum())]
+
+
+def _nearness(camera: Camera, points: Array) -> Array:
+    return 1 / np.linalg.norm(points - camera.pose.position, axis=1) ** 2

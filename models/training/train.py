@@ -1,0 +1,168 @@
+"""Train the U-Net on rendered pitches: `python -m models.training.train`.
+
+Starts where it stopped when it is called again; a run of the default length takes about two hours on two cores. Ends with
+the export to `models/unet.onnx`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from tqdm import tqdm
+
+from models.training.cache import SHARD_CROPS, Crops, start_workers
+from models.training.export import MODEL_PATH, export
+from models.training.network import UNet, focal_loss
+
+EPOCH_STEPS = 100
+WARM_UP_EPOCHS = 2
+LEARNING_RATE = 1e-3
+LAST_RATE = 0.01  # of the first one
+WEIGHT_DECAY = 1e-4
+AVERAGE = 0.995
+SAVE_EVERY_S = 240
+
+
+def main() -> None:
+    """Render, train, export."""
+    options = _options()
+    device = torch.device(("cuda" if torch.cuda.is_available() else "cpu") if options.device == "auto" else options.device)
+    if device.type == "cpu":
+        torch.set_num_threads(options.threads)
+    options.run.mkdir(parents=True, exist_ok=True)
+    workers = start_workers(options.run / "crops", options.seed, options.workers, options.shards)
+    crops = Crops(options.run / "crops", np.random.default_rng([options.seed, 1]))
+    while crops.refresh() < 4 * SHARD_CROPS:
+        time.sleep(1)
+    training = Training(device, options.epochs * EPOCH_STEPS, options.gamma)
+    checkpoint = options.run / "checkpoint.pt"
+    if checkpoint.exists():
+        training.load(checkpoint)
+    elif options.start:
+        training.load_weights(options.start)
+    train(training, crops, options, checkpoint)
+    for worker in workers:
+        worker.terminate()
+    if not options.no_export:
+        print(json.dumps(export(training.average, MODEL_PATH), indent=1))
+
+
+class Training:
+    """Network, running average of its weights, optimiser and schedule."""
+
+    def __init__(self, device: torch.device, steps: int, gamma: float) -> None:
+        torch.manual_seed(0)
+        self.device, self.steps, self.step, self.gamma = device, steps, 0, gamma
+        self.network = UNet().to(device, memory_format=torch.channels_last)
+        self.average = copy.deepcopy(self.network).eval()
+        self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+
+    def learning_rate(self) -> float:
+        """Two epochs of warm-up, then exponentially down."""
+        warm = WARM_UP_EPOCHS * EPOCH_STEPS
+        if self.step < warm:
+            return LEARNING_RATE * (self.step + 1) / warm
+        return LEARNING_RATE * LAST_RATE ** ((self.step - warm) / max(self.steps - warm, 1))
+
+    def learn(self, pictures: Tensor, targets: Tensor) -> float:
+        """One step; the loss."""
+        for group in self.optimiser.param_groups:
+            group["lr"] = self.learning_rate()
+        pictures = pictures.to(self.device, memory_format=torch.channels_last)
+        with torch.autocast(self.device.type, torch.bfloat16):
+            logits = self.network(pictures)
+        loss = focal_loss(logits.float(), targets.to(self.device), self.gamma)
+        self.optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
+        self.optimiser.step()
+        self.step += 1
+        self._follow()
+        return float(loss)
+
+    @torch.no_grad()
+    def _follow(self) -> None:
+        share = max(1 - AVERAGE, 1 / (self.step + 1))
+        for mean, value in zip(self.average.state_dict().values(), self.network.state_dict().values(), strict=True):
+            if mean.is_floating_point():
+                mean.lerp_(value, share)
+            else:
+                mean.copy_(value)
+
+    def save(self, path: Path) -> None:
+        """Everything needed to go on."""
+        partial = path.with_suffix(".partial")
+        state = {
+            "step": self.step,
+            "network": self.network.state_dict(),
+            "average": self.average.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+        }
+        torch.save(state, partial)
+        partial.rename(path)
+
+    def load(self, path: Path) -> None:
+        """Go on from a checkpoint."""
+        state = torch.load(path, map_location=self.device, weights_only=True)
+        self.step = state["step"]
+        self.network.load_state_dict(state["network"])
+        self.average.load_state_dict(state["average"])
+        self.optimiser.load_state_dict(state["optimiser"])
+
+    def load_weights(self, path: Path) -> None:
+        """Start a new schedule from the averaged weights of another run."""
+        state = torch.load(path, map_location=self.device, weights_only=True)
+        self.network.load_state_dict(state["average"])
+        self.average.load_state_dict(state["average"])
+
+
+def train(training: Training, crops: Crops, options: argparse.Namespace, checkpoint: Path) -> None:
+    """Steps until the schedule ends, a checkpoint every few minutes, a line in the log every epoch."""
+    training.network.train()
+    saved = time.monotonic()
+    losses: list[float] = []
+    log = (options.run / "log.jsonl").open("a")
+    progress = tqdm(total=training.steps, initial=training.step, unit="step", mininterval=5)
+    while training.step < training.steps:
+        pictures, targets = crops.batch(options.batch, options.size)
+        losses.append(training.learn(torch.from_numpy(pictures), torch.from_numpy(targets)))
+        progress.update()
+        if training.step % EPOCH_STEPS == 0:
+            line = {"step": training.step, "loss": float(np.mean(losses)), "crops": crops.refresh()}
+            progress.set_postfix(loss=f"{line['loss']:.4f}", crops=line["crops"])
+            log.write(json.dumps({**line, "rate": training.learning_rate()}) + "\n")
+            log.flush()
+            losses.clear()
+        if time.monotonic() - saved > SAVE_EVERY_S:
+            training.save(checkpoint)
+            saved = time.monotonic()
+    training.save(checkpoint)
+    progress.close()
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--run", type=Path, default=Path("runs/unet"), help="folder of crops, checkpoint and log")
+    parser.add_argument("--device", default="auto", help="auto, cpu or cuda")
+    parser.add_argument("--epochs", type=int, default=110, help=f"of {EPOCH_STEPS} steps")
+    parser.add_argument("--batch", type=int, default=8)
+    parser.add_argument("--size", type=int, default=256, help="pixels of a crop, a multiple of 32")
+    parser.add_argument("--workers", type=int, default=1, help="processes that render")
+    parser.add_argument("--shards", type=int, default=400, help=f"of {SHARD_CROPS} crops per worker")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--gamma", type=float, default=2.0, help="of the focal loss")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", type=Path, help="checkpoint whose weights to start from")
+    parser.add_argument("--no-export", action="store_true")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
