@@ -1,0 +1,95 @@
+"""The HTTP front end: checks, stores, queues and answers. It computes nothing."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from importlib.metadata import version
+
+import obstore.exceptions
+import sqlalchemy as sa
+import structlog
+from fastapi import FastAPI, Request
+from starlette.responses import Response
+
+from service import problems
+from service.access import Access
+from service.context import Context
+from service.metrics import Metrics
+from service.problems import Problem
+from service.queue import Queue
+from service.queue import migrate as migrate_queue
+from service.routes import calibrate, documented, health, jobs, venues
+from service.settings import Settings
+from service.store.blobs import Blobs
+from service.store.engine import connect, migrate
+from service.store.jobs import Jobs
+from service.store.venues import Venues
+from service.store.workers import Workers
+from service.watch import Watch
+
+log = structlog.get_logger()
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """The application; brings the database up to date first."""
+    context = open_context(settings)
+    app = FastAPI(
+        title="ESC",
+        summary="Keeps fixed multi-camera installations on sports fields calibrated.",
+        version=version("esc-calibration"),
+        max_body_size=int(settings.max_body_mb * 1e6),
+        lifespan=_lifespan,
+        responses=documented.problems(422, 503),
+    )
+    app.state.context = context
+    app.add_middleware(Access, metrics=context.metrics)
+    problems.install(app)
+    _answer_outages(app)
+    for routes in (venues, calibrate, jobs, health):
+        app.include_router(routes.router)
+    return app
+
+
+def open_context(settings: Settings) -> Context:
+    """Open the database, the files and the queue."""
+    engine = connect(settings.home_database_url)
+    migrate(engine)
+    migrate_queue(settings.home_database_url)
+    jobs_, workers = Jobs(engine), Workers(engine)
+    return Context(
+        settings=settings,
+        engine=engine,
+        queue=Queue(settings.home_database_url),
+        blobs=Blobs(settings.home_blob_url),
+        venues=Venues(engine),
+        jobs=jobs_,
+        workers=workers,
+        watch=Watch(jobs_.states),
+        metrics=Metrics(jobs_, workers, settings.takeover_after_s),
+    )
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    context: Context = app.state.context
+    watching = asyncio.create_task(context.watch.run())
+    yield
+    watching.cancel()
+    with suppress(asyncio.CancelledError):
+        await watching
+    context.queue.close()
+    context.engine.dispose()
+
+
+def _answer_outages(app: FastAPI) -> None:
+    """A database or a bucket that is away is no mistake of the service: 503, try again."""
+
+    @app.exception_handler(sa.exc.OperationalError)
+    @app.exception_handler(sa.exc.TimeoutError)
+    @app.exception_handler(obstore.exceptions.BaseError)
+    @app.exception_handler(OSError)
+    async def away(_: Request, error: Exception) -> Response:
+        log.error("storage is away", exc_info=error)
+        return Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}).response()

@@ -1,0 +1,294 @@
+"""`esc`: the command line, and the one place that puts the parts together."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, TypeVar
+
+import httpx
+import typer
+from pydantic import BaseModel, ValidationError
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from service import frames as border
+from service import lifeline, logs, serving
+from service.client import Client, Refused
+from service.problems import Problem
+from service.schemas import Job, JobError, Options, Result, VenueIn
+from service.schemas import Progress as Step
+from service.settings import Settings
+from service.store.engine import UnsupportedDatabase
+
+ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
+M = TypeVar("M", bound=BaseModel)
+LOCAL = "http://127.0.0.1:8000"
+
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False)
+venue_app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
+job_app = typer.Typer(no_args_is_help=True, help="Jobs of a running service.")
+app.add_typer(venue_app, name="venue")
+app.add_typer(job_app, name="job")
+err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+
+Url = Annotated[str, typer.Option("--url", envvar="ESC_URL", help="The service.")]
+ApiKey = Annotated[str | None, typer.Option("--api-key", envvar="ESC_API_KEY", help="Sent as bearer token.")]
+Data = Annotated[Path | None, typer.Option("--data", help="Folder of the embedded home (ESC_DATA).")]
+Host = Annotated[str | None, typer.Option("--host", help="Address to listen on (ESC_HOST).")]
+Port = Annotated[int | None, typer.Option("--port", help="0 takes a free one (ESC_PORT).")]
+Frames = Annotated[list[str], typer.Argument(metavar="CAMERA=FILE...", help="Repeat a camera to fuse its frames.")]
+OptionsText = Annotated[str, typer.Option("--options", metavar="JSON", help='For instance {"dry_run": true}.')]
+
+
+def main() -> None:
+    """Run a command; what goes wrong is a line and an exit code, not a traceback."""
+    lifeline.end_with_parent()
+    try:
+        app()
+    except Refused as refused:
+        _fail(_in_words(refused), BUSY if refused.busy else FAILED)
+    except httpx.TransportError as error:
+        _fail(f"The service cannot be reached: {error or type(error).__name__}", FAILED)
+    except (serving.CannotListen, UnsupportedDatabase) as error:
+        _fail(str(error), USAGE)
+
+
+@app.callback()
+def esc() -> None:
+    """Keeps fixed multi-camera installations on sports fields calibrated."""
+
+
+# A service
+
+
+@app.command()
+def up(data: Data = None, host: Host = None, port: Port = None) -> None:
+    """API and one worker on this machine, with nothing else beside them."""
+    settings = _settings(data=data, host=host, port=port)
+    serving.serve(settings, with_worker=True)
+
+
+@app.command()
+def serve(data: Data = None, host: Host = None, port: Port = None) -> None:
+    """The API alone; `esc worker` computes, here or on other machines."""
+    settings = _settings(data=data, host=host, port=port)
+    serving.serve(settings, with_worker=False)
+
+
+@app.command()
+def worker(
+    data: Data = None, name: Annotated[str | None, typer.Option("--name", help="Unique and stable.")] = None
+) -> None:
+    """A worker alone."""
+    from worker import process
+
+    try:
+        process.run(_settings(data=data, worker_name=name))
+    except process.AlreadyRunning as error:
+        _fail(str(error), USAGE)
+
+
+# Calibrating
+
+
+@app.command()
+def calibrate(
+    venue: Annotated[str, typer.Argument()],
+    frames: Frames,
+    options: OptionsText = "{}",
+    wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end.")] = False,
+    key: Annotated[str | None, typer.Option("--idempotency-key", help="The same key is the same job.")] = None,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the quality gate, 75 busy."""
+    files, chosen = _files(frames), _options(options)
+    with Client(url, api_key) as client:
+        job = client.calibrate(venue, files, chosen.model_dump(mode="json", exclude_unset=True), key)
+        if not wait:
+            _print({"job": job.id, "url": client.url_of(job.links["self"])})
+            return
+        with _bar() as show:
+            job = client.follow(job, lambda job: show(job.progress, _waiting(job)))
+    _print(job)
+    raise typer.Exit(_verdict(job))
+
+
+@app.command()
+def run(
+    venue: Annotated[Path, typer.Argument(metavar="VENUE.json", exists=True, dir_okay=False)],
+    frames: Frames,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for result.json and the pictures.")],
+    options: OptionsText = "{}",
+) -> None:
+    """The same calibration without a server. Exit codes as of `calibrate`."""
+    from worker import job
+
+    settings, chosen = _settings(), _options(options)
+    stored = _checked(VenueIn, venue.read_text(), str(venue)).stored()
+    files = {camera: [path.read_bytes() for path in paths] for camera, paths in _files(frames).items()}
+    if chosen.seed is None:
+        chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
+    try:
+        border.check_cameras(stored, {camera: len(several) for camera, several in files.items()}, settings)
+        for camera in stored.cameras:
+            for data in files[camera.id]:
+                border.check(camera, data, settings)
+        with _bar() as show:
+            outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
+    except Problem as problem:
+        _fail(problem.detail, FAILED)
+    except job.Failure as failure:
+        _fail(failure.error.detail, FAILED)
+    output.mkdir(parents=True, exist_ok=True)
+    (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
+    for name, picture in outcome.pictures.items():
+        (output / f"{name}.jpg").write_bytes(picture)
+    _print(outcome.result)
+    raise typer.Exit(_gate(outcome.result))
+
+
+# Looking after venues and jobs
+
+
+@venue_app.command("put")
+def put_venue(
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False)], url: Url = LOCAL, api_key: ApiKey = None
+) -> None:
+    """Create or replace a venue from a JSON file."""
+    venue = _checked(VenueIn, file.read_text(), str(file))
+    with Client(url, api_key) as client:
+        _print(client.put_venue(venue))
+
+
+@venue_app.command("get")
+def get_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Print a venue with the poses that hold now."""
+    with Client(url, api_key) as client:
+        _print(client.venue(venue))
+
+
+@venue_app.command("list")
+def list_venues(url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Print a line per venue: id, name, cameras."""
+    with Client(url, api_key) as client:
+        for venue in client.venues():
+            print(f"{venue.id}\t{venue.name}\t{' '.join(camera.id for camera in venue.cameras)}")
+
+
+@venue_app.command("delete")
+def delete_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Forget a venue and the history of its poses."""
+    with Client(url, api_key) as client:
+        client.delete_venue(venue)
+
+
+@job_app.command("get")
+def get_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Print a job."""
+    with Client(url, api_key) as client:
+        _print(client.job(job))
+
+
+@job_app.command("cancel")
+def cancel_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """End a job that is still open."""
+    with Client(url, api_key) as client:
+        _print(client.cancel(job))
+
+
+# Parts
+
+
+def _settings(**given: Any) -> Settings:
+    try:
+        settings = Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        _fail("\n".join(f"ESC_{'.'.join(map(str, e['loc'])).upper()}: {e['msg']}" for e in error.errors()), USAGE)
+    logs.configure(settings)
+    return settings
+
+
+def _files(frames: Sequence[str]) -> dict[str, list[Path]]:
+    files: dict[str, list[Path]] = {}
+    for frame in frames:
+        camera, equals, name = frame.partition("=")
+        if not (camera and equals and name):
+            _fail(f"{frame!r} is not CAMERA=FILE, for instance left=left.jpg", USAGE)
+        if not Path(name).is_file():
+            _fail(f"There is no file {name} (camera {camera})", USAGE)
+        files.setdefault(camera, []).append(Path(name))
+    return files
+
+
+def _options(text: str) -> Options:
+    return _checked(Options, text, "--options")
+
+
+def _checked(model: type[M], text: str, source: str) -> M:
+    try:
+        return model.model_validate_json(text)
+    except ValidationError as error:
+        lines = [f"{source}: {'.'.join(map(str, e['loc']))} {e['msg']}" for e in error.errors()]
+        _fail("\n".join(lines), USAGE)
+
+
+def _verdict(job: Job) -> int:
+    if job.result is not None:
+        return _gate(job.result)
+    _explain(job.error)
+    return FAILED
+
+
+def _gate(result: Result) -> int:
+    if result.accepted:
+        return ACCEPTED
+    err.print(f"Rejected: {result.rejected_because}")
+    return REJECTED
+
+
+def _explain(error: JobError | None) -> None:
+    if error is not None:
+        err.print(f"{error.title}: {error.detail}")
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[Step | None, str], None]]:
+    """A line that shows how far a calibration is, where somebody looks at the terminal."""
+    columns = (TextColumn("{task.description:<14}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    with Progress(*columns, TimeElapsedColumn(), console=err, disable=not err.is_terminal) as progress:
+        line = progress.add_task("waiting", total=1.0)
+
+        def show(step: Step | None, otherwise: str) -> None:
+            fraction, name = (step.fraction, step.stage) if step else (0.0, otherwise)
+            progress.update(line, completed=fraction, description=name)
+
+        yield show
+
+
+def _waiting(job: Job) -> str:
+    return f"queued, {job.queue_position}." if job.queue_position else "starting"
+
+
+def _in_words(refused: Refused) -> str:
+    lines = [str(refused)]
+    lines += [f"  {finding.get('where')}: {finding.get('message')}" for finding in refused.members.get("errors", [])]
+    return "\n".join(lines)
+
+
+def _print(what: BaseModel | dict[str, str]) -> None:
+    print(what.model_dump_json(indent=2) if isinstance(what, BaseModel) else json.dumps(what, indent=2))
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    err.print(message)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""A typed client of the HTTP interface: what `esc venue`, `esc calibrate` and `esc job` speak."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import httpx
+
+from service.schemas import Job, Venue, VenueIn, Venues
+
+# Longer than the longest poll.
+TIMEOUT_S = 75
+
+
+class Refused(Exception):  # noqa: N818
+    """The service answered with a problem; `members` are its JSON object."""
+
+    def __init__(self, status: int, members: Mapping[str, Any]) -> None:
+        super().__init__(f"{members.get('title', 'Refused')}: {members.get('detail', '')}")
+        self.status = status
+        self.members = members
+
+    @property
+    def busy(self) -> bool:
+        """Whether trying again later can help."""
+        return self.status in (409, 429, 503)
+
+
+class Client:
+    """One service, by its URL."""
+
+    def __init__(self, url: str, api_key: str | None = None) -> None:
+        headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
+        self._http = httpx.Client(base_url=url, headers=headers, timeout=TIMEOUT_S)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._http.close()
+
+    def put_venue(self, venue: VenueIn) -> Venue:
+        """Create or replace a venue."""
+        content = venue.model_dump(mode="json", exclude_none=True)
+        return Venue.model_validate(self._json("PUT", f"/venues/{venue.id}", json=content))
+
+    def venue(self, venue_id: str) -> Venue:
+        """A venue with its stored poses."""
+        return Venue.model_validate(self._json("GET", f"/venues/{venue_id}"))
+
+    def venues(self) -> Iterator[Venue]:
+        """All venues, page by page."""
+        cursor = None
+        while True:
+            page = Venues.model_validate(self._json("GET", "/venues", params={"cursor": cursor} if cursor else {}))
+            yield from page.venues
+            cursor = page.next_cursor
+            if cursor is None:
+                return
+
+    def delete_venue(self, venue_id: str) -> None:
+        """Forget a venue."""
+        self._answer("DELETE", f"/venues/{venue_id}")
+
+    def calibrate(
+        self,
+        venue_id: str,
+        files: Mapping[str, Sequence[Path]],
+        options: Mapping[str, Any],
+        idempotency_key: str | None = None,
+    ) -> Job:
+        """Submit frames; the job may be an older one if the content is the same."""
+        parts: list[tuple[str, tuple[str, bytes, str]]] = [
+            (camera, (path.name, path.read_bytes(), "application/octet-stream"))
+            for camera, several in files.items()
+            for path in several
+        ]
+        if options:
+            parts.append(("options", ("options.json", json.dumps(options).encode(), "application/json")))
+        headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
+        return Job.model_validate(self._json("POST", f"/venues/{venue_id}/calibrate", files=parts, headers=headers))
+
+    def job(self, job_id: str, wait_s: float = 0) -> Job:
+        """A job, at its end or after `wait_s`."""
+        return Job.model_validate(self._json("GET", f"/jobs/{job_id}", params={"wait": wait_s} if wait_s else {}))
+
+    def cancel(self, job_id: str) -> Job:
+        """End a job."""
+        return Job.model_validate(self._json("POST", f"/jobs/{job_id}/cancel"))
+
+    def follow(self, job: Job, show: Callable[[Job], None], every_s: float = 0.5) -> Job:
+        """Wait for the end of a job, showing what it does meanwhile."""
+        while job.open:
+            show(job)
+            job = self.job(job.id, wait_s=every_s)
+        return job
+
+    def url_of(self, path: str) -> str:
+        """The address of something the service linked to."""
+        return str(self._http.base_url.join(path))
+
+    def _json(self, method: str, path: str, **request: Any) -> Any:
+        return self._answer(method, path, **request).json()
+
+    def _answer(self, method: str, path: str, **request: Any) -> httpx.Response:
+        response = self._http.request(method, path, **request)
+        if response.is_success:
+            return response
+        try:
+            members = response.json()
+        except ValueError:
+            members = {"title": f"HTTP {response.status_code}", "detail": response.text[:500]}
+        raise Refused(response.status_code, members if isinstance(members, dict) else {})

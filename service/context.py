@@ -1,0 +1,43 @@
+"""What the routes work with: built once per process, handed to each request."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, cast
+
+from fastapi import Depends, Path, Request
+from sqlalchemy import Engine
+
+from service.metrics import Metrics
+from service.queue import Queue
+from service.schemas import ID_PATTERN, JOB_ID_PATTERN
+from service.settings import Settings
+from service.store.blobs import Blobs
+from service.store.jobs import Jobs
+from service.store.venues import Venues
+from service.store.workers import Workers
+from service.watch import Watch
+
+
+@dataclass(frozen=True)
+class Context:
+    """Settings and everything that holds state."""
+
+    settings: Settings
+    engine: Engine
+    queue: Queue
+    blobs: Blobs
+    venues: Venues
+    jobs: Jobs
+    workers: Workers
+    watch: Watch
+    metrics: Metrics
+
+
+def _context(request: Request) -> Context:
+    return cast(Context, request.app.state.context)
+
+
+InContext = Annotated[Context, Depends(_context)]
+VenueIdPath = Annotated[str, Path(alias="venue", pattern=ID_PATTERN, examples=["tsukuba"])]
+JobIdPath = Annotated[str, Path(alias="job", pattern=JOB_ID_PATTERN, examples=["01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"])]

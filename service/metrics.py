@@ -1,0 +1,54 @@
+"""What Prometheus reads: requests as they come, jobs and workers as the database has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+
+from prometheus_client import CollectorRegistry, Counter, Histogram
+from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.metrics_core import Metric
+from prometheus_client.registry import Collector
+
+from service.store.jobs import Jobs
+from service.store.workers import Workers
+
+STATES = ("queued", "running", "succeeded", "failed", "cancelled")
+
+
+class Metrics:
+    """The figures of one API process."""
+
+    def __init__(self, jobs: Jobs, workers: Workers, silence_s: float) -> None:
+        self.registry = CollectorRegistry()
+        self.requests = Counter(
+            "esc_http_requests", "Requests answered.", ["method", "route", "status"], registry=self.registry
+        )
+        self.seconds = Histogram(
+            "esc_http_request_seconds", "Time to answer.", ["method", "route"], registry=self.registry
+        )
+        self.registry.register(_Stored(jobs, workers, silence_s))
+
+
+class _Stored(Collector):
+    def __init__(self, jobs: Jobs, workers: Workers, silence_s: float) -> None:
+        self._jobs = jobs
+        self._workers = workers
+        self._silence_s = silence_s
+
+    def describe(self) -> Iterator[Metric]:
+        """Nothing: registering must not read the database."""
+        yield from ()
+
+    def collect(self) -> Iterator[Metric]:
+        """Read the database."""
+        counts = self._jobs.counts()
+        jobs = GaugeMetricFamily("esc_jobs", "Jobs by state.", labels=["status"])
+        for status in STATES:
+            jobs.add_metric([status], counts.get(status, 0))
+        yield jobs
+        oldest = self._jobs.oldest_queued_at()
+        age = 0.0 if oldest is None else (datetime.now(UTC) - oldest).total_seconds()
+        yield GaugeMetricFamily("esc_queue_age_seconds", "How long the oldest queued job has waited.", value=age)
+        alive = len(self._workers.alive(self._silence_s))
+        yield GaugeMetricFamily("esc_workers", "Workers that gave a sign of life.", value=alive)

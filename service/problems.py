@@ -1,0 +1,145 @@
+"""Errors as RFC 9457 problem details: a stable `type`, what is wrong, which part of it, and what to do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import structlog
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from pydantic import ValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+
+MEDIA_TYPE = "application/problem+json"
+log = structlog.get_logger()
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One sort of problem: its HTTP status and its title, the same every time it occurs."""
+
+    status: int
+    title: str
+
+
+# The last part of a problem's `type`. These names are part of the interface: add some, change none.
+KINDS: dict[str, Kind] = {
+    # The request.
+    "malformed-request": Kind(400, "The request cannot be read"),
+    "invalid-request": Kind(422, "The request does not have the documented form"),
+    "not-found": Kind(404, "There is nothing at this address"),
+    "method-not-allowed": Kind(405, "This address does not take this method"),
+    "body-too-large": Kind(413, "The request is too large"),
+    "not-multipart": Kind(415, "Frames come as multipart/form-data"),
+    # Venues.
+    "venue-not-found": Kind(404, "There is no such venue"),
+    "venue-id-mismatch": Kind(422, "The venue's id differs from the address"),
+    "venue-changed": Kind(412, "The venue is not the one the request expects"),
+    "venue-busy": Kind(409, "The venue has an active job"),
+    # Frames.
+    "unknown-camera": Kind(422, "The venue has no such camera"),
+    "missing-camera": Kind(422, "A camera of the venue has no frame"),
+    "too-many-frames": Kind(422, "Too many frames of one camera"),
+    "not-a-file": Kind(422, "A frame must be sent as a file"),
+    "empty-frame": Kind(422, "The frame has no bytes"),
+    "frame-too-large": Kind(413, "The frame has too many bytes"),
+    "not-an-image": Kind(422, "The frame is neither JPEG nor PNG"),
+    "broken-image": Kind(422, "The frame is damaged"),
+    "truncated-image": Kind(422, "The frame ends too early"),
+    "too-many-pixels": Kind(422, "The frame has too many pixels"),
+    "frame-size": Kind(422, "The frame does not have the size of the camera"),
+    # Jobs.
+    "job-not-found": Kind(404, "There is no such job"),
+    "picture-not-found": Kind(404, "There is no such picture"),
+    "idempotency-key-reused": Kind(422, "The idempotency key was used for other content"),
+    "queue-full": Kind(429, "Too many jobs are waiting"),
+    "calibration-failed": Kind(422, "The frames cannot be calibrated"),
+    "model-missing": Kind(503, "The segmentation network is missing"),
+    "job-timeout": Kind(504, "The job took longer than it may"),
+    "job-crashed": Kind(500, "The computation broke off"),
+    "job-abandoned": Kind(500, "The job was given up after several attempts"),
+    # The service.
+    "unavailable": Kind(503, "The service cannot answer right now"),
+    "internal-error": Kind(500, "The service made a mistake"),
+}
+
+
+def type_of(kind: str) -> str:
+    """The `type` member: a URI reference that the service itself answers with an explanation."""
+    return f"/problems/{kind}"
+
+
+class Problem(Exception):  # noqa: N818  (the term of RFC 9457)
+    """An answer that is not the one hoped for. `parts` are members of their own: the camera, expected and got."""
+
+    def __init__(self, kind: str, detail: str, *, headers: Mapping[str, str] | None = None, **parts: Any) -> None:
+        super().__init__(detail)
+        self.kind = kind
+        self.detail = detail
+        self.headers = headers
+        self.parts = parts
+
+    def members(self) -> dict[str, Any]:
+        """The JSON object."""
+        kind = KINDS[self.kind]
+        return {
+            "type": type_of(self.kind),
+            "title": kind.title,
+            "status": kind.status,
+            "detail": self.detail,
+            **self.parts,
+        }
+
+    def response(self) -> Response:
+        """The HTTP answer. Escaped to ASCII: a client's lone surrogates must not break it."""
+        content = json.dumps(self.members(), ensure_ascii=True).encode("ascii")
+        return Response(content, KINDS[self.kind].status, self.headers, MEDIA_TYPE)
+
+
+def invalid(error: ValidationError | RequestValidationError, *inside: str) -> Problem:
+    """What a schema found, each finding with the place it was found at."""
+    findings = [
+        {"where": ".".join(str(step) for step in (*inside, *finding["loc"])), "message": finding["msg"]}
+        for finding in error.errors()
+    ]
+    first = findings[0]
+    return Problem("invalid-request", f"{first['where']}: {first['message']}", errors=findings)
+
+
+def install(app: FastAPI) -> None:
+    """Let every error of `app` leave as a problem."""
+
+    @app.exception_handler(Problem)
+    async def problem(_: Request, error: Problem) -> Response:
+        return error.response()
+
+    @app.exception_handler(RequestValidationError)
+    async def validation(_: Request, error: RequestValidationError) -> Response:
+        if any(finding["type"] == "json_invalid" for finding in error.errors()):
+            return Problem("malformed-request", "The body is not JSON.").response()
+        return invalid(error).response()
+
+    @app.exception_handler(HTTPException)
+    async def http(request: Request, error: HTTPException) -> Response:
+        return _from_http(request, error).response()
+
+    @app.exception_handler(Exception)
+    async def unexpected(_: Request, error: Exception) -> Response:
+        log.error("unexpected error", exc_info=error)
+        return Problem("internal-error", "This is a fault of the service; its log has the details.").response()
+
+
+def _from_http(request: Request, error: HTTPException) -> Problem:
+    match error.status_code:
+        case 404:
+            return Problem("not-found", f"Nothing is at {request.url.path}; /docs lists what there is.")
+        case 405:
+            return Problem("method-not-allowed", f"{request.method} does not work here.", headers=error.headers)
+        case 413:
+            return Problem("body-too-large", "Send fewer or smaller frames.", headers=error.headers)
+        case _:
+            return Problem("malformed-request", str(error.detail), headers=error.headers)

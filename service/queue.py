@@ -1,0 +1,106 @@
+"""The queue: the one module that knows DBOS.
+
+What can be relied on: a job that was enqueued in a transaction is begun by some worker once that transaction is
+committed, `live` before `routine`, in order of submission; it is begun again when its worker died, three times in all;
+then it is given up. The queue does not know how a job ended; the job's row does.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Collection
+
+import sqlalchemy as sa
+from dbos import DBOS, DBOSClient, DBOSConfig
+from dbos import WorkflowStatusString as QueueStatus
+
+APPLICATION = "esc"
+QUEUE = "calibration"
+WORKFLOW = "calibrate"
+# The engine's default is a hash of the source; after a deployment the jobs of the old version would never be begun.
+VERSION = "1"
+BEGINS_AGAIN = 2
+POLL_S = 0.5
+
+
+def migrate(url: str) -> None:
+    """Bring the queue's own tables up to date; they live in the same database as ours."""
+    DBOS.migrate(url)
+
+
+def _engine(url: str) -> sa.Engine:
+    """The queue's own engine: its SQL expects the driver to begin transactions, ours does not."""
+    if not url.startswith("sqlite"):
+        return sa.create_engine(sa.make_url(url).set(drivername="postgresql+psycopg"), pool_pre_ping=True)
+    engine = sa.create_engine(url)
+
+    @sa.event.listens_for(engine, "connect")
+    def _(connection: sqlite3.Connection, _: object) -> None:
+        connection.isolation_level = "IMMEDIATE"
+        for pragma in ("busy_timeout=30000", "journal_mode=WAL", "foreign_keys=ON"):
+            connection.execute(f"PRAGMA {pragma}")
+
+    return engine
+
+
+class Queue:
+    """The half of the HTTP service: puts jobs in."""
+
+    def __init__(self, url: str) -> None:
+        self._engine = _engine(url)
+        self._client = DBOSClient(system_database_engine=self._engine, application_name=APPLICATION)
+
+    def enqueue(self, connection: sa.Connection, job_id: str, priority: int) -> None:
+        """Put a job in, when and if the caller's transaction commits. A smaller `priority` goes first."""
+        self._client.enqueue_in_transaction(
+            connection,
+            {"workflow_name": WORKFLOW, "queue_name": QUEUE, "workflow_id": job_id, "priority": priority},
+            job_id,
+        )
+
+    def close(self) -> None:
+        """Let the database go."""
+        self._client.destroy()
+        self._engine.dispose()
+
+
+class WorkerQueue:
+    """The half of the worker: takes jobs out and calls `run(job_id)` for each, in a thread of its own."""
+
+    def __init__(self, url: str, worker: str, jobs_at_once: int, run: Callable[[str], None]) -> None:
+        self._jobs_at_once = jobs_at_once
+        config: DBOSConfig = {
+            "name": APPLICATION,
+            "system_database_url": url,
+            "system_database_engine": _engine(url),
+            "executor_id": worker,
+            "application_version": VERSION,
+            "log_level": "WARNING",
+        }
+        DBOS(config=config)
+        DBOS.workflow(name=WORKFLOW, max_recovery_attempts=BEGINS_AGAIN)(run)
+
+    def start(self) -> None:
+        """Begin with what this worker left behind, then take from the queue."""
+        DBOS.launch()
+        DBOS.register_queue(
+            QUEUE,
+            worker_concurrency=self._jobs_at_once,
+            polling_interval_sec=POLL_S,
+            on_conflict="always_update",
+        )
+
+    def take_over(self, dead_workers: Collection[str]) -> None:
+        """Put the jobs of dead workers back into the queue. Private to the engine: its version is pinned exactly."""
+        DBOS._recover_pending_workflows(list(dead_workers))
+
+    def given_up(self, job_ids: Collection[str]) -> list[str]:
+        """Which of these jobs the queue will not begin again."""
+        ended = [
+            QueueStatus.SUCCESS.value,
+            QueueStatus.ERROR.value,
+            QueueStatus.CANCELLED.value,
+            QueueStatus.MAX_RECOVERY_ATTEMPTS_EXCEEDED.value,
+        ]
+        found = DBOS.list_workflows(workflow_ids=list(job_ids), status=ended, load_input=False, load_output=False)
+        return [workflow.workflow_id for workflow in found]

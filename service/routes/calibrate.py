@@ -1,0 +1,161 @@
+"""Frames in, a job out: checked here once, stored, and queued before the answer leaves."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Request, Response
+from pydantic import ValidationError
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import FormData, UploadFile
+
+from service import frames as border
+from service.context import Context, InContext, VenueIdPath
+from service.problems import Problem, invalid
+from service.routes.documented import problems
+from service.routes.jobs import RETRY_AFTER_S, job_answer
+from service.routes.venues import no_such_venue
+from service.schemas import OPTIONS_PART, Job, Options, Venue
+from service.store.jobs import KeyReused, QueueFull, Submission, VenueBusy, new_job_id
+
+router = APIRouter(tags=["jobs"])
+
+KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
+LONGEST_OPTIONS = 64 * 1024
+UPLOAD: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part "
+                    "to send several frames of a camera, they are fused.",
+                    "properties": {OPTIONS_PART: {"$ref": "#/components/schemas/Options"}},
+                    "additionalProperties": {"type": "array", "items": {"type": "string", "format": "binary"}},
+                },
+                "encoding": {OPTIONS_PART: {"contentType": "application/json"}},
+            }
+        },
+    }
+}
+
+
+@router.post(
+    "/venues/{venue}/calibrate",
+    status_code=202,
+    response_model=Job,
+    responses={
+        200: {"model": Job, "description": "This content is already a job"},
+        **problems(404, 409, 413, 415, 422, 429),
+    },
+    openapi_extra=UPLOAD,
+)
+async def calibrate(
+    venue_id: VenueIdPath,
+    request: Request,
+    context: InContext,
+    idempotency_key: Annotated[str | None, Header(pattern=KEY_PATTERN)] = None,
+) -> Response:
+    """Submit a frame (or several) per camera. Follow the job at `Location`."""
+    if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
+        raise Problem("not-multipart", "Send each frame as a file part named by its camera, as curl -F does.")
+    stored = await run_in_threadpool(context.venues.get, venue_id)
+    if stored is None:
+        raise no_such_venue(venue_id)
+    # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time.
+    async with request.form(max_files=2000, max_fields=100, max_part_size=LONGEST_OPTIONS) as form:
+        return await run_in_threadpool(_submit, context, stored.venue, form, idempotency_key)
+
+
+def _submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None) -> Response:
+    options = _options(form)
+    files = _files(venue, form, context)
+    content_hash = _check(context, venue, files, options)
+    try:
+        known = context.jobs.same_as(venue.id, idempotency_key, content_hash)
+        if known is not None:
+            return job_answer(known, status=200)
+        job_id = new_job_id()
+        seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
+        paths = _store(context, job_id, files)
+        submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths)
+        job = None
+        try:
+            job, new = context.jobs.submit(submission, context.settings.queue_limit, context.queue.enqueue)
+        finally:
+            if job is None or job.id != job_id:
+                context.blobs.delete_under(_folder(job_id))
+    except KeyReused as error:
+        raise Problem("idempotency-key-reused", "Use a new key for new frames.", job=error.job_id) from None
+    except VenueBusy as error:
+        raise Problem(
+            "venue-busy",
+            f"Wait for job {error.job_id} of the same venue or cancel it.",
+            headers={"Retry-After": str(RETRY_AFTER_S), "Location": f"/jobs/{error.job_id}"},
+            job=error.job_id,
+        ) from None
+    except QueueFull:
+        raise Problem(
+            "queue-full", f"{context.settings.queue_limit} jobs wait; try again.", headers={"Retry-After": "30"}
+        ) from None
+    return job_answer(job, status=202 if new else 200)
+
+
+def _options(form: FormData) -> Options:
+    parts = form.getlist(OPTIONS_PART)
+    if not parts:
+        return Options()
+    if len(parts) > 1:
+        raise Problem("invalid-request", "Send one options part.", errors=[])
+    part = parts[0]
+    try:
+        data: str | bytes = part.file.read(LONGEST_OPTIONS + 1) if isinstance(part, UploadFile) else part
+        return Options.model_validate(json.loads(data))
+    except ValidationError as error:
+        raise invalid(error, OPTIONS_PART) from None
+    except (ValueError, RecursionError):
+        raise Problem("invalid-request", "The options part is not JSON.", errors=[]) from None
+
+
+def _files(venue: Venue, form: FormData, context: Context) -> dict[str, list[UploadFile]]:
+    names = [name for name, _ in form.multi_items() if name != OPTIONS_PART]
+    border.check_cameras(venue, {name: names.count(name) for name in names}, context.settings)
+    files: dict[str, list[UploadFile]] = {camera.id: [] for camera in venue.cameras}
+    for name, part in form.multi_items():
+        if name == OPTIONS_PART:
+            continue
+        if not isinstance(part, UploadFile):
+            raise Problem("not-a-file", f"Send camera {name} as a file, with curl: -F {name}=@frame.jpg", camera=name)
+        files[name].append(part)
+    return files
+
+
+def _check(context: Context, venue: Venue, files: dict[str, list[UploadFile]], options: Options) -> str:
+    """Let each frame pass the border; returns the hash of all that was sent."""
+    sent = hashlib.sha256(options.model_dump_json().encode())
+    for camera in venue.cameras:
+        for file in files[camera.id]:
+            data = file.file.read()
+            border.check(camera, data, context.settings)
+            sent.update(f"\n{camera.id} {hashlib.sha256(data).hexdigest()}".encode())
+    return sent.hexdigest()
+
+
+def _store(context: Context, job_id: str, files: dict[str, list[UploadFile]]) -> dict[str, list[str]]:
+    paths: dict[str, list[str]] = {}
+    for camera, uploads in files.items():
+        paths[camera] = []
+        for number, file in enumerate(uploads):
+            path = f"{_folder(job_id)}/{camera}/{number}"
+            file.file.seek(0)
+            context.blobs.put(path, file.file.read())
+            paths[camera].append(path)
+    return paths
+
+
+def _folder(job_id: str) -> str:
+    return f"frames/{job_id}"

@@ -1,0 +1,137 @@
+"""Jobs: how far they are, how they ended, what they look like."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import AsyncIterable, Callable
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Path, Query, Response
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from starlette.concurrency import run_in_threadpool
+
+from service import etags
+from service.context import Context, InContext, JobIdPath
+from service.problems import Problem
+from service.routes.documented import problems
+from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, Job, Jobs, Status
+from service.store.jobs import State
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+
+RETRY_AFTER_S = 2
+LONGEST_WAIT_S = 60
+# An event at least this often, so that a client sees the queue move.
+EVENT_AT_LEAST_EVERY_S = 10
+JPEG: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"image/jpeg": {"schema": {"type": "string", "format": "binary"}}}}
+}
+
+
+def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
+    """The one form a job leaves in: body, ETag, Location of a new one, Retry-After while it is open."""
+    body = job.model_dump_json().encode()
+    tag = hashlib.sha256(body).hexdigest()[:32]
+    headers = {"ETag": etags.quoted(tag), "Cache-Control": "no-cache"}
+    if job.open:
+        headers["Retry-After"] = str(RETRY_AFTER_S)
+    if if_none_match is not None and etags.names(if_none_match, tag):
+        return Response(status_code=304, headers=headers)
+    if status == 202:
+        headers["Location"] = job.links["self"]
+    return Response(body, status, headers, "application/json")
+
+
+def _existing(job_id: JobIdPath, context: InContext) -> Job:
+    job = context.jobs.get(job_id)
+    if job is None:
+        raise Problem("job-not-found", "GET /jobs lists those there are.")
+    return job
+
+
+Existing = Annotated[Job, Depends(_existing)]
+
+
+@router.get("")
+def list_jobs(
+    context: InContext,
+    venue: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
+    status: Status | None = None,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
+) -> Jobs:
+    """Jobs, newest first, in pages."""
+    page = context.jobs.page(venue, status, cursor, limit + 1)
+    more = len(page) > limit
+    return Jobs(jobs=page[:limit], next_cursor=page[limit - 1].id if more else None)
+
+
+@router.get("/{job}", response_model=Job, responses={304: {"description": "Unchanged"}, **problems(404)})
+async def get_job(
+    job: Existing,
+    context: InContext,
+    wait: Annotated[float, Query(ge=0, allow_inf_nan=False, description="Seconds, at most 60 are waited.")] = 0,
+    if_none_match: Annotated[str | None, Header()] = None,
+) -> Response:
+    """A job in whatever state. With `wait` the answer is held until the job ends."""
+    if wait and job.open:
+        await context.watch.until(job.id, lambda state: state.status not in OPEN, min(wait, LONGEST_WAIT_S))
+        job = await _read_again(context, job)
+    return job_answer(job, if_none_match=if_none_match)
+
+
+@router.post("/{job}/cancel", response_model=Job, responses=problems(404))
+def cancel_job(job: Existing, context: InContext) -> Response:
+    """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
+    context.jobs.cancel(job.id)
+    return job_answer(context.jobs.get(job.id) or job)
+
+
+@router.get("/{job}/events", response_class=EventSourceResponse, responses=problems(404))
+async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerSentEvent]:
+    """The job as server-sent events: `progress` whenever it changes, `end` when it has ended."""
+    while True:
+        state = (await run_in_threadpool(context.jobs.states, [job.id])).get(job.id)
+        job = await _read_again(context, job)
+        if not job.open:
+            yield ServerSentEvent(data=job, event="end")
+            return
+        yield ServerSentEvent(data=job, event="progress")
+        if context.watch.closed:
+            return
+        await context.watch.until(job.id, _later_than(state), EVENT_AT_LEAST_EVERY_S)
+
+
+@router.get("/{job}/preview.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+def preview(job: Existing, context: InContext) -> Response:
+    """One wide view stitched from all cameras."""
+    return _picture(context, job, "preview")
+
+
+@router.get("/{job}/birdseye.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+def birdseye(job: Existing, context: InContext) -> Response:
+    """The pitch from above, 10 px/m."""
+    return _picture(context, job, "birdseye")
+
+
+@router.get("/{job}/overlay/{camera}.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+def overlay(job: Existing, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext) -> Response:
+    """A camera's frame with the field drawn on it, before and after."""
+    return _picture(context, job, f"overlay_{camera}")
+
+
+def _picture(context: Context, job: Job, name: str) -> Response:
+    folder = context.jobs.picture_folder(job.id)
+    data = context.blobs.get(f"{folder}/{name}.jpg") if folder else None
+    if data is None:
+        detail = "The job has not come to its pictures yet." if job.open else "The job made no such picture."
+        raise Problem("picture-not-found", detail, job=job.id)
+    return Response(data, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=3600"})
+
+
+def _later_than(seen: State | None) -> Callable[[State], bool]:
+    return lambda state: seen is None or state.revision > seen.revision
+
+
+async def _read_again(context: Context, job: Job) -> Job:
+    return await run_in_threadpool(context.jobs.get, job.id) or job

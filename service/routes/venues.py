@@ -1,0 +1,92 @@
+"""Venues: what is calibrated, with the poses that hold now."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, Response
+
+from service import etags
+from service.context import InContext, VenueIdPath
+from service.problems import Problem
+from service.routes.documented import problems
+from service.schemas import ID_PATTERN, Venue, VenueIn, Venues
+from service.store.venues import StoredVenue
+
+router = APIRouter(prefix="/venues", tags=["venues"])
+
+
+def no_such_venue(venue_id: str) -> Problem:
+    """The same answer wherever a venue is named."""
+    return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
+
+
+@router.put("/{venue}", responses={201: {"model": Venue}, **problems(412, 422)})
+def put_venue(
+    venue_id: VenueIdPath,
+    venue: VenueIn,
+    response: Response,
+    context: InContext,
+    if_match: Annotated[str | None, Header()] = None,
+    if_none_match: Annotated[str | None, Header()] = None,
+) -> Venue:
+    """Create or replace a venue. Its poses are where the next calibration starts."""
+    if venue.id != venue_id:
+        raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
+
+    def allow(before: StoredVenue | None) -> None:
+        tag = before.revision if before else None
+        if if_match is not None and not etags.names(if_match, tag):
+            raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)
+        if if_none_match is not None and etags.names(if_none_match, tag):
+            raise Problem("venue-changed", "The venue is already there.", got=tag)
+
+    stored, new = context.venues.put(venue.stored(), allow)
+    response.headers["ETag"] = etags.quoted(stored.revision)
+    response.status_code = 201 if new else 200
+    return stored.venue
+
+
+@router.get("")
+def list_venues(
+    context: InContext,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    cursor: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
+) -> Venues:
+    """All venues by id, in pages."""
+    page = context.venues.page(cursor, limit + 1)
+    more = len(page) > limit
+    return Venues(venues=page[:limit], next_cursor=page[limit - 1].id if more else None)
+
+
+@router.get("/{venue}", response_model=Venue, responses={304: {"description": "Unchanged"}, **problems(404)})
+def get_venue(
+    venue_id: VenueIdPath,
+    response: Response,
+    context: InContext,
+    if_none_match: Annotated[str | None, Header()] = None,
+) -> Venue | Response:
+    """A venue with the poses that hold now."""
+    stored = context.venues.get(venue_id)
+    if stored is None:
+        raise no_such_venue(venue_id)
+    tag = etags.quoted(stored.revision)
+    if if_none_match is not None and etags.names(if_none_match, stored.revision):
+        return Response(status_code=304, headers={"ETag": tag})
+    response.headers["ETag"] = tag
+    return stored.venue
+
+
+@router.delete("/{venue}", status_code=204, responses=problems(404, 409, 412))
+def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[str | None, Header()] = None) -> None:
+    """Forget a venue and the history of its poses; its jobs stay."""
+
+    def allow(before: StoredVenue | None, active_job: str | None) -> None:
+        if before is None:
+            raise no_such_venue(venue_id)
+        if active_job is not None:
+            raise Problem("venue-busy", "Wait for the job or cancel it.", job=active_job)
+        if if_match is not None and not etags.names(if_match, before.revision):
+            raise Problem("venue-changed", "Read the venue again and decide.", got=before.revision)
+
+    context.venues.delete(venue_id, allow)

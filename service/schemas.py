@@ -1,0 +1,417 @@
+"""The wire models: what crosses HTTP, what `esc` reads from files, and what a worker hands back.
+
+World: right-handed, metres, origin at the pitch centre on z = 0, x along the touchline, y across the pitch, z up.
+Cameras are OpenCV's: x right, y down, z forward, pixel centres at integers.
+"""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+
+ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
+OPTIONS_PART = "options"
+DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+LARGEST_SIDE = 16384
+
+Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
+JobId = Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)]
+Name = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+# Finite, and a number: neither NaN, which Python's JSON reader lets through, nor true nor "1".
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Whole = Annotated[int, Field(strict=True)]
+Flag = Annotated[bool, Field(strict=True)]
+Metres = Annotated[Number, Field(ge=-2000, le=2000)]
+Radians = Annotated[Number, Field(ge=-10, le=10)]
+Position = Annotated[list[Metres], Field(min_length=3, max_length=3)]
+Rotation = Annotated[list[Radians], Field(min_length=3, max_length=3)]
+Row = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Side = Annotated[Whole, Field(ge=32, le=LARGEST_SIDE)]
+
+
+class Wire(BaseModel):
+    """A model of the interface: unknown fields are errors, not ignored."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class PoseIn(Wire):
+    """Where a camera stands and looks: `rotation` and exactly one of `position` and `translation`."""
+
+    rotation: Rotation = Field(description="Rodrigues vector, rad, world to camera.")
+    position: Position | None = Field(None, description="Camera centre in the world, m.")
+    translation: Position | None = Field(None, description="OpenCV's tvec = -R·position, m.")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.position is None) == (self.translation is None):
+            raise ValueError("give exactly one of position and translation")
+        return self
+
+
+class Pose(Wire):
+    """Where a camera stands and looks, in both conventions."""
+
+    rotation: list[float] = Field(description="Rodrigues vector, rad, world to camera.")
+    position: list[float] = Field(description="Camera centre in the world, m.")
+    translation: list[float] = Field(description="OpenCV's tvec = -R·position, m.")
+
+    @classmethod
+    def at(cls, rotation: list[float], position: list[float]) -> Pose:
+        """From rotation vector and camera centre."""
+        translation = [-component for component in rotated(rotation, position)]
+        return cls(rotation=rotation, position=position, translation=translation)
+
+    @classmethod
+    def of(cls, pose: PoseIn) -> Pose:
+        """From a pose as it was sent."""
+        if pose.position is not None:
+            return cls.at(pose.rotation, pose.position)
+        assert pose.translation is not None
+        backwards = rotated([-component for component in pose.rotation], pose.translation)
+        return cls(
+            rotation=pose.rotation,
+            position=[-component for component in backwards],
+            translation=pose.translation,
+        )
+
+
+def rotated(rotation: list[float], vector: list[float]) -> list[float]:
+    """A vector turned by a Rodrigues vector (rad): Rodrigues' formula."""
+    angle = math.hypot(*rotation)
+    if angle == 0.0:
+        return list(vector)
+    ax, ay, az = (component / angle for component in rotation)
+    x, y, z = vector
+    cos, sin = math.cos(angle), math.sin(angle)
+    along = (ax * x + ay * y + az * z) * (1 - cos)
+    return [
+        x * cos + (ay * z - az * y) * sin + ax * along,
+        y * cos + (az * x - ax * z) * sin + ay * along,
+        z * cos + (ax * y - ay * x) * sin + az * along,
+    ]
+
+
+class Intrinsics(Wire):
+    """The lens: OpenCV's camera matrix in pixels and its distortion coefficients in OpenCV's order."""
+
+    matrix: Annotated[list[Row], Field(min_length=3, max_length=3)]
+    distortion: Annotated[list[Annotated[Number, Field(ge=-1000, le=1000)]], Field(max_length=14)] = Field(
+        description="0, 4, 5, 8, 12 or 14 numbers."
+    )
+
+    @model_validator(mode="after")
+    def _a_lens(self) -> Self:
+        (fx, _, _), (lower, fy, _), last = self.matrix
+        if lower != 0 or last != [0, 0, 1]:
+            raise ValueError("matrix must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]")
+        if fx <= 0 or fy <= 0:
+            raise ValueError("focal lengths must be above 0 pixels")
+        if len(self.distortion) not in DISTORTION_LENGTHS:
+            raise ValueError("distortion must have 0, 4, 5, 8, 12 or 14 numbers")
+        return self
+
+
+class _Lens(Wire):
+    """What a camera is, but for its pose."""
+
+    id: Id
+    image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] = Field(description="Width, height in pixels.")
+    intrinsics: Intrinsics
+
+    @model_validator(mode="after")
+    def _plausible(self) -> Self:
+        if self.id == OPTIONS_PART:
+            raise ValueError("a camera cannot be called 'options': that is a part of the upload")
+        (fx, _, cx), (_, fy, cy), _ = self.intrinsics.matrix
+        width, height = self.image_size
+        for focal, centre, size in ((fx, cx, width), (fy, cy, height)):
+            # From wider than any fisheye to longer than any broadcast lens; a matrix of another resolution shows here.
+            if not 0.1 * size <= focal <= 200 * size or not -size <= centre <= 2 * size:
+                raise ValueError(f"the camera matrix does not belong to an image of {width}x{height} pixels")
+        return self
+
+
+class CameraIn(_Lens):
+    """A camera of a venue as it is sent."""
+
+    pose: PoseIn
+
+
+class Camera(_Lens):
+    """A camera of a venue with its stored pose."""
+
+    pose: Pose
+
+
+class FieldOfPlay(Wire):
+    """The pitch. `ridge`: the two ends of the roof's ridge (same y, same z), absent or null = flat."""
+
+    template: Literal["football"] = "football"
+    length_m: Annotated[Number, Field(ge=60, le=130)]
+    width_m: Annotated[Number, Field(ge=41, le=100)]
+    line_width_m: Annotated[Number, Field(ge=0.02, le=0.3)] = 0.12
+    ridge: Annotated[list[Row], Field(min_length=2, max_length=2)] | None = None
+
+    @model_validator(mode="after")
+    def _a_roof(self) -> Self:
+        if self.ridge is None:
+            return self
+        (x1, y1, z1), (x2, y2, z2) = self.ridge
+        if y1 != y2 or z1 != z2:
+            raise ValueError("both ends of the ridge need the same y and the same z")
+        if max(abs(x1), abs(x2)) >= self.length_m / 2 or abs(y1) >= self.width_m / 2:
+            raise ValueError("the ridge must lie inside the pitch")
+        if not 0 <= z1 <= 3:
+            raise ValueError("the ridge must be 0 to 3 m high")
+        return self
+
+
+VENUE_EXAMPLE: dict[str, Any] = {
+    "id": "tsukuba",
+    "name": "University pitch",
+    "field": {
+        "template": "football",
+        "length_m": 105.0,
+        "width_m": 68.0,
+        "line_width_m": 0.12,
+        "ridge": [[-18.5, 0.0, 0.2367], [18.5, 0.0, 0.2367]],
+    },
+    "cameras": [
+        {
+            "id": "left",
+            "image_size": [3072, 1728],
+            "intrinsics": {
+                "matrix": [[2122.4, 0, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
+                "distortion": [-0.3402, 0.1042, 0, 0, 0],
+            },
+            "pose": {"rotation": [1.675, 0.372, -0.462], "position": [-1.48, -49.49, 7.84]},
+        }
+    ],
+}
+
+
+class _Place(Wire):
+    id: Id
+    name: Name = ""
+    field: FieldOfPlay
+
+
+class VenueIn(_Place):
+    """A venue as it is sent."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
+
+    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
+
+    @model_validator(mode="after")
+    def _cameras_differ(self) -> Self:
+        ids = [camera.id for camera in self.cameras]
+        if len(set(ids)) < len(ids):
+            raise ValueError("two cameras have the same id")
+        return self
+
+    def stored(self) -> Venue:
+        """The venue with poses in both conventions."""
+        cameras = [
+            Camera(id=c.id, image_size=c.image_size, intrinsics=c.intrinsics, pose=Pose.of(c.pose))
+            for c in self.cameras
+        ]
+        return Venue(id=self.id, name=self.name, field=self.field, cameras=cameras)
+
+
+class Venue(_Place):
+    """A venue with the poses that hold now."""
+
+    cameras: list[Camera]
+
+    def with_poses(self, poses: dict[str, Pose]) -> Venue:
+        """The same venue, cameras moved."""
+        cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
+        return self.model_copy(update={"cameras": cameras})
+
+    def calibrates_like(self, other: Venue) -> bool:
+        """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
+        return self.field == other.field and self.cameras == other.cameras
+
+
+class Venues(Wire):
+    """A page of venues, by id. `next_cursor`: null on the last page."""
+
+    venues: list[Venue]
+    next_cursor: str | None = None
+
+
+class Options(Wire):
+    """What a caller may choose; everything is optional."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"preset": "esc", "seed": 7, "dry_run": True}]})
+
+    preset: Literal["esc", "paper", "scpr"] = "esc"
+    seed: Annotated[Whole, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
+    generations: Annotated[Whole, Field(ge=1, le=2000)] | None = Field(None, description="Absent: the preset's.")
+    parents: Annotated[Whole, Field(ge=2, le=4096)] | None = Field(None, description="μ; absent: the preset's.")
+    offspring: Annotated[Whole, Field(ge=2, le=8192)] | None = Field(None, description="λ; absent: the preset's.")
+    stitch_weight: Annotated[Number, Field(ge=0, le=1)] = Field(0.5, description="The paper's trade-off λ.")
+    flat: Flag = Field(False, description="Calibrate on a plane although the venue has a ridge.")
+    dry_run: Flag = Field(False, description="Never move the stored poses.")
+    priority: Literal["live", "routine"] = "routine"
+    timeout_s: Annotated[Number, Field(ge=1, le=3600)] | None = Field(None, description="Absent: the service's.")
+
+
+class Progress(Wire):
+    """How far a running job has come: `fraction` 0..1 of the whole."""
+
+    stage: Literal["segmentation", "evolution", "refinement", "preview"]
+    fraction: float = Field(ge=0, le=1)
+    generation: int | None = None
+    loss: float | None = None
+
+
+class Sigma(Wire):
+    """One standard deviation of a pose."""
+
+    rotation_deg: float
+    position_m: float
+
+
+class Moved(Wire):
+    """From the stored pose to the new one; `pixels`: mean shift of the visible pitch."""
+
+    rotation_deg: float
+    position_m: float
+    pixels: float | None
+
+
+class CameraResult(Wire):
+    """One camera's answer."""
+
+    id: Id
+    pose: Pose
+    sigma: Sigma | None
+    moved: Moved
+    iou: float | None
+    residual_px: float | None
+
+
+class Provenance(Wire):
+    """What it takes to compute the same numbers again."""
+
+    software: str
+    model_sha256: str
+    seed: int
+    options: dict[str, Any]
+
+
+class Result(Wire):
+    """Poses and what they are worth. Stitch errors: 1 px is 10 cm on the pitch; one camera has none."""
+
+    accepted: bool
+    rejected_because: str | None
+    cameras: list[CameraResult]
+    stitch_error_px: float | None
+    stitch_error_before_px: float | None
+    loss: float | None
+    generations: int
+    timings_s: dict[str, float]
+    provenance: Provenance
+
+
+class JobError(Wire):
+    """Why a job failed: the members of a problem (RFC 9457)."""
+
+    type: str
+    title: str
+    detail: str
+    camera: str | None = None
+
+
+Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]
+OPEN: tuple[Status, ...] = ("queued", "running")
+
+
+class Job(Wire):
+    """A calibration: its state, how far it is, and in the end its result or its error."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "id": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
+                    "venue": "tsukuba",
+                    "status": "running",
+                    "progress": {"stage": "evolution", "fraction": 0.42, "generation": 37, "loss": 0.31},
+                    "queue_position": None,
+                    "attempt": 1,
+                    "created_at": "2026-11-21T10:00:00Z",
+                    "started_at": "2026-11-21T10:00:01Z",
+                    "finished_at": None,
+                    "error": None,
+                    "result": None,
+                    "links": {"self": "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"},
+                }
+            ]
+        }
+    )
+
+    id: str
+    venue: str
+    status: Status
+    progress: Progress | None
+    queue_position: int | None = Field(description="1 = next; null unless queued.")
+    attempt: int = Field(description="How often the job was begun; above 1 after a crash of its worker.")
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    error: JobError | None
+    result: Result | None
+    links: dict[str, str]
+
+    @property
+    def open(self) -> bool:
+        """Whether anything can still change."""
+        return self.status in OPEN
+
+
+class Jobs(Wire):
+    """A page of jobs, newest first. `next_cursor`: null on the last page."""
+
+    jobs: list[Job]
+    next_cursor: str | None = None
+
+
+class Health(Wire):
+    """`ok`, or per part what is wrong with it."""
+
+    status: Literal["ok", "unavailable"]
+    parts: dict[str, str] = {}
+
+
+class ProblemDetails(BaseModel):
+    """RFC 9457. Beside these members a problem carries the part that is wrong: camera, expected, got, job, errors."""
+
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={
+            "examples": [
+                {
+                    "type": "/problems/frame-size",
+                    "title": "The frame does not have the size of the camera",
+                    "status": 422,
+                    "detail": "Send camera left in 3840x2160 pixels, the size of its intrinsics.",
+                    "camera": "left",
+                    "expected": [3840, 2160],
+                    "got": [1920, 1080],
+                }
+            ]
+        },
+    )
+
+    type: str
+    title: str
+    status: int
+    detail: str

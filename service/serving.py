@@ -1,0 +1,115 @@
+"""Running the API in this process, and beside it, for `esc up`, a worker that is kept alive."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from contextlib import nullcontext
+from types import TracebackType
+from typing import Self
+
+import structlog
+import uvicorn
+from fastapi import FastAPI
+
+from service import lifeline
+from service.app import create_app
+from service.settings import Settings
+
+# What open requests get to end in, and after them the worker.
+GRACE_S = 5
+RESTART_AFTER_S = 1.0
+log = structlog.get_logger()
+
+
+class CannotListen(Exception):  # noqa: N818
+    """The address cannot or must not be used; the message says what to do."""
+
+
+def serve(settings: Settings, *, with_worker: bool) -> None:
+    """Answer requests until SIGTERM or SIGINT."""
+    if settings.listens_beyond_this_machine and not settings.allow_unauthenticated:
+        raise CannotListen(
+            f"Whoever can reach {settings.host} could use the service: it has no authentication yet. Listen on "
+            "127.0.0.1, put a proxy that authenticates in front of it, or set ESC_ALLOW_UNAUTHENTICATED=true."
+        )
+    listener = _listen(settings)
+    server = _Server(create_app(settings))
+    # Uvicorn raises the signal again after its shutdown, which would end the process before the worker is stopped.
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)
+    with KeptWorker(settings) if with_worker else nullcontext():
+        host, port = listener.getsockname()[:2]
+        print(f"ESC listens on http://{host}:{port}", flush=True)
+        server.run(sockets=[listener])
+
+
+def _listen(settings: Settings) -> socket.socket:
+    try:
+        return socket.create_server(
+            (settings.host, settings.port),
+            family=socket.AF_INET6 if ":" in settings.host else socket.AF_INET,
+            backlog=2048,
+        )
+    except OSError as error:
+        raise CannotListen(f"Cannot listen on {settings.host}:{settings.port}: {error.strerror}.") from None
+
+
+class _Server(uvicorn.Server):
+    """Uvicorn, but long polls and event streams are let go before it waits for open requests."""
+
+    def __init__(self, app: FastAPI) -> None:
+        super().__init__(uvicorn.Config(app, log_config=None, access_log=False, timeout_graceful_shutdown=GRACE_S))
+        self._watch = app.state.context.watch
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop answering."""
+        self._watch.close()
+        await super().shutdown(sockets)
+
+
+class KeptWorker:
+    """A worker as a child process, started again when it dies, ended with this process in any case."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._stopping = threading.Event()
+        self._process: subprocess.Popen[bytes] | None = None
+        # The kernel ends the child with the thread that started it: this one, which lives until `__exit__`.
+        self._thread = threading.Thread(target=self._keep, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stopping.set()
+        if self._process is not None:
+            self._process.terminate()
+        self._thread.join(GRACE_S)
+        if self._process is not None and self._process.poll() is None:
+            self._process.kill()
+
+    def _keep(self) -> None:
+        while not self._stopping.is_set():
+            self._process = self._start()
+            code = self._process.wait()
+            if not self._stopping.is_set():
+                log.error("worker died, starting another", code=code)
+                self._stopping.wait(RESTART_AFTER_S)
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        data = ["--data", str(self._settings.data)]
+        # A session of its own: Ctrl-C reaches this process, which then stops the worker.
+        return subprocess.Popen(
+            [sys.executable, "-m", "service.cli", "worker", *data],
+            env=os.environ | lifeline.for_child(),
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )

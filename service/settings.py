@@ -1,0 +1,72 @@
+"""Every setting of the service and its worker: environment variables `ESC_...`, or a `.env` file."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import socket
+import sys
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
+
+
+class Settings(BaseSettings):
+    """What an operator may change. Sizes in megabytes are 10^6 bytes, times are in seconds."""
+
+    model_config = SettingsConfigDict(env_prefix="ESC_", env_file=".env", env_ignore_empty=True, extra="ignore")
+
+    # Where things live.
+    data: Path = Field(Path("esc-data"), description="Folder of the embedded home: database, frames, pictures.")
+    database_url: str | None = Field(None, description="SQLAlchemy URL; absent: SQLite in the data folder.")
+    blob_url: str | None = Field(None, description="obstore URL of frames and pictures; absent: the data folder.")
+    model: Path = Field(MODEL_BESIDE_THE_CODE, description="The segmentation network, an ONNX file.")
+
+    # Listening.
+    host: str = "127.0.0.1"
+    port: int = Field(8000, ge=0, le=65535, description="0 takes a free one and says which.")
+    allow_unauthenticated: bool = Field(False, description="Listen beyond this machine although anyone may call.")
+
+    # What a client may send.
+    max_body_mb: float = Field(256, gt=0)
+    max_frame_mb: float = Field(48, gt=0)
+    max_frame_pixels: int = Field(64_000_000, gt=0)
+    max_frames_per_camera: int = Field(16, ge=1)
+    queue_limit: int = Field(100, ge=1, description="Jobs that may wait; more are answered with 429.")
+
+    # The worker.
+    worker_name: str = Field(default_factory=socket.gethostname, description="Unique per worker and stable.")
+    jobs_at_once: int = Field(1, ge=1)
+    threads: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="Per job.")
+    job_timeout_s: float = Field(600, gt=0, description="For jobs that name no limit of their own.")
+    job_program: list[str] = Field(
+        [sys.executable, "-m", "worker.job"],
+        description="What computes one job; called with the job's id and the token of the attempt.",
+    )
+    takeover_after_s: float = Field(10, gt=2, description="Silence after which another worker takes a job over.")
+
+    # Being watched.
+    log_format: Literal["json", "console"] = "json"
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+
+    @property
+    def home_database_url(self) -> str:
+        """The database that is used."""
+        return self.database_url or f"sqlite:///{self.data.absolute() / 'esc.sqlite'}"
+
+    @property
+    def home_blob_url(self) -> str:
+        """The object store that is used."""
+        return self.blob_url or (self.data.absolute() / "blobs").as_uri()
+
+    @property
+    def listens_beyond_this_machine(self) -> bool:
+        """Whether others can reach the port."""
+        try:
+            return not ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return self.host != "localhost"

@@ -1,0 +1,86 @@
+"""The database: one engine, transactions for reading and for writing, and the schema brought up to date."""
+
+from __future__ import annotations
+
+import sqlite3
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import sqlalchemy as sa
+from alembic import command
+from alembic.config import Config
+
+MIGRATIONS = Path(__file__).parent / "migrations"
+WRITES = "esc_writes"
+# Any number, the same everywhere: serialises writers that must see each other's rows on PostgreSQL.
+LOCK = 0x45_53_43
+
+
+class UnsupportedDatabase(Exception):  # noqa: N818
+    """This machine cannot run the service on this database; the message says what to do."""
+
+
+def connect(url: str) -> sa.Engine:
+    """An engine on SQLite in WAL mode or on PostgreSQL."""
+    parsed = sa.make_url(url)
+    if parsed.get_backend_name() != "sqlite":
+        return sa.create_engine(parsed.set(drivername="postgresql+psycopg"), pool_pre_ping=True)
+    if sys.version_info >= (3, 12) and sqlite3.sqlite_version_info < (3, 42):
+        raise UnsupportedDatabase(
+            f"Python {sys.version_info.major}.{sys.version_info.minor} here has SQLite {sqlite3.sqlite_version}; "
+            "the job queue needs 3.42 with it. Use Python 3.11, a Python with a newer SQLite, or PostgreSQL."
+        )
+    if parsed.database:
+        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+    engine = sa.create_engine(parsed)
+    sa.event.listen(engine, "connect", _set_up_sqlite)
+    sa.event.listen(engine, "begin", _begin_sqlite)
+    return engine
+
+
+def _set_up_sqlite(connection: sqlite3.Connection, _: object) -> None:
+    # Transactions are begun by hand below: the driver would begin one only at the first write.
+    connection.isolation_level = None
+    connection.execute("PRAGMA busy_timeout=30000")
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("PRAGMA foreign_keys=ON")
+
+
+def _begin_sqlite(connection: sa.Connection) -> None:
+    # A transaction that reads first and writes later fails at once when another writer was faster, whatever the
+    # busy timeout: writers take the lock at their beginning.
+    writes = connection.get_execution_options().get(WRITES, False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+@contextmanager
+def reading(engine: sa.Engine) -> Iterator[sa.Connection]:
+    """A transaction that sees one state of the database and takes no lock."""
+    with engine.connect() as connection, connection.begin():
+        yield connection
+
+
+@contextmanager
+def writing(engine: sa.Engine) -> Iterator[sa.Connection]:
+    """A transaction alone with the database (SQLite) or at least with its rows (PostgreSQL)."""
+    with engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+        yield connection
+
+
+def serialise(connection: sa.Connection) -> None:
+    """Wait until no other transaction that called this is open; on SQLite a writer is alone anyway."""
+    if connection.dialect.name == "postgresql":
+        connection.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
+
+
+def migrate(engine: sa.Engine) -> None:
+    """Bring the schema up to date; of several processes that start together one does it."""
+    with writing(engine) as connection:
+        serialise(connection)
+        config = Config()
+        config.set_main_option("script_location", str(MIGRATIONS))
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")

@@ -1,0 +1,345 @@
+"""Jobs, from their submission to their end: all SQL about them.
+
+The row is the one truth about a job. The engine of the queue only decides when a worker looks at it; whether there is
+still something to do is decided here. Every write of a worker carries the token of its attempt (`run_token`) and
+changes nothing when the job was cancelled or given to another attempt meanwhile.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+import uuid
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import sqlalchemy as sa
+
+from service.schemas import OPEN, Job, JobError, Options, Progress, Result, Status, Venue
+from service.store import tables
+from service.store.engine import reading, serialise, writing
+from service.store.venues import StoredVenue, find_venue, save_poses, save_venue
+
+PRIORITIES = {"live": 1, "routine": 100}
+CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
+j = tables.jobs.c
+
+
+@dataclass(frozen=True)
+class Submission:
+    """What a client sent, checked and stored: ready to become a job."""
+
+    job_id: str
+    venue: Venue
+    options: Options
+    content_hash: str
+    idempotency_key: str | None
+    frames: dict[str, list[str]]
+
+
+class KeyReused(Exception):  # noqa: N818
+    """The idempotency key belongs to a job of other content."""
+
+    def __init__(self, job_id: str) -> None:
+        self.job_id = job_id
+
+
+class VenueBusy(Exception):  # noqa: N818
+    """The venue has an active job of other content."""
+
+    def __init__(self, job_id: str) -> None:
+        self.job_id = job_id
+
+
+class QueueFull(Exception):  # noqa: N818
+    """As many jobs wait as may."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker needs to compute a job."""
+
+    job_id: str
+    run_token: str
+    venue: Venue
+    options: Options
+    frames: dict[str, list[str]]
+
+
+@dataclass(frozen=True)
+class State:
+    """What waiters watch: `revision` grows with every change."""
+
+    revision: int
+    status: Status
+
+
+def new_job_id() -> str:
+    """A ULID: 48 bits of milliseconds and 80 of chance in Crockford's base 32, so ids sort by time."""
+    number = int(time.time() * 1000) << 80 | int.from_bytes(os.urandom(10))
+    return "".join(CROCKFORD[number >> shift & 31] for shift in range(125, -1, -5))
+
+
+class Jobs:
+    """The jobs in the database."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    # Submission
+
+    def same_as(self, venue_id: str, idempotency_key: str | None, content_hash: str) -> Job | None:
+        """The job that this content already is, so that nothing needs to be stored."""
+        with reading(self._engine) as connection:
+            job_id = self._duplicate(connection, venue_id, idempotency_key, content_hash)
+            return None if job_id is None else self._read(connection, job_id)
+
+    def submit(
+        self, submission: Submission, queue_limit: int, enqueue: Callable[[sa.Connection, str, int], None]
+    ) -> tuple[Job, bool]:
+        """Row and queue entry in one transaction, or the job that the content already is; also says which."""
+        now = datetime.now(UTC)
+        with writing(self._engine) as connection:
+            serialise(connection)
+            same = self._duplicate(connection, submission.venue.id, submission.idempotency_key, submission.content_hash)
+            if same is not None:
+                return self._read(connection, same), False
+            waiting = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued"))
+            if waiting is not None and waiting >= queue_limit:
+                raise QueueFull
+            priority = PRIORITIES[submission.options.priority]
+            connection.execute(
+                sa.insert(tables.jobs).values(
+                    id=submission.job_id,
+                    venue=submission.venue.id,
+                    status="queued",
+                    priority=priority,
+                    options=submission.options.model_dump(mode="json"),
+                    content_hash=submission.content_hash,
+                    idempotency_key=submission.idempotency_key,
+                    venue_document=submission.venue.model_dump(mode="json"),
+                    frames=submission.frames,
+                    created_at=now,
+                    updated_at=now,
+                )
+            )
+            enqueue(connection, submission.job_id, priority)
+            return self._read(connection, submission.job_id), True
+
+    def _duplicate(
+        self, connection: sa.Connection, venue_id: str, idempotency_key: str | None, content_hash: str
+    ) -> str | None:
+        if idempotency_key is not None:
+            query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.idempotency_key == idempotency_key)
+            known = connection.execute(query).one_or_none()
+            if known is not None:
+                if known.content_hash != content_hash:
+                    raise KeyReused(known.id)
+                return str(known.id)
+        query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.status.in_(OPEN))
+        active = connection.execute(query).one_or_none()
+        if active is None:
+            return None
+        if active.content_hash != content_hash:
+            raise VenueBusy(active.id)
+        return str(active.id)
+
+    # Reading
+
+    def get(self, job_id: str) -> Job | None:
+        """One job as clients see it."""
+        with reading(self._engine) as connection:
+            try:
+                return self._read(connection, job_id)
+            except sa.exc.NoResultFound:
+                return None
+
+    def page(self, venue: str | None, status: str | None, before: str | None, limit: int) -> list[Job]:
+        """Up to `limit` jobs, newest first, those older than `before`."""
+        query = sa.select(tables.jobs).order_by(j.id.desc()).limit(limit)
+        for column, value in ((j.venue, venue), (j.status, status)):
+            if value is not None:
+                query = query.where(column == value)
+        if before is not None:
+            query = query.where(j.id < before)
+        with reading(self._engine) as connection:
+            return [self._job(connection, row) for row in connection.execute(query)]
+
+    def states(self, job_ids: Collection[str]) -> dict[str, State]:
+        """What waiters need to know about several jobs."""
+        query = sa.select(j.id, j.revision, j.status).where(j.id.in_(job_ids))
+        with reading(self._engine) as connection:
+            return {row.id: State(row.revision, row.status) for row in connection.execute(query)}
+
+    def picture_folder(self, job_id: str) -> str | None:
+        """Where the pictures of a job lie in the blob store, None if there are none (yet)."""
+        query = sa.select(j.run_token).where(j.id == job_id, j.result.is_not(None))
+        with reading(self._engine) as connection:
+            token = connection.scalar(query)
+            return None if token is None else picture_folder(job_id, token)
+
+    def counts(self) -> dict[str, int]:
+        """How many jobs are in each state."""
+        with reading(self._engine) as connection:
+            rows = connection.execute(sa.select(j.status, sa.func.count().label("n")).group_by(j.status))
+            return {row.status: row.n for row in rows}
+
+    def oldest_queued_at(self) -> datetime | None:
+        """When the job that waits longest was submitted."""
+        query = sa.select(j.created_at).where(j.status == "queued").order_by(j.created_at).limit(1)
+        with reading(self._engine) as connection:
+            oldest: datetime | None = connection.scalar(query)
+            return oldest
+
+    # Working
+
+    def begin(self, job_id: str) -> Task | None:
+        """Start an attempt; None if there is nothing to do any more."""
+        token, now = uuid.uuid4().hex, datetime.now(UTC)
+        begin = (
+            sa.update(tables.jobs)
+            .where(j.id == job_id, j.status.in_(OPEN))
+            .values(
+                status="running",
+                run_token=token,
+                attempt=j.attempt + 1,
+                started_at=sa.func.coalesce(j.started_at, now, type_=j.started_at.type),
+                progress=None,
+                **_changed(),
+            )
+        )
+        with writing(self._engine) as connection:
+            if connection.execute(begin).rowcount == 0:
+                return None
+            return self._task(connection, job_id)
+
+    def task(self, job_id: str, run_token: str) -> Task | None:
+        """What to compute; None if the attempt has lost the job."""
+        with reading(self._engine) as connection:
+            task = self._task(connection, job_id)
+            return task if task is not None and task.run_token == run_token else None
+
+    def keep(self, task: Task) -> bool:
+        """A sign of life of an attempt; False if it has lost the job, to a cancellation or to another attempt."""
+        alive = sa.update(tables.jobs).where(*_fence(task)).values(updated_at=datetime.now(UTC))
+        with writing(self._engine) as connection:
+            return connection.execute(alive).rowcount == 1
+
+    def report(self, task: Task, progress: Progress) -> None:
+        """Show how far the job is."""
+        with writing(self._engine) as connection:
+            connection.execute(
+                sa.update(tables.jobs).where(*_fence(task)).values(progress=progress.model_dump(), **_changed())
+            )
+
+    def finish(self, task: Task, result: Result) -> None:
+        """End a job with a result; if it is accepted the stored poses move in the same transaction."""
+        with writing(self._engine) as connection:
+            serialise(connection)
+            if connection.scalar(sa.select(j.id).where(*_fence(task))) is None:
+                return
+            now_stored = find_venue(connection, task.venue.id)
+            if result.accepted and (now_stored is None or not now_stored.venue.calibrates_like(task.venue)):
+                result = result.model_copy(
+                    update={"accepted": False, "rejected_because": "the venue was changed while the job ran"}
+                )
+            self._end(connection, _fence(task), "succeeded", result=result.model_dump(mode="json"))
+            if result.accepted and not task.options.dry_run and now_stored is not None:
+                poses = {camera.id: camera.pose for camera in result.cameras}
+                save_venue(connection, StoredVenue(now_stored.venue.with_poses(poses), now_stored.revision + 1))
+                save_poses(connection, task.venue.id, poses, "calibration", task.job_id)
+
+    def fail(self, task: Task, error: JobError) -> None:
+        """End a job without a result."""
+        with writing(self._engine) as connection:
+            self._end(connection, _fence(task), "failed", error=error.model_dump())
+
+    def cancel(self, job_id: str) -> None:
+        """End a job that is still open; its worker notices."""
+        with writing(self._engine) as connection:
+            self._end(connection, [j.id == job_id, j.status.in_(OPEN)], "cancelled")
+
+    # Tidying
+
+    def unchanged_for(self, seconds: float) -> list[str]:
+        """Open jobs that nothing was heard of for a while."""
+        query = sa.select(j.id).where(j.status.in_(OPEN), j.updated_at < datetime.now(UTC) - timedelta(seconds=seconds))
+        with reading(self._engine) as connection:
+            return list(connection.scalars(query.order_by(j.updated_at).limit(100)))
+
+    def abandon(self, job_id: str, error: JobError) -> None:
+        """End an open job that the queue has given up."""
+        with writing(self._engine) as connection:
+            self._end(connection, [j.id == job_id, j.status.in_(OPEN)], "failed", error=error.model_dump())
+
+    # Parts
+
+    def _end(
+        self, connection: sa.Connection, where: list[sa.ColumnElement[bool]], status: Status, **values: Any
+    ) -> None:
+        connection.execute(
+            sa.update(tables.jobs)
+            .where(*where)
+            .values(status=status, finished_at=datetime.now(UTC), **values, **_changed())
+        )
+
+    def _task(self, connection: sa.Connection, job_id: str) -> Task | None:
+        row = connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one_or_none()
+        if row is None:
+            return None
+        return Task(
+            row.id,
+            row.run_token,
+            Venue.model_validate(row.venue_document),
+            Options.model_validate(row.options),
+            row.frames,
+        )
+
+    def _read(self, connection: sa.Connection, job_id: str) -> Job:
+        return self._job(connection, connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one())
+
+    def _job(self, connection: sa.Connection, row: Any) -> Job:
+        return Job(
+            id=row.id,
+            venue=row.venue,
+            status=row.status,
+            progress=row.progress,
+            queue_position=self._position(connection, row) if row.status == "queued" else None,
+            attempt=row.attempt,
+            created_at=row.created_at,
+            started_at=row.started_at,
+            finished_at=row.finished_at,
+            error=row.error,
+            result=row.result,
+            links=_links(row),
+        )
+
+    def _position(self, connection: sa.Connection, row: Any) -> int:
+        ahead = sa.or_(j.priority < row.priority, sa.and_(j.priority == row.priority, j.id < row.id))
+        count = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued", ahead))
+        return 1 + (count or 0)
+
+
+def picture_folder(job_id: str, run_token: str) -> str:
+    """Each attempt has pictures of its own, so that one given up late cannot overwrite those of the next."""
+    return f"pictures/{job_id}/{run_token}"
+
+
+def _fence(task: Task) -> list[sa.ColumnElement[bool]]:
+    return [j.id == task.job_id, j.run_token == task.run_token, j.status == "running"]
+
+
+def _changed() -> dict[str, Any]:
+    return {"revision": j.revision + 1, "updated_at": datetime.now(UTC)}
+
+
+def _links(row: Any) -> dict[str, str]:
+    base = f"/jobs/{row.id}"
+    links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel", "venue": f"/venues/{row.venue}"}
+    if row.result is not None:
+        links["preview"] = f"{base}/preview.jpg"
+        links["birdseye"] = f"{base}/birdseye.jpg"
+        links |= {f"overlay/{camera}": f"{base}/overlay/{camera}.jpg" for camera in row.frames}
+    return links

@@ -1,0 +1,97 @@
+"""The tables. What they mean is written here once; how they came to be is in `migrations`."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+
+class Instant(sa.TypeDecorator[datetime]):
+    """A moment in UTC. SQLite keeps no time zone, so it is put back when read."""
+
+    impl = sa.DateTime(timezone=True)
+    cache_ok = True
+
+    def process_result_value(self, value: Any, dialect: sa.Dialect) -> datetime | None:  # noqa: ARG002
+        """Let every moment leave with its zone."""
+        return None if value is None else value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+metadata = sa.MetaData()
+
+venues = sa.Table(
+    "venues",
+    metadata,
+    sa.Column("id", sa.String(64), primary_key=True),
+    # Counts every change of the document; it is the ETag.
+    sa.Column("revision", sa.Integer, nullable=False),
+    # schemas.Venue, with the poses that hold now.
+    sa.Column("document", sa.JSON, nullable=False),
+    sa.Column("updated_at", Instant, nullable=False),
+)
+
+# Every pose that ever held, and what brought it: a PUT (no job) or an accepted job.
+pose_history = sa.Table(
+    "pose_history",
+    metadata,
+    sa.Column("id", sa.Integer, primary_key=True),
+    sa.Column("venue", sa.String(64), nullable=False, index=True),
+    sa.Column("camera", sa.String(64), nullable=False),
+    sa.Column("pose", sa.JSON, nullable=False),
+    sa.Column("cause", sa.String(32), nullable=False),
+    sa.Column("job", sa.String(26)),
+    sa.Column("since", Instant, nullable=False),
+)
+
+jobs = sa.Table(
+    "jobs",
+    metadata,
+    sa.Column("id", sa.String(26), primary_key=True),
+    sa.Column("venue", sa.String(64), nullable=False),
+    sa.Column("status", sa.String(16), nullable=False),
+    sa.Column("priority", sa.Integer, nullable=False),
+    # schemas.Options, the seed filled in.
+    sa.Column("options", sa.JSON, nullable=False),
+    # Of the frames and options as they were sent: the same content is the same job.
+    sa.Column("content_hash", sa.String(64), nullable=False),
+    sa.Column("idempotency_key", sa.String(255)),
+    # The venue as it was when the frames were checked against it.
+    sa.Column("venue_document", sa.JSON, nullable=False),
+    # Camera id to the paths of its frames in the blob store.
+    sa.Column("frames", sa.JSON, nullable=False),
+    sa.Column("attempt", sa.Integer, nullable=False, default=0),
+    # Of the attempt that may write: a worker that lost its job finds another token here and stops.
+    sa.Column("run_token", sa.String(32)),
+    # Counts every change of the row, so that waiters need to read nothing else.
+    sa.Column("revision", sa.Integer, nullable=False, default=1),
+    sa.Column("progress", sa.JSON(none_as_null=True)),
+    sa.Column("result", sa.JSON(none_as_null=True)),
+    sa.Column("error", sa.JSON(none_as_null=True)),
+    sa.Column("created_at", Instant, nullable=False),
+    sa.Column("started_at", Instant),
+    sa.Column("finished_at", Instant),
+    sa.Column("updated_at", Instant, nullable=False),
+    sa.Index("jobs_by_venue", "venue", "id"),
+    sa.Index("jobs_by_status", "status", "priority", "id"),
+    sa.Index("one_job_per_key", "venue", "idempotency_key", unique=True),
+    sa.Index(
+        "one_active_job_per_venue",
+        "venue",
+        unique=True,
+        sqlite_where=sa.text("status IN ('queued', 'running')"),
+        postgresql_where=sa.text("status IN ('queued', 'running')"),
+    ),
+)
+
+# The heartbeat of the workers.
+workers = sa.Table(
+    "workers",
+    metadata,
+    sa.Column("name", sa.String(255), primary_key=True),
+    # Of the model file the worker computes with; null: the file is missing.
+    sa.Column("model_sha256", sa.String(64)),
+    sa.Column("started_at", Instant, nullable=False),
+    sa.Column("seen_at", Instant, nullable=False),
+)
