@@ -5,8 +5,10 @@ A wall is a plane with a texture in metres along it and in metres of height; it 
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
+from models.training.lettering import writing
 from models.training.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
 from models.training.scene import Conditions, Wall, World, hsv
 from worker.calibration.field import Field
@@ -187,6 +189,13 @@ def _board(wall: Wall, patch: Patch) -> tuple[Plane, Plane]:
         bands(patch.x - wall.extent[0], (wall.extent[1] - wall.extent[0]) / (1 + wall.seed % 5), 0.1, across),
         bands(patch.y - low, (wall.height - low) / (1 + wall.seed % 3), 0.1, up),
     )
+    if wall.seed % 3 == 0:
+        picture = writing(wall.seed)
+        texel = (wall.height - 0.3) * 0.6 / picture.shape[0]
+        column = (patch.x - np.float32(wall.extent[0] + 0.4)) / np.float32(texel)
+        row = (np.float32(wall.height * 0.9) - patch.y) / np.float32(texel)
+        ink = cv2.remap(picture, column, row, cv2.INTER_LINEAR, borderValue=0)
+        frame = np.maximum(frame, ink * np.clip(texel * 3 / up, 0, 1))
     colour = mix(colour, wall.accent, frame)
     return colour, step(np.float32(wall.height) - patch.y, up) * step(patch.y - low, up)
 

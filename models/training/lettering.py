@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +46,12 @@ def random_letters(rng: np.random.Generator, pitch: Field) -> tuple[Letters, ...
         colour = random_colour(rng, 0.9)
         found.append(Letters(picture, (float(corner[0]), float(corner[1])), along, TEXEL_M, colour))
     return tuple(found)
+
+
+@lru_cache(maxsize=32)
+def writing(seed: int) -> NDArray[np.float32]:
+    """A word as coverage, for boards."""
+    return _word(np.random.default_rng(seed), 24)
 
 
 def _word(rng: np.random.Generator, rows: int) -> NDArray[np.float32]:

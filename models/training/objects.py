@@ -48,8 +48,24 @@ class Canvas:
         for label in self.labels:
             cv2.fillPoly(label, corners, 0, cv2.LINE_AA, SHIFT)
 
+    def disc(self, middle: Array, radius: float, colour: Colour) -> None:
+        """A ball of `radius` metres at a world point, darker below."""
+        spot = self.project(middle[None])[0]
+        size = radius * self.size_at(middle)
+        height, width = self.colour.shape[:2]
+        if not (-size < spot[0] < width + size and -size < spot[1] < height + size):
+            return
+        angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+        ring = size * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        self.polygon(spot + ring, colour * np.float32(0.7))
+        self.polygon(spot + 0.8 * ring - [0, 0.2 * size], colour)
+
     def bar(self, start: Array, end: Array, thick: float, colour: Colour) -> None:
         """A round bar of `thick` metres between two world points; thinner than a pixel it becomes faint."""
+        ends = self.project(np.array([start, end]))
+        height, width = self.colour.shape[:2]
+        if not np.isfinite(ends).all() or (ends.max(axis=0) < -40).any() or (ends.min(axis=0) > (width + 40, height + 40)).any():
+            return
         steps = max(2, int(np.linalg.norm(end - start) / 2) + 1)
         points = start + np.linspace(0, 1, steps)[:, None] * (end - start)
         pixels = self.project(points)
@@ -160,12 +176,7 @@ class Person:
             shade = self.kit[part] * np.float32(0.9 if part == 2 else 1.0)
             canvas.polygon(canvas.project(self.place(canvas.camera.pose.position, polygon)), shade)
         if self.ball is not None:
-            spot = canvas.project(self.ball[None])[0]
-            radius = 0.11 * canvas.size_at(self.ball)
-            angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-            ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-            canvas.polygon(spot + radius * ring, np.float32([0.95, 0.95, 0.95]))
-            canvas.polygon(spot + radius * (0.5 * ring + 0.3), np.float32([0.7, 0.7, 0.72]))
+            canvas.disc(self.ball, 0.11, np.float32([0.95, 0.95, 0.95]))
 
 
 def _people(pitch: Field, world: World, conditions: Conditions) -> Iterator[Person]:
@@ -221,7 +232,7 @@ def _shadows(world: World, conditions: Conditions, canvas: Canvas, people: list[
                 if np.isfinite(spots).all() and np.abs(spots).max() < 20000:
                     cv2.fillPoly(layer, [np.round(spots * 2**SHIFT).astype(np.int32)], 255, cv2.LINE_AA, SHIFT)
             if layer is not ink:
-                ink = np.maximum(ink // 1, layer) if strength > 0.3 else cv2.add(ink, layer // 4)
+                ink = cv2.add(ink, layer // 4)
     if ink.any():
         if len(lamps) > 1:
             strength = 0.6
@@ -313,6 +324,9 @@ def _furniture(
     def bar(start: Array, end: Array, thick: float, colour: Colour) -> tuple[Array, Callable[[Canvas], None]]:
         return start, lambda canvas: canvas.bar(start, end, thick, colour)
 
+    def disc(middle: Array, radius: float, colour: Colour) -> tuple[Array, Callable[[Canvas], None]]:
+        return middle, lambda canvas: canvas.disc(middle, radius, colour)
+
     flag = random_colour(rng, 0.3)
     pole = random_colour(rng, 0.6)
     for x in (-1, 1):
@@ -336,9 +350,8 @@ def _furniture(
         yield bar(spot, spot + [0, 0, rng.uniform(8, 22)], rng.uniform(0.15, 0.4), random_colour(rng, 0.5))
     for _ in range(int(rng.integers(0, 25))):  # cones, bottles and balls on the ground
         xy = rng.uniform(-0.6, 0.6, 2) * [pitch.length, pitch.width]
-        spot = pitch.lift(xy)
-        size = rng.uniform(0.12, 0.35)
-        yield bar(spot, spot + [0, 0, size], size, random_colour(rng, 0.6))
+        radius = float(rng.uniform(0.08, 0.2))
+        yield disc(pitch.lift(xy) + [0, 0, radius], radius, random_colour(rng, 0.6))
 
 
 def _ink(colour: Colour, dim: float) -> tuple[float, float, float]:

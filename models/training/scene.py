@@ -172,7 +172,6 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
 
     rng = np.random.default_rng([conditions.world, 17])
     grass, other = _grass(rng, conditions)
-    contrast = rng.uniform(0.5, 1.6) * (1.2 if conditions.turf == "artificial" else 1.0)
     zones = _zones(rng, grass)
     return World(
         grass=(grass, other),
@@ -180,21 +179,9 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
         stripe_period=float(rng.uniform(3.5, 18)),
         stripe_angle=float(rng.choice([0, 0, np.pi / 2, np.pi / 2, rng.uniform(0, np.pi)])),
         stripe_kind=str(rng.choice(["stripes", "stripes", "checks", "rings"])),
-        turf_noise=Noise.draw(
-            rng,
-            {
-                0.008: 0.30 * contrast * rng.uniform(0.3, 1.2),
-                0.02: 0.26 * contrast * rng.uniform(0.3, 1.2),
-                0.05: 0.18 * contrast * rng.uniform(0.3, 1.2),
-                0.13: 0.10 * contrast * rng.uniform(0.3, 1.2),
-                0.4: 0.05 * contrast * rng.uniform(0.3, 1.2),
-                1.3: 0.035 * contrast * rng.uniform(0.3, 1.2),
-                5.0: 0.04 * rng.uniform(0.3, 1.5),
-                18.0: 0.05 * rng.uniform(0.2, 1.2),
-            },
-        ),
+        turf_noise=_turf(rng, conditions),
         tint_noise=Noise.draw(rng, {0.1: 0.15, 0.5: 0.25, 2.5: 0.4, 11.0: 0.6}),
-        tint=rng.normal(0, 0.06, 3).astype(np.float32),
+        tint=rng.normal(0, 0.05, 3).astype(np.float32),
         wear_noise=Noise.draw(rng, {0.05: 0.25, 0.2: 0.35, 0.8: 0.5, 3.0: 0.5, 9.0: 0.3}),
         paint=_paint(rng),
         paint_noise=Noise.draw(rng, {0.01: 0.35, 0.03: 0.3, 0.1: 0.3, 0.4: 0.3, 1.5: 0.4, 6.0: 0.4}),
@@ -216,6 +203,17 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
         goal_style=int(rng.integers(1 << 30)),
         strips=tuple(random_colour(rng, 0.4) for _ in range(6)),
     )
+
+
+def _turf(rng: np.random.Generator, conditions: Conditions) -> Noise:
+    """Light and dark of the turf: blades and filling first on artificial turf, tufts and patches too on natural."""
+    blades, tufts, patches = np.exp(rng.uniform(np.log([0.12, 0.03, 0.02]), np.log([0.6, 0.3, 0.12])))
+    if conditions.turf == "artificial":
+        blades, tufts, patches = 1.3 * blades, 0.35 * tufts, 0.6 * patches
+    weights = rng.uniform(0.4, 1.2, 8)
+    grains = (0.008, 0.02, 0.05, 0.13, 0.4, 1.3, 5.0, 18.0)
+    sizes = (blades, blades, 0.7 * tufts + 0.2 * blades, tufts, 0.6 * tufts, 0.4 * tufts, patches, patches)
+    return Noise.draw(rng, {g: float(s * w) for g, s, w in zip(grains, sizes, weights, strict=True)})
 
 
 def _grass(rng: np.random.Generator, conditions: Conditions) -> tuple[Colour, Colour]:
@@ -257,6 +255,8 @@ def _zones(rng: np.random.Generator, grass: Colour) -> tuple[Zone, ...]:
             stripe = colour * np.float32(rng.uniform(0.5, 1.3))
         zones.append(Zone(start, kind, colour, np.clip(stripe, 0, 1), float(period), float(width)))
         start += float(rng.uniform(0.3, 12.0))
+    meadow = grass * np.float32(rng.uniform(0.5, 1.2)) if rng.random() < 0.6 else random_colour(rng, 0.1)
+    zones.append(Zone(start + float(rng.uniform(2, 15)), "grass", np.clip(meadow, 0, 1), meadow, 1.0, 0.0))
     return tuple(zones)
 
 
@@ -265,8 +265,8 @@ def _walls(rng: np.random.Generator) -> tuple[Wall, ...]:
     heights = {
         "building": (4, 15, 0.0),
         "trees": (4, 16, 0.0),
-        "stand": (2, 14, 1.7),
-        "fence": (1.2, 8, 0.0),
+        "stand": (1.2, 14, 1.7),
+        "fence": (1.0, 8, 0.0),
         "board": (1.5, 4, 0.0),
         "hoarding": (0.6, 1.1, 0.0),
     }

@@ -42,7 +42,11 @@ def shade_ground(
     colour = _beside(pitch, world, patch, outside, colour)
     if conditions.other_lines:
         colour = _other_lines(pitch, world, conditions, patch, colour)
-    coverage, target, painted = marking_coverage(pitch, world, conditions, patch)
+    coverage, target = marking_shares(pitch, patch)
+    painted, lasting = coverage, np.float32(1)
+    if coverage.any():
+        rough = np.float32(0.012 * (0.3 + conditions.wear)) * world.edge_noise.at(patch)
+        painted, _ = marking_shares(pitch, patch, rough)
     opacity, lasting = _paint(world, conditions, patch)
     paint = world.paint * (1 + 0.12 * world.paint_noise.at(patch))[..., None]
     colour = mix(colour, paint, painted * opacity)
@@ -50,6 +54,9 @@ def shade_ground(
         share = _letter_coverage(letters, patch)
         if share is not None:
             colour = mix(colour, letters.colour * paint / world.paint, share * np.maximum(opacity, 0.3))
+    if conditions.rain:  # wet ground mirrors the sky, more so far away
+        gloss = np.float32(0.45 * conditions.rain) * smooth_step(world.cloud_noise.at(patch) + patch.depth / 40, 0, 3)
+        colour = mix(colour, np.float32([0.75, 0.72, 0.7]), gloss)
     snow = _snow(world, conditions, patch)
     if snow is not None:
         colour = mix(colour, np.float32([0.97, 0.94, 0.92]), snow)
@@ -120,31 +127,36 @@ def _roof_planes(pitch: Field) -> list[tuple[float, float, float]]:
     ]
 
 
-def marking_coverage(
-    pitch: Field, world: World, conditions: Conditions, patch: Patch
-) -> tuple[Plane, Plane, Plane]:
-    """Coverage, training target and painted share (H, W) of all markings; paint has rough edges, the labels have not."""
-    coverage = np.zeros_like(patch.x)
-    target, painted = coverage.copy(), coverage.copy()
-    rough = None
+def marking_shares(pitch: Field, patch: Patch, rough: Plane | float = 0.0) -> tuple[Plane, Plane]:
+    """Share (H, W) of each pixel covered by markings, as they are and as the network learns them.
+
+    `rough` (H, W), metres, shifts the edges of the first.
+    """
+    coverage, target = np.zeros_like(patch.x), np.zeros_like(patch.x)
     for marking in pitch.markings():
         place = _near(marking, patch)
         if place is None:
             continue
         part = patch.part(*place)
         offset, beyond, across, along = _offsets(marking, part)
-        if rough is None:
-            rough = 0.012 * (0.3 + conditions.wear) * world.edge_noise.at(patch)
-        inside = step(-beyond, along)
+        inside = step(-beyond, along) * part.seen
         width = np.float32(marking.width)
-        exact = band(offset, width, across) * inside
+        shifted = offset + (rough[place] if isinstance(rough, np.ndarray) else rough)
         wide = np.maximum(width, LEARNT_WIDTH_PX * across)
-        faint = smooth_step(width / across, *FAINTEST_WIDTH_PX)
-        learnt = band(offset, wide, across) * inside * faint
-        paint = band(offset + rough[place], width, across) * inside
-        for total, share in ((coverage, exact), (target, learnt), (painted, paint)):
-            total[place] = np.maximum(total[place], np.where(part.seen, share, 0))
-    return coverage, target, painted
+        learnt = band(offset, wide, across) * smooth_step(width / across, *FAINTEST_WIDTH_PX)
+        for total, share in ((coverage, band(shifted, width, across)), (target, learnt)):
+            total[place] = np.maximum(total[place], share * inside)
+    return coverage, target
+
+
+def marking_distance(pitch: Field, patch: Patch) -> Plane:
+    """Metres (H, W) on the ground to the nearest edge of a marking."""
+    nearest = np.full_like(patch.x, np.inf)
+    for marking in pitch.markings():
+        offset, beyond, _, _ = _offsets(marking, patch)
+        aside = np.maximum(np.abs(offset) - np.float32(marking.width / 2), 0)
+        nearest = np.minimum(nearest, np.hypot(aside, np.maximum(beyond, 0)))
+    return nearest
 
 
 def _near(marking: Marking, patch: Patch) -> tuple[slice, slice] | None:

@@ -1,0 +1,174 @@
+"""How good a model is: on frames of real venues with known poses, or on rendered venues it has never seen.
+
+    python -m models.training.evaluate --rendered 200
+    python -m models.training.evaluate --real FOLDER --write OUT
+
+FOLDER holds `venue.json`, `reference.json` with a pose per camera, and frames `<camera>_<moment>.jpg`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from models.training.crops import random_crop
+from models.training.noise import Plane
+from models.training.surface import ground_patch, marking_distance, marking_shares, window_rays
+from worker.calibration.camera import Camera, Intrinsics, Pose
+from worker.calibration.field import Field
+
+MODEL_PATH = Path(__file__).parents[1] / "unet.onnx"
+TILE, HALO = 512, 96
+TOLERANCE_PX = 3
+AROUND_PITCH_M = 5.0
+CLEAR_M = 1.0
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Shares 0..1: markings found, answers inside the pitch that are markings, pixels far from markings called one."""
+
+    recall: float
+    precision: float
+    false_alarms: float
+
+    def __str__(self) -> str:
+        return f"recall {self.recall:.3f}  precision {self.precision:.3f}  false alarms {100 * self.false_alarms:.3f} %"
+
+
+def judge(field: Field, camera: Camera, probability: Plane, threshold: float = 0.5) -> Figures:
+    """Figures of a probability map (H, W) of the raw frame of a camera whose pose is known.
+
+    A label pixel is found if an answer lies within `TOLERANCE_PX`, and an answer is right if a label pixel does.
+    """
+    width, height = camera.intrinsics.size
+    rays = window_rays(camera, (0, 0, width, height))
+    patch = ground_patch(field, None, camera.pose.position, rays)
+    _, target = marking_shares(field, patch)
+    label, answer = target > 0.5, probability > threshold
+    near_answer = _distance_px(answer) <= TOLERANCE_PX
+    near_label = _distance_px(label) <= TOLERANCE_PX
+    on_pitch = patch.seen & (np.abs(patch.x) < field.length / 2 + AROUND_PITCH_M)
+    on_pitch &= np.abs(patch.y) < field.width / 2 + AROUND_PITCH_M
+    clear = ~patch.seen | (marking_distance(field, patch) > CLEAR_M)
+    return Figures(
+        recall=float(near_answer[label].mean()),
+        precision=float(near_label[answer & on_pitch].mean()) if (answer & on_pitch).any() else 1.0,
+        false_alarms=float(answer[clear].mean()),
+    )
+
+
+def _distance_px(mask: NDArray[np.bool_]) -> Plane:
+    return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
+
+
+def segment(session: onnxruntime.InferenceSession, frame: NDArray[np.uint8]) -> Plane:
+    """Probability (H, W) of a frame (H, W, 3) blue green red, tile by tile."""
+    height, width = frame.shape[:2]
+    rows, columns = -(-height // TILE) * TILE, -(-width // TILE) * TILE
+    padded = cv2.copyMakeBorder(
+        frame, HALO, HALO + rows - height, HALO, HALO + columns - width, cv2.BORDER_REFLECT_101
+    )
+    probability = np.empty((rows, columns), np.float32)
+    name = session.get_inputs()[0].name
+    for top in range(0, rows, TILE):
+        for left in range(0, columns, TILE):
+            tile = padded[top : top + TILE + 2 * HALO, left : left + TILE + 2 * HALO, ::-1]
+            picture = tile.transpose(2, 0, 1)[None].astype(np.float32) / 255
+            answer = session.run(None, {name: picture})[0][0, 0]
+            probability[top : top + TILE, left : left + TILE] = answer[HALO:-HALO, HALO:-HALO]
+    return probability[:height, :width]
+
+
+def open_model(path: Path = MODEL_PATH, threads: int = 2) -> onnxruntime.InferenceSession:
+    """An ONNX session on the CPU."""
+    settings = onnxruntime.SessionOptions()
+    settings.intra_op_num_threads = threads
+    return onnxruntime.InferenceSession(str(path), settings, providers=["CPUExecutionProvider"])
+
+
+def real_cameras(folder: Path) -> tuple[Field, dict[str, Camera]]:
+    """The pitch and the cameras, with the poses of `reference.json`, of a folder of real frames."""
+    venue = json.loads((folder / "venue.json").read_text())
+    poses = json.loads((folder / "reference.json").read_text())["poses"]
+    shape = venue["field"]
+    ridge = np.array(shape["ridge"]) if shape.get("ridge") else None
+    field = Field(shape["length_m"], shape["width_m"], shape["line_width_m"], ridge)
+    cameras = {}
+    for entry in venue["cameras"]:
+        lens = entry["intrinsics"]
+        intrinsics = Intrinsics(np.array(lens["matrix"]), np.array(lens["distortion"]), tuple(entry["image_size"]))
+        pose = poses[entry["id"]]
+        cameras[entry["id"]] = Camera(
+            entry["id"], intrinsics, Pose(np.array(pose["rotation"]), np.array(pose["position"]))
+        )
+    return field, cameras
+
+
+def real(session: onnxruntime.InferenceSession, folder: Path, out: Path | None) -> dict[str, Figures]:
+    """Figures per frame of a folder of real frames; the probabilities as pictures in `out`."""
+    field, cameras = real_cameras(folder)
+    figures = {}
+    for path in sorted(folder.glob("*_*.jpg")):
+        camera = cameras.get(path.stem.rsplit("_", 1)[0])
+        if camera is None:
+            continue
+        frame = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        probability = segment(session, frame)
+        figures[path.stem] = judge(field, camera, probability)
+        if out:
+            out.mkdir(parents=True, exist_ok=True)
+            cv2.imwrite(str(out / f"{path.stem}.png"), np.round(probability * 255).astype(np.uint8))
+    return figures
+
+
+def rendered(session: onnxruntime.InferenceSession, crops: int, seed: int = 2**20) -> dict[str, float]:
+    """Mean figures over rendered crops of venues that training never draws: IoU and F1 at 0.5, false share off lines."""
+    hits = answers = labels = alarms = clear = 0
+    name = session.get_inputs()[0].name
+    for index in range(crops):
+        rendering = random_crop(np.random.default_rng([seed, index]))
+        picture = rendering.frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
+        answer = session.run(None, {name: picture})[0][0, 0] > 0.5
+        label = rendering.target > 0.5
+        far = _distance_px(rendering.target > 0.05) > TOLERANCE_PX
+        hits += int((answer & label).sum())
+        answers += int(answer.sum())
+        labels += int(label.sum())
+        alarms += int((answer & far).sum())
+        clear += int(far.sum())
+    return {
+        "iou": hits / max(answers + labels - hits, 1),
+        "f1": 2 * hits / max(answers + labels, 1),
+        "recall": hits / max(labels, 1),
+        "precision": hits / max(answers, 1),
+        "false_alarms": alarms / max(clear, 1),
+    }
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", type=Path, default=MODEL_PATH)
+    parser.add_argument("--rendered", type=int, default=0, help="number of rendered crops")
+    parser.add_argument("--real", type=Path, help="folder of real frames")
+    parser.add_argument("--write", type=Path, help="folder for the probability maps")
+    options = parser.parse_args()
+    session = open_model(options.model)
+    if options.rendered:
+        for name, value in rendered(session, options.rendered).items():
+            print(f"{name:13} {value:.4f}")
+    if options.real:
+        for name, figures in real(session, options.real, options.write).items():
+            print(f"{name:10} {figures}")
+
+
+if __name__ == "__main__":
+    main()
