@@ -17,7 +17,7 @@ OUTWARD = {"near": (0.0, -1.0), "far": (0.0, 1.0), "left": (-1.0, 0.0), "right":
 
 
 def shade_sky(conditions: Conditions, rays: Plane) -> Plane:
-    """Sky colours (H, W, 3) along rays (H, W, 3): a gradient, clouds on a plane overhead, a dull meadow below."""
+    """Sky colours (H, W, 3) along rays (H, W, 3): a gradient, and clouds on a plane overhead."""
     rng = np.random.default_rng([conditions.world, 31])
     length = np.linalg.norm(rays, axis=-1)
     up = rays[..., 2] / length
@@ -39,8 +39,7 @@ def shade_sky(conditions: Conditions, rays: Plane) -> Plane:
     cover = smooth_step(clouds.at(sky) + np.float32(rng.uniform(-1.5, 1.5)), -0.5, 1.8)
     white = np.float32(0.15 if conditions.light == "floodlight" else rng.uniform(0.85, 1.1))
     colour = mix(colour, np.float32([1.0, 0.98, 0.97]) * white, cover * np.clip(up * 12, 0, 1))
-    meadow = hsv(rng.uniform(30, 120), rng.uniform(0.1, 0.5), rng.uniform(0.2, 0.5))
-    return mix(colour, meadow, (up < 0.0).astype(np.float32))
+    return colour
 
 
 def add_walls(
@@ -77,7 +76,7 @@ def _wall_patch(pitch: Field, wall: Wall, centre: Plane, rays: Plane) -> tuple[t
     closing = rays[..., 0] * ox + rays[..., 1] * oy - wall.lean * rays[..., 2]
     depth = ahead / np.where(closing > 1e-4, closing, 1e9)
     height = centre[2] + depth * rays[..., 2]
-    seen = (closing > 1e-3) & (height > -0.1) & (height < 1.3 * wall.height) & (depth < 500)
+    seen = (closing > 1e-3) & (height > -0.1) & (height < 1.3 * wall.height) & (depth < 700)
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     if len(rows) < 3 or len(columns) < 3:
         return None

@@ -17,7 +17,7 @@ SHARD_CROPS = 64
 
 def render_shards(folder: Path, seed: int, worker: int, first: int, last: int) -> None:
     """Fill shards first..last-1 of `folder` that are not there yet; (64, S, S, 4) uint8: blue, green, red, target."""
-    os.nice(12)
+    os.nice(4)
     cv2.setNumThreads(1)
     folder.mkdir(parents=True, exist_ok=True)
     for number in range(first, last):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from models.training.backdrop import add_walls, shade_sky
 from models.training.objects import Canvas, draw_objects
 from models.training.scene import Conditions, World, build_world
-from models.training.sensor import add_fog, expose
+from models.training.sensor import add_air, expose
 from models.training.surface import shade_ground, window_rays
 from worker.calibration.camera import Camera
 from worker.calibration.field import Field
@@ -78,9 +78,10 @@ def _paint(
     dim = 0.9 if conditions.light == "floodlight" else 1.0
     lit = ground.patch.seen
     colour = np.where(lit[..., None], ground.colour * np.float32(dim), shade_sky(conditions, rays))
-    depth = np.where(lit, ground.patch.depth, np.float32(1000.0))
+    depth = np.where(lit, ground.patch.depth, np.float32(1e6))
     colour, depth, hidden = add_walls(field, world, conditions, centre, rays, colour, depth)
-    colour = add_fog(conditions, colour, np.minimum(depth, 400))
+    away = np.where(depth < 1e6, depth, np.float32(600 if conditions.fog else 0))
+    colour = add_air(conditions, colour, away)
     picture = (np.clip(colour, 0, 1) * 255).astype(np.uint8)
     seen = 1 - hidden
     labels = tuple((np.clip(label * seen, 0, 1) * 255 + 0.5).astype(np.uint8) for label in (ground.coverage, ground.target))

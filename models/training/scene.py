@@ -27,11 +27,13 @@ SIZES = ((1280, 720), (1920, 1080), (1920, 1080), (2560, 1440), (2688, 1520), (3
 class Conditions:
     """Light, weather, state of the pitch, people and lens of one rendering.
 
-    `world` seeds everything that stays at its place, `moment` where people stand. Shares are 0..1.
+    `world` seeds everything that stays at its place, `moment` where people stand. Shares are 0..1. `variety`: 0 for a
+    well-kept ground and a good camera, 1 for anything that is called a pitch and anything that is called a camera.
     """
 
     world: int = 0
     moment: int = 0
+    variety: float = 0.0
     light: str = "sun"
     turf: str = "natural"
     long_shadows: float = 0.0
@@ -64,6 +66,7 @@ class Conditions:
         return cls(
             world=int(rng.integers(2**31)),
             moment=int(rng.integers(2**31)),
+            variety=1.0,
             light=str(rng.choice(LIGHTS, p=[0.45, 0.4, 0.15])),
             turf=str(rng.choice(["natural", "artificial"])),
             long_shadows=sometimes(0.3),
@@ -181,7 +184,7 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
         stripe_kind=str(rng.choice(["stripes", "stripes", "checks", "rings"])),
         turf_noise=_turf(rng, conditions),
         tint_noise=Noise.draw(rng, {0.1: 0.15, 0.5: 0.25, 2.5: 0.4, 11.0: 0.6}),
-        tint=rng.normal(0, 0.05, 3).astype(np.float32),
+        tint=((0.2 + 0.8 * conditions.variety) * rng.normal(0, 0.05, 3)).astype(np.float32),
         wear_noise=Noise.draw(rng, {0.05: 0.25, 0.2: 0.35, 0.8: 0.5, 3.0: 0.5, 9.0: 0.3}),
         paint=_paint(rng),
         paint_noise=Noise.draw(rng, {0.01: 0.35, 0.03: 0.3, 0.1: 0.3, 0.4: 0.3, 1.5: 0.4, 6.0: 0.4}),
@@ -210,6 +213,8 @@ def _turf(rng: np.random.Generator, conditions: Conditions) -> Noise:
     blades, tufts, patches = np.exp(rng.uniform(np.log([0.12, 0.03, 0.02]), np.log([0.6, 0.3, 0.12])))
     if conditions.turf == "artificial":
         blades, tufts, patches = 1.3 * blades, 0.35 * tufts, 0.6 * patches
+    calm = 0.4 + 0.6 * conditions.variety
+    blades, tufts, patches = 0.7 * blades + 0.3 * calm * blades, calm * tufts, calm * patches
     weights = rng.uniform(0.4, 1.2, 8)
     grains = (0.008, 0.02, 0.05, 0.13, 0.4, 1.3, 5.0, 18.0)
     sizes = (blades, blades, 0.7 * tufts + 0.2 * blades, tufts, 0.6 * tufts, 0.4 * tufts, patches, patches)
@@ -218,7 +223,8 @@ def _turf(rng: np.random.Generator, conditions: Conditions) -> Noise:
 
 def _grass(rng: np.random.Generator, conditions: Conditions) -> tuple[Colour, Colour]:
     """Two colours of the mowing pattern."""
-    hue, saturation, value = rng.uniform(65, 150), rng.uniform(0.18, 0.7), rng.uniform(0.26, 0.62)
+    ordinary, anything = np.array([95, 0.55, 0.5]), rng.uniform([65, 0.18, 0.26], [150, 0.7, 0.62])
+    hue, saturation, value = ordinary + (0.25 + 0.75 * conditions.variety) * (anything - ordinary)
     contrast = conditions.mowing
     light = hsv(hue, saturation, value * (1 + 0.18 * contrast))
     dark = hsv(
@@ -255,7 +261,7 @@ def _zones(rng: np.random.Generator, grass: Colour) -> tuple[Zone, ...]:
             stripe = colour * np.float32(rng.uniform(0.5, 1.3))
         zones.append(Zone(start, kind, colour, np.clip(stripe, 0, 1), float(period), float(width)))
         start += float(rng.uniform(0.3, 12.0))
-    meadow = grass * np.float32(rng.uniform(0.5, 1.2)) if rng.random() < 0.6 else random_colour(rng, 0.1)
+    meadow = grass * np.float32(rng.uniform(0.5, 1.2)) if rng.random() < 0.85 else random_colour(rng, 0.1)
     zones.append(Zone(start + float(rng.uniform(2, 15)), "grass", np.clip(meadow, 0, 1), meadow, 1.0, 0.0))
     return tuple(zones)
 
@@ -273,6 +279,11 @@ def _walls(rng: np.random.Generator) -> tuple[Wall, ...]:
     chances = {"building": 0.3, "trees": 0.7, "stand": 0.45, "fence": 0.55, "board": 0.3, "hoarding": 0.35}
     walls = []
     for side in SIDES:
+        if rng.random() < 0.7:  # woods in the distance
+            colour = hsv(rng.uniform(60, 130), rng.uniform(0.2, 0.6), rng.uniform(0.2, 0.4))
+            leaves = Noise.draw(rng, {0.4: 0.5, 1.2: 0.8, 3.5: 0.9, 10.0: 0.5})
+            far, tall, seed = float(rng.uniform(90, 300)), float(rng.uniform(8, 22)), int(rng.integers(1 << 30))
+            walls.append(Wall(side, "trees", far, tall, 0.0, (-500.0, 500.0), colour, colour, 9.0, seed, leaves))
         distance = float(rng.uniform(25, 60))
         for kind, (low, high, lean) in heights.items():
             distance = max(2.5, distance * float(rng.uniform(0.5, 0.9)))

@@ -10,12 +10,11 @@ from models.training.noise import Plane
 from models.training.scene import Conditions
 
 
-def add_fog(conditions: Conditions, colour: Plane, depth: Plane) -> Plane:
-    """Air between camera and ground, denser with distance."""
-    if not conditions.fog:
-        return colour
-    share = 1 - np.exp(-depth * np.float32(0.012 * conditions.fog))
-    grey = np.float32([0.82, 0.8, 0.78]) * np.float32(0.4 if conditions.light == "floodlight" else 1.0)
+def add_air(conditions: Conditions, colour: Plane, depth: Plane) -> Plane:
+    """Air between camera and scene: a blue haze far away, and fog."""
+    dim = np.float32(0.3 if conditions.light == "floodlight" else 1.0)
+    share = 1 - np.exp(-depth * np.float32(0.0008 + 0.012 * conditions.fog))
+    grey = np.float32([0.82, 0.8, 0.78] if conditions.fog else [0.8, 0.72, 0.66]) * dim
     return colour + share[..., None] * (grey - colour)
 
 
@@ -31,7 +30,7 @@ def expose(
     light = _drops(conditions, light, origin, size, lens)
     light = _blur(conditions, light, lens)
     light = _fringe(conditions, light, origin, size, lens)
-    light = _tone(light, origin, size, lens)
+    light = _tone(conditions, light, origin, size, lens)
     light = light + _grain(conditions, light, rng, lens)
     light = _sharpen(conditions, light, lens)
     frame = np.clip(light * 255 + 0.5, 0, 255).astype(np.uint8)
@@ -96,18 +95,19 @@ def _fringe(
     return np.dstack(bands)
 
 
-def _tone(light: Plane, origin: tuple[int, int], size: tuple[int, int], lens: np.random.Generator) -> Plane:
+def _tone(conditions: Conditions, light: Plane, origin: tuple[int, int], size: tuple[int, int], lens: np.random.Generator) -> Plane:
     """Exposure, white balance, contrast, saturation and the dark corners of the lens."""
-    gain = np.exp(lens.normal(0, 0.12)) * np.exp(lens.normal(0, 0.05, 3))
+    odd = 0.15 + 0.85 * conditions.variety
+    gain = np.exp(odd * lens.normal(0, 0.12)) * np.exp(odd * lens.normal(0, 0.05, 3))
     light = light * gain.astype(np.float32)
-    contrast, pivot = np.float32(lens.uniform(0.8, 1.3)), np.float32(0.42)
-    light = pivot + contrast * (light - pivot) + np.float32(lens.normal(0, 0.03))
+    contrast, pivot = np.float32(1 + odd * lens.uniform(-0.2, 0.3)), np.float32(0.42)
+    light = pivot + contrast * (light - pivot) + np.float32(odd * lens.normal(0, 0.03))
     grey = light.mean(axis=-1, keepdims=True)
-    light = grey + np.float32(lens.uniform(0.6, 1.35)) * (light - grey)
+    light = grey + np.float32(1 + odd * lens.uniform(-0.4, 0.35)) * (light - grey)
     height, width = light.shape[:2]
     x = (np.arange(width, dtype=np.float32) + origin[0]) / size[0] - 0.5
     y = (np.arange(height, dtype=np.float32) + origin[1]) / size[0] - 0.5 * size[1] / size[0]
-    corner = np.float32(lens.uniform(0, 0.9)) * (x[None] ** 2 + y[:, None] ** 2)
+    corner = np.float32(odd * lens.uniform(0, 0.9)) * (x[None] ** 2 + y[:, None] ** 2)
     return light * (1 - corner)[..., None]
 
 

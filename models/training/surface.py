@@ -12,7 +12,7 @@ from models.training.scene import Conditions, Letters, World
 from worker.calibration.camera import Camera
 from worker.calibration.field import Field, Marking
 
-FARTHEST_M = 600.0
+FARTHEST_M = 2500.0
 LEARNT_WIDTH_PX = 1.5
 FAINTEST_WIDTH_PX = (0.06, 0.16)
 GRID_STEP = 8

@@ -1,0 +1,94 @@
+"""Makes the demo venue: `python -m tests.demo.render` writes venue.json, truth.json, left.jpg and right.jpg beside itself.
+
+Two cameras on one pole near the halfway line. The venue stores the poses of before a storm; truth.json has those of the
+frames.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from models.training.render import Conditions, render_frame
+from worker.calibration.camera import Camera, Intrinsics, Pose, rotation_matrices, rotation_vectors
+from worker.calibration.field import Field
+
+HERE = Path(__file__).parent
+SIZE = (3840, 2160)
+WORLD = 22
+MOVED_M, MOVED_DEG = 0.16, 1.0
+LARGEST_BYTES = 3_000_000
+
+FIELD = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
+
+
+def cameras() -> list[Camera]:
+    """The two cameras as they stand when the frames are taken."""
+    left = Intrinsics(
+        np.array([[2460.0, 0, 1931.5], [0, 2460.0, 1068.2], [0, 0, 1]]), np.array([-0.302, 0.083, 0, 0, 0]), SIZE
+    )
+    right = Intrinsics(
+        np.array([[2452.0, 0, 1908.3], [0, 2452.0, 1087.9], [0, 0, 1]]), np.array([-0.299, 0.081, 0, 0, 0]), SIZE
+    )
+    return [
+        Camera("left", left, Pose.looking_at([-0.9, -48.0, 12.1], [-25.0, -19.5, 0], roll_deg=-1.2)),
+        Camera("right", right, Pose.looking_at([0.8, -48.1, 12.0], [24.6, -19.0, 0], roll_deg=0.9)),
+    ]
+
+
+def conditions() -> Conditions:
+    """A sunny afternoon."""
+    return replace(Conditions.fair(WORLD), long_shadows=0.0, lettering=True)
+
+
+def outdated(pose: Pose, rng: np.random.Generator) -> Pose:
+    """The pose of before: `MOVED_M` and `MOVED_DEG` off, in random directions."""
+    shift, turn = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+    turned = rotation_matrices(np.radians(MOVED_DEG) * turn) @ pose.matrix
+    return Pose(rotation_vectors(turned), pose.position + MOVED_M * shift)
+
+
+def main() -> None:
+    """Render the frames and write the venue."""
+    rng = np.random.default_rng(2026)
+    entries, truth = [], {}
+    for camera in cameras():
+        rendering = render_frame(FIELD, camera, conditions(), rng)
+        for quality in range(92, 40, -3):
+            _, packed = cv2.imencode(".jpg", rendering.frame, [cv2.IMWRITE_JPEG_QUALITY, quality])
+            if len(packed) <= LARGEST_BYTES:
+                break
+        (HERE / f"{camera.id}.jpg").write_bytes(packed.tobytes())
+        truth[camera.id] = _written(camera.pose)
+        entries.append(
+            {
+                "id": camera.id,
+                "image_size": list(SIZE),
+                "intrinsics": {
+                    "matrix": camera.intrinsics.matrix.tolist(),
+                    "distortion": camera.intrinsics.distortion.tolist(),
+                },
+                "pose": _written(outdated(camera.pose, rng)),
+            }
+        )
+    shape = {"length_m": FIELD.length, "width_m": FIELD.width, "line_width_m": FIELD.line_width}
+    venue = {
+        "id": "demo",
+        "name": "Demo pitch (rendered)",
+        "field": {"template": "football", **shape, "ridge": FIELD.ridge.tolist()},
+        "cameras": entries,
+    }
+    (HERE / "venue.json").write_text(json.dumps(venue, indent=1) + "\n")
+    (HERE / "truth.json").write_text(json.dumps({"poses": truth}, indent=1) + "\n")
+
+
+def _written(pose: Pose) -> dict[str, list[float]]:
+    return {"rotation": np.round(pose.rotation, 8).tolist(), "position": np.round(pose.position, 6).tolist()}
+
+
+if __name__ == "__main__":
+    main()
