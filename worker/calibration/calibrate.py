@@ -15,9 +15,9 @@ from worker.calibration.camera import Camera, Pose
 from worker.calibration.field import Field
 from worker.calibration.linemeasurement import whiteness
 from worker.calibration.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
-from worker.calibration.refinement import Refined, refine
+from worker.calibration.refinement import Refined, assess, refine
 from worker.calibration.registration import stitch_error_px
-from worker.calibration.search import Strategy, search
+from worker.calibration.search import COARSE_TO_FINE, ON_THE_GROUND, Found, Level, Strategy, search
 from worker.calibration.segmentation import fuse, reachable_tiles
 from worker.calibration.visibility import SeenLines
 
@@ -52,6 +52,24 @@ class Options:
     offspring: int = 128
     stitch_weight: float = 0.5
     flat: bool = False
+
+
+@dataclass(frozen=True)
+class Method:
+    """What a preset does: levels of the search, over all cameras at once or each alone, and how it ends."""
+
+    levels: Sequence[Level]
+    joint: bool
+    flat: bool
+    finish: Callable[..., Refined]
+
+
+METHODS: Mapping[Preset, Method] = {
+    "esc": Method(COARSE_TO_FINE, joint=True, flat=False, finish=refine),
+    "paper": Method(ON_THE_GROUND, joint=True, flat=False, finish=assess),
+    "scpr": Method(ON_THE_GROUND, joint=False, flat=True, finish=assess),
+}
+"""`esc`: the default. `paper`: the paper to the letter. `scpr`: its predecessor, flat and without a stitch term."""
 
 
 @dataclass(frozen=True)
@@ -123,20 +141,19 @@ def calibrate(
     the intrinsics. Deterministic for `options.seed`, whatever the number of threads. Raises `CalibrationError` when a
     stored pose sees no markings, `Stopped` soon after `stop()` turns true.
     """
-    pitch = pitch.flat() if options.flat else pitch
+    method = METHODS[options.preset]
+    pitch = pitch.flat() if options.flat or method.flat else pitch
     clock = Clock()
     journey = Journey(report, stop)
     require_markings_in_view(pitch, cameras)
     with clock.measuring("segmentation"):
         responses = _segment_all(pitch, cameras, frames, segment, journey)
     with clock.measuring("evolution"):
-        strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
-        rng = np.random.default_rng(options.seed)
-        found = search(pitch, cameras, responses, strategy, rng, journey.evolution(options.generations))
+        found = _evolve(pitch, cameras, responses, method, options, journey)
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
         brightness = [_still([whiteness(frame) for frame in frames[camera.id]]) for camera in cameras]
-        refined = refine(pitch, found.cameras, brightness, responses, options.stitch_weight)
+        refined = method.finish(pitch, found.cameras, brightness, responses, options.stitch_weight)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(pitch, refined.cameras, by_id)
         stitch_before = stitch_error_px(pitch, cameras, by_id)
@@ -187,6 +204,39 @@ def _segment_all(
             done += 1
         responses.append(fuse(seen))
     return responses
+
+
+def _evolve(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    responses: Sequence[Response],
+    method: Method,
+    options: Options,
+    journey: Journey,
+) -> Found:
+    """The search of the preset: over all cameras at once, or over one camera after the other."""
+    strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
+    rng = np.random.default_rng(options.seed)
+    if method.joint:
+        return search(
+            pitch, cameras, responses, method.levels, strategy, rng, journey.evolution(0, options.generations)
+        )
+    total = options.generations * len(cameras)
+    alone = [
+        search(
+            pitch,
+            [camera],
+            [response],
+            method.levels,
+            strategy,
+            rng,
+            journey.evolution(number * options.generations, total),
+        )
+        for number, (camera, response) in enumerate(zip(cameras, responses, strict=True))
+    ]
+    return Found(
+        [found.cameras[0] for found in alone], float(np.mean([found.loss for found in alone])), options.generations
+    )
 
 
 def _still(brightness: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
@@ -240,6 +290,6 @@ class Journey:
         begin, end = SHARE_OF_JOB[stage]
         self.report(Progress(stage, begin + share * (end - begin), generation, loss))
 
-    def evolution(self, generations: int) -> Callable[[int, float], None]:
-        """What the search calls after each generation."""
-        return lambda number, loss: self.at("evolution", number / generations, number, loss)
+    def evolution(self, done: int, total: int) -> Callable[[int, float], None]:
+        """What a search calls after each generation, `done` out of `total` generations before it began."""
+        return lambda number, loss: self.at("evolution", (done + number) / total, done + number, loss)

@@ -173,7 +173,7 @@ class Intrinsics:
         target = np.asarray(pixels, dtype=float)
         linear = self.matrix[:2, :2]
         rays = (target - self.matrix[:2, 2]) @ np.linalg.inv(linear).T
-        rays = rays * self._undistorted_scale(np.linalg.norm(rays, axis=-1))[..., None]
+        rays = self._within_model(rays * self._undistorted_scale(np.linalg.norm(rays, axis=-1))[..., None])
         step = 1e-6
         for _ in range(iterations):
             here = self.distort(rays)
@@ -195,13 +195,19 @@ class Intrinsics:
             )
             with np.errstate(divide="ignore", invalid="ignore"):
                 move = move / determinant[..., None]
-            rays = rays + move
+            rays = self._within_model(rays + move)
             if np.nanmax(np.abs(move), initial=0.0) < 1e-12:
                 break
         with np.errstate(invalid="ignore"):
             off = ~(np.linalg.norm(self.distort(rays) - target, axis=-1) < 1e-3)
         rays[off] = np.nan
         return rays
+
+    def _within_model(self, rays: Array) -> Array:
+        """Rays (..., 2) pulled back to where the radial model still grows: Newton must not jump over its end."""
+        radius = np.linalg.norm(rays, axis=-1, keepdims=True)
+        limit = 0.9999 * self.largest_radius
+        return np.where(radius > limit, rays * (limit / np.maximum(radius, limit)), rays)
 
     def _undistorted_scale(self, distorted_radius: Array) -> Array:
         """Ratio of undistorted to distorted radius by the radial terms alone: a start for Newton."""

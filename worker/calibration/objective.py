@@ -50,18 +50,18 @@ class Objective:
         pitch: Field,
         cameras: Sequence[Camera],
         responses: Sequence[Response],
-        sigma_px: float,
         stitch_weight: float,
+        blur_px: float,
     ) -> None:
         """`cameras` carry the poses the level starts from; `responses` are their segmentations (H, W) in 0..1.
 
-        `sigma_px` is the blur for a picture 3840 px wide; other sizes scale it.
+        `blur_px`: standard deviation of the blur for a picture 3840 px wide; other sizes scale it.
         """
         lines = pitch.line_points()
         self.singles = []
         views = []
         for camera, response in zip(cameras, responses, strict=True):
-            sigma = max(sigma_px * camera.intrinsics.size[0] / 3840, 0.7)
+            sigma = max(blur_px * camera.intrinsics.size[0] / 3840, 0.7)
             blurred = BlurredResponse.from_response(response, sigma)
             surround = BlurredResponse.from_response(response, SURROUND * sigma)
             self.singles.append(SingleTerm.build(lines, camera, blurred.minus(surround), sigma))

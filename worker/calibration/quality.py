@@ -87,20 +87,22 @@ def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) ->
 
     A line is thinner than any honest tolerance, so a plain IoU of pixels would measure paint and blur. Here a piece of
     expected line is found when the segmentation has a marking within `TOLERANCE_PX` of it; segmentation on the pitch
-    that lies beside every expected line counts as as much line as it could have been.
+    that lies beside every expected line counts as as much line as it could have been. A line thinner than a pixel
+    covers only a part of it, and has that part of the weight and of the response that is asked for.
     """
     seen = SeenLines.from_camera(pitch.line_points(), camera)
-    expected = float(seen.length_px.sum())
+    coverage = np.minimum(seen.width_px, 1.0)
+    weight = seen.length_px * coverage
+    expected = float(weight.sum())
     if expected == 0:
         return 0.0
     tolerance = TOLERANCE_PX * camera.intrinsics.size[0] / 3840
+    found = float(weight[_strongest(response, tolerance)[_rounded(seen.pixel)] > MARKING * coverage].sum())
     marked = (response > MARKING).astype(np.uint8)
-    found = float(seen.length_px[_near(marked, tolerance)[_rounded(seen.pixel)] > 0].sum())
     explained = _band(seen, camera.intrinsics.size, tolerance)
-    on_pitch = _pitch_area(pitch, camera)
     area_explained = np.count_nonzero(marked & explained)
-    area_beside = np.count_nonzero(marked & on_pitch & ~explained)
-    beside = area_beside * found / area_explained if area_explained else area_beside / max(tolerance, 1.0)
+    area_beside = np.count_nonzero(marked & _pitch_area(pitch, camera) & ~explained)
+    beside = area_beside * found / area_explained if area_explained else float(area_beside)
     return found / (expected + beside)
 
 
@@ -148,10 +150,11 @@ def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
     return None
 
 
-def _near(marked: NDArray[np.uint8], distance: float) -> NDArray[np.uint8]:
-    """Pixels within `distance` of a marked one."""
+def _strongest(response: NDArray[np.float32], distance: float) -> NDArray[np.float32]:
+    """The largest response (H, W) within `distance` of each pixel."""
     size = 2 * round(distance) + 1
-    return np.asarray(cv2.dilate(marked, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))), dtype=np.uint8)
+    around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return np.asarray(cv2.dilate(response, around), dtype=np.float32)
 
 
 def _rounded(pixels: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

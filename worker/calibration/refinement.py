@@ -21,6 +21,7 @@ from worker.calibration.linemeasurement import NOISE_PX, Measurements, measure_l
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0)
 """How far from where the pose expects it a line is looked for, round by round, in a picture 3840 px wide."""
+ASSESSING_SEARCH_PX = 8.0
 STEPS_PER_ROUND = 4
 TUKEY = 4.685
 LEAST_SINGLE_WEIGHT = 0.02
@@ -64,21 +65,43 @@ def refine(
 
     `brightness` (H, W) of each frame (`linemeasurement.whiteness`); `responses` (H, W): segmentations in 0..1.
     """
-    lines = pitch.line_points()
     here = list(cameras)
-    measured: list[Measurements] = []
     for search in SEARCH_PX:
-        measured = [
-            measure_lines(lines, camera, bright, response, search * camera.intrinsics.size[0] / 3840)
-            for camera, bright, response in zip(here, brightness, responses, strict=True)
-        ]
+        measured = _measure_all(pitch, here, brightness, responses, search)
         for _ in range(STEPS_PER_ROUND):
             here = _step(here, measured, stitch_weight)
-    return Refined(
-        here,
-        _covariances(here, measured, stitch_weight),
-        [_residual_px(camera, found) for camera, found in zip(here, measured, strict=True)],
-    )
+    return _assessed(here, measured, stitch_weight)
+
+
+def assess(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    brightness: Sequence[NDArray[np.float32]],
+    responses: Sequence[NDArray[np.float32]],
+    stitch_weight: float,
+) -> Refined:
+    """What the lines say of poses that are left as they are; arguments as for `refine`."""
+    measured = _measure_all(pitch, cameras, brightness, responses, ASSESSING_SEARCH_PX)
+    return _assessed(list(cameras), measured, stitch_weight)
+
+
+def _assessed(cameras: list[Camera], measured: Sequence[Measurements], stitch_weight: float) -> Refined:
+    residuals = [_residual_px(camera, found) for camera, found in zip(cameras, measured, strict=True)]
+    return Refined(cameras, _covariances(cameras, measured, stitch_weight), residuals)
+
+
+def _measure_all(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    brightness: Sequence[NDArray[np.float32]],
+    responses: Sequence[NDArray[np.float32]],
+    search_px: float,
+) -> list[Measurements]:
+    lines = pitch.line_points()
+    return [
+        measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.size[0] / 3840)
+        for camera, bright, response in zip(cameras, brightness, responses, strict=True)
+    ]
 
 
 def _step(cameras: list[Camera], measured: Sequence[Measurements], stitch_weight: float) -> list[Camera]:

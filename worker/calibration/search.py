@@ -1,9 +1,11 @@
-"""From stored poses to poses near enough for the finish: the evolution strategy over the levels of a preset."""
+"""From stored poses to new ones: the evolution strategy over the levels of a preset."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from worker.calibration.camera import Array, Camera, Pose
 from worker.calibration.evolution import EvolutionStrategy, exponential_decay
 from worker.calibration.field import Field
+from worker.calibration.groundobjective import GroundObjective
 from worker.calibration.objective import GENES, Objective
 
 MUTATION_RAD = 0.005
@@ -18,16 +21,29 @@ MUTATION_M = 0.1
 DECAY = 0.95
 
 
+class Losses(Protocol):
+    """An objective ready to judge: `losses` (P,) of genomes (P, 6 N)."""
+
+    def losses(self, genomes: Array) -> Array:
+        """Lower is better."""
+
+
 @dataclass(frozen=True)
 class Level:
-    """A stretch of generations with one objective: blur in px of a picture 3840 px wide, and strength of mutation."""
+    """A stretch of generations with one objective, and the strength of mutation at its start."""
 
-    blur_px: float
     mutation: float
+    objective: Callable[[Field, Sequence[Camera], Sequence[NDArray[np.float32]], float], Losses]
 
 
-COARSE_TO_FINE = (Level(48, 4), Level(16, 1.5), Level(6, 0.5), Level(2, 0.2), Level(0.8, 0.1))
-"""Each level pulls from about one blur away, and hands over within the next one's."""
+def _blurred(blur_px: float, mutation: float) -> Level:
+    return Level(mutation, partial(Objective, blur_px=blur_px))
+
+
+COARSE_TO_FINE = (_blurred(48, 4), _blurred(16, 1.5), _blurred(6, 0.5), _blurred(2, 0.2), _blurred(0.8, 0.1))
+"""Preset `esc`: each level pulls from about one blur away, and hands over within the next one's."""
+ON_THE_GROUND = (Level(1.0, GroundObjective),)
+"""Presets `paper` and `scpr`."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +69,12 @@ def search(
     pitch: Field,
     cameras: Sequence[Camera],
     responses: Sequence[NDArray[np.float32]],
+    levels: Sequence[Level],
     strategy: Strategy,
     rng: np.random.Generator,
     on_generation: Callable[[int, float], None],
 ) -> Found:
-    """Evolve the poses of all cameras together, coarse to fine.
+    """Evolve the poses of all cameras together, level by level.
 
     `responses` (H, W): segmentations in 0..1. `on_generation(number, loss)` is called after each generation and may
     raise to stop.
@@ -65,11 +82,11 @@ def search(
     decay = exponential_decay(DECAY)
     mutation = np.tile([MUTATION_RAD] * 3 + [MUTATION_M] * 3, len(cameras))
     evolution = EvolutionStrategy(strategy.parents, strategy.offspring, mutation, rng)
-    candidates = evolution.first_parents(genome_of(cameras), COARSE_TO_FINE[0].mutation)
+    candidates = evolution.first_parents(genome_of(cameras), levels[0].mutation)
     here = list(cameras)
     done = 0
-    for level, generations in zip(COARSE_TO_FINE, _shares(strategy.generations, len(COARSE_TO_FINE)), strict=True):
-        objective = Objective(pitch, here, responses, level.blur_px, strategy.stitch_weight)
+    for level, generations in zip(levels, _shares(strategy.generations, len(levels)), strict=True):
+        objective = level.objective(pitch, here, responses, strategy.stitch_weight)
         evolution.tell(candidates, objective.losses(candidates))
         for generation in range(generations):
             children = evolution.ask(level.mutation * decay(generation))

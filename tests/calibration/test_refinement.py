@@ -1,0 +1,126 @@
+"""The finish: line centres to a fraction of a pixel, and poses to millimetres on a perfect picture."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.calibration.synthetic import CROWNED, moved, paint_frame, paint_markings, pair
+from worker.calibration.camera import rotation_angles_deg
+from worker.calibration.linemeasurement import expected_profiles, measure_lines, sliding_correlation, whiteness
+from worker.calibration.refinement import assess, refine, tukey_weights
+from worker.calibration.registration import stitch_error_px
+
+SMALL_TURN = (0.0008, -0.0006, 0.0005)
+SMALL_SHIFT = (0.02, -0.03, 0.02)
+
+
+@cache
+def scene():
+    cameras = pair()
+    brightness = [whiteness(paint_frame(CROWNED, c)) for c in cameras]
+    return cameras, brightness, [paint_markings(CROWNED, c) for c in cameras]
+
+
+def off_by(cameras, refined):
+    return [
+        (
+            np.linalg.norm(after.pose.position - before.pose.position),
+            rotation_angles_deg(after.pose.rotation, before.pose.rotation),
+        )
+        for before, after in zip(cameras, refined, strict=True)
+    ]
+
+
+def test_lines_are_found_where_they_are():
+    cameras, brightness, responses = scene()
+    wrong = moved(cameras[0], SMALL_TURN)
+    found = measure_lines(CROWNED.line_points(), wrong, brightness[0], responses[0], 6.0)
+    truth = cameras[0].project(found.points.position)
+    off = np.sum((found.pixel - truth) * found.normal, axis=1)
+    assert len(found) > 300
+    assert np.abs(np.median(off)) < 0.02
+    assert np.percentile(np.abs(off), 80) < 0.1
+
+
+def test_a_bright_ridge_that_is_no_marking_is_not_measured():
+    cameras, brightness, responses = scene()
+    found = measure_lines(CROWNED.line_points(), cameras[0], brightness[0], np.zeros_like(responses[0]), 6.0)
+    assert len(found) == 0
+
+
+@pytest.mark.parametrize("shift", [-3.25, 0.0, 1.5])
+@pytest.mark.parametrize("width", [1.0, 4.0, 9.0])
+def test_the_filter_fits_best_at_the_centre_of_its_line(width, shift):
+    offsets = np.arange(-30, 30.5, 0.5)
+    line = expected_profiles(np.array([width]), offsets - shift)
+    filters = expected_profiles(np.array([width]), np.arange(-15, 15.5, 0.5))
+    correlation = sliding_correlation(100 * line + 50, filters)
+    best = np.argmax(correlation[0])
+    assert (best - correlation.shape[1] // 2) * 0.5 == pytest.approx(shift, abs=0.26)
+    assert correlation[0, best] > 0.95
+
+
+def test_slightly_moved_cameras_come_back_to_where_they_were():
+    cameras, brightness, responses = scene()
+    start = [moved(c, SMALL_TURN, SMALL_SHIFT) for c in cameras]
+    refined = refine(CROWNED, start, brightness, responses, 0.5)
+    for shift, turn in off_by(cameras, refined.cameras):
+        assert shift < 0.02
+        assert turn < 0.01
+    assert all(residual < 0.3 for residual in refined.residual_px)
+
+
+def test_where_it_ends_does_not_depend_on_where_it_began():
+    cameras, brightness, responses = scene()
+    starts = ([moved(c, SMALL_TURN, SMALL_SHIFT) for c in cameras], [moved(c, (-0.0005, 0.0008, 0)) for c in cameras])
+    first, second = (refine(CROWNED, start, brightness, responses, 0.5).cameras for start in starts)
+    for shift, turn in off_by(first, second):
+        assert shift < 0.002
+        assert turn < 0.001
+
+
+def test_the_error_is_of_the_size_of_its_sigma():
+    cameras, brightness, responses = scene()
+    rng = np.random.default_rng(0)
+    noisy = [b + rng.normal(scale=12, size=b.shape).astype(np.float32) for b in brightness]
+    refined = refine(CROWNED, cameras, noisy, responses, 0.5)
+    for camera, after, covariance in zip(cameras, refined.cameras, refined.covariance, strict=True):
+        error = after.pose.position - camera.pose.position
+        assert (np.abs(error) < 4 * np.sqrt(np.diag(covariance)[3:])).all()
+        assert np.sqrt(np.diag(covariance)[3:]).max() < 0.1
+
+
+def test_the_stitch_term_holds_together_what_a_wrong_roof_pulls_apart():
+    cameras, brightness, responses = scene()
+    by_id = {c.id: r for c, r in zip(cameras, responses, strict=True)}
+    alone, together = (
+        stitch_error_px(CROWNED.flat(), refine(CROWNED.flat(), cameras, brightness, responses, weight).cameras, by_id)
+        for weight in (0.0, 0.9)
+    )
+    assert together < alone
+
+
+def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
+    cameras, brightness, responses = scene()
+    blind = [responses[0], np.zeros_like(responses[1])]
+    refined = refine(CROWNED, cameras, brightness, blind, 0.5)
+    np.testing.assert_array_equal(refined.cameras[1].pose.position, cameras[1].pose.position)
+    assert refined.covariance[1] is None
+    assert refined.residual_px[1] is None
+    assert refined.covariance[0] is not None
+
+
+def test_assessing_moves_nothing():
+    cameras, brightness, responses = scene()
+    start = [moved(c, SMALL_TURN) for c in cameras]
+    assessed = assess(CROWNED, start, brightness, responses, 0.5)
+    assert assessed.cameras == start
+    assert all(residual > 0.3 for residual in assessed.residual_px)
+
+
+def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
+    weights = tukey_weights(np.array([0.0, 0.5, -0.5, 0.2, 100.0]))
+    assert weights[-1] == 0
+    assert weights[0] == 1
+    assert (weights[:4] > 0.9).all()

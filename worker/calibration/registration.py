@@ -1,0 +1,266 @@
+"""How far apart two cameras put the same markings: the paper's stitch error, measured without ground truth.
+
+The line responses of both cameras are laid onto the pitch (bird's-eye) and registered: a coarse search that bridges
+metres, then Gauss-Newton, finer and finer, on small turns and moves of both cameras that bring their markings onto each
+other. Those, and no free warp, because a circle and a line through its centre do not tell a shift along the line from
+the fanning out that a tilted camera makes; with the form that a turn or a move can have, they do.
+
+Unit: 1 px = 10 cm on the pitch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.camera import Array, Camera, cross_matrices, inside
+from worker.calibration.field import Field
+from worker.calibration.stitching import ground_grid, ground_view
+
+Response = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+# A response seen from above, on a square grid of the pitch: values, and where the camera sees it.
+View = tuple[Response, Mask]
+
+PIXEL_M = 0.1
+
+COARSE_STEP_M, COARSE_HALF_M, COARSE_BLUR_M = 0.2, 18.0, 0.4
+# How far apart two views may be to be found.
+REACH_M = 8.0
+# Shifts that leave less than this part of the common region are not judged.
+LEAST_COMMON = 0.3
+# Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
+SHIFT_PENALTY = 0.05
+
+FINE_STEP_M, FINE_HALF_M = 0.05, 12.0
+# Blur in metres and number of steps, coarse to fine. The last blur is about what a far camera smears.
+FINE_STAGES = ((0.4, 4), (0.2, 4), (0.1, 6))
+# What is expected of a camera: the paper's Start errors. Only what the markings do not tell is left to it.
+EXPECTED_TURN_RAD, EXPECTED_MOVE_M = 0.02, 0.16
+# A difference of this part of a line's response counts as half an outlier.
+OUTLIER = 0.5
+# Responses differ by this much through sampling alone.
+SAMPLING_NOISE = 0.005
+# A direction in which the markings leave the displacement looser than this is one along which they can slide.
+LOOSE_M = 0.1
+
+# Below these the views show nothing in common.
+LEAST_SUPPORT_M = 4.0
+LEAST_CORRELATION = 0.3
+
+
+@dataclass(frozen=True)
+class Registration:
+    """The second camera's markings relative to the first's: `dx_px`, `dy_px` along the world's axes, pixels of 10 cm.
+
+    Where the common markings are all parallel, only the displacement across them. `support`: metres of marking that
+    both views show on top of each other once registered. `pair`: the ids of the cameras.
+    """
+
+    dx_px: float
+    dy_px: float
+    support: float
+    pair: tuple[str, str]
+
+    @property
+    def error_px(self) -> float:
+        """How far apart the two views are."""
+        return float(np.hypot(self.dx_px, self.dy_px))
+
+
+def stitch_error_px(pitch: Field, cameras: Sequence[Camera], responses: Mapping[str, Response]) -> float | None:
+    """The worst disagreement of any two cameras around the pitch centre, 1 px = 10 cm; None if no two can be compared.
+
+    `responses[camera.id]`: float32 (height, width), probability 0..1 of a marking in each pixel of the raw frame.
+    """
+    found = (
+        register_pair(pitch, first, second, responses[first.id], responses[second.id])
+        for first, second in combinations(cameras, 2)
+    )
+    return max((pair.error_px for pair in found if pair is not None), default=None)
+
+
+def register_pair(
+    pitch: Field, first: Camera, second: Camera, first_response: Response, second_response: Response
+) -> Registration | None:
+    """Register the bird's-eye views of two cameras around the pitch centre, or the markings in common nearest to it.
+
+    Responses as in `stitch_error_px`. None if the cameras show no markings in common, or show them too far apart.
+    """
+    centre = _reference_point(pitch, first, second)
+    if centre is None:
+        return None
+    views = [
+        ground_view(pitch, camera, response, _square(centre, COARSE_HALF_M, COARSE_STEP_M))
+        for camera, response in ((first, first_response), (second, second_response))
+    ]
+    shift = _coarse_shift(*views)
+    if shift is None:
+        return None
+    # The displacement is measured where the cameras put the centre, roughly, and not beside it.
+    template = _template(pitch, centre)
+    placed = [_coarse_shift(template, view) for view in views]
+    middle = centre + np.mean([put for put in placed if put is not None] or [np.zeros(2)], axis=0)
+
+    grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
+    forms = [_forms(camera, pitch.lift(grid)) for camera in (first, second)]
+    at_middle = np.concatenate([_forms(first, pitch.lift(middle)) * -1, _forms(second, pitch.lift(middle))], axis=-1)
+    # The most likely turns and moves that make the coarse shift.
+    start = at_middle.T @ np.linalg.solve(at_middle @ at_middle.T, shift)
+    fine = _fine_moves(
+        ground_view(pitch, first, first_response, grid + forms[0] @ start[:6]),
+        ground_view(pitch, second, second_response, grid + forms[1] @ start[6:]),
+        np.concatenate(forms, axis=-1),
+        start,
+    )
+    support = fine.common_area_m2 / pitch.line_width
+    if support < LEAST_SUPPORT_M or fine.correlation < LEAST_CORRELATION:
+        return None
+
+    variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
+    told = directions[:, variance < LOOSE_M**2]
+    dx, dy = told @ told.T @ at_middle @ fine.moves / PIXEL_M
+    return Registration(float(dx), float(dy), float(support), (first.id, second.id))
+
+
+def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
+    """The pitch centre (2,) if both cameras see it, else the middle of the common markings around the nearest one."""
+    points = np.concatenate([pitch.lift(np.zeros((1, 2))), pitch.line_points(0.5).position])
+    seen = np.all([inside(camera.project(points), camera.intrinsics.size) for camera in (first, second)], axis=0)
+    if not seen.any():
+        return None
+    if seen[0]:
+        return np.zeros(2)
+    common: Array = points[seen, :2]
+    nearest = common[np.argmin(np.linalg.norm(common, axis=1))]
+    return np.asarray(common[np.linalg.norm(common - nearest, axis=1) < FINE_HALF_M].mean(axis=0))
+
+
+def _square(middle: Array, half_m: float, step_m: float) -> Array:
+    count = round(half_m / step_m)
+    return ground_grid(count, count, step_m) + middle
+
+
+def _template(pitch: Field, centre: Array) -> View:
+    """The markings as they should be, on the coarse grid."""
+    points = pitch.line_points(COARSE_STEP_M / 4)
+    count = round(COARSE_HALF_M / COARSE_STEP_M)
+    edges = COARSE_STEP_M * (np.arange(-count, count + 2) - 0.5)
+    x, y = (points.position[:, :2] - centre).T
+    area, _, _ = np.histogram2d(y, x, (edges, edges), weights=points.width * points.spacing)
+    values = area[::-1] / COARSE_STEP_M**2
+    return values.astype(np.float32), np.ones(values.shape, bool)
+
+
+def _coarse_shift(first: View, second: View) -> Array | None:
+    """Shift (2,) in metres, world axes, of the second view relative to the first with the highest correlation."""
+    a_seen, b_seen = first[1], second[1]
+    a, b = (_blur(values, COARSE_BLUR_M / COARSE_STEP_M) * seen for values, seen in (first, second))
+    reach = round(REACH_M / COARSE_STEP_M)
+    # Over what both see at each shift (masked normalised correlation after Padfield, 2012).
+    plane = 2 * a.shape[0]
+    fa, fb, fa2, fb2, fas, fbs = (np.fft.rfft2(p, (plane, plane)) for p in (a, b, a * a, b * b, a_seen, b_seen))
+
+    def correlate(p: NDArray[np.complex128], q: NDArray[np.complex128]) -> Array:
+        full = np.fft.fftshift(np.fft.irfft2(np.conj(p) * q, (plane, plane)))
+        return full[plane // 2 - reach : plane // 2 + reach + 1, plane // 2 - reach : plane // 2 + reach + 1]
+
+    common = np.maximum(correlate(fas, fbs), 1.0)
+    sum_a, sum_b = correlate(fa, fbs), correlate(fas, fb)
+    var_a = correlate(fa2, fbs) - sum_a**2 / common
+    var_b = correlate(fas, fb2) - sum_b**2 / common
+    covariance = correlate(fa, fb) - sum_a * sum_b / common
+    judged = (common > LEAST_COMMON * common.max()) & (np.minimum(var_a, var_b) > 1e-3)
+    if not judged.any():
+        return None
+    correlation = covariance[judged] / np.sqrt(var_a[judged] * var_b[judged])
+    shifts = ground_grid(reach, reach, COARSE_STEP_M)[judged]
+    best = np.argmax(correlation - SHIFT_PENALTY * np.linalg.norm(shifts, axis=1) / REACH_M)
+    return np.asarray(shifts[best])
+
+
+def _forms(camera: Camera, points: Array) -> Array:
+    """How points (..., 3) of the pitch move, (..., 2, 6) metres, in the view of a camera that believes a wrong pose.
+
+    One column per expected turn about and move along each axis of the world.
+    """
+    ray = points - camera.pose.position
+    turned = -EXPECTED_TURN_RAD * cross_matrices(ray)
+    moved = np.broadcast_to(EXPECTED_MOVE_M * np.eye(3), turned.shape)
+    change = np.concatenate([turned, moved], axis=-1)
+    # The changed ray, back to where it meets the surface.
+    return np.asarray(change[..., :2, :] - ray[..., :2, None] * change[..., 2:, :] / ray[..., 2, None, None])
+
+
+@dataclass(frozen=True)
+class _Fine:
+    """`moves` (12,) of both cameras, in expected turns and moves, their `covariance`, and what then coincides."""
+
+    moves: Array
+    covariance: Array
+    common_area_m2: float
+    correlation: float
+
+
+def _fine_moves(first: View, second: View, forms: Array, start: Array) -> _Fine:
+    """Gauss-Newton from `start` on the moves (12,) of both cameras; `forms` (n, n, 2, 12), views sampled at `start`."""
+    (a, a_seen), (b, b_seen) = ((values, seen.astype(np.float32)) for values, seen in (first, second))
+    moves = start
+    for blur, steps in FINE_STAGES:
+        smooth_a, smooth_b = (_blur(view, blur / FINE_STEP_M) for view in (a, b))
+        for _ in range(steps):
+            offset_a, offset_b = forms[..., :6] @ (moves - start)[:6], forms[..., 6:] @ (moves - start)[6:]
+            warped_a, warped_b = _warp(smooth_a, offset_a), _warp(smooth_b, offset_b)
+            valid = (_warp(a_seen, offset_a) == 1) & (_warp(b_seen, offset_b) == 1)
+            step, covariance = _gauss_newton(warped_a, warped_b, valid, forms, moves, blur)
+            moves = moves + step
+    common = np.minimum(warped_a, warped_b)[valid].sum(dtype=float) * FINE_STEP_M**2
+    return _Fine(moves, covariance, float(common), _correlation(warped_a[valid], warped_b[valid]))
+
+
+def _gauss_newton(
+    a: Response, b: Response, valid: Mask, forms: Array, moves: Array, blur: float
+) -> tuple[Array, Array]:
+    """One robust step (12,) that brings a and b closer, and the covariance (12, 12) of the moves."""
+    active = valid & (a + b > 0.02)
+    down, right = np.gradient(a + b)
+    gradient = np.stack([right[active], -down[active]], axis=-1).astype(float) / (2 * FINE_STEP_M)
+    slope = (gradient[:, :, None] * forms[active]).sum(axis=1)
+    slope[:, :6] *= -1
+    residual = (a - b)[active].astype(float)
+    # What only one view has, players for one, must not pull (Geman and McClure's weight); lines that are still apart must.
+    scale = OUTLIER * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
+    weight = 1 / (1 + (residual / scale) ** 2) ** 2
+    # The blur makes neighbours alike: this many pixels count as one.
+    alike = 4 * np.pi * (blur / FINE_STEP_M) ** 2
+    noise = SAMPLING_NOISE**2 + (weight * residual**2).sum() / max(weight.sum(), 1.0)
+    weighted = slope * (weight / (noise * alike))[:, None]
+    # Sums rather than matrix products, so that the number of threads cannot change a digit.
+    count = len(moves)
+    information = np.array([[(weighted[:, i] * slope[:, j]).sum() for j in range(count)] for i in range(count)])
+    covariance = np.linalg.inv(information + np.eye(count))
+    return covariance @ ((weighted * residual[:, None]).sum(axis=0) - moves), covariance
+
+
+def _blur(view: Response, sigma: float) -> Response:
+    return np.asarray(cv2.GaussianBlur(view, (0, 0), sigma), np.float32)
+
+
+def _warp(view: Response, offset: Array) -> Response:
+    """A view (n, n) on the fine grid, sampled at the points of the grid moved by `offset` (n, n, 2) metres."""
+    rows, columns = np.indices(view.shape, np.float32)
+    move = (offset / FINE_STEP_M).astype(np.float32)
+    sampled = cv2.remap(view, columns + move[..., 0], rows - move[..., 1], cv2.INTER_LINEAR, borderValue=0.0)
+    return np.asarray(sampled, np.float32)
+
+
+def _correlation(a: Response, b: Response) -> float:
+    """Normalised correlation of two sets of values, 0 where there is nothing to correlate."""
+    a, b = a - a.mean(dtype=float), b - b.mean(dtype=float)
+    power = (a * a).sum(dtype=float) * (b * b).sum(dtype=float)
+    return float((a * b).sum(dtype=float) / np.sqrt(power)) if power > 0 else 0.0
