@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check bench train lock clean
+.PHONY: setup demo test check bench-real train lock clean
 
 setup: $(VENV)/.installed
 
@@ -26,6 +26,9 @@ check: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/deptry .
+
+bench-real: setup
+	$(BIN)/python -m tests.benchmarks.real_pair
 
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check '.[train]'

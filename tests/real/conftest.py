@@ -1,0 +1,12 @@
+"""Where the real pair is missing, its tests are skipped."""
+
+import pytest
+
+from tests.real.pair import FOLDER, RealPair
+
+
+@pytest.fixture(scope="session")
+def real_pair() -> RealPair:
+    if not FOLDER.is_dir():
+        pytest.skip(f"the real pair is not there: put it into {FOLDER} to run this test")
+    return RealPair.load()
