@@ -24,7 +24,10 @@ def shade_sky(conditions: Conditions, rays: Plane) -> Plane:
     if conditions.light == "floodlight":
         top, low = hsv(230, 0.5, 0.05), hsv(230, 0.3, 0.15)
     elif conditions.light == "cloud":
-        top, low = hsv(220, rng.uniform(0, 0.2), rng.uniform(0.5, 0.8)), hsv(220, rng.uniform(0, 0.15), rng.uniform(0.75, 1))
+        top, low = (
+            hsv(220, rng.uniform(0, 0.2), rng.uniform(0.5, 0.8)),
+            hsv(220, rng.uniform(0, 0.15), rng.uniform(0.75, 1)),
+        )
     else:
         top, low = hsv(215, rng.uniform(0.4, 0.8), rng.uniform(0.5, 0.9)), hsv(210, 0.2, 0.95)
     colour = mix(np.broadcast_to(low, rays.shape), top, np.clip(up * 2.5, 0, 1))
@@ -129,7 +132,9 @@ def _fence(wall: Wall, patch: Patch) -> tuple[Plane, Plane]:
 def _hoarding(wall: Wall, patch: Patch) -> tuple[Plane, Plane]:
     """Panels of different colours with blocks that read as writing."""
     rng = np.random.default_rng(wall.seed)
-    palette = np.stack([hsv(*v) for v in np.column_stack([rng.uniform(0, 360, 9), rng.random(9), rng.uniform(0.1, 1, 9)])])
+    palette = np.stack(
+        [hsv(*v) for v in np.column_stack([rng.uniform(0, 360, 9), rng.random(9), rng.uniform(0.1, 1, 9)])]
+    )
     if rng.random() < 0.5:
         palette = np.where(rng.random((9, 1)) < 0.6, np.float32([0.95, 0.95, 0.95]), palette).astype(np.float32)
     panel = np.floor(patch.x / wall.period).astype(int)

@@ -73,9 +73,7 @@ def segment(session: onnxruntime.InferenceSession, frame: NDArray[np.uint8]) -> 
     """Probability (H, W) of a frame (H, W, 3) blue green red, tile by tile."""
     height, width = frame.shape[:2]
     rows, columns = -(-height // TILE) * TILE, -(-width // TILE) * TILE
-    padded = cv2.copyMakeBorder(
-        frame, HALO, HALO + rows - height, HALO, HALO + columns - width, cv2.BORDER_REFLECT_101
-    )
+    padded = cv2.copyMakeBorder(frame, HALO, HALO + rows - height, HALO, HALO + columns - width, cv2.BORDER_REFLECT_101)
     probability = np.empty((rows, columns), np.float32)
     name = session.get_inputs()[0].name
     for top in range(0, rows, TILE):

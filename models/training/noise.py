@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Plane = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-TEXTURE_SIZE = 512
+TEXTURE_SIZE = 256
 
 
 @dataclass(frozen=True)

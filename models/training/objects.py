@@ -34,6 +34,17 @@ class Canvas:
         """World points (N, 3) to pixels of the window (N, 2)."""
         return self.camera.project(points) - np.array(self.origin)
 
+    def near(self, starts: Array, ends: Array, reach: float) -> NDArray[np.bool_]:
+        """Which of N things between world points (N, 3) and (N, 3) may show within `reach` metres of them."""
+        if len(starts) == 0:
+            return np.zeros(0, dtype=bool)
+        first, last = self.project(starts), self.project(ends)
+        depth = (starts - self.camera.pose.position) @ self.camera.pose.matrix[2]
+        margin = (reach * self.camera.intrinsics.matrix[0, 0] / np.maximum(depth, 1.0))[:, None]
+        height, width = self.colour.shape[:2]
+        low, high = np.minimum(first, last) - margin, np.maximum(first, last) + margin
+        return ((high > 0) & (low < [width, height])).all(axis=1)
+
     def size_at(self, point: Array) -> float:
         """Pixels per metre at a world point; 0 where it is out of view."""
         depth = float(self.camera.pose.matrix[2] @ (point - self.camera.pose.position))
@@ -64,7 +75,11 @@ class Canvas:
         """A round bar of `thick` metres between two world points; thinner than a pixel it becomes faint."""
         ends = self.project(np.array([start, end]))
         height, width = self.colour.shape[:2]
-        if not np.isfinite(ends).all() or (ends.max(axis=0) < -40).any() or (ends.min(axis=0) > (width + 40, height + 40)).any():
+        if (
+            not np.isfinite(ends).all()
+            or (ends.max(axis=0) < -40).any()
+            or (ends.min(axis=0) > (width + 40, height + 40)).any()
+        ):
             return
         steps = max(2, int(np.linalg.norm(end - start) / 2) + 1)
         points = start + np.linspace(0, 1, steps)[:, None] * (end - start)
@@ -102,16 +117,17 @@ class Canvas:
 def draw_objects(pitch: Field, world: World, conditions: Conditions, canvas: Canvas) -> None:
     """Draw shadows, then everything else from far to near."""
     people = list(_people(pitch, world, conditions))
+    feet = np.array([person.foot for person in people]).reshape(-1, 3)
+    people = [people[i] for i in np.flatnonzero(canvas.near(feet, feet, 12.0))]
     _shadows(world, conditions, canvas, people)
+    furniture = list(_furniture(pitch, world, conditions))
+    starts, ends = (np.array([item[i] for item in furniture]) for i in (0, 1))
+    furniture = [furniture[i] for i in np.flatnonzero(canvas.near(starts, ends, 2.0))]
+    things: list[tuple[Array, Callable[[Canvas], None]]] = [(start, draw) for start, _, draw in furniture]
+    things += [(person.foot, person.draw) for person in people]
+    things += [(goal.middle, goal.draw) for goal in _goals(pitch, world)]
     centre = canvas.camera.pose.position
-    things: list[tuple[float, Callable[[Canvas], None]]] = []
-    for person in people:
-        things.append((float(np.linalg.norm(person.foot - centre)), person.draw))
-    for goal in _goals(pitch, world):
-        things.append((float(np.linalg.norm(goal.middle - centre)), goal.draw))
-    for place, draw in _furniture(pitch, world, conditions):
-        things.append((float(np.linalg.norm(place - centre)), draw))
-    for _, draw in sorted(things, key=lambda thing: -thing[0]):
+    for _, draw in sorted(things, key=lambda thing: -float(np.linalg.norm(thing[0] - centre))):
         draw(canvas)
 
 
@@ -152,7 +168,17 @@ class Person:
             (limb((0.6 * lean, hip + 0.1), (0.6 * lean + 0.1 + 0.1 * s, 0.38 * t), 0.26), 1),
             (limb((lean - 0.2, shoulder - 0.02), (lean - 0.3 - 0.2 * s, 0.55 * t), 0.11), 3),
             (limb((lean + 0.2, shoulder - 0.02), (lean + 0.28 + 0.25 * s, 0.58 * t), 0.11), 3),
-            (np.array([(lean - 0.24, shoulder), (lean + 0.24, shoulder), (0.55 * lean + 0.19, hip), (0.55 * lean - 0.19, hip)]), 0),
+            (
+                np.array(
+                    [
+                        (lean - 0.24, shoulder),
+                        (lean + 0.24, shoulder),
+                        (0.55 * lean + 0.19, hip),
+                        (0.55 * lean - 0.19, hip),
+                    ]
+                ),
+                0,
+            ),
             (head, 3),
         ]
 
@@ -261,7 +287,9 @@ class Goal:
         """Net, rear frame, then posts and bar."""
         up = np.array([0.0, 0.0, self.tall])
         size = canvas.size_at(self.middle)
-        pixels = canvas.project(np.array([self.left, self.right, self.left + up, self.right + up, self.middle + self.back]))
+        pixels = canvas.project(
+            np.array([self.left, self.right, self.left + up, self.right + up, self.middle + self.back])
+        )
         height, width = canvas.colour.shape[:2]
         outside = (pixels.max(axis=0) < 0).any() or (pixels.min(axis=0) > (width, height)).any()
         if size == 0 or not np.isfinite(pixels).all() or outside:
@@ -312,20 +340,22 @@ def _goals(pitch: Field, world: World) -> Iterator[Goal]:
         mouth = np.array(spot, dtype=float)
         half = half_size * np.array([-np.sin(angle), np.cos(angle), 0])
         back = rng.uniform(0.8, 2) * np.array([np.cos(angle), np.sin(angle), 0])
-        yield Goal(mouth - half, mouth + half, back, 0.66 * half_size if half_size > 3 else half_size, 0.1, white, net, share)
+        yield Goal(
+            mouth - half, mouth + half, back, 0.66 * half_size if half_size > 3 else half_size, 0.1, white, net, share
+        )
 
 
 def _furniture(
     pitch: Field, world: World, conditions: Conditions
-) -> Iterator[tuple[Array, Callable[[Canvas], None]]]:
-    """Corner flags, benches, dugouts, masts, cones and loose balls."""
+) -> Iterator[tuple[Array, Array, Callable[[Canvas], None]]]:
+    """Corner flags, benches, masts and loose balls: where each begins and ends, and how to draw it."""
     rng = np.random.default_rng([conditions.world, 43])
 
-    def bar(start: Array, end: Array, thick: float, colour: Colour) -> tuple[Array, Callable[[Canvas], None]]:
-        return start, lambda canvas: canvas.bar(start, end, thick, colour)
+    def bar(start: Array, end: Array, thick: float, colour: Colour) -> tuple[Array, Array, Callable[[Canvas], None]]:
+        return start, end, lambda canvas: canvas.bar(start, end, thick, colour)
 
-    def disc(middle: Array, radius: float, colour: Colour) -> tuple[Array, Callable[[Canvas], None]]:
-        return middle, lambda canvas: canvas.disc(middle, radius, colour)
+    def disc(middle: Array, radius: float, colour: Colour) -> tuple[Array, Array, Callable[[Canvas], None]]:
+        return middle, middle, lambda canvas: canvas.disc(middle, radius, colour)
 
     flag = random_colour(rng, 0.3)
     pole = random_colour(rng, 0.6)
@@ -345,7 +375,9 @@ def _furniture(
             step = np.array([0, long, 0])
         yield bar(start, start + step, rng.uniform(0.1, 0.4), random_colour(rng, 0.7))
     for _ in range(int(rng.integers(0, 4))):  # masts
-        spot = np.array([rng.choice([-1, 1]) * (pitch.length / 2 * rng.uniform(0, 1.1)), pitch.width / 2 + rng.uniform(6, 25), 0])
+        spot = np.array(
+            [rng.choice([-1, 1]) * (pitch.length / 2 * rng.uniform(0, 1.1)), pitch.width / 2 + rng.uniform(6, 25), 0]
+        )
         spot[1] *= rng.choice([-1, 1])
         yield bar(spot, spot + [0, 0, rng.uniform(8, 22)], rng.uniform(0.15, 0.4), random_colour(rng, 0.5))
     for _ in range(int(rng.integers(0, 25))):  # cones, bottles and balls on the ground

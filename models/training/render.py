@@ -84,7 +84,9 @@ def _paint(
     colour = add_air(conditions, colour, away)
     picture = (np.clip(colour, 0, 1) * 255).astype(np.uint8)
     seen = 1 - hidden
-    labels = tuple((np.clip(label * seen, 0, 1) * 255 + 0.5).astype(np.uint8) for label in (ground.coverage, ground.target))
+    labels = tuple(
+        (np.clip(label * seen, 0, 1) * 255 + 0.5).astype(np.uint8) for label in (ground.coverage, ground.target)
+    )
     canvas = Canvas(picture, labels, camera, (window[0], window[1]), dim)
     draw_objects(field, world, conditions, canvas)
     return picture, labels[0], labels[1]

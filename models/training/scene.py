@@ -228,7 +228,9 @@ def _grass(rng: np.random.Generator, conditions: Conditions) -> tuple[Colour, Co
     contrast = conditions.mowing
     light = hsv(hue, saturation, value * (1 + 0.18 * contrast))
     dark = hsv(
-        hue + contrast * rng.normal(0, 14), saturation * (1 + contrast * rng.normal(0, 0.15)), value * (1 - 0.1 * contrast)
+        hue + contrast * rng.normal(0, 14),
+        saturation * (1 + contrast * rng.normal(0, 0.15)),
+        value * (1 - 0.1 * contrast),
     )
     return light, np.clip(dark, 0, 1)
 
@@ -246,7 +248,9 @@ def _zones(rng: np.random.Generator, grass: Colour) -> tuple[Zone, ...]:
     for _ in range(int(rng.integers(1, 4))):
         kind = str(rng.choice(["plain", "grass", "track", "terrace"], p=[0.3, 0.2, 0.25, 0.25]))
         if kind == "track":
-            colour = hsv(rng.choice([8, 15, 210, 0]) + rng.normal(0, 6), rng.uniform(0.25, 0.7), rng.uniform(0.35, 0.75))
+            colour = hsv(
+                rng.choice([8, 15, 210, 0]) + rng.normal(0, 6), rng.uniform(0.25, 0.7), rng.uniform(0.35, 0.75)
+            )
             period, width = 1.22, 0.05
         elif kind == "terrace":
             colour = hsv(rng.uniform(0, 360), rng.uniform(0, 0.15), rng.uniform(0.35, 0.75))

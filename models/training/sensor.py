@@ -19,7 +19,11 @@ def add_air(conditions: Conditions, colour: Plane, depth: Plane) -> Plane:
 
 
 def expose(
-    conditions: Conditions, picture: NDArray[np.uint8], origin: tuple[int, int], size: tuple[int, int], rng: np.random.Generator
+    conditions: Conditions,
+    picture: NDArray[np.uint8],
+    origin: tuple[int, int],
+    size: tuple[int, int],
+    rng: np.random.Generator,
 ) -> NDArray[np.uint8]:
     """What the camera delivers of a window at `origin` of a frame of `size` (width, height).
 
@@ -89,13 +93,17 @@ def _fringe(
         if sign:
             shift = sign * conditions.fringe * float(lens.uniform(-1.5, 1.5)) / (size[0] / 2)
             move = np.float32([[1 + shift, 0, -shift * middle[0]], [0, 1 + shift, -shift * middle[1]]])
-            plane = cv2.warpAffine(plane, move, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            plane = cv2.warpAffine(
+                plane, move, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+            )
             plane = cv2.GaussianBlur(plane, (0, 0), 0.2 + conditions.fringe * float(lens.uniform(0, 1.5)))
         bands.append(plane)
     return np.dstack(bands)
 
 
-def _tone(conditions: Conditions, light: Plane, origin: tuple[int, int], size: tuple[int, int], lens: np.random.Generator) -> Plane:
+def _tone(
+    conditions: Conditions, light: Plane, origin: tuple[int, int], size: tuple[int, int], lens: np.random.Generator
+) -> Plane:
     """Exposure, white balance, contrast, saturation and the dark corners of the lens."""
     odd = 0.15 + 0.85 * conditions.variety
     gain = np.exp(odd * lens.normal(0, 0.12)) * np.exp(odd * lens.normal(0, 0.05, 3))

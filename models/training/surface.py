@@ -32,9 +32,7 @@ class Ground:
     target: Plane
 
 
-def shade_ground(
-    pitch: Field, world: World, conditions: Conditions, centre: Plane, rays: Plane
-) -> Ground:
+def shade_ground(pitch: Field, world: World, conditions: Conditions, centre: Plane, rays: Plane) -> Ground:
     """The ground as seen from `centre` (3,) along `rays` (H, W, 3)."""
     patch = ground_patch(pitch, world, centre, rays)
     outside = _outside(pitch, patch)
@@ -47,13 +45,14 @@ def shade_ground(
     if coverage.any():
         rough = np.float32(0.012 * (0.3 + conditions.wear)) * world.edge_noise.at(patch)
         painted, _ = marking_shares(pitch, patch, rough)
-    opacity, lasting = _paint(world, conditions, patch)
-    paint = world.paint * (1 + 0.12 * world.paint_noise.at(patch))[..., None]
-    colour = mix(colour, paint, painted * opacity)
-    for letters in world.letters:
-        share = _letter_coverage(letters, patch)
-        if share is not None:
-            colour = mix(colour, letters.colour * paint / world.paint, share * np.maximum(opacity, 0.3))
+    lettering = [(letters.colour, _letter_coverage(letters, patch)) for letters in world.letters]
+    lettering = [(ink, share) for ink, share in lettering if share is not None]
+    if lettering or coverage.any():
+        opacity, lasting = _paint(world, conditions, patch)
+        shade = (1 + 0.12 * world.paint_noise.at(patch))[..., None]
+        colour = mix(colour, world.paint * shade, painted * opacity)
+        for ink, share in lettering:
+            colour = mix(colour, ink * shade, share * np.maximum(opacity, 0.3))
     if conditions.rain:  # wet ground mirrors the sky, more so far away
         gloss = np.float32(0.45 * conditions.rain) * smooth_step(world.cloud_noise.at(patch) + patch.depth / 40, 0, 3)
         colour = mix(colour, np.float32([0.75, 0.72, 0.7]), gloss)
@@ -78,7 +77,7 @@ def window_rays(camera: Camera, window: tuple[int, int, int, int]) -> Plane:
     if np.isnan(grid).any():
         grid = np.where(np.isnan(grid), [0.0, 0.0, 1.0], grid)
     across, down = _weights(width, len(columns)), _weights(height, len(rows))
-    return np.ascontiguousarray(np.einsum("rg,gck,wc->rwk", down, grid, across, optimize=True), dtype=np.float32)
+    return np.stack([down @ grid[..., axis] @ across.T for axis in range(3)], axis=-1).astype(np.float32)
 
 
 def _weights(count: int, nodes: int) -> Plane:

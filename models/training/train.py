@@ -33,7 +33,9 @@ SAVE_EVERY_S = 240
 def main() -> None:
     """Render, train, export."""
     options = _options()
-    device = torch.device(("cuda" if torch.cuda.is_available() else "cpu") if options.device == "auto" else options.device)
+    device = torch.device(
+        ("cuda" if torch.cuda.is_available() else "cpu") if options.device == "auto" else options.device
+    )
     if device.type == "cpu":
         torch.set_num_threads(options.threads)
     options.run.mkdir(parents=True, exist_ok=True)
@@ -41,7 +43,7 @@ def main() -> None:
     crops = Crops(options.run / "crops", np.random.default_rng([options.seed, 1]))
     while crops.refresh() < 4 * SHARD_CROPS:
         time.sleep(1)
-    training = Training(device, options.epochs * EPOCH_STEPS, options.gamma)
+    training = Training(device, 60 * options.minutes, options.gamma)
     checkpoint = options.run / "checkpoint.pt"
     if checkpoint.exists():
         training.load(checkpoint)
@@ -57,19 +59,18 @@ def main() -> None:
 class Training:
     """Network, running average of its weights, optimiser and schedule."""
 
-    def __init__(self, device: torch.device, steps: int, gamma: float) -> None:
+    def __init__(self, device: torch.device, budget_s: float, gamma: float) -> None:
         torch.manual_seed(0)
-        self.device, self.steps, self.step, self.gamma = device, steps, 0, gamma
+        self.device, self.budget_s, self.gamma = device, budget_s, gamma
+        self.step, self.elapsed_s = 0, 0.0
         self.network = UNet().to(device, memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.network).eval()
         self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
 
     def learning_rate(self) -> float:
-        """Two epochs of warm-up, then exponentially down."""
-        warm = WARM_UP_EPOCHS * EPOCH_STEPS
-        if self.step < warm:
-            return LEARNING_RATE * (self.step + 1) / warm
-        return LEARNING_RATE * LAST_RATE ** ((self.step - warm) / max(self.steps - warm, 1))
+        """Two epochs of warm-up, then exponentially down; by the clock, so that slow machines finish the schedule too."""
+        warm = min(1.0, (self.step + 1) / (WARM_UP_EPOCHS * EPOCH_STEPS))
+        return LEARNING_RATE * warm * LAST_RATE ** min(1.0, self.elapsed_s / self.budget_s)
 
     def learn(self, pictures: Tensor, targets: Tensor) -> float:
         """One step; the loss."""
@@ -85,7 +86,7 @@ class Training:
         self.optimiser.step()
         self.step += 1
         self._follow()
-        return float(loss)
+        return float(loss.detach())
 
     @torch.no_grad()
     def _follow(self) -> None:
@@ -101,6 +102,7 @@ class Training:
         partial = path.with_suffix(".partial")
         state = {
             "step": self.step,
+            "elapsed_s": self.elapsed_s,
             "network": self.network.state_dict(),
             "average": self.average.state_dict(),
             "optimiser": self.optimiser.state_dict(),
@@ -111,7 +113,7 @@ class Training:
     def load(self, path: Path) -> None:
         """Go on from a checkpoint."""
         state = torch.load(path, map_location=self.device, weights_only=True)
-        self.step = state["step"]
+        self.step, self.elapsed_s = state["step"], state["elapsed_s"]
         self.network.load_state_dict(state["network"])
         self.average.load_state_dict(state["average"])
         self.optimiser.load_state_dict(state["optimiser"])
@@ -124,25 +126,28 @@ class Training:
 
 
 def train(training: Training, crops: Crops, options: argparse.Namespace, checkpoint: Path) -> None:
-    """Steps until the schedule ends, a checkpoint every few minutes, a line in the log every epoch."""
+    """Steps until the time is up, a checkpoint every few minutes, a line in the log every epoch."""
     training.network.train()
-    saved = time.monotonic()
+    saved = before = time.monotonic()
     losses: list[float] = []
     log = (options.run / "log.jsonl").open("a")
-    progress = tqdm(total=training.steps, initial=training.step, unit="step", mininterval=5)
-    while training.step < training.steps:
+    progress = tqdm(total=round(training.budget_s), initial=round(training.elapsed_s), unit="s", mininterval=5)
+    while training.elapsed_s < training.budget_s:
         pictures, targets = crops.batch(options.batch, options.size)
         losses.append(training.learn(torch.from_numpy(pictures), torch.from_numpy(targets)))
-        progress.update()
+        now = time.monotonic()
+        training.elapsed_s += now - before
+        progress.update(now - before)
+        before = now
         if training.step % EPOCH_STEPS == 0:
             line = {"step": training.step, "loss": float(np.mean(losses)), "crops": crops.refresh()}
-            progress.set_postfix(loss=f"{line['loss']:.4f}", crops=line["crops"])
-            log.write(json.dumps({**line, "rate": training.learning_rate()}) + "\n")
+            progress.set_postfix(line)
+            log.write(json.dumps({**line, "elapsed_s": training.elapsed_s, "rate": training.learning_rate()}) + "\n")
             log.flush()
             losses.clear()
-        if time.monotonic() - saved > SAVE_EVERY_S:
+        if now - saved > SAVE_EVERY_S:
             training.save(checkpoint)
-            saved = time.monotonic()
+            saved = now
     training.save(checkpoint)
     progress.close()
 
@@ -151,9 +156,9 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--run", type=Path, default=Path("runs/unet"), help="folder of crops, checkpoint and log")
     parser.add_argument("--device", default="auto", help="auto, cpu or cuda")
-    parser.add_argument("--epochs", type=int, default=110, help=f"of {EPOCH_STEPS} steps")
-    parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--size", type=int, default=256, help="pixels of a crop, a multiple of 32")
+    parser.add_argument("--minutes", type=float, default=120.0, help="budget of the whole schedule")
+    parser.add_argument("--batch", type=int, default=6)
+    parser.add_argument("--size", type=int, default=224, help="pixels of a crop, a multiple of 32")
     parser.add_argument("--workers", type=int, default=1, help="processes that render")
     parser.add_argument("--shards", type=int, default=400, help=f"of {SHARD_CROPS} crops per worker")
     parser.add_argument("--threads", type=int, default=2)

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import numpy as np
+import onnxruntime
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra `train`: pip install '.[train]'")
+
+from models.training.export import export, fold  # noqa: E402
+from models.training.network import UNet, focal_loss  # noqa: E402
+
+pytestmark = [pytest.mark.train, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
+
+
+@pytest.fixture(scope="module")
+def network():
+    torch.manual_seed(0)
+    model = UNet()
+    model.train()
+    with torch.no_grad():  # so that the normalisation has seen something
+        for _ in range(3):
+            model(torch.rand(2, 3, 64, 64))
+    return model.eval()
+
+
+def test_pytorch_and_onnx_runtime_agree(network, tmp_path):
+    card = export(network, tmp_path / "unet.onnx")
+    session = onnxruntime.InferenceSession(str(tmp_path / "unet.onnx"), providers=["CPUExecutionProvider"])
+    assert card["bytes"] <= 12_000_000
+    assert len(card["sha256"]) == 64
+    for shape in ((1, 3, 64, 96), (2, 3, 128, 32)):
+        picture = np.random.default_rng(0).random(shape, dtype=np.float32)
+        [answer] = session.run(None, {session.get_inputs()[0].name: picture})
+        with torch.no_grad():
+            expected = torch.sigmoid(network(torch.from_numpy(picture))).numpy()
+        assert answer.shape == (shape[0], 1, *shape[2:])
+        np.testing.assert_allclose(answer, expected, atol=1e-4)
+
+
+def test_folding_the_normalisation_changes_nothing(network):
+    picture = torch.rand(1, 3, 64, 64)
+    with torch.no_grad():
+        torch.testing.assert_close(fold(network)(picture), network(picture), atol=1e-4, rtol=1e-4)
+
+
+def test_the_loss_is_least_where_probability_and_coverage_agree():
+    coverage = torch.full((1, 1, 8, 8), 0.3)
+    losses = [
+        float(focal_loss(torch.full((1, 1, 8, 8), float(np.log(p / (1 - p)))), coverage)) for p in (0.1, 0.3, 0.6)
+    ]
+    assert losses[1] < min(losses[0], losses[2])
+
+
+def test_a_few_steps_learn_a_bright_stripe(network):
+    picture = torch.full((2, 3, 64, 64), 0.3)
+    target = torch.zeros(2, 1, 64, 64)
+    picture[:, :, 30:34], target[:, :, 30:34] = 0.9, 1.0
+    model = UNet()
+    optimiser = torch.optim.AdamW(model.parameters(), lr=3e-3)
+    losses = []
+    for _ in range(25):
+        loss = focal_loss(model(picture), target)
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        losses.append(float(loss.detach()))
+    assert losses[-1] < 0.3 * losses[0]
