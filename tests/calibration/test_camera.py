@@ -22,9 +22,7 @@ vectors = st.lists(st.floats(-3, 3, allow_subnormal=False), min_size=3, max_size
 
 
 def lens(distortion=(), size=(3000, 1800)):
-    return Intrinsics(
-        np.array([[2000.0, 0, 1500], [0, 2010, 900], [0, 0, 1]]), np.array(distortion, dtype=float), size
-    )
+    return Intrinsics(np.array([[2000.0, 0, 1500], [0, 2010, 900], [0, 0, 1]]), np.array(distortion, dtype=float), size)
 
 
 @given(vectors)
