@@ -53,5 +53,5 @@ class Access:
         method = scope["method"] if route != "none" else "any"
         self._metrics.requests.labels(method, route, status).inc()
         self._metrics.seconds.labels(method, route).observe(seconds)
-        say = log.debug if scope["path"] in QUIET and status < 400 else log.info
+        say = log.debug if scope["path"] in QUIET else log.info
         say("request", method=scope["method"], path=scope["path"], status=status, seconds=round(seconds, 4))

@@ -15,6 +15,7 @@ from starlette.responses import Response
 
 from service import problems
 from service.access import Access
+from service.bodylimit import BodyLimit
 from service.context import Context
 from service.metrics import Metrics
 from service.problems import Problem
@@ -39,11 +40,11 @@ def create_app(settings: Settings) -> FastAPI:
         title="ESC",
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
         version=version("esc-calibration"),
-        max_body_size=int(settings.max_body_mb * 1e6),
         lifespan=_lifespan,
         responses=documented.problems(422, 503),
     )
     app.state.context = context
+    app.add_middleware(BodyLimit, largest=int(settings.max_body_mb * 1e6))
     app.add_middleware(Access, metrics=context.metrics)
     problems.install(app)
     _answer_outages(app)

@@ -39,5 +39,5 @@ def _context(request: Request) -> Context:
 
 
 InContext = Annotated[Context, Depends(_context)]
-VenueIdPath = Annotated[str, Path(alias="venue", pattern=ID_PATTERN, examples=["tsukuba"])]
-JobIdPath = Annotated[str, Path(alias="job", pattern=JOB_ID_PATTERN, examples=["01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"])]
+VenueIdPath = Annotated[str, Path(pattern=ID_PATTERN, examples=["tsukuba"])]
+JobIdPath = Annotated[str, Path(pattern=JOB_ID_PATTERN, examples=["01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"])]

@@ -58,6 +58,7 @@ KINDS: dict[str, Kind] = {
     "idempotency-key-reused": Kind(422, "The idempotency key was used for other content"),
     "queue-full": Kind(429, "Too many jobs are waiting"),
     "calibration-failed": Kind(422, "The frames cannot be calibrated"),
+    "no-markings-in-view": Kind(422, "The stored pose of a camera sees no markings"),
     "model-missing": Kind(503, "The segmentation network is missing"),
     "job-timeout": Kind(504, "The job took longer than it may"),
     "job-crashed": Kind(500, "The computation broke off"),

@@ -78,7 +78,10 @@ class WorkerQueue:
             "log_level": "WARNING",
         }
         DBOS(config=config)
-        DBOS.workflow(name=WORKFLOW, max_recovery_attempts=BEGINS_AGAIN)(run)
+
+        @DBOS.workflow(name=WORKFLOW, max_recovery_attempts=BEGINS_AGAIN)
+        def attempt(job_id: str) -> None:
+            run(job_id)
 
     def start(self) -> None:
         """Begin with what this worker left behind, then take from the queue."""

@@ -106,7 +106,8 @@ def solve(
             pitch, cameras, frames, segmenter, _engine_options(options), lambda step: report(_progress(step))
         )
     except CalibrationError as error:
-        raise Failure("calibration-failed", error.detail, error.camera) from error
+        kind = error.kind if error.kind in KINDS else "calibration-failed"
+        raise Failure(kind, error.detail, error.camera) from error
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
     drawing = time.perf_counter()
     pictures = _draw(pitch.flat() if options.flat else pitch, cameras, found, frames)

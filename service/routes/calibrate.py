@@ -45,7 +45,7 @@ UPLOAD: dict[str, Any] = {
 
 
 @router.post(
-    "/venues/{venue}/calibrate",
+    "/venues/{venue_id}/calibrate",
     status_code=202,
     response_model=Job,
     responses={

@@ -66,7 +66,7 @@ def list_jobs(
     return Jobs(jobs=page[:limit], next_cursor=page[limit - 1].id if more else None)
 
 
-@router.get("/{job}", response_model=Job, responses={304: {"description": "Unchanged"}, **problems(404)})
+@router.get("/{job_id}", response_model=Job, responses={304: {"description": "Unchanged"}, **problems(404)})
 async def get_job(
     job: Existing,
     context: InContext,
@@ -80,14 +80,14 @@ async def get_job(
     return job_answer(job, if_none_match=if_none_match)
 
 
-@router.post("/{job}/cancel", response_model=Job, responses=problems(404))
+@router.post("/{job_id}/cancel", response_model=Job, responses=problems(404))
 def cancel_job(job: Existing, context: InContext) -> Response:
     """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
     context.jobs.cancel(job.id)
     return job_answer(context.jobs.get(job.id) or job)
 
 
-@router.get("/{job}/events", response_class=EventSourceResponse, responses=problems(404))
+@router.get("/{job_id}/events", response_class=EventSourceResponse, responses=problems(404))
 async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerSentEvent]:
     """The job as server-sent events: `progress` whenever it changes, `end` when it has ended."""
     while True:
@@ -102,19 +102,19 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
         await context.watch.until(job.id, _later_than(state), EVENT_AT_LEAST_EVERY_S)
 
 
-@router.get("/{job}/preview.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get("/{job_id}/preview.jpg", response_class=Response, responses={**JPEG, **problems(404)})
 def preview(job: Existing, context: InContext) -> Response:
     """One wide view stitched from all cameras."""
     return _picture(context, job, "preview")
 
 
-@router.get("/{job}/birdseye.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get("/{job_id}/birdseye.jpg", response_class=Response, responses={**JPEG, **problems(404)})
 def birdseye(job: Existing, context: InContext) -> Response:
     """The pitch from above, 10 px/m."""
     return _picture(context, job, "birdseye")
 
 
-@router.get("/{job}/overlay/{camera}.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get("/{job_id}/overlay/{camera}.jpg", response_class=Response, responses={**JPEG, **problems(404)})
 def overlay(job: Existing, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext) -> Response:
     """A camera's frame with the field drawn on it, before and after."""
     return _picture(context, job, f"overlay_{camera}")

@@ -21,7 +21,7 @@ def no_such_venue(venue_id: str) -> Problem:
     return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
 
 
-@router.put("/{venue}", responses={201: {"model": Venue}, **problems(412, 422)})
+@router.put("/{venue_id}", responses={201: {"model": Venue}, **problems(412, 422)})
 def put_venue(
     venue_id: VenueIdPath,
     venue: VenueIn,
@@ -59,7 +59,7 @@ def list_venues(
     return Venues(venues=page[:limit], next_cursor=page[limit - 1].id if more else None)
 
 
-@router.get("/{venue}", response_model=Venue, responses={304: {"description": "Unchanged"}, **problems(404)})
+@router.get("/{venue_id}", response_model=Venue, responses={304: {"description": "Unchanged"}, **problems(404)})
 def get_venue(
     venue_id: VenueIdPath,
     response: Response,
@@ -77,7 +77,7 @@ def get_venue(
     return stored.venue
 
 
-@router.delete("/{venue}", status_code=204, responses=problems(404, 409, 412))
+@router.delete("/{venue_id}", status_code=204, responses=problems(404, 409, 412))
 def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[str | None, Header()] = None) -> None:
     """Forget a venue and the history of its poses; its jobs stay."""
 

@@ -1,0 +1,81 @@
+"""Stands in for the program that computes a job: does what the name of the venue says, and no geometry."""
+
+import json
+import os
+import signal
+import sys
+import time
+
+from service import lifeline
+from service.schemas import CameraResult, JobError, Moved, Pose, Progress, Provenance, Result
+from service.settings import Settings
+from service.store.blobs import Blobs
+from service.store.engine import connect
+from service.store.jobs import Jobs, picture_folder
+
+JPEG = b"\xff\xd8\xff\xd9"
+SHIFT_M = 0.125
+
+
+def say(**message):
+    print(json.dumps({key: value.model_dump() for key, value in message.items()}), flush=True)
+
+
+def main(job_id: str, run_token: str) -> None:
+    lifeline.end_with_parent()
+    settings = Settings()
+    task = Jobs(connect(settings.home_database_url)).task(job_id, run_token)
+    behaviour, _, seconds = task.venue.name.partition(" ")
+    with (settings.data / "begun").open("a") as begun:
+        begun.write(f"{job_id} {os.getpid()}\n")
+    say(progress=Progress(stage="segmentation", fraction=0.1))
+    end = time.monotonic() + float(seconds or 0)
+    while time.monotonic() < end:
+        time.sleep(0.05)
+        say(progress=Progress(stage="evolution", fraction=0.5, generation=7, loss=0.3))
+    match behaviour:
+        case "hang":
+            time.sleep(3600)
+        case "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        case "kill-worker":
+            os.kill(os.getppid(), signal.SIGKILL)
+            time.sleep(3600)
+        case "chatter":
+            print("this is not a message", flush=True)
+        case "fail":
+            say(error=JobError(type="/problems/calibration-failed", title="", detail="It is black.", camera="left"))
+            return
+    blobs = Blobs(settings.home_blob_url)
+    for name in ("preview", "birdseye", *(f"overlay_{camera.id}" for camera in task.venue.cameras)):
+        blobs.put(f"{picture_folder(job_id, run_token)}/{name}.jpg", JPEG)
+    cameras = [
+        CameraResult(
+            id=camera.id,
+            pose=Pose.at(camera.pose.rotation, [camera.pose.position[0] + SHIFT_M, *camera.pose.position[1:]]),
+            sigma=None,
+            moved=Moved(rotation_deg=0, position_m=SHIFT_M, pixels=1.0),
+            iou=0.9,
+            residual_px=1.0,
+        )
+        for camera in task.venue.cameras
+    ]
+    say(
+        result=Result(
+            accepted=behaviour != "reject",
+            rejected_because="the lines do not fit" if behaviour == "reject" else None,
+            cameras=cameras,
+            stitch_error_px=0.2,
+            stitch_error_before_px=10.0,
+            loss=0.1,
+            generations=10,
+            timings_s={"decode": 0.1},
+            provenance=Provenance(
+                software="0", model_sha256="0", seed=task.options.seed, options=task.options.model_dump()
+            ),
+        )
+    )
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

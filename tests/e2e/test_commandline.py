@@ -1,0 +1,132 @@
+import json
+import signal
+import subprocess
+import sys
+
+import httpx
+import pytest
+
+from tests.e2e.running import png, venue, wait_for
+
+
+@pytest.fixture
+def esc(service, tmp_path):
+    """Run `esc`; files of the test are in the folder it runs in."""
+    for side in ("left", "right"):
+        (tmp_path / f"{side}.png").write_bytes(png())
+
+    def esc(*arguments, url=service.url):
+        command = [sys.executable, "-m", "service.cli", *arguments]
+        environment = service.environment | {"ESC_URL": url}
+        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+
+    return esc
+
+
+FRAMES = ("left=left.png", "right=right.png")
+
+
+def test_a_venue_is_put_read_listed_and_deleted(esc, name, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name)))
+    assert json.loads(esc("venue", "put", "venue.json").stdout)["id"] == name
+    assert json.loads(esc("venue", "get", name).stdout)["cameras"][0]["id"] == "left"
+    assert f"{name}\taccept\tleft right" in esc("venue", "list").stdout
+    assert esc("venue", "delete", name).returncode == 0
+    gone = esc("venue", "get", name)
+    assert gone.returncode == 1
+    assert "There is no such venue" in gone.stderr
+
+
+def test_a_wrong_venue_file_is_a_usage_error(esc, tmp_path):
+    (tmp_path / "venue.json").write_text('{"id": "v"}')
+    answer = esc("venue", "put", "venue.json")
+    assert answer.returncode == 2
+    assert "cameras" in answer.stderr
+
+
+@pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3)])
+def test_the_exit_code_tells_how_a_calibration_ended(service, esc, name, behaviour, code):
+    service.venue(name, behaviour)
+    answer = esc("calibrate", name, *FRAMES, "--wait")
+    assert answer.returncode == code, answer.stderr
+    job = json.loads(answer.stdout)
+    assert job["venue"] == name
+    if behaviour == "fail":
+        assert "It is black." in answer.stderr
+    if behaviour == "reject":
+        assert "the lines do not fit" in answer.stderr
+
+
+def test_without_wait_the_job_is_told(service, esc, name):
+    service.venue(name)
+    told = json.loads(esc("calibrate", name, *FRAMES, "--options", '{"seed": 3}').stdout)
+    assert told["url"] == f"{service.url}/jobs/{told['job']}"
+    service.end(told["job"])
+    assert json.loads(esc("job", "get", told["job"]).stdout)["result"]["provenance"]["seed"] == 3
+    assert json.loads(esc("job", "cancel", told["job"]).stdout)["status"] == "succeeded"
+
+
+def test_a_busy_service_is_told_apart(service, esc, name):
+    service.venue(name, "hang")
+    job = service.submit(name, 1).json()["id"]
+    busy = esc("calibrate", name, *FRAMES, "--wait")
+    assert (busy.returncode, job in busy.stderr) == (75, True)
+    service.http.post(f"/jobs/{job}/cancel")
+
+
+def test_usage_errors_are_told_before_anything_is_sent(esc):
+    for arguments in (("left",), ("left=nowhere.png",), ("=x",), (*FRAMES, "--options", "{"), ()):
+        assert esc("calibrate", "v", *arguments).returncode == 2
+
+
+def test_refused_frames_and_an_absent_service_are_failures(service, esc, name):
+    service.venue(name)
+    refused = esc("calibrate", name, "left=left.png")
+    assert (refused.returncode, "right" in refused.stderr) == (1, True)
+    absent = esc("calibrate", name, *FRAMES, url="http://127.0.0.1:9")
+    assert (absent.returncode, "cannot be reached" in absent.stderr) == (1, True)
+    assert "Traceback" not in refused.stderr + absent.stderr
+
+
+def test_nobody_listens_to_the_world_by_accident(esc):
+    answer = esc("serve", "--host", "0.0.0.0", "--port", "0")
+    assert answer.returncode == 2
+    assert "ESC_ALLOW_UNAUTHENTICATED" in answer.stderr
+
+
+def test_a_port_in_use_is_told(service, esc):
+    answer = esc("serve", "--port", str(httpx.URL(service.url).port))
+    assert answer.returncode == 2
+    assert "Cannot listen" in answer.stderr
+
+
+def test_a_wrong_setting_is_told(start, tmp_path):
+    command = [sys.executable, "-m", "service.cli", "serve", "--data", str(tmp_path)]
+    answer = subprocess.run(command, env={"ESC_QUEUE_LIMIT": "many"}, capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 2
+    assert "ESC_QUEUE_LIMIT" in answer.stderr
+
+
+def test_ctrl_c_ends_it_cleanly(start):
+    service = start().ready()
+    service.process.send_signal(signal.SIGINT)
+    assert service.process.wait(30) == 0
+
+
+def test_a_bad_frame_without_a_server_is_told_too(esc, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue("v")))
+    (tmp_path / "left.png").write_bytes(png()[:-20])
+    answer = esc("run", "venue.json", *FRAMES, "-o", "out")
+    assert answer.returncode == 1
+    assert "left ends before its picture does" in answer.stderr
+
+
+def test_a_worker_alone_serves_an_api_alone(start):
+    service = start("serve")
+    command = [sys.executable, "-m", "service.cli", "worker", "--name", "alone"]
+    worker = subprocess.Popen(command, env=service.environment, stderr=service.log)
+    job = service.submit(service.venue("v")).json()["id"]
+    assert service.end(job)["status"] == "succeeded"
+    worker.send_signal(signal.SIGTERM)
+    assert worker.wait(30) == 0
+    wait_for(lambda: service.http.get("/readyz").status_code == 503)

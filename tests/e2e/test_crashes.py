@@ -1,0 +1,108 @@
+"""Power cuts, killed processes and native crashes: a job that was accepted ends, once."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+
+from tests.e2e.running import alive, children, wait_for
+
+
+def poses(service, venue):
+    return [camera["pose"]["position"][0] for camera in service.http.get(f"/venues/{venue}").json()["cameras"]]
+
+
+def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
+    service = start().ready()
+    service.venue("v", "accept 2")
+    job = service.submit("v").json()["id"]
+    service.running(job)
+    worker = service.worker()
+    os.kill(worker, signal.SIGKILL)
+    ended = service.end(job)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
+    # The first attempt died with its worker, and the pose moved by one step, not two.
+    first, second = service.begun(job)
+    assert not alive(first)
+    assert not alive(second)
+    assert poses(service, "v") == [-0.875, -0.875]
+    assert service.worker() != worker
+
+
+def test_a_worker_on_another_machine_takes_over(start, tmp_path):
+    service = start("serve")
+    service.venue("v", "accept 3")
+    first, second = (worker(service, number) for number in (1, 2))
+    job = service.submit("v").json()["id"]
+    service.running(job)
+    doomed = first if children(first.pid) else second
+    doomed.kill()
+    doomed.wait()
+    ended = service.end(job)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
+    assert poses(service, "v") == [-0.875, -0.875]
+    for process in (first, second):
+        process.kill()
+        process.wait()
+
+
+def worker(service, number):
+    command = [sys.executable, "-m", "service.cli", "worker", "--name", f"worker-{number}"]
+    return subprocess.Popen(command, env=service.environment, stderr=service.log)
+
+
+def test_two_workers_of_one_name_do_not_run_on_one_machine(start):
+    service = start().ready()
+    command = [sys.executable, "-m", "service.cli", "worker", "--name", socket.gethostname()]
+    second = subprocess.run(command, env=service.environment, capture_output=True, timeout=30)
+    assert second.returncode == 2
+    assert b"already runs" in second.stderr
+
+
+def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
+    service = start().ready()
+    service.venue("v", "accept 2")
+    job = service.submit("v").json()["id"]
+    service.running(job)
+    worker = service.worker()
+    (computing,) = service.begun(job)
+    service.kill()
+    wait_for(lambda: not alive(worker) and not alive(computing))
+    service.start()
+    ended = service.end(job)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
+    assert poses(service, "v") == [-0.875, -0.875]
+
+
+def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):
+    service = start().ready()
+    service.venue("v", "hang")
+    job = service.submit("v").json()["id"]
+    service.running(job)
+    worker = service.worker()
+    (computing,) = service.begun(job)
+    with service.http.stream("GET", f"/jobs/{job}/events") as events:
+        next(events.iter_lines())
+        assert service.stop() == 0
+    assert not alive(worker)
+    assert not alive(computing)
+
+
+def test_a_crash_of_the_computation_costs_one_job(start):
+    service = start().ready()
+    worker = service.worker()
+    crashed = service.end(service.submit(service.venue("bad", "crash")).json()["id"])
+    assert (crashed["status"], crashed["error"]["type"]) == ("failed", "/problems/job-crashed")
+    assert "SIGSEGV" in crashed["error"]["detail"]
+    assert service.end(service.submit(service.venue("good", "chatter")).json()["id"])["status"] == "succeeded"
+    assert service.worker() == worker
+
+
+def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):
+    service = start().ready()
+    job = service.end(service.submit(service.venue("v", "kill-worker")).json()["id"])
+    assert (job["status"], job["attempt"]) == ("failed", 3)
+    assert job["error"]["type"] == "/problems/job-abandoned"
+    service.ready()
+    assert service.end(service.submit(service.venue("w")).json()["id"])["status"] == "succeeded"

@@ -1,0 +1,107 @@
+import json
+
+import pytest
+
+from tests.e2e.running import venue
+
+
+def test_a_new_venue_is_created_and_an_old_one_replaced(service, name):
+    first = service.http.put(f"/venues/{name}", json=venue(name))
+    assert (first.status_code, first.headers["etag"]) == (201, '"1"')
+    second = service.http.put(f"/venues/{name}", json=venue(name, "other"))
+    assert (second.status_code, second.headers["etag"]) == (200, '"2"')
+    assert service.http.get(f"/venues/{name}").json()["name"] == "other"
+
+
+def test_the_same_venue_again_changes_nothing(service, name):
+    service.venue(name)
+    assert service.http.put(f"/venues/{name}", json=venue(name)).headers["etag"] == '"1"'
+
+
+def test_poses_are_written_in_both_conventions(service, name):
+    service.venue(name)
+    pose = service.http.get(f"/venues/{name}").json()["cameras"][0]["pose"]
+    assert set(pose) == {"rotation", "position", "translation"}
+
+
+def test_a_conditional_put_of_an_outdated_venue_is_refused(service, name):
+    service.venue(name)
+    service.venue(name, "other")
+    answer = service.http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": '"1"'})
+    assert (answer.status_code, answer.json()["type"]) == (412, "/problems/venue-changed")
+    assert service.http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": '"2"'}).status_code == 200
+    assert service.http.put(f"/venues/{name}", json=venue(name), headers={"If-None-Match": "*"}).status_code == 412
+
+
+def test_an_unchanged_venue_is_not_sent_again(service, name):
+    service.venue(name)
+    tag = service.http.get(f"/venues/{name}").headers["etag"]
+    answer = service.http.get(f"/venues/{name}", headers={"If-None-Match": tag})
+    assert (answer.status_code, answer.content) == (304, b"")
+
+
+def test_a_deleted_venue_is_gone(service, name):
+    service.venue(name)
+    assert service.http.delete(f"/venues/{name}").status_code == 204
+    answer = service.http.get(f"/venues/{name}")
+    assert (answer.status_code, answer.json()["type"]) == (404, "/problems/venue-not-found")
+    assert service.http.delete(f"/venues/{name}").status_code == 404
+
+
+def test_venues_come_in_pages(service):
+    ids = [service.venue(f"page-{number}") for number in range(3)]
+    first = service.http.get("/venues", params={"limit": 2, "cursor": "page"}).json()
+    rest = service.http.get("/venues", params={"limit": 1000, "cursor": first["next_cursor"]}).json()
+    assert [v["id"] for v in first["venues"]] == ids[:2]
+    assert rest["venues"][0]["id"] == ids[2]
+    assert rest["next_cursor"] is None
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "where"),
+    [
+        (["surprise"], 1, "surprise"),
+        (["field", "length_m"], 5, "field.length_m"),
+        (["field", "ridge"], [[0, 0, 1], [1, 1, 1]], "field"),
+        (["cameras"], [], "cameras"),
+        (["cameras", 0, "id"], "Left!", "cameras.0.id"),
+        (["cameras", 0, "id"], "options", "cameras.0"),
+        (["cameras", 0, "image_size"], [64, -1], "cameras.0.image_size.1"),
+        (["cameras", 0, "intrinsics", "distortion"], [0, 0, 0], "cameras.0.intrinsics"),
+        (["cameras", 0, "intrinsics", "matrix", 0, 0], "60", "cameras.0.intrinsics.matrix.0.0"),
+        (["cameras", 0, "intrinsics", "matrix", 0, 0], 3.4e6, "cameras.0"),
+        (["cameras", 0, "pose", "translation"], [0, 0, 0], "cameras.0.pose"),
+        (["cameras", 0, "pose", "position"], None, "cameras.0.pose"),
+        (["cameras", 0, "pose", "rotation", 0], True, "cameras.0.pose.rotation.0"),
+    ],
+)
+def test_a_wrong_venue_is_refused_and_the_place_named(service, name, path, value, where):
+    document = venue("wrong")
+    inner = document
+    for step in path[:-1]:
+        inner = inner[step]
+    inner[path[-1]] = value
+    answer = service.http.put("/venues/wrong", json=document)
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert f"body.{where}" in [error["where"] for error in answer.json()["errors"]]
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", "9" * 400, "9" * 5000, '"\\ud800"'])
+def test_numbers_that_are_none_are_refused(service, number):
+    text = json.dumps(venue("wrong")).replace("105", number)
+    answer = service.http.put("/venues/wrong", content=text, headers={"Content-Type": "application/json"})
+    assert answer.status_code in (400, 422)
+    assert answer.json()["type"] in ("/problems/invalid-request", "/problems/malformed-request")
+
+
+@pytest.mark.parametrize("body", [b"", b"{", b"\xff\xfe", b"[" * 100_000, b"null", b'{"\\ud800": 1}'])
+def test_a_body_that_is_no_venue_is_refused(service, body):
+    answer = service.http.put("/venues/wrong", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code in (400, 422)
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_the_id_in_the_address_is_the_id_of_the_venue(service):
+    answer = service.http.put("/venues/one", json=venue("other"))
+    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/venue-id-mismatch")

@@ -1,0 +1,92 @@
+import pytest
+import sqlalchemy as sa
+
+from service.schemas import VENUE_EXAMPLE, VenueIn
+from service.store import tables
+from service.store.blobs import Blobs
+from service.store.engine import connect, migrate, reading
+from service.store.jobs import Jobs, new_job_id
+from service.store.venues import Venues
+from service.store.workers import Workers
+
+
+@pytest.fixture
+def engine(tmp_path):
+    engine = connect(f"sqlite:///{tmp_path}/esc.sqlite")
+    migrate(engine)
+    yield engine
+    engine.dispose()
+
+
+def test_the_migrations_make_the_tables_that_the_code_knows(engine):
+    found = sa.MetaData()
+    found.reflect(engine)
+    for name, table in tables.metadata.tables.items():
+        assert {c.name: (str(c.type), c.nullable) for c in found.tables[name].columns} == {
+            c.name: (c.type.compile(engine.dialect), c.nullable) for c in table.columns
+        }
+        assert {index.name for index in found.tables[name].indexes} == {index.name for index in table.indexes}
+
+
+def test_migrating_twice_changes_nothing(engine):
+    migrate(engine)
+
+
+def test_every_pose_that_held_is_remembered_with_its_cause(engine):
+    venues = Venues(engine)
+    venue = VenueIn.model_validate(VENUE_EXAMPLE).stored()
+    venues.put(venue, lambda _: None)
+    venues.put(venue.model_copy(update={"name": "renamed"}), lambda _: None)
+    moved = venue.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
+    venues.put(venue.with_poses({"left": moved}), lambda _: None)
+    with reading(engine) as connection:
+        rows = connection.execute(sa.select(tables.pose_history).order_by(tables.pose_history.c.id)).all()
+    assert [(row.camera, row.cause, row.pose["position"][2]) for row in rows] == [
+        ("left", "put", 7.84),
+        ("left", "put", 9.0),
+    ]
+
+
+def test_a_refused_put_changes_nothing(engine):
+    venues = Venues(engine)
+
+    def refuse(_):
+        raise PermissionError
+
+    with pytest.raises(PermissionError):
+        venues.put(VenueIn.model_validate(VENUE_EXAMPLE).stored(), refuse)
+    assert venues.get("tsukuba") is None
+
+
+def test_job_ids_sort_by_time():
+    ids = [new_job_id() for _ in range(3)]
+    assert all(len(one) == 26 for one in ids)
+    assert ids[0][:8] == ids[2][:8]
+
+
+def test_jobs_that_are_not_there_are_none(engine):
+    jobs = Jobs(engine)
+    assert jobs.get(new_job_id()) is None
+    assert jobs.begin(new_job_id()) is None
+    assert jobs.states([new_job_id()]) == {}
+
+
+def test_a_silent_worker_is_noticed_and_may_come_back(engine):
+    workers = Workers(engine)
+    workers.enter("w", None)
+    assert [worker.name for worker in workers.alive(5)] == ["w"]
+    assert workers.silent(0) == ["w"]
+    workers.leave("w", 5)
+    assert workers.beat("w")
+    workers.leave("w", 0)
+    assert not workers.beat("w")
+
+
+def test_blobs_are_kept_and_removed_by_folder(tmp_path):
+    blobs = Blobs((tmp_path / "a folder").as_uri())
+    blobs.put("frames/a/left/0", b"1")
+    blobs.put("frames/ab/left/0", b"2")
+    blobs.delete_under("frames/a")
+    assert blobs.get("frames/a/left/0") is None
+    assert blobs.get("frames/ab/left/0") == b"2"
+    blobs.check()
