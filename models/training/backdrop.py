@@ -41,8 +41,7 @@ def shade_sky(conditions: Conditions, rays: Plane) -> Plane:
     )
     cover = smooth_step(clouds.at(sky) + np.float32(rng.uniform(-1.5, 1.5)), -0.5, 1.8)
     white = np.float32(0.15 if conditions.light == "floodlight" else rng.uniform(0.85, 1.1))
-    colour = mix(colour, np.float32([1.0, 0.98, 0.97]) * white, cover * np.clip(up * 12, 0, 1))
-    return colour
+    return mix(colour, np.float32([1.0, 0.98, 0.97]) * white, cover * np.clip(up * 12, 0, 1))
 
 
 def add_walls(

@@ -1,7 +1,7 @@
 """Export to ONNX: `python -m models.training.export runs/unet/checkpoint.pt`.
 
-One input, float32 N x 3 x H x W, RGB in 0..1; one output, float32 N x 1 x H x W, probability of a field marking. H and W
-are free multiples of 32; batch normalisation is folded into the convolutions.
+One input, float32 N x 3 x H x W, RGB in 0..1; one output, float32 N x 1 x H x W, probability of a field marking. H and
+W are free multiples of 32; batch normalisation is folded into the convolutions.
 """
 
 from __future__ import annotations

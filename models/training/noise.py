@@ -112,12 +112,12 @@ def step(signed: Plane, footprint: Plane) -> Plane:
 
 
 def band(offset: Plane, width: Plane | float, footprint: Plane) -> Plane:
-    """Share of a pixel covered by a band of `width` metres around offset 0; also right for bands thinner than a pixel."""
+    """Share of a pixel covered by a band of `width` metres around offset 0; also of bands thinner than a pixel."""
     return step(width / 2 - offset, footprint) - step(-width / 2 - offset, footprint)
 
 
 def bands(position: Plane, period: float, width: float, footprint: Plane) -> Plane:
-    """Share of a pixel covered by bands of `width` repeated every `period` metres; their mean where they blur together."""
+    """Share of a pixel covered by bands of `width` every `period` metres; their mean where they blur together."""
     offset = np.mod(position + period / 2, period) - period / 2
     fade = np.clip(2 - 2 * footprint / period, 0, 1)
     return fade * band(offset, width, footprint) + (1 - fade) * (width / period)

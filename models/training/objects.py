@@ -1,4 +1,4 @@
-"""What stands on the ground in front of it all: players and their shadows, balls, goals with nets, flags, benches, masts.
+"""What stands on the ground in front of it all: players, their shadows, balls, goals with nets, flags, benches.
 
 Everything is drawn as anti-aliased polygons on 8-bit pictures, farthest first. What is opaque covers the labels too.
 """
@@ -120,7 +120,7 @@ def draw_objects(pitch: Field, world: World, conditions: Conditions, canvas: Can
     feet = np.array([person.foot for person in people]).reshape(-1, 3)
     people = [people[i] for i in np.flatnonzero(canvas.near(feet, feet, 12.0))]
     _shadows(world, conditions, canvas, people)
-    furniture = list(_furniture(pitch, world, conditions))
+    furniture = list(_furniture(pitch, conditions))
     starts, ends = (np.array([item[i] for item in furniture]) for i in (0, 1))
     furniture = [furniture[i] for i in np.flatnonzero(canvas.near(starts, ends, 2.0))]
     things: list[tuple[Array, Callable[[Canvas], None]]] = [(start, draw) for start, _, draw in furniture]
@@ -233,7 +233,7 @@ def _people(pitch: Field, world: World, conditions: Conditions) -> Iterator[Pers
 
 
 def _shadows(world: World, conditions: Conditions, canvas: Canvas, people: list[Person]) -> None:
-    """Darken the ground where people keep the light off: one shadow in the sun, four in floodlight, a patch under clouds."""
+    """Darken the ground beside people: one shadow in the sun, four in floodlight, a spot under clouds."""
     ink = np.zeros(canvas.colour.shape[:2], np.uint8)
     azimuth, elevation = world.sun
     if conditions.light == "sun":
@@ -281,6 +281,7 @@ class Goal:
 
     @property
     def middle(self) -> Array:
+        """The middle of the goal line between the posts."""
         return (self.left + self.right) / 2
 
     def draw(self, canvas: Canvas) -> None:
@@ -345,9 +346,7 @@ def _goals(pitch: Field, world: World) -> Iterator[Goal]:
         )
 
 
-def _furniture(
-    pitch: Field, world: World, conditions: Conditions
-) -> Iterator[tuple[Array, Array, Callable[[Canvas], None]]]:
+def _furniture(pitch: Field, conditions: Conditions) -> Iterator[tuple[Array, Array, Callable[[Canvas], None]]]:
     """Corner flags, benches, masts and loose balls: where each begins and ends, and how to draw it."""
     rng = np.random.default_rng([conditions.world, 43])
 

@@ -23,7 +23,8 @@ class Ground:
     """The shaded ground of a window.
 
     `colour` (H, W, 3) blue, green, red in 0..1; `coverage` (H, W): share of the pixel inside a marking; `target` (H, W):
-    the same with every marking at least `LEARNT_WIDTH_PX` wide, so that lines thinner than a pixel can be learnt.
+    the same with every marking at least `LEARNT_WIDTH_PX` wide, so that lines thinner than a pixel can be learnt, and
+    without those that nobody could see.
     """
 
     patch: Patch
@@ -40,6 +41,7 @@ def shade_ground(pitch: Field, world: World, conditions: Conditions, centre: Pla
     colour = _beside(pitch, world, patch, outside, colour)
     if conditions.other_lines:
         colour = _other_lines(pitch, world, conditions, patch, colour)
+    light = _light(pitch, world, conditions, patch)
     coverage, target = marking_shares(pitch, patch)
     painted, lasting = coverage, np.float32(1)
     if coverage.any():
@@ -50,7 +52,9 @@ def shade_ground(pitch: Field, world: World, conditions: Conditions, centre: Pla
     if lettering or coverage.any():
         opacity, lasting = _paint(world, conditions, patch)
         shade = (1 + 0.12 * world.paint_noise.at(patch))[..., None]
-        colour = mix(colour, world.paint * shade, painted * opacity)
+        bare = colour
+        colour = mix(bare, world.paint * shade, painted * opacity)
+        target = target * _visible(conditions, patch, np.abs(colour - bare).max(axis=-1) * light)
         for ink, share in lettering:
             colour = mix(colour, ink * shade, share * np.maximum(opacity, 0.3))
     if conditions.rain:  # wet ground mirrors the sky, more so far away
@@ -60,7 +64,7 @@ def shade_ground(pitch: Field, world: World, conditions: Conditions, centre: Pla
     if snow is not None:
         colour = mix(colour, np.float32([0.97, 0.94, 0.92]), snow)
         lasting = lasting * (1 - smooth_step(snow, 0.3, 0.7))
-    colour = colour * _light(pitch, world, conditions, patch)[..., None]
+    colour = colour * light[..., None]
     seen = patch.seen
     return Ground(patch, colour, np.where(seen, coverage * lasting, 0), np.where(seen, target * lasting, 0))
 
@@ -316,6 +320,16 @@ def _paint(world: World, conditions: Conditions, patch: Patch) -> tuple[Plane, P
     return opacity, lasting
 
 
+def _visible(conditions: Conditions, patch: Patch, contrast: Plane) -> Plane:
+    """1 where paint stands out from the grass by `contrast` (H, W) enough to be seen through air and noise, else 0.
+
+    To ask for what cannot be seen would teach the network to guess.
+    """
+    through_air = contrast * np.exp(-patch.depth * np.float32(0.0008 + 0.012 * conditions.fog))
+    around = cv2.blur(cv2.dilate(through_air, np.ones((5, 5), np.uint8)), (9, 9))
+    return smooth_step(around, 0.02 + 0.025 * conditions.noise, 0.045 + 0.05 * conditions.noise)
+
+
 def _letter_coverage(letters: Letters, patch: Patch) -> Plane | None:
     """Share of each pixel under the lettering; None if it is not in the window."""
     ax, ay = (np.float32(v) for v in letters.along)
@@ -328,8 +342,7 @@ def _letter_coverage(letters: Letters, patch: Patch) -> Plane | None:
         return None
     size = float(np.median(patch.axes[1][inside])) / letters.texel
     picture = cv2.GaussianBlur(letters.picture, (0, 0), size / 3) if size > 1.5 else letters.picture
-    share = cv2.remap(picture, np.where(inside, column, -9), np.where(inside, row, -9), cv2.INTER_LINEAR, borderValue=0)
-    return share
+    return cv2.remap(picture, np.where(inside, column, -9), np.where(inside, row, -9), cv2.INTER_LINEAR, borderValue=0)
 
 
 def _snow(world: World, conditions: Conditions, patch: Patch) -> Plane | None:
@@ -339,7 +352,7 @@ def _snow(world: World, conditions: Conditions, patch: Patch) -> Plane | None:
 
 
 def _light(pitch: Field, world: World, conditions: Conditions, patch: Patch) -> Plane:
-    """Factor (H, W) of the light that falls on the ground: shadows of stands, trees, masts and clouds, cones of floodlight."""
+    """Factor (H, W) of the light that falls on the ground: shadows of stands, trees, masts, clouds; floodlight."""
     if conditions.light == "floodlight":
         return (1 + 0.12 * world.cloud_noise.at(patch)).astype(np.float32)
     if conditions.light == "cloud":
@@ -359,7 +372,7 @@ def _long_shadow(pitch: Field, world: World, patch: Patch) -> Plane:
         "left": patch.x + pitch.length / 2,
         "right": pitch.length / 2 - patch.x,
     }[world.shadow_side].astype(np.float32)
-    short, long = patch.axes
+    _, long = patch.axes
     jagged = world.shadow_reach % 2 < 1
     edge = np.float32(world.shadow_reach) - inward
     if jagged:

@@ -1,7 +1,7 @@
 """Train the U-Net on rendered pitches: `python -m models.training.train`.
 
-Starts where it stopped when it is called again; a run of the default length takes about two hours on two cores. Ends with
-the export to `models/unet.onnx`.
+Starts where it stopped when called again. The default budget is two hours: enough for a usable model on two cores.
+Ends with the export to `models/unet.onnx`.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from __future__ import annotations
 import argparse
 import copy
 import json
+import signal
+import threading
 import time
 from pathlib import Path
 
@@ -52,7 +54,7 @@ def main() -> None:
     train(training, crops, options, checkpoint)
     for worker in workers:
         worker.terminate()
-    if not options.no_export:
+    if training.elapsed_s >= training.budget_s and not options.no_export:
         print(json.dumps(export(training.average, MODEL_PATH), indent=1))
 
 
@@ -68,7 +70,7 @@ class Training:
         self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
 
     def learning_rate(self) -> float:
-        """Two epochs of warm-up, then exponentially down; by the clock, so that slow machines finish the schedule too."""
+        """Two epochs of warm-up, then exponentially down; by the clock, so that a slow machine finishes too."""
         warm = min(1.0, (self.step + 1) / (WARM_UP_EPOCHS * EPOCH_STEPS))
         return LEARNING_RATE * warm * LAST_RATE ** min(1.0, self.elapsed_s / self.budget_s)
 
@@ -132,7 +134,9 @@ def train(training: Training, crops: Crops, options: argparse.Namespace, checkpo
     losses: list[float] = []
     log = (options.run / "log.jsonl").open("a")
     progress = tqdm(total=round(training.budget_s), initial=round(training.elapsed_s), unit="s", mininterval=5)
-    while training.elapsed_s < training.budget_s:
+    stopped = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: stopped.set())
+    while training.elapsed_s < training.budget_s and not stopped.is_set():
         pictures, targets = crops.batch(options.batch, options.size)
         losses.append(training.learn(torch.from_numpy(pictures), torch.from_numpy(targets)))
         now = time.monotonic()

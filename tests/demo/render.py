@@ -1,4 +1,4 @@
-"""Makes the demo venue: `python -m tests.demo.render` writes venue.json, truth.json, left.jpg and right.jpg beside itself.
+"""Makes the demo venue: `python -m tests.demo.render` writes venue.json, truth.json, left.jpg and right.jpg here.
 
 Two cameras on one pole near the halfway line. The venue stores the poses of before a storm; truth.json has those of the
 frames.
