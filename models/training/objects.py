@@ -137,7 +137,7 @@ class Person:
 
     foot: Array
     tall: float
-    kit: tuple[Colour, Colour, Colour, Colour]  # shirt, shorts, socks, skin
+    kit: tuple[Colour, ...]  # shirt, shorts, socks, skin, the shirt in its own shadow, hair
     stride: float
     lean: float
     ball: Array | None
@@ -156,6 +156,24 @@ class Person:
 
         angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
         head = np.stack([0.085 * np.cos(angle) + 1.25 * lean, 0.92 * t + 0.12 * np.sin(angle)], axis=1)
+        hair = head * [1.05, 1.0] + [-0.05 * 1.25 * lean, 0.03]
+        hair[:, 1] = np.maximum(hair[:, 1], 0.93 * t)
+        waist, neck = 0.55 * lean, 0.86 * t
+        body = np.array(
+            [
+                (lean - 0.07, neck),
+                (lean + 0.07, neck),
+                (lean + 0.22, shoulder + 0.02),
+                (lean + 0.23, shoulder - 0.1),
+                (waist + 0.17, hip + 0.15),
+                (waist + 0.19, hip - 0.02),
+                (waist - 0.19, hip - 0.02),
+                (waist - 0.17, hip + 0.15),
+                (lean - 0.23, shoulder - 0.1),
+                (lean - 0.22, shoulder + 0.02),
+            ]
+        )
+        shaded = np.concatenate([body[2:6], [(waist + 0.08, hip - 0.02), (lean + 0.1, shoulder - 0.1)]])
         left, right = (-0.35 * s - 0.06, 0.0), (0.4 * s + 0.06, 0.06 * s)
         knee_l, knee_r = (-0.12 * s - 0.07, knee), (0.28 * s + 0.07, knee + 0.05 * s)
         return [
@@ -168,18 +186,10 @@ class Person:
             (limb((0.6 * lean, hip + 0.1), (0.6 * lean + 0.1 + 0.1 * s, 0.38 * t), 0.26), 1),
             (limb((lean - 0.2, shoulder - 0.02), (lean - 0.3 - 0.2 * s, 0.55 * t), 0.11), 3),
             (limb((lean + 0.2, shoulder - 0.02), (lean + 0.28 + 0.25 * s, 0.58 * t), 0.11), 3),
-            (
-                np.array(
-                    [
-                        (lean - 0.24, shoulder),
-                        (lean + 0.24, shoulder),
-                        (0.55 * lean + 0.19, hip),
-                        (0.55 * lean - 0.19, hip),
-                    ]
-                ),
-                0,
-            ),
+            (body, 0),
+            (shaded, 4),
             (head, 3),
+            (hair, 5),
         ]
 
     def place(self, camera: Array, polygon: Array) -> Array:
@@ -199,8 +209,7 @@ class Person:
         if (pixels.min(axis=0) > np.array([width, height]) + reach).any() or canvas.size_at(self.foot) == 0:
             return
         for polygon, part in self.limbs():
-            shade = self.kit[part] * np.float32(0.9 if part == 2 else 1.0)
-            canvas.polygon(canvas.project(self.place(canvas.camera.pose.position, polygon)), shade)
+            canvas.polygon(canvas.project(self.place(canvas.camera.pose.position, polygon)), self.kit[part])
         if self.ball is not None:
             canvas.disc(self.ball, 0.11, np.float32([0.95, 0.95, 0.95]))
 
@@ -225,7 +234,7 @@ def _people(pitch: Field, world: World, conditions: Conditions) -> Iterator[Pers
         yield Person(
             foot,
             float(rng.uniform(1.6, 1.95)),
-            (*(part * np.float32(rng.uniform(0.85, 1.05)) for part in kit), skin),
+            (*kit, skin, 0.72 * kit[0], hsv(25, 0.5, rng.uniform(0.03, 0.35))),
             float(rng.uniform(0, 1.1)),
             float(rng.normal(0, 0.1)),
             ball,

@@ -22,7 +22,7 @@ GRID_STEP = 8
 class Ground:
     """The shaded ground of a window.
 
-    `colour` (H, W, 3) blue, green, red in 0..1; `coverage` (H, W): share of the pixel inside a marking; `target` (H, W):
+    `colour` (H, W, 3) blue, green, red in 0..1; `coverage` (H, W): share of it in a marking; `target` (H, W):
     the same with every marking at least `LEARNT_WIDTH_PX` wide, so that lines thinner than a pixel can be learnt, and
     without those that nobody could see.
     """

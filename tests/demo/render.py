@@ -19,7 +19,7 @@ from worker.calibration.field import Field
 
 HERE = Path(__file__).parent
 SIZE = (3840, 2160)
-WORLD = 22
+WORLD = 36
 MOVED_M, MOVED_DEG = 0.16, 1.0
 LARGEST_BYTES = 3_000_000
 
@@ -29,14 +29,14 @@ FIELD = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]
 def cameras() -> list[Camera]:
     """The two cameras as they stand when the frames are taken."""
     left = Intrinsics(
-        np.array([[2460.0, 0, 1931.5], [0, 2460.0, 1068.2], [0, 0, 1]]), np.array([-0.302, 0.083, 0, 0, 0]), SIZE
+        np.array([[2330.0, 0, 1931.5], [0, 2330.0, 1068.2], [0, 0, 1]]), np.array([-0.302, 0.083, 0, 0, 0]), SIZE
     )
     right = Intrinsics(
-        np.array([[2452.0, 0, 1908.3], [0, 2452.0, 1087.9], [0, 0, 1]]), np.array([-0.299, 0.081, 0, 0, 0]), SIZE
+        np.array([[2322.0, 0, 1908.3], [0, 2322.0, 1087.9], [0, 0, 1]]), np.array([-0.299, 0.081, 0, 0, 0]), SIZE
     )
     return [
-        Camera("left", left, Pose.looking_at([-0.9, -48.0, 12.1], [-25.0, -19.5, 0], roll_deg=-1.2)),
-        Camera("right", right, Pose.looking_at([0.8, -48.1, 12.0], [24.6, -19.0, 0], roll_deg=0.9)),
+        Camera("left", left, Pose.looking_at([-0.9, -48.0, 12.1], [-26.0, -17.0, 0], roll_deg=-1.2)),
+        Camera("right", right, Pose.looking_at([0.8, -48.1, 12.0], [25.6, -16.5, 0], roll_deg=0.9)),
     ]
 
 
