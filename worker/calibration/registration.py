@@ -37,13 +37,18 @@ LEAST_COMMON = 0.3
 # Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
 SHIFT_PENALTY = 0.05
 
-FINE_STEP_M, FINE_HALF_M = 0.05, 12.0
-# Blur in metres and number of steps, coarse to fine. The last blur is about what a far camera smears.
-FINE_STAGES = ((0.4, 4), (0.2, 4), (0.1, 6))
-# What is expected of a camera: the paper's Start errors. Only what the markings do not tell is left to it.
-EXPECTED_TURN_RAD, EXPECTED_MOVE_M = 0.02, 0.16
+# Sampled finely, so that no edge of a line falls between two samples; once blurred, every second sample will do.
+FINE_STEP_M, FINE_HALF_M, FINE_STRIDE = 0.05, 12.0, 2
+# Blur in metres and number of steps, coarse to fine. The last blur is about what a far camera smears: with less, the
+# smear of two cameras that face each other would show as a displacement.
+FINE_STAGES = ((0.4, 4), (0.2, 6))
+# What is expected of a camera that is out of place, the paper's Start errors. It shrinks with the displacement found,
+# but not below this part: cameras that agree at the centre are not suspected of moves that happen to cancel there.
+EXPECTED_TURN_RAD, EXPECTED_MOVE_M, LEAST_EXPECTED = 0.02, 0.16, 0.01
 # A difference of this part of a line's response counts as half an outlier.
 OUTLIER = 0.5
+# Grass, where neither view shows more than this, is left out.
+LEAST_RESPONSE = 0.05
 # Responses differ by this much through sampling alone.
 SAMPLING_NOISE = 0.005
 # A direction in which the markings leave the displacement looser than this is one along which they can slide.
@@ -107,15 +112,16 @@ def register_pair(
     placed = [_coarse_shift(template, view) for view in views]
     middle = centre + np.mean([put for put in placed if put is not None] or [np.zeros(2)], axis=0)
 
-    grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
-    forms = [_forms(camera, pitch.lift(grid)) for camera in (first, second)]
-    at_middle = np.concatenate([_forms(first, pitch.lift(middle)) * -1, _forms(second, pitch.lift(middle))], axis=-1)
+    at_middle = np.concatenate([-_forms(first, pitch.lift(middle)), _forms(second, pitch.lift(middle))], axis=-1)
     # The most likely turns and moves that make the coarse shift.
     start = at_middle.T @ np.linalg.solve(at_middle @ at_middle.T, shift)
+    grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
+    forms = [_forms(camera, pitch.lift(grid)) for camera in (first, second)]
     fine = _fine_moves(
         ground_view(pitch, first, first_response, grid + forms[0] @ start[:6]),
         ground_view(pitch, second, second_response, grid + forms[1] @ start[6:]),
-        np.concatenate(forms, axis=-1),
+        np.concatenate(forms, axis=-1)[::FINE_STRIDE, ::FINE_STRIDE],
+        at_middle,
         start,
     )
     support = fine.common_area_m2 / pitch.line_width
@@ -207,9 +213,14 @@ class _Fine:
     correlation: float
 
 
-def _fine_moves(first: View, second: View, forms: Array, start: Array) -> _Fine:
-    """Gauss-Newton from `start` on the moves (12,) of both cameras; `forms` (n, n, 2, 12), views sampled at `start`."""
+def _fine_moves(first: View, second: View, forms: Array, at_middle: Array, start: Array) -> _Fine:
+    """Gauss-Newton on the moves (12,) of both cameras.
+
+    `forms` (n, n, 2, 12): what they do to every `FINE_STRIDE`th point of each view; `at_middle` (2, 12): what they do
+    to the displacement in the middle. The views are sampled where `start` puts them.
+    """
     (a, a_seen), (b, b_seen) = ((values, seen.astype(np.float32)) for values, seen in (first, second))
+    step_m = FINE_STRIDE * FINE_STEP_M
     moves = start
     for blur, steps in FINE_STAGES:
         smooth_a, smooth_b = (_blur(view, blur / FINE_STEP_M) for view in (a, b))
@@ -217,34 +228,35 @@ def _fine_moves(first: View, second: View, forms: Array, start: Array) -> _Fine:
             offset_a, offset_b = forms[..., :6] @ (moves - start)[:6], forms[..., 6:] @ (moves - start)[6:]
             warped_a, warped_b = _warp(smooth_a, offset_a), _warp(smooth_b, offset_b)
             valid = (_warp(a_seen, offset_a) == 1) & (_warp(b_seen, offset_b) == 1)
-            step, covariance = _gauss_newton(warped_a, warped_b, valid, forms, moves, blur)
-            moves = moves + step
-    common = np.minimum(warped_a, warped_b)[valid].sum(dtype=float) * FINE_STEP_M**2
+            pull, information = _normal_equations(warped_a, warped_b, valid, forms, step_m, blur)
+            found = np.linalg.norm(at_middle @ moves) / np.linalg.norm(at_middle)
+            prior = 1 / max(float(found), LEAST_EXPECTED) ** 2
+            covariance = np.asarray(np.linalg.inv(information + prior * np.eye(len(moves))), float)
+            moves = moves + covariance @ (pull - prior * moves)
+    common = np.minimum(warped_a, warped_b)[valid].sum(dtype=float) * step_m**2
     return _Fine(moves, covariance, float(common), _correlation(warped_a[valid], warped_b[valid]))
 
 
-def _gauss_newton(
-    a: Response, b: Response, valid: Mask, forms: Array, moves: Array, blur: float
+def _normal_equations(
+    a: Response, b: Response, valid: Mask, forms: Array, step_m: float, blur: float
 ) -> tuple[Array, Array]:
-    """One robust step (12,) that brings a and b closer, and the covariance (12, 12) of the moves."""
-    active = valid & (a + b > 0.02)
+    """What the difference of two views says about the moves: pull (12,) and information (12, 12)."""
+    active = valid & (a + b > LEAST_RESPONSE)
     down, right = np.gradient(a + b)
-    gradient = np.stack([right[active], -down[active]], axis=-1).astype(float) / (2 * FINE_STEP_M)
+    gradient = np.stack([right[active], -down[active]], axis=-1).astype(float) / (2 * step_m)
     slope = (gradient[:, :, None] * forms[active]).sum(axis=1)
     slope[:, :6] *= -1
     residual = (a - b)[active].astype(float)
-    # What only one view has, players for one, must not pull (Geman and McClure's weight); lines that are still apart must.
+    # What only one view has, players for one, must not pull (Geman and McClure's weight); lines still apart must.
     scale = OUTLIER * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
     weight = 1 / (1 + (residual / scale) ** 2) ** 2
     # The blur makes neighbours alike: this many pixels count as one.
-    alike = 4 * np.pi * (blur / FINE_STEP_M) ** 2
+    alike = 4 * np.pi * (blur / step_m) ** 2
     noise = SAMPLING_NOISE**2 + (weight * residual**2).sum() / max(weight.sum(), 1.0)
     weighted = slope * (weight / (noise * alike))[:, None]
     # Sums rather than matrix products, so that the number of threads cannot change a digit.
-    count = len(moves)
-    information = np.array([[(weighted[:, i] * slope[:, j]).sum() for j in range(count)] for i in range(count)])
-    covariance = np.linalg.inv(information + np.eye(count))
-    return covariance @ ((weighted * residual[:, None]).sum(axis=0) - moves), covariance
+    information = np.array([(weighted * column[:, None]).sum(axis=0) for column in slope.T])
+    return (weighted * residual[:, None]).sum(axis=0), information
 
 
 def _blur(view: Response, sigma: float) -> Response:
@@ -252,8 +264,8 @@ def _blur(view: Response, sigma: float) -> Response:
 
 
 def _warp(view: Response, offset: Array) -> Response:
-    """A view (n, n) on the fine grid, sampled at the points of the grid moved by `offset` (n, n, 2) metres."""
-    rows, columns = np.indices(view.shape, np.float32)
+    """A view on the fine grid, sampled at every `FINE_STRIDE`th point moved by `offset` (n, n, 2) metres."""
+    rows, columns = FINE_STRIDE * np.indices(offset.shape[:2], np.float32)
     move = (offset / FINE_STEP_M).astype(np.float32)
     sampled = cv2.remap(view, columns + move[..., 0], rows - move[..., 1], cv2.INTER_LINEAR, borderValue=0.0)
     return np.asarray(sampled, np.float32)
@@ -261,6 +273,8 @@ def _warp(view: Response, offset: Array) -> Response:
 
 def _correlation(a: Response, b: Response) -> float:
     """Normalised correlation of two sets of values, 0 where there is nothing to correlate."""
+    if not a.size:
+        return 0.0
     a, b = a - a.mean(dtype=float), b - b.mean(dtype=float)
     power = (a * a).sum(dtype=float) * (b * b).sum(dtype=float)
     return float((a * b).sum(dtype=float) / np.sqrt(power)) if power > 0 else 0.0
