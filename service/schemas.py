@@ -246,6 +246,23 @@ class Venues(Wire):
     next_cursor: str | None = None
 
 
+class HeldPose(Wire):
+    """A pose that a camera had from `since` on, and what brought it: a `put`, or a `calibration` by `job`."""
+
+    camera: Id
+    pose: Pose
+    cause: Literal["put", "calibration"]
+    job: str | None
+    since: datetime
+
+
+class PoseHistory(Wire):
+    """A page of poses, newest first; the newest of each camera holds now. `next_cursor`: null on the last page."""
+
+    poses: list[HeldPose]
+    next_cursor: int | None = None
+
+
 class Options(Wire):
     """What a caller may choose; everything is optional."""
 

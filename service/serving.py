@@ -106,9 +106,10 @@ class KeptWorker:
 
     def _start(self) -> subprocess.Popen[bytes]:
         data = ["--data", str(self._settings.data)]
-        # A session of its own: Ctrl-C reaches this process, which then stops the worker.
+        # A session of its own: Ctrl-C reaches this process, which then stops the worker. -P: whatever lies in the
+        # folder that `esc` was called in is not taken for a part of it.
         return subprocess.Popen(
-            [sys.executable, "-m", "service.cli", "worker", *data],
+            [sys.executable, "-P", "-m", "service.cli", "worker", *data],
             env=os.environ | lifeline.for_child(),
             stdin=subprocess.DEVNULL,
             start_new_session=True,

@@ -44,7 +44,7 @@ class Settings(BaseSettings):
     threads: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="Per job.")
     job_timeout_s: float = Field(600, gt=0, description="For jobs that name no limit of their own.")
     job_program: list[str] = Field(
-        [sys.executable, "-m", "worker.job"],
+        [sys.executable, "-P", "-m", "worker.job"],
         description="What computes one job; called with the job's id and the token of the attempt.",
     )
     takeover_after_s: float = Field(10, gt=2, description="Silence after which another worker takes a job over.")

@@ -34,7 +34,7 @@ UPLOAD: dict[str, Any] = {
                     "type": "object",
                     "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part "
                     "to send several frames of a camera, they are fused.",
-                    "properties": {OPTIONS_PART: {"$ref": "#/components/schemas/Options"}},
+                    "properties": {OPTIONS_PART: Options.model_json_schema()},
                     "additionalProperties": {"type": "array", "items": {"type": "string", "format": "binary"}},
                 },
                 "encoding": {OPTIONS_PART: {"contentType": "application/json"}},
@@ -75,34 +75,38 @@ def _submit(context: Context, venue: Venue, form: FormData, idempotency_key: str
     options = _options(form)
     files = _files(venue, form, context)
     content_hash = _check(context, venue, files, options)
+    job_id = new_job_id()
     try:
         known = context.jobs.same_as(venue.id, idempotency_key, content_hash)
         if known is not None:
-            return job_answer(known, status=200)
-        job_id = new_job_id()
+            return job_answer(known)
         seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
         paths = _store(context, job_id, files)
         submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths)
-        job = None
-        try:
-            job, new = context.jobs.submit(submission, context.settings.queue_limit, context.queue.enqueue)
-        finally:
-            if job is None or job.id != job_id:
-                context.blobs.delete_under(_folder(job_id))
-    except KeyReused as error:
-        raise Problem("idempotency-key-reused", "Use a new key for new frames.", job=error.job_id) from None
-    except VenueBusy as error:
-        raise Problem(
-            "venue-busy",
-            f"Wait for job {error.job_id} of the same venue or cancel it.",
-            headers={"Retry-After": str(RETRY_AFTER_S), "Location": f"/jobs/{error.job_id}"},
-            job=error.job_id,
-        ) from None
-    except QueueFull:
-        raise Problem(
-            "queue-full", f"{context.settings.queue_limit} jobs wait; try again.", headers={"Retry-After": "30"}
-        ) from None
+        job, new = context.jobs.submit(submission, context.settings.queue_limit, context.queue.enqueue)
+    except (KeyReused, VenueBusy, QueueFull) as refusal:
+        context.blobs.delete_under(_folder(job_id))
+        raise _in_words(refusal, context) from None
+    if not new:
+        context.blobs.delete_under(_folder(job_id))
+    # After any other error the frames stay: whether the transaction was committed is then not known.
     return job_answer(job, status=202 if new else 200)
+
+
+def _in_words(refusal: KeyReused | VenueBusy | QueueFull, context: Context) -> Problem:
+    match refusal:
+        case KeyReused():
+            return Problem("idempotency-key-reused", "Use a new key for new frames.", job=refusal.job_id)
+        case VenueBusy():
+            return Problem(
+                "venue-busy",
+                f"Wait for job {refusal.job_id} of the same venue or cancel it.",
+                headers={"Retry-After": str(RETRY_AFTER_S), "Location": f"/jobs/{refusal.job_id}"},
+                job=refusal.job_id,
+            )
+        case QueueFull():
+            waiting = context.settings.queue_limit
+            return Problem("queue-full", f"{waiting} jobs wait; try again.", headers={"Retry-After": "30"})
 
 
 def _options(form: FormData) -> Options:

@@ -10,7 +10,7 @@ from service import etags
 from service.context import InContext, VenueIdPath
 from service.problems import Problem
 from service.routes.documented import problems
-from service.schemas import ID_PATTERN, Venue, VenueIn, Venues
+from service.schemas import ID_PATTERN, PoseHistory, Venue, VenueIn, Venues
 from service.store.venues import StoredVenue
 
 router = APIRouter(prefix="/venues", tags=["venues"])
@@ -75,6 +75,21 @@ def get_venue(
         return Response(status_code=304, headers={"ETag": tag})
     response.headers["ETag"] = tag
     return stored.venue
+
+
+@router.get("/{venue_id}/poses", responses=problems(404))
+def list_poses(
+    venue_id: VenueIdPath,
+    context: InContext,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    cursor: Annotated[int | None, Query(ge=0, le=2**31)] = None,
+) -> PoseHistory:
+    """Every pose that held, newest first, in pages: the way back from a calibration that should not have been."""
+    if context.venues.get(venue_id) is None:
+        raise no_such_venue(venue_id)
+    page = context.venues.poses(venue_id, cursor, limit + 1)
+    more = len(page) > limit
+    return PoseHistory(poses=[pose for _, pose in page[:limit]], next_cursor=page[limit - 1][0] if more else None)
 
 
 @router.delete("/{venue_id}", status_code=204, responses=problems(404, 409, 412))

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 import sqlalchemy as sa
 
-from service.schemas import Pose, Venue
+from service.schemas import HeldPose, Pose, Venue
 from service.store import tables
 from service.store.engine import reading, serialise, writing
 
@@ -68,12 +68,17 @@ class Venues:
             connection.execute(sa.delete(tables.pose_history).where(tables.pose_history.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
 
-    def history(self, venue_id: str) -> list[sa.Row[tuple[str, Pose, str, str | None, datetime]]]:
-        """Every pose that held, oldest first: camera, pose, cause, job, since."""
+    def poses(self, venue_id: str, before: int | None, limit: int) -> list[tuple[int, HeldPose]]:
+        """Up to `limit` poses that held, newest first, those older than number `before`, with their numbers."""
         h = tables.pose_history.c
-        query = sa.select(h.camera, h.pose, h.cause, h.job, h.since).where(h.venue == venue_id).order_by(h.id)
+        query = sa.select(tables.pose_history).where(h.venue == venue_id).order_by(h.id.desc()).limit(limit)
+        if before is not None:
+            query = query.where(h.id < before)
         with reading(self._engine) as connection:
-            return list(connection.execute(query))
+            return [
+                (row.id, HeldPose(camera=row.camera, pose=row.pose, cause=row.cause, job=row.job, since=row.since))
+                for row in connection.execute(query)
+            ]
 
 
 def find_venue(connection: sa.Connection, venue_id: str) -> StoredVenue | None:

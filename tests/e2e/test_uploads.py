@@ -1,14 +1,17 @@
 """What bad input gets: an answer that names the camera and what to do, and a service that is still there."""
 
 import json
+import re
+import socket
 import struct
 import zlib
 
 import cv2
+import httpx
 import numpy as np
 import pytest
 
-from tests.e2e.running import SIZE, png, png_of, upload
+from tests.e2e.running import SIZE, png, png_of, upload, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -214,7 +217,19 @@ def test_after_all_this_the_service_is_there_and_has_made_no_mistake(service):
 
 
 def test_the_interface_describes_itself(service):
-    document = service.http.get("/openapi.json").json()
-    assert json.dumps(document).count("multipart/form-data") == 1
+    text = service.http.get("/openapi.json").text
+    document = json.loads(text)
+    schemas = document["components"]["schemas"]
     assert "/venues/{venue_id}/calibrate" in document["paths"]
+    assert {ref.rpartition("/")[2] for ref in re.findall(r'"\$ref":"([^"]+)"', text)} <= set(schemas)
+    assert all("examples" in schemas[name] for name in ("VenueIn", "Job"))
     assert service.http.get("/docs").status_code == 200
+
+
+def test_an_upload_that_breaks_off_is_no_mistake_of_the_service(service, stadium):
+    url = httpx.URL(service.url)
+    with socket.create_connection((url.host, url.port)) as connection:
+        head = f"POST /venues/{stadium}/calibrate HTTP/1.1\r\nHost: x\r\nContent-Length: 5000\r\n"
+        connection.sendall(head.encode() + b"Content-Type: multipart/form-data; boundary=x\r\n\r\n--x\r\n")
+    wait_for(lambda: "calibrate" in (service.data / "log").read_text().splitlines()[-1])
+    assert "Traceback" not in (service.data / "log").read_text()

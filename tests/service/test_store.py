@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from service.schemas import VENUE_EXAMPLE, VenueIn
 from service.store import tables
 from service.store.blobs import Blobs
-from service.store.engine import connect, migrate, reading
+from service.store.engine import connect, migrate
 from service.store.jobs import Jobs, new_job_id
 from service.store.venues import Venues
 from service.store.workers import Workers
@@ -39,11 +39,10 @@ def test_every_pose_that_held_is_remembered_with_its_cause(engine):
     venues.put(venue.model_copy(update={"name": "renamed"}), lambda _: None)
     moved = venue.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
     venues.put(venue.with_poses({"left": moved}), lambda _: None)
-    with reading(engine) as connection:
-        rows = connection.execute(sa.select(tables.pose_history).order_by(tables.pose_history.c.id)).all()
-    assert [(row.camera, row.cause, row.pose["position"][2]) for row in rows] == [
-        ("left", "put", 7.84),
+    held = [pose for _, pose in venues.poses("tsukuba", None, 10)]
+    assert [(pose.camera, pose.cause, pose.pose.position[2]) for pose in held] == [
         ("left", "put", 9.0),
+        ("left", "put", 7.84),
     ]
 
 
