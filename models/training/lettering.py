@@ -20,6 +20,7 @@ HERSHEY = (
     cv2.FONT_HERSHEY_SCRIPT_SIMPLEX,
     cv2.FONT_HERSHEY_COMPLEX,
 )
+NAMES = ("RIVERSIDE", "University", "SV Nord", "Athletic", "HOME", "United", "Stadium", "VISITORS", "F.C. Hill", "Park")
 ALPHABET = list("ABCDEFGHIJKLMNOPRSTUVWYZabcdefghiklmnoprstuvyz0123456789.!-&")
 
 
@@ -56,7 +57,9 @@ def writing(seed: int) -> NDArray[np.float32]:
 
 def _word(rng: np.random.Generator, rows: int) -> NDArray[np.float32]:
     """A word or two as coverage; strokes from thin to fat, round or as of a broad pen."""
-    text = "".join(rng.choice(ALPHABET, size=int(rng.integers(2, 16))))
+    text = str(rng.choice(NAMES))
+    if rng.random() < 0.6:
+        text = "".join(rng.choice(ALPHABET, size=int(rng.integers(2, 16)))) if rng.random() < 0.8 else text.lower()
     font = int(rng.choice(HERSHEY)) | (cv2.FONT_ITALIC if rng.random() < 0.4 else 0)
     scale = rows / 34
     thick = max(1, round(rng.uniform(0.05, 0.28) * rows * 0.5))

@@ -214,7 +214,7 @@ def _turf(rng: np.random.Generator, conditions: Conditions) -> Noise:
     if conditions.turf == "artificial":
         blades, tufts, patches = 1.3 * blades, 0.35 * tufts, 0.6 * patches
     calm = 0.4 + 0.6 * conditions.variety
-    blades, tufts, patches = 0.7 * blades + 0.3 * calm * blades, calm * tufts, calm * patches
+    blades, tufts, patches = (0.35 + 0.65 * conditions.variety) * blades, calm * tufts, calm * patches
     weights = rng.uniform(0.4, 1.2, 8)
     grains = (0.008, 0.02, 0.05, 0.13, 0.4, 1.3, 5.0, 18.0)
     sizes = (blades, blades, 0.7 * tufts + 0.2 * blades, tufts, 0.6 * tufts, 0.4 * tufts, patches, patches)

@@ -19,7 +19,7 @@ from worker.calibration.field import Field
 
 HERE = Path(__file__).parent
 SIZE = (3840, 2160)
-WORLD = 36
+WORLD = 41
 MOVED_M, MOVED_DEG = 0.16, 1.0
 LARGEST_BYTES = 3_000_000
 
@@ -35,8 +35,8 @@ def cameras() -> list[Camera]:
         np.array([[2322.0, 0, 1908.3], [0, 2322.0, 1087.9], [0, 0, 1]]), np.array([-0.299, 0.081, 0, 0, 0]), SIZE
     )
     return [
-        Camera("left", left, Pose.looking_at([-0.9, -48.0, 12.1], [-26.0, -17.0, 0], roll_deg=-1.2)),
-        Camera("right", right, Pose.looking_at([0.8, -48.1, 12.0], [25.6, -16.5, 0], roll_deg=0.9)),
+        Camera("left", left, Pose.looking_at([-0.9, -48.0, 12.1], [-26.0, -19.5, 0], roll_deg=-1.2)),
+        Camera("right", right, Pose.looking_at([0.8, -48.1, 12.0], [25.6, -19.0, 0], roll_deg=0.9)),
     ]
 
 
