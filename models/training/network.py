@@ -59,11 +59,12 @@ def _block(before: int, after: int) -> nn.Sequential:
     return nn.Sequential(*layers)
 
 
-def focal_loss(logits: Tensor, target: Tensor, gamma: float = 2.0) -> Tensor:
+def focal_loss(logits: Tensor, target: Tensor, gamma: float = 2.0, marked: float = 2.0) -> Tensor:
     """Focal loss for soft targets (both (N, 1, H, W)): cross entropy weighted by |target - probability|^gamma.
 
-    Per marked pixel of the batch. It has its minimum where probability and target agree, so the output stays a share.
+    Per marked pixel of the batch. A pixel has its least loss where probability and target agree, so the output stays a
+    share; `marked` is the weight of a fully marked pixel, for the few there are.
     """
     entropy = nn.functional.binary_cross_entropy_with_logits(logits, target, reduction="none")
     miss = (target - torch.sigmoid(logits)).abs() ** gamma
-    return (miss * entropy).sum() / target.sum().clamp(min=100.0)
+    return ((1 + (marked - 1) * target) * miss * entropy).sum() / target.sum().clamp(min=100.0)
