@@ -36,7 +36,7 @@ log = structlog.get_logger()
 def create_app(settings: Settings) -> FastAPI:
     """The application; brings the database up to date first."""
     context = open_context(settings)
-    app = FastAPI(
+    app = documented.DocumentedApp(
         title="ESC",
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
         version=version("esc-calibration"),

@@ -41,7 +41,7 @@ def serve(settings: Settings, *, with_worker: bool) -> None:
     server = _Server(create_app(settings))
     # Uvicorn raises the signal again after its shutdown, which would end the process before the worker is stopped.
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: None)
+        signal.signal(number, server.handle_exit)
     with KeptWorker(settings) if with_worker else nullcontext():
         host, port = listener.getsockname()[:2]
         print(f"ESC listens on http://{host}:{port}", flush=True)

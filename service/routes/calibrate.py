@@ -15,7 +15,7 @@ from starlette.datastructures import FormData, UploadFile
 from service import frames as border
 from service.context import Context, InContext, VenueIdPath
 from service.problems import Problem, invalid
-from service.routes.documented import problems
+from service.routes.documented import problems, reference
 from service.routes.jobs import RETRY_AFTER_S, job_answer
 from service.routes.venues import no_such_venue
 from service.schemas import OPTIONS_PART, Job, Options, Venue
@@ -34,7 +34,7 @@ UPLOAD: dict[str, Any] = {
                     "type": "object",
                     "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part "
                     "to send several frames of a camera, they are fused.",
-                    "properties": {OPTIONS_PART: Options.model_json_schema()},
+                    "properties": {OPTIONS_PART: reference(Options)},
                     "additionalProperties": {"type": "array", "items": {"type": "string", "format": "binary"}},
                 },
                 "encoding": {OPTIONS_PART: {"contentType": "application/json"}},

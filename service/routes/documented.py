@@ -1,18 +1,35 @@
-"""How the routes' problems appear in the OpenAPI document."""
+"""How problems and uploads appear in the OpenAPI document."""
 
 from __future__ import annotations
 
 from http import HTTPStatus
 from typing import Any
 
+from fastapi import FastAPI
+
 from service.problems import MEDIA_TYPE
-from service.schemas import ProblemDetails
+from service.schemas import Options, ProblemDetails
+
+# Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
+MODELS = (Options, ProblemDetails)
+
+
+class DocumentedApp(FastAPI):
+    """FastAPI with these models among the schemas of its document."""
+
+    def openapi(self) -> dict[str, Any]:
+        """The OpenAPI document."""
+        document = super().openapi()
+        document["components"]["schemas"] |= {model.__name__: model.model_json_schema() for model in MODELS}
+        return document
+
+
+def reference(model: type[Options | ProblemDetails]) -> dict[str, str]:
+    """A schema that points to one of `MODELS`."""
+    return {"$ref": f"#/components/schemas/{model.__name__}"}
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Entries for `responses=` of a route."""
-    schema = ProblemDetails.model_json_schema()
-    return {
-        status: {"description": HTTPStatus(status).phrase, "content": {MEDIA_TYPE: {"schema": schema}}}
-        for status in statuses
-    }
+    content = {MEDIA_TYPE: {"schema": reference(ProblemDetails)}}
+    return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}

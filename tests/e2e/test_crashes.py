@@ -75,6 +75,16 @@ def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     assert poses(service, "v") == [-0.875, -0.875]
 
 
+def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
+    service = start().ready()
+    service.venue("v")
+    job = service.submit("v").json()["id"]
+    service.kill()
+    service.start()
+    assert service.end(job)["status"] == "succeeded"
+    assert poses(service, "v") == [-0.875, -0.875]
+
+
 def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):
     service = start().ready()
     service.venue("v", "hang")

@@ -222,7 +222,7 @@ def test_the_interface_describes_itself(service):
     schemas = document["components"]["schemas"]
     assert "/venues/{venue_id}/calibrate" in document["paths"]
     assert {ref.rpartition("/")[2] for ref in re.findall(r'"\$ref":"([^"]+)"', text)} <= set(schemas)
-    assert all("examples" in schemas[name] for name in ("VenueIn", "Job"))
+    assert all("examples" in schemas[name] for name in ("VenueIn", "Options", "Job", "ProblemDetails"))
     assert service.http.get("/docs").status_code == 200
 
 
