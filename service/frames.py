@@ -1,18 +1,17 @@
 """Is this upload a whole picture of the right size? Answered from its bytes, before anything decodes it.
 
 JPEG: ITU-T T.81, annex B. PNG: ISO/IEC 15948, clause 5. Decoders are lenient where a calibration must not be: OpenCV
-fills the missing part of a truncated JPEG with grey and says nothing.
+fills the missing part of a truncated JPEG with grey and says nothing. Sizes are read here and not by a package: those
+turn them by the EXIF orientation, and what the calibration sees is not turned.
 """
 
 from __future__ import annotations
 
-import io
 import re
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-
-import imagesize
+from dataclasses import dataclass
 
 from service.problems import Problem
 from service.schemas import Camera, Venue
@@ -23,6 +22,8 @@ PNG_START = b"\x89PNG\r\n\x1a\n"
 # A marker inside entropy-coded data: FF and neither a stuffed 00, nor a restart (D0 to D7), nor a fill byte FF.
 JPEG_MARKER = re.compile(rb"\xff([^\x00\xd0-\xd7\xff])")
 JPEG_END, JPEG_SCAN = 0xD9, 0xDA
+# Start of frame, of all processes; C4, C8 and CC are something else.
+JPEG_FRAMES = set(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -> None:
@@ -51,47 +52,31 @@ def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -
 
 def check(camera: Camera, data: bytes, settings: Settings) -> None:
     """One frame: an entire JPEG or PNG of the camera's size."""
+    name = camera.id
     if not data:
-        raise Problem(
-            "empty-frame", f"The file of camera {camera.id} is empty; was it still being written?", camera=camera.id
-        )
+        raise Problem("empty-frame", f"The file of camera {name} is empty; was it still being written?", camera=name)
     if len(data) > settings.max_frame_mb * 1e6:
         raise Problem(
             "frame-too-large",
-            f"Send camera {camera.id} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
-            camera=camera.id,
+            f"Send camera {name} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
+            camera=name,
         )
     if not data.startswith((JPEG_START, PNG_START)):
-        raise Problem("not-an-image", f"Send camera {camera.id} as JPEG or PNG.", camera=camera.id)
-    _check_size(camera, _size(camera, data), settings)
-    walk = _jpeg_ends if data.startswith(JPEG_START) else _png_ends
+        raise Problem("not-an-image", f"Send camera {name} as JPEG or PNG.", camera=name)
     try:
-        ends = walk(data)
-    except (struct.error, IndexError, ValueError) as error:
-        raise Problem(
-            "broken-image", f"The file of camera {camera.id} is damaged; grab it again.", camera=camera.id
-        ) from error
-    if not ends:
+        outline = _jpeg(data) if data.startswith(JPEG_START) else _png(data)
+    except (struct.error, IndexError, ValueError):
+        raise Problem("broken-image", f"The file of camera {name} is damaged; grab it again.", camera=name) from None
+    _check_size(camera, outline.size, settings)
+    if not outline.whole:
         raise Problem(
             "truncated-image",
-            f"The file of camera {camera.id} ends before its picture does; was it still being written?",
-            camera=camera.id,
+            f"The file of camera {name} ends before its picture does; was it still being written?",
+            camera=name,
         )
 
 
-def _size(camera: Camera, data: bytes) -> tuple[int, int]:
-    try:
-        size = imagesize.get(io.BytesIO(data))
-    except Exception:  # a parser of hostile bytes, which may fail in any way
-        size = (-1, -1)
-    if min(size) <= 0:
-        raise Problem(
-            "broken-image", f"The file of camera {camera.id} does not say its size; grab it again.", camera=camera.id
-        )
-    return int(size[0]), int(size[1])
-
-
-def _check_size(camera: Camera, size: tuple[int, int], settings: Settings) -> None:
+def _check_size(camera: Camera, size: list[int], settings: Settings) -> None:
     (width, height), wanted = size, camera.image_size
     if width * height > settings.max_frame_pixels:
         raise Problem(
@@ -99,50 +84,78 @@ def _check_size(camera: Camera, size: tuple[int, int], settings: Settings) -> No
             f"The frame of camera {camera.id} has {width}x{height} pixels; {settings.max_frame_pixels} are allowed.",
             camera=camera.id,
             expected=wanted,
-            got=[width, height],
+            got=size,
         )
-    if [width, height] != wanted:
+    if size != wanted:
         raise Problem(
             "frame-size",
             f"Send camera {camera.id} in {wanted[0]}x{wanted[1]} pixels, the size of its intrinsics.",
             camera=camera.id,
             expected=wanted,
-            got=[width, height],
+            got=size,
         )
 
 
-def _jpeg_ends(data: bytes) -> bool:
+@dataclass(frozen=True)
+class Outline:
+    """What a file says about its picture: `size` (width, height) as stored, and whether the file goes to its end.
+
+    As stored: an orientation that the camera notes in its EXIF data turns nothing, here and when it is decoded.
+    """
+
+    size: list[int]
+    whole: bool
+
+
+def _jpeg(data: bytes) -> Outline:
     """Walk the segments to the end-of-image marker; whatever follows it is the camera's business."""
+    position, size = 2, None
+    for position, marker in _jpeg_segments(data):
+        if marker in JPEG_FRAMES:
+            if size is not None:
+                raise ValueError("two frame headers")
+            height, width = struct.unpack_from(">HH", data, position + 5)
+            size = [width, height]
+        if marker == JPEG_SCAN and size is None:
+            raise ValueError("a scan of no frame")
+    if not size or min(size) < 1:
+        raise ValueError("no size")
+    return Outline(size, data[position : position + 2] == b"\xff\xd9")
+
+
+def _jpeg_segments(data: bytes) -> Iterator[tuple[int, int]]:
+    """Position and code of each marker, up to end-of-image after a scan or to the end of the data."""
     position, scanned = 2, False
-    while position + 1 < len(data):
+    while position + 2 <= len(data):
         if data[position] != 0xFF:
             raise ValueError("no marker where one must be")
         marker = data[position + 1]
         if marker == 0xFF:
             position += 1
             continue
+        yield position, marker
         if marker == JPEG_END:
-            return scanned
+            if not scanned:
+                raise ValueError("no picture")
+            return
         if position + 4 > len(data):
-            return False
+            return
         position += 2 + struct.unpack_from(">H", data, position + 2)[0]
         if marker == JPEG_SCAN:
             scanned = True
             following = JPEG_MARKER.search(data, position)
             if following is None:
-                return False
+                return
             position = following.start()
-    return False
 
 
-def _png_ends(data: bytes) -> bool:
+def _png(data: bytes) -> Outline:
     """Walk the chunks to IEND, each with a right checksum."""
-    kinds = set()
-    for kind in _png_chunks(data):
-        kinds.add(kind)
-        if kind == b"IEND":
-            return b"IDAT" in kinds
-    return False
+    width, height = struct.unpack_from(">II", data, len(PNG_START) + 8)
+    if data[12:16] != b"IHDR" or min(width, height) < 1:
+        raise ValueError("no size")
+    kinds = list(_png_chunks(data))
+    return Outline([width, height], b"IDAT" in kinds and kinds[-1] == b"IEND")
 
 
 def _png_chunks(data: bytes) -> Iterator[bytes]:
@@ -155,4 +168,6 @@ def _png_chunks(data: bytes) -> Iterator[bytes]:
         if zlib.crc32(data[position + 4 : end]) != struct.unpack_from(">I", data, end)[0]:
             raise ValueError("wrong checksum")
         yield kind
+        if kind == b"IEND":
+            return
         position = end + 4

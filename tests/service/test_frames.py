@@ -58,6 +58,13 @@ def test_a_preview_inside_a_jpeg_does_not_end_it():
         check(whole[:2] + preview + whole[2:-2])
 
 
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+def test_the_orientation_in_the_exif_data_turns_nothing(orientation):
+    exif = b"\xff\xe1\0\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0%c\0\0\0\0\0\0" % orientation
+    whole = encoded("baseline")
+    check(whole[:2] + exif + whole[2:])
+
+
 @settings(deadline=None)
 @given(st.binary(max_size=300), st.sampled_from(sorted(ENCODINGS)), st.integers(0, 400))
 def test_whatever_comes_a_problem_is_the_worst(garbage, kind, position):
