@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.training.render import Conditions, Rendering, render_window
-from models.training.scene import random_camera, random_field
+from models.training.venues import random_camera, random_field
 from worker.calibration.camera import Array, Camera, inside
 from worker.calibration.field import Field
 

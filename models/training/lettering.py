@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.scene import Letters, random_colour
+from models.training.colours import Colour, random_colour
 from worker.calibration.field import Field
 
 TEXEL_M = 0.04
@@ -22,6 +23,17 @@ HERSHEY = (
 )
 NAMES = ("RIVERSIDE", "University", "SV Nord", "Athletic", "HOME", "United", "Stadium", "VISITORS", "F.C. Hill", "Park")
 ALPHABET = list("ABCDEFGHIJKLMNOPRSTUVWYZabcdefghiklmnoprstuvyz0123456789.!-&")
+
+
+@dataclass(frozen=True)
+class Letters:
+    """White lettering or a logo on the ground: a picture of coverage, its corner, its axes and its texel in metres."""
+
+    picture: NDArray[np.float32]
+    corner: tuple[float, float]
+    along: tuple[float, float]
+    texel: float
+    colour: Colour
 
 
 def random_letters(rng: np.random.Generator, pitch: Field) -> tuple[Letters, ...]:

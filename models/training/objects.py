@@ -12,7 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.scene import Colour, Conditions, World, hsv, random_colour
+from models.training.colours import Colour, hsv, random_colour
+from models.training.conditions import Conditions
+from models.training.world import World
 from worker.calibration.camera import Array, Camera
 from worker.calibration.field import GOAL_HALF_WIDTH_M, GOAL_HEIGHT_M, Field
 

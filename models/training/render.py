@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.training.backdrop import add_walls, shade_sky
+from models.training.conditions import Conditions
 from models.training.objects import Canvas, draw_objects
-from models.training.scene import Conditions, World, build_world
 from models.training.sensor import add_air, expose
 from models.training.surface import shade_ground, window_rays
+from models.training.world import World, build_world
 from worker.calibration.camera import Camera
 from worker.calibration.field import Field
 

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from models.training.colours import hsv
+from models.training.conditions import Conditions
+from models.training.lettering import Letters
 from models.training.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
-from models.training.scene import Conditions, Letters, World
+from models.training.world import World
 from worker.calibration.camera import Camera
 from worker.calibration.field import Field, Marking
 
@@ -284,8 +287,6 @@ def _other_lines(pitch: Field, world: World, conditions: Conditions, patch: Patc
     """Lines of another sport: any colour but white, anywhere on the pitch."""
     rng = np.random.default_rng([conditions.world, 23])
     hue = rng.choice([55, 48, 25, 5, 205, 225, 185, 300, 75])
-    from models.training.scene import hsv
-
     paint = hsv(float(hue + rng.normal(0, 5)), float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.5, 0.95)))
     share = np.zeros_like(patch.x)
     width = float(rng.uniform(0.05, 0.12))

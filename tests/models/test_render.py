@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.training.conditions import LIGHTS
 from models.training.render import Conditions, render_frame, render_window
-from models.training.scene import LIGHTS, random_camera, random_field
+from models.training.venues import random_camera, random_field
 from worker.calibration.camera import Camera, Intrinsics, Pose, inside
 from worker.calibration.field import Field
 

@@ -1,4 +1,4 @@
-"""What there is to see: the conditions of a rendering, the world around a pitch, and random venues and cameras.
+"""What stays at its place around one pitch: turf, paint, belts, walls, lettering, sun.
 
 A world hangs on its seed alone: the same seed gives the same wear, lettering, trees and players at the same places,
 whoever looks.
@@ -6,84 +6,17 @@ whoever looks.
 
 from __future__ import annotations
 
-import colorsys
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from models.training.colours import Colour, hsv, random_colour
+from models.training.conditions import Conditions
+from models.training.lettering import Letters, random_letters
 from models.training.noise import Noise
-from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field
 
-Colour = NDArray[np.float32]  # blue, green, red in 0..1 as displayed
-
-LIGHTS = ("sun", "cloud", "floodlight")
 SIDES = ("near", "far", "left", "right")
-SIZES = ((1280, 720), (1920, 1080), (1920, 1080), (2560, 1440), (2688, 1520), (3072, 1728), (3840, 2160), (3840, 2160))
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """Light, weather, state of the pitch, people and lens of one rendering.
-
-    `world` seeds everything that stays at its place, `moment` where people stand. Shares are 0..1. `variety`: 0 for a
-    well-kept ground and a good camera, 1 for anything that is called a pitch and anything that is called a camera.
-    """
-
-    world: int = 0
-    moment: int = 0
-    variety: float = 0.0
-    light: str = "sun"
-    turf: str = "natural"
-    long_shadows: float = 0.0
-    wear: float = 0.15  # of grass and of paint
-    mowing: float = 0.5  # contrast of the stripes
-    players: int = 22
-    other_lines: bool = False  # of another sport, coloured
-    lettering: bool = True
-    rain: float = 0.0
-    fog: float = 0.0
-    snow: float = 0.0
-    noise: float = 0.15
-    blur: float = 0.2
-    sharpening: float = 0.3
-    fringe: float = 0.2
-    jpeg_quality: int = 92
-
-    @classmethod
-    def fair(cls, world: int = 0) -> Conditions:
-        """A clean, sunny afternoon on well-kept natural grass."""
-        return cls(world=world)
-
-    @classmethod
-    def random(cls, rng: np.random.Generator) -> Conditions:
-        """Anything a camera beside a pitch meets in a year, the bad days more often than they come."""
-
-        def sometimes(chance: float) -> float:
-            return float(rng.uniform(0.1, 1.0)) if rng.random() < chance else 0.0
-
-        return cls(
-            world=int(rng.integers(2**31)),
-            moment=int(rng.integers(2**31)),
-            variety=1.0,
-            light=str(rng.choice(LIGHTS, p=[0.45, 0.4, 0.15])),
-            turf=str(rng.choice(["natural", "artificial"])),
-            long_shadows=sometimes(0.3),
-            wear=float(rng.beta(1.2, 2.5)),
-            mowing=float(rng.uniform(0, 1)) if rng.random() < 0.8 else 0.0,
-            players=int(rng.integers(0, 36)),
-            other_lines=bool(rng.random() < 0.3),
-            lettering=bool(rng.random() < 0.7),
-            rain=sometimes(0.12),
-            fog=sometimes(0.15),
-            snow=sometimes(0.06),
-            noise=float(rng.beta(1.2, 2.5)),
-            blur=float(rng.beta(1.2, 2.5)),
-            sharpening=float(rng.uniform(0, 1)) if rng.random() < 0.75 else 0.0,
-            fringe=float(rng.beta(1, 2)),
-            jpeg_quality=int(rng.integers(45, 98)),
-        )
 
 
 @dataclass(frozen=True)
@@ -116,17 +49,6 @@ class Wall:
 
 
 @dataclass(frozen=True)
-class Letters:
-    """White lettering or a logo on the ground: a picture of coverage, its corner, its axes and its texel in metres."""
-
-    picture: NDArray[np.float32]
-    corner: tuple[float, float]
-    along: tuple[float, float]
-    texel: float
-    colour: Colour
-
-
-@dataclass(frozen=True)
 class World:
     """Everything that stays at its place around one pitch."""
 
@@ -154,25 +76,11 @@ class World:
     shadow_reach: float
     masts: tuple[tuple[float, float], ...]
     goal_style: int
-    strips: tuple[Colour, ...] = field(default=())
-
-
-def hsv(hue_deg: float, saturation: float, value: float) -> Colour:
-    """A colour from hue in degrees, saturation and value."""
-    return np.array(colorsys.hsv_to_rgb((hue_deg % 360) / 360, saturation, value)[::-1], dtype=np.float32)
-
-
-def random_colour(rng: np.random.Generator, white: float = 0.2) -> Colour:
-    """Any colour; white with the chance given."""
-    if rng.random() < white:
-        return hsv(rng.uniform(0, 360), rng.uniform(0, 0.08), rng.uniform(0.8, 1.0))
-    return hsv(rng.uniform(0, 360), rng.uniform(0.1, 1.0) ** 0.7, rng.uniform(0.05, 0.9))
+    strips: tuple[Colour, ...]
 
 
 def build_world(pitch: Field, conditions: Conditions) -> World:
     """The world of a seed around a pitch."""
-    from models.training.lettering import random_letters
-
     rng = np.random.default_rng([conditions.world, 17])
     grass, other = _grass(rng, conditions)
     zones = _zones(rng, grass)
@@ -319,49 +227,3 @@ def _walls(rng: np.random.Generator) -> tuple[Wall, ...]:
                 )
             )
     return tuple(walls)
-
-
-def random_field(rng: np.random.Generator) -> Field:
-    """A pitch within Law 1, from flat to a crown of 0.6 m."""
-    length, width = float(rng.uniform(90, 120)), float(rng.uniform(45, 90))
-    if rng.random() < 0.6:
-        length, width = 105.0, 68.0
-    crown, half_ridge = float(rng.uniform(0, 0.6)), float(rng.uniform(0, 0.45 * length))
-    ridge = np.array([[-half_ridge, 0.0, crown], [half_ridge, 0.0, crown]])
-    return Field(length, width, float(rng.uniform(0.09, 0.125)), ridge if rng.random() < 0.8 else None)
-
-
-def random_intrinsics(rng: np.random.Generator) -> Intrinsics:
-    """A lens of 60 to 120 degrees across (now and then a longer one), with the distortion such lenses have."""
-    width, height = SIZES[rng.integers(len(SIZES))]
-    across = np.radians(rng.uniform(60, 120) if rng.random() < 0.8 else rng.uniform(25, 60))
-    k1 = float(rng.uniform(-0.38, -0.2) if rng.random() < 0.6 else rng.uniform(-0.2, 0.03))
-    # Above 0.45 k1² the radius grows everywhere, so that every pixel has a ray.
-    k2 = k1 * k1 * float(rng.uniform(0.6, 1.1))
-    edge = np.tan(across / 2)
-    focal = (width / 2) / (edge * (1 + k1 * edge**2 + k2 * edge**4))
-    centre = np.array([width, height]) / 2 + rng.normal(0, 0.02, 2) * width
-    matrix = np.array([[focal, 0, centre[0]], [0, focal * rng.uniform(0.998, 1.002), centre[1]], [0, 0, 1]])
-    tangential = rng.normal(0, 0.0005, 2)
-    return Intrinsics(matrix, np.array([k1, k2, *tangential, 0.0]), (width, height))
-
-
-def random_camera(rng: np.random.Generator, pitch: Field) -> Camera:
-    """A camera 5 to 40 m high on any side of the pitch, that looks at a place on it."""
-    height = float(np.exp(rng.uniform(np.log(5), np.log(40 if rng.random() < 0.5 else 15))))
-    behind = float(rng.uniform(1, 12) if rng.random() < 0.5 else rng.uniform(5, 45))
-    along = float(np.clip(rng.normal(0, 0.25), -0.6, 0.6))
-    side = rng.choice(SIDES, p=[0.35, 0.25, 0.2, 0.2])
-    sign = -1.0 if side in ("near", "left") else 1.0
-    if side in ("near", "far"):
-        position = np.array([along * pitch.length, sign * (pitch.width / 2 + behind), height])
-    else:
-        position = np.array([sign * (pitch.length / 2 + behind), along * pitch.width, height])
-    target = np.array([rng.uniform(-0.5, 0.5) * pitch.length, rng.uniform(-0.5, 0.5) * pitch.width, 0.0])
-    pose = Pose.looking_at(position, target, roll_deg=float(rng.normal(0, 3)))
-    return Camera("camera", random_intrinsics(rng), pose)
-
-
-def calmer(conditions: Conditions, **changes: object) -> Conditions:
-    """The same with some fields replaced."""
-    return replace(conditions, **changes)  # type: ignore[arg-type]
