@@ -1,7 +1,7 @@
 """One job, in a process of its own: load, calibrate, draw, hand back.
 
 `python -m worker.job JOB_ID RUN_TOKEN` prints a line of JSON for each step of progress and one for the end, a
-`worker.process.Message` each. It writes no row: its parent does.
+`worker.message.Message` each. It writes no row: its parent does.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from worker.calibration.calibrate import CalibrationError, calibrate
 from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field
 from worker.calibration.segmentation import Segmenter
-from worker.process import Message
+from worker.message import Message
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
@@ -131,7 +131,7 @@ def _line_to_parent() -> Callable[[Message], None]:
     os.dup2(2, 1)
 
     def say(message: Message) -> None:
-        print(message.model_dump_json(exclude_none=True), file=messages, flush=True)
+        print(message.line(), file=messages, flush=True)
 
     return say
 

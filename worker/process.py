@@ -20,17 +20,18 @@ from pathlib import Path
 from typing import IO
 
 import structlog
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from service import lifeline
 from service.problems import KINDS, type_of
 from service.queue import WorkerQueue
 from service.queue import migrate as migrate_queue
-from service.schemas import JobError, Progress, Result
+from service.schemas import JobError
 from service.settings import Settings
 from service.store.engine import connect, migrate
 from service.store.jobs import Jobs, Task
 from service.store.workers import Workers
+from worker.message import Message
 
 BEAT_S = 2.0
 SWEEP_S = 3.0
@@ -39,14 +40,6 @@ LOOK_S = 0.5
 PROGRESS_S = 0.25
 LONGEST_LINE = 16 * 1024 * 1024
 log = structlog.get_logger()
-
-
-class Message(BaseModel):
-    """One line that a job's program prints: exactly one of the three. `error` and `result` are its last word."""
-
-    progress: Progress | None = None
-    result: Result | None = None
-    error: JobError | None = None
 
 
 class AlreadyRunning(Exception):  # noqa: N818

@@ -1,6 +1,5 @@
 """Stands in for the program that computes a job: does what the name of the venue says, and no geometry."""
 
-import json
 import os
 import signal
 import sys
@@ -12,13 +11,14 @@ from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.engine import connect
 from service.store.jobs import Jobs, picture_folder
+from worker.message import Message
 
 JPEG = b"\xff\xd8\xff\xd9"
 SHIFT_M = 0.125
 
 
 def say(**message):
-    print(json.dumps({key: value.model_dump() for key, value in message.items()}), flush=True)
+    print(Message(**message).line(), flush=True)
 
 
 def main(job_id: str, run_token: str) -> None:

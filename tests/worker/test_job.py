@@ -7,6 +7,7 @@ from service.settings import Settings
 from worker import job
 from worker.calibration import calibrate as engine
 from worker.calibration.camera import Pose
+from worker.message import Message
 
 SIZE = (320, 180)
 UP_LEFT = [1.675, 0.372, -0.462]
@@ -103,6 +104,13 @@ def test_what_json_cannot_say_is_null(venue, files, asked, settings):
     camera = job.solve(venue, files, Options(seed=7), settings, steps.append).result.cameras[0]
     assert (camera.sigma, camera.moved.pixels, camera.residual_px) == (None, None, None)
     assert (steps[0].loss, steps[0].fraction) == (None, job.PREVIEW_FRACTION)
+
+
+def test_what_a_program_says_is_what_its_worker_understands(venue, files, asked, settings):
+    steps = []
+    outcome = job.solve(venue, files, Options(), settings, steps.append)
+    for message in (Message(progress=steps[0]), Message(result=outcome.result)):
+        assert Message.model_validate_json(message.line()) == message
 
 
 def test_the_orientation_a_camera_writes_into_its_files_is_not_obeyed(venue, files, asked, settings):

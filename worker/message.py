@@ -1,0 +1,19 @@
+"""What a job's program says to the worker that started it: lines of JSON on its standard output."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel
+
+from service.schemas import JobError, Progress, Result
+
+
+class Message(BaseModel):
+    """One line: exactly one of the three. `error` and `result` are the program's last word."""
+
+    progress: Progress | None = None
+    result: Result | None = None
+    error: JobError | None = None
+
+    def line(self) -> str:
+        """The line, to be printed."""
+        return self.model_dump_json(exclude_unset=True)
