@@ -26,6 +26,7 @@ Response = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 # A response seen from above, on a square grid of the pitch: values, and where the camera sees it.
 View = tuple[Response, Mask]
+Sight = tuple[Camera, Response]
 
 PIXEL_M = 0.1
 
@@ -36,15 +37,18 @@ REACH_M = 8.0
 LEAST_COMMON = 0.3
 # Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
 SHIFT_PENALTY = 0.05
+# Views that are nearer than this where they should be need no other guess.
+NEAR_M = 0.5
 
 # Sampled finely, so that no edge of a line falls between two samples; once blurred, every second sample will do.
 FINE_STEP_M, FINE_HALF_M, FINE_STRIDE = 0.05, 12.0, 2
-# Blur in metres and number of steps, coarse to fine. The last blur is about what a far camera smears: with less, the
-# smear of two cameras that face each other would show as a displacement.
-FINE_STAGES = ((0.4, 4), (0.2, 6))
-# What is expected of a camera that is out of place, the paper's Start errors. It shrinks with the displacement found,
-# but not below this part: cameras that agree at the centre are not suspected of moves that happen to cancel there.
-EXPECTED_TURN_RAD, EXPECTED_MOVE_M, LEAST_EXPECTED = 0.02, 0.16, 0.01
+# What is expected of a camera that is out of place: the paper's Start errors.
+EXPECTED_TURN_RAD, EXPECTED_MOVE_M = 0.02, 0.16
+# Blur in metres, number of steps, and the part of what is expected that is expected at least. Coarse to fine; the last
+# blur is about what a far camera smears: with less, the smear of two cameras that face each other would show as a
+# displacement. What is expected shrinks with the displacement found: cameras that agree at the centre are not
+# suspected of turns and moves that happen to cancel there.
+FINE_STAGES = ((0.8, 5, 1.0), (0.4, 5, 0.3), (0.2, 4, 0.1), (0.2, 4, 0.01))
 # A difference of this part of a line's response counts as half an outlier.
 OUTLIER = 0.5
 # Grass, where neither view shows more than this, is left out.
@@ -100,38 +104,13 @@ def register_pair(
     centre = _reference_point(pitch, first, second)
     if centre is None:
         return None
-    views = [
-        ground_view(pitch, camera, response, _square(centre, COARSE_HALF_M, COARSE_STEP_M))
-        for camera, response in ((first, first_response), (second, second_response))
-    ]
-    shift = _coarse_shift(*views)
-    if shift is None:
+    sights = ((first, first_response), (second, second_response))
+    fits = [_fit(pitch, sights, middle, shift) for middle, shift in _guesses(pitch, sights, centre)]
+    best = max(fits, key=lambda fit: fit.support * fit.correlation, default=None)
+    if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
         return None
-    # The displacement is measured where the cameras put the centre, roughly, and not beside it.
-    template = _template(pitch, centre)
-    placed = [_coarse_shift(template, view) for view in views]
-    middle = centre + np.mean([put for put in placed if put is not None] or [np.zeros(2)], axis=0)
-
-    at_middle = np.concatenate([-_forms(first, pitch.lift(middle)), _forms(second, pitch.lift(middle))], axis=-1)
-    # The most likely turns and moves that make the coarse shift.
-    start = at_middle.T @ np.linalg.solve(at_middle @ at_middle.T, shift)
-    grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
-    forms = [_forms(camera, pitch.lift(grid)) for camera in (first, second)]
-    fine = _fine_moves(
-        ground_view(pitch, first, first_response, grid + forms[0] @ start[:6]),
-        ground_view(pitch, second, second_response, grid + forms[1] @ start[6:]),
-        np.concatenate(forms, axis=-1)[::FINE_STRIDE, ::FINE_STRIDE],
-        at_middle,
-        start,
-    )
-    support = fine.common_area_m2 / pitch.line_width
-    if support < LEAST_SUPPORT_M or fine.correlation < LEAST_CORRELATION:
-        return None
-
-    variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
-    told = directions[:, variance < LOOSE_M**2]
-    dx, dy = told @ told.T @ at_middle @ fine.moves / PIXEL_M
-    return Registration(float(dx), float(dy), float(support), (first.id, second.id))
+    dx, dy = best.displacement / PIXEL_M
+    return Registration(float(dx), float(dy), best.support, (first.id, second.id))
 
 
 def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
@@ -145,6 +124,49 @@ def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | Non
     common: Array = points[seen, :2]
     nearest = common[np.argmin(np.linalg.norm(common, axis=1))]
     return np.asarray(common[np.linalg.norm(common - nearest, axis=1) < FINE_HALF_M].mean(axis=0))
+
+
+def _guesses(pitch: Field, sights: Sequence[Sight], centre: Array) -> list[tuple[Array, Array]]:
+    """Where to measure (2,), and how far apart (2,) the views may be there: as they should be, and as they look."""
+    grid = _square(centre, COARSE_HALF_M, COARSE_STEP_M)
+    views = [ground_view(pitch, camera, response, grid) for camera, response in sights]
+    shift = _coarse_shift(views[0], views[1], pitch.line_width)
+    if shift is None:
+        return []
+    # Where the cameras put the markings of the centre, roughly: the displacement is measured there and not beside it.
+    template = _template(pitch, centre)
+    placed = [put for put in (_coarse_shift(template, view, pitch.line_width) for view in views) if put is not None]
+    middle = centre + np.mean(placed or [np.zeros(2)], axis=0)
+    guesses = [(centre, np.zeros(2)), (middle, shift)]
+    return guesses if np.hypot(*(middle - centre)) + np.hypot(*shift) > NEAR_M else guesses[:1]
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """`displacement` (2,) m as far as the markings tell it, metres of marking in common, and how alike they are."""
+
+    displacement: Array
+    support: float
+    correlation: float
+
+
+def _fit(pitch: Field, sights: Sequence[Sight], middle: Array, shift: Array) -> _Fit:
+    """The displacement of the views in the `middle`, from a guess that is right to a metre or so."""
+    on_surface = pitch.lift(middle)
+    at_middle = np.concatenate([-_forms(sights[0][0], on_surface), _forms(sights[1][0], on_surface)], axis=-1)
+    # The most likely turns and moves that make the shift.
+    start = at_middle.T @ np.linalg.solve(at_middle @ at_middle.T, shift)
+    grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
+    views, forms = [], []
+    for (camera, response), moves in zip(sights, (start[:6], start[6:]), strict=True):
+        form = _forms(camera, pitch.lift(grid))
+        views.append(ground_view(pitch, camera, response, grid + form @ moves))
+        forms.append(form[::FINE_STRIDE, ::FINE_STRIDE])
+    fine = _fine_moves(views[0], views[1], np.concatenate(forms, axis=-1), at_middle, start, pitch.line_width)
+
+    variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
+    told = directions[:, variance < LOOSE_M**2]
+    return _Fit(told @ told.T @ at_middle @ fine.moves, fine.common_area_m2 / pitch.line_width, fine.correlation)
 
 
 def _square(middle: Array, half_m: float, step_m: float) -> Array:
@@ -163,10 +185,10 @@ def _template(pitch: Field, centre: Array) -> View:
     return values.astype(np.float32), np.ones(values.shape, bool)
 
 
-def _coarse_shift(first: View, second: View) -> Array | None:
+def _coarse_shift(first: View, second: View, line_width: float) -> Array | None:
     """Shift (2,) in metres, world axes, of the second view relative to the first with the highest correlation."""
     a_seen, b_seen = first[1], second[1]
-    a, b = (_blur(values, COARSE_BLUR_M / COARSE_STEP_M) * seen for values, seen in (first, second))
+    a, b = (_smooth(view, COARSE_BLUR_M, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
     reach = round(REACH_M / COARSE_STEP_M)
     # Over what both see at each shift (masked normalised correlation after Padfield, 2012).
     plane = 2 * a.shape[0]
@@ -205,7 +227,10 @@ def _forms(camera: Camera, points: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Fine:
-    """`moves` (12,) of both cameras, in expected turns and moves, their `covariance`, and what then coincides."""
+    """`moves` (12,) of both cameras, in expected turns and moves, and what then coincides.
+
+    `covariance` (12, 12): how loose the markings leave the moves of cameras of which no more is known than is expected.
+    """
 
     moves: Array
     covariance: Array
@@ -213,26 +238,27 @@ class _Fine:
     correlation: float
 
 
-def _fine_moves(first: View, second: View, forms: Array, at_middle: Array, start: Array) -> _Fine:
+def _fine_moves(first: View, second: View, forms: Array, at_middle: Array, start: Array, line_width: float) -> _Fine:
     """Gauss-Newton on the moves (12,) of both cameras.
 
     `forms` (n, n, 2, 12): what they do to every `FINE_STRIDE`th point of each view; `at_middle` (2, 12): what they do
     to the displacement in the middle. The views are sampled where `start` puts them.
     """
-    (a, a_seen), (b, b_seen) = ((values, seen.astype(np.float32)) for values, seen in (first, second))
+    a_seen, b_seen = first[1].astype(np.float32), second[1].astype(np.float32)
     step_m = FINE_STRIDE * FINE_STEP_M
+    expected = np.linalg.inv(at_middle @ at_middle.T)
     moves = start
-    for blur, steps in FINE_STAGES:
-        smooth_a, smooth_b = (_blur(view, blur / FINE_STEP_M) for view in (a, b))
+    for blur, steps, least in FINE_STAGES:
+        smooth_a, smooth_b = (_smooth(view, blur, FINE_STEP_M, line_width) for view in (first, second))
         for _ in range(steps):
             offset_a, offset_b = forms[..., :6] @ (moves - start)[:6], forms[..., 6:] @ (moves - start)[6:]
             warped_a, warped_b = _warp(smooth_a, offset_a), _warp(smooth_b, offset_b)
             valid = (_warp(a_seen, offset_a) == 1) & (_warp(b_seen, offset_b) == 1)
             pull, information = _normal_equations(warped_a, warped_b, valid, forms, step_m, blur)
-            found = np.linalg.norm(at_middle @ moves) / np.linalg.norm(at_middle)
-            prior = 1 / max(float(found), LEAST_EXPECTED) ** 2
-            covariance = np.asarray(np.linalg.inv(information + prior * np.eye(len(moves))), float)
-            moves = moves + covariance @ (pull - prior * moves)
+            found = at_middle @ moves
+            prior = 1 / max(float(found @ expected @ found), least**2)
+            moves = moves + np.linalg.solve(information + prior * np.eye(len(moves)), pull - prior * moves)
+    covariance = np.asarray(np.linalg.inv(information + np.eye(len(moves))), float)
     common = np.minimum(warped_a, warped_b)[valid].sum(dtype=float) * step_m**2
     return _Fine(moves, covariance, float(common), _correlation(warped_a[valid], warped_b[valid]))
 
@@ -259,8 +285,16 @@ def _normal_equations(
     return (weighted * residual[:, None]).sum(axis=0), information
 
 
-def _blur(view: Response, sigma: float) -> Response:
-    return np.asarray(cv2.GaussianBlur(view, (0, 0), sigma), np.float32)
+def _smooth(view: View, blur_m: float, step_m: float, line_width: float) -> Response:
+    """A view blurred over what the camera sees, and no brighter than a line of the width then is.
+
+    Lines stay as they are; players and lettering, wider than a line, cannot outweigh them.
+    """
+    values, seen = (
+        cv2.GaussianBlur(part.astype(np.float32), (0, 0), blur_m / step_m) for part in (view[0] * view[1], view[1])
+    )
+    brightest = 1.1 * line_width / (np.sqrt(2 * np.pi) * blur_m)
+    return np.asarray(np.minimum(values / np.maximum(seen, 1e-3), brightest), np.float32)
 
 
 def _warp(view: Response, offset: Array) -> Response:
