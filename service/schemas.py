@@ -270,9 +270,9 @@ class Options(Wire):
 
     preset: Literal["esc", "paper", "scpr"] = "esc"
     seed: Annotated[Whole, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
-    generations: Annotated[Whole, Field(ge=1, le=2000)] | None = Field(None, description="Absent: the preset's.")
-    parents: Annotated[Whole, Field(ge=2, le=4096)] | None = Field(None, description="μ; absent: the preset's.")
-    offspring: Annotated[Whole, Field(ge=2, le=8192)] | None = Field(None, description="λ; absent: the preset's.")
+    generations: Annotated[Whole, Field(ge=1, le=2000)] = Field(100, description="G of the paper.")
+    parents: Annotated[Whole, Field(ge=2, le=4096)] = Field(64, description="μ of the paper.")
+    offspring: Annotated[Whole, Field(ge=2, le=8192)] = Field(128, description="λ of the paper's strategy.")
     stitch_weight: Annotated[Number, Field(ge=0, le=1)] = Field(0.5, description="The paper's trade-off λ.")
     flat: Flag = Field(False, description="Calibrate on a plane although the venue has a ridge.")
     dry_run: Flag = Field(False, description="Never move the stored poses.")

@@ -67,7 +67,7 @@ def test_slightly_moved_cameras_come_back_to_where_they_were():
     refined = refine(CROWNED, start, brightness, responses, 0.5)
     for shift, turn in off_by(cameras, refined.cameras):
         assert shift < 0.02
-        assert turn < 0.01
+        assert turn < 0.02
     assert all(residual < 0.3 for residual in refined.residual_px)
 
 

@@ -32,8 +32,10 @@ OFF_CENTRE_PENALTY = 0.15
 """Correlation that a candidate at the end of the search loses against one where the pose expects the line."""
 NOISE_PX = 0.25
 """Error of one measurement of a perfect line."""
-UNEVEN_GROUND_M = 0.01
-"""Lines are painted, and the ground swells, to about a centimetre."""
+PAINT_M = 0.01
+"""Lines are painted to about a centimetre."""
+UNEVEN_GROUND_M = 0.015
+"""And the ground swells by a little more, which from a low camera moves a far line by decimetres."""
 
 _erf = np.vectorize(erf, otypes=[float])
 
@@ -43,7 +45,8 @@ class Measurements:
     """Line centres found in one frame, M of them.
 
     `index` (M,): which of the pitch's line points; `points`: those points; `pixel` (M, 2): where the line was found;
-    `normal` (M, 2): across it in the picture, towards `points.normal`; `px_per_metre` (M,) along it.
+    `normal` (M, 2): across it in the picture, towards `points.normal`; `px_per_metre` and `px_per_metre_up` (M,): how
+    far it moves along that when the line or the ground under it does (see `SeenLines`).
     """
 
     index: NDArray[np.intp]
@@ -51,6 +54,7 @@ class Measurements:
     pixel: Array
     normal: Array
     px_per_metre: Array
+    px_per_metre_up: Array
 
     def __len__(self) -> int:
         return len(self.index)
@@ -58,7 +62,8 @@ class Measurements:
     @property
     def sigma_px(self) -> Array:
         """Expected error (M,) along the normal: of the measurement, and of paint and ground."""
-        return np.hypot(NOISE_PX, UNEVEN_GROUND_M * self.px_per_metre)
+        of_model = np.hypot(PAINT_M * self.px_per_metre, UNEVEN_GROUND_M * self.px_per_metre_up)
+        return np.hypot(NOISE_PX, of_model)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Measurements:
         return Measurements(
@@ -67,6 +72,7 @@ class Measurements:
             self.pixel[chosen],
             self.normal[chosen],
             self.px_per_metre[chosen],
+            self.px_per_metre_up[chosen],
         )
 
 
@@ -100,6 +106,7 @@ def measure_lines(
         np.concatenate([m.pixel for m in found]),
         np.concatenate([m.normal for m in found]),
         np.concatenate([m.px_per_metre for m in found]),
+        np.concatenate([m.px_per_metre_up for m in found]),
     )
 
 
@@ -134,7 +141,14 @@ def _measure_class(
         & (bilinear(response, pixel) >= LEAST_RESPONSE)
         & np.isfinite(profiles).all(axis=1)
     )
-    return Measurements(seen.index[good], seen.points[good], pixel[good], seen.normal[good], seen.px_per_metre[good])
+    return Measurements(
+        seen.index[good],
+        seen.points[good],
+        pixel[good],
+        seen.normal[good],
+        seen.px_per_metre[good],
+        seen.px_per_metre_up[good],
+    )
 
 
 def expected_profiles(width_px: Array, offsets_px: Array) -> Array:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, Pose, project, rotation_matrices, rotation_vectors
-from worker.calibration.field import Field
-from worker.calibration.linemeasurement import NOISE_PX, Measurements, measure_lines
+from worker.calibration.field import Field, LinePoints
+from worker.calibration.linemeasurement import NOISE_PX, UNEVEN_GROUND_M, Measurements, measure_lines
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0)
 """How far from where the pose expects it a line is looked for, round by round, in a picture 3840 px wide."""
@@ -26,8 +26,10 @@ STEPS_PER_ROUND = 4
 TUKEY = 4.685
 LEAST_SINGLE_WEIGHT = 0.02
 FEWEST_MEASUREMENTS = 30
-CLUSTER_POINTS = 20
-"""Line points (25 cm apart) whose errors are taken as one: paint and ground keep their error over some metres."""
+CLUSTER_POINTS = 8
+"""Line points (25 cm apart) whose errors of paint and measurement are taken as one."""
+SWELL_M = 8.0
+"""Over how far the ground keeps its error: the correlation length of `UNEVEN_GROUND_M`."""
 DAMPING = 1e-6
 JACOBIAN_STEP = 1e-5
 
@@ -46,12 +48,16 @@ class Refined:
 
 @dataclass(frozen=True)
 class Residuals:
-    """Rows of the least squares: `value` (M,), `jacobian` (M, 6 N), `weight` (M,), `cluster` (M,) of shared error."""
+    """Rows of the least squares: `value` (M,) in units of its expected error, `jacobian` (M, 6 N), `weight` (M,).
+
+    `point` (M,): the line point it is about; `rise` (M,): how much the value changes per metre of ground under it.
+    """
 
     value: Array
     jacobian: Array
     weight: Array
-    cluster: NDArray[np.intp]
+    point: NDArray[np.intp]
+    rise: Array
 
 
 def refine(
@@ -70,7 +76,7 @@ def refine(
         measured = _measure_all(pitch, here, brightness, responses, search)
         for _ in range(STEPS_PER_ROUND):
             here = _step(here, measured, stitch_weight)
-    return _assessed(here, measured, stitch_weight)
+    return _assessed(pitch, here, measured, stitch_weight)
 
 
 def assess(
@@ -82,12 +88,12 @@ def assess(
 ) -> Refined:
     """What the lines say of poses that are left as they are; arguments as for `refine`."""
     measured = _measure_all(pitch, cameras, brightness, responses, ASSESSING_SEARCH_PX)
-    return _assessed(list(cameras), measured, stitch_weight)
+    return _assessed(pitch, list(cameras), measured, stitch_weight)
 
 
-def _assessed(cameras: list[Camera], measured: Sequence[Measurements], stitch_weight: float) -> Refined:
+def _assessed(pitch: Field, cameras: list[Camera], measured: Sequence[Measurements], stitch_weight: float) -> Refined:
     residuals = [_residual_px(camera, found) for camera, found in zip(cameras, measured, strict=True)]
-    return Refined(cameras, _covariances(cameras, measured, stitch_weight), residuals)
+    return Refined(cameras, _covariances(pitch.line_points(), cameras, measured, stitch_weight), residuals)
 
 
 def _measure_all(
@@ -145,7 +151,8 @@ def _all_residuals(cameras: Sequence[Camera], measured: Sequence[Measurements], 
         np.concatenate([p.value for p in parts]),
         np.concatenate([p.jacobian for p in parts]),
         np.concatenate([p.weight for p in parts]),
-        np.concatenate([p.cluster for p in parts]),
+        np.concatenate([p.point for p in parts]),
+        np.concatenate([p.rise for p in parts]),
     )
 
 
@@ -177,7 +184,8 @@ def _single(view: _LineView, index: int, count: int, share: float) -> Residuals:
     value = view.offset / sigma
     jacobian = np.zeros((len(value), 6 * count))
     jacobian[:, 6 * index : 6 * index + 6] = view.jacobian / sigma[:, None]
-    return Residuals(value, jacobian, share * tukey_weights(value), view.measured.index // CLUSTER_POINTS)
+    rise = view.measured.px_per_metre_up / sigma
+    return Residuals(value, jacobian, share * tukey_weights(value), view.measured.index, rise)
 
 
 def _stitch(first: _LineView, second: _LineView, i: int, j: int, count: int, share: float) -> Residuals:
@@ -191,11 +199,12 @@ def _stitch(first: _LineView, second: _LineView, i: int, j: int, count: int, sha
     jacobian = np.zeros((len(index), 6 * count))
     jacobian[:, 6 * i : 6 * i + 6] = first.jacobian[a] / (scale_a * sigma_m)[:, None]
     jacobian[:, 6 * j : 6 * j + 6] = -second.jacobian[b] / (scale_b * sigma_m)[:, None]
-    return Residuals(value, jacobian, share * tukey_weights(value), index // CLUSTER_POINTS)
+    up_a, up_b = first.measured.px_per_metre_up[a], second.measured.px_per_metre_up[b]
+    return Residuals(value, jacobian, share * tukey_weights(value), index, (up_a / scale_a - up_b / scale_b) / sigma_m)
 
 
 def _nothing(count: int) -> Residuals:
-    return Residuals(np.empty(0), np.empty((0, 6 * count)), np.empty(0), np.empty(0, dtype=np.intp))
+    return Residuals(np.empty(0), np.empty((0, 6 * count)), np.empty(0), np.empty(0, dtype=np.intp), np.empty(0))
 
 
 def robust_scale(values: Array) -> float:
@@ -210,29 +219,42 @@ def tukey_weights(values: Array) -> Array:
 
 
 def _covariances(
-    cameras: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float
+    lines: LinePoints, cameras: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float
 ) -> list[Array | None]:
-    """Covariance (6, 6) per camera from the normal matrix, with the errors of a few metres of line taken as one.
+    """Covariance (6, 6) per camera: H^-1 (measurement + ground) H^-1 with the normal matrix H.
 
-    The sandwich H^-1 (sum over clusters of g g') H^-1 of a clustered regression; where the lines are so few that it
-    cannot be told, the plain H^-1 holds from below.
+    Measurement: the residuals themselves, those of two metres of line taken as one, never less than expected. Ground:
+    heights that are off by `UNEVEN_GROUND_M` and alike over `SWELL_M`. They move every line on a swell the same way, in
+    all cameras, so many points do not average them out and the residuals do not show them.
     """
     rows = _all_residuals(cameras, measured, stitch_weight)
     weighted = rows.jacobian * rows.weight[:, None]
     normal = np.einsum("mi,mj->ij", weighted, rows.jacobian)
     free = np.flatnonzero(np.diag(normal) > 0)
+    patches, patch = np.unique(rows.point // CLUSTER_POINTS, return_inverse=True)
+    by_residual = _sum_by(patch, len(patches), weighted * rows.value[:, None])
+    by_rise = _sum_by(patch, len(patches), weighted * rows.rise[:, None])
+    where = lines.position[np.minimum(patches * CLUSTER_POINTS + CLUSTER_POINTS // 2, len(lines) - 1), :2]
+    apart = np.sum((where[:, None] - where[None]) ** 2, axis=-1)
+    heights = UNEVEN_GROUND_M**2 * np.exp(-apart / (2 * SWELL_M**2))
+    expected = np.einsum("mi,mj->ij", weighted, weighted)
+    measurement = np.einsum("ci,cj->ij", by_residual, by_residual)
+    meat = np.maximum(np.diag(expected), np.diag(measurement))
+    growth = np.sqrt(meat / np.maximum(np.diag(measurement), 1e-300))
+    ground = np.einsum("ci,cj->ij", by_rise, np.einsum("cd,dj->cj", heights, by_rise))
     inverse = np.linalg.pinv(normal[np.ix_(free, free)], hermitian=True)
-    _, member = np.unique(rows.cluster, return_inverse=True)
-    gradients = np.zeros((member.max(initial=-1) + 1, len(free)))
-    np.add.at(gradients, member, weighted[:, free] * rows.value[:, None])
-    meat = np.einsum("ci,cj->ij", gradients, gradients)
-    sandwich = inverse @ meat @ inverse
-    # Per number the larger of the two, so that no number is surer than its own measurements allow.
-    growth = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.maximum(np.diag(sandwich), 1e-300)))
+    total = (measurement * growth[:, None] * growth[None, :] + ground)[np.ix_(free, free)]
     full = np.zeros(normal.shape)
-    full[np.ix_(free, free)] = sandwich * growth[:, None] * growth[None, :]
+    full[np.ix_(free, free)] = inverse @ total @ inverse
     blocks = [full[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] for i in range(len(cameras))]
     return [block if np.diag(block).all() else None for block in blocks]
+
+
+def _sum_by(group: NDArray[np.intp], groups: int, rows: Array) -> Array:
+    """Sums (groups, K) of rows (M, K) by their group (M,)."""
+    sums = np.zeros((groups, rows.shape[1]))
+    np.add.at(sums, group, rows)
+    return sums
 
 
 def _residual_px(camera: Camera, measured: Measurements) -> float | None:
