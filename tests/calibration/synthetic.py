@@ -109,7 +109,7 @@ def _box(distance: Array, half_width: float) -> Array:
 
 def paint_frame(pitch: Field, camera: Camera, exposure: float = 1.0) -> NDArray[np.uint8]:
     """White lines on grass under a sky, BGR."""
-    paint = paint_markings(pitch, camera)[..., None]
+    paint = paint_markings(pitch, camera, oversampling=2)[..., None]
     sky = np.isnan(ground_behind(pitch, camera)).any(axis=-1)[..., None]
     picture = np.where(sky, SKY, GRASS + (PAINT - GRASS) * paint)
     return np.clip(exposure * picture, 0, 255).astype(np.uint8)
