@@ -79,8 +79,10 @@ class Crops:
         crop = np.asarray(shard[rng.integers(len(shard))])
         if rng.random() < 0.5:
             crop = crop[:, ::-1]
-        if rng.random() < 0.1:
+        if rng.random() < 0.08:
             crop = crop[::-1]
+        if rng.random() < 0.12:
+            crop = crop.transpose(1, 0, 2)
         spare = crop.shape[0] - size
         if rng.random() < 0.35:
             crop = _warped(np.ascontiguousarray(crop), size, rng)

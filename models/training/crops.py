@@ -11,6 +11,8 @@ from worker.calibration.camera import Array, Camera, inside
 from worker.calibration.field import Field
 
 CROP_SIZE = 288
+# How often the middle of a crop is what.
+KINDS = {"marking": 0.22, "near marking": 0.2, "steep marking": 0.2, "pitch": 0.1, "outside": 0.22, "frame": 0.06}
 
 
 def random_crop(rng: np.random.Generator, size: int = CROP_SIZE) -> Rendering:
@@ -28,12 +30,13 @@ def random_crop(rng: np.random.Generator, size: int = CROP_SIZE) -> Rendering:
 
 def _interesting(rng: np.random.Generator, field: Field, camera: Camera) -> NDArray[np.float64] | None:
     """A pixel (2,): on a marking, on the grass, just outside the pitch, or anywhere; None if the camera sees none."""
-    kind = rng.choice(["marking", "near marking", "pitch", "outside", "frame"], p=[0.25, 0.3, 0.12, 0.25, 0.08])
+    kind = str(rng.choice(list(KINDS), p=list(KINDS.values())))
     if kind == "frame":
         return rng.uniform(0, 1, 2) * camera.intrinsics.size
     half = np.array([field.length, field.width]) / 2
-    if kind in ("marking", "near marking"):
-        points = field.line_points(0.5).position
+    if kind in ("marking", "near marking", "steep marking"):
+        lines = field.line_points(0.5)
+        points = lines.position
     elif kind == "pitch":
         points = field.lift(rng.uniform(-1, 1, (50, 2)) * half)
     else:
@@ -45,6 +48,12 @@ def _interesting(rng: np.random.Generator, field: Field, camera: Camera) -> NDAr
         return None
     # Weighted by size in the picture, or else nearly all of a line is far away.
     weight = _nearness(camera, points[seen]) if kind == "near marking" else np.ones(len(seen))
+    if kind == "steep marking":
+        # Lines seen lengthwise run up the picture as posts do, and must not be taken for them.
+        ahead = camera.project(points[seen] + 0.1 * lines.tangent[seen]) - pixels[seen]
+        weight = _nearness(camera, points[seen]) * (np.abs(ahead[:, 1]) > 1.5 * np.abs(ahead[:, 0]))
+        if not weight.any():
+            return None
     return pixels[rng.choice(seen, p=weight / weight.sum())]
 
 

@@ -82,16 +82,16 @@ def _blur(conditions: Conditions, light: Plane, lens: np.random.Generator) -> Pl
 def _fringe(
     conditions: Conditions, light: Plane, origin: tuple[int, int], size: tuple[int, int], lens: np.random.Generator
 ) -> Plane:
-    """Blue and red at another magnification, and less sharp, than green."""
+    """Blue and red at another magnification, and less sharp, than green: up to some pixels at the frame's edge."""
     if conditions.fringe < 0.05:
         return light
     height, width = light.shape[:2]
     middle = np.array(size) / 2 - np.array(origin)
     bands = []
-    for channel, sign in ((0, 1), (1, 0), (2, -1)):
+    for channel, reach in ((0, 8.0), (1, 0.0), (2, 3.0)):
         plane = np.ascontiguousarray(light[..., channel])
-        if sign:
-            shift = sign * conditions.fringe * float(lens.uniform(-1.5, 1.5)) / (size[0] / 2)
+        if reach:
+            shift = conditions.fringe**1.5 * reach * float(lens.uniform(-1, 1)) / (size[0] / 2)
             move = np.float32([[1 + shift, 0, -shift * middle[0]], [0, 1 + shift, -shift * middle[1]]])
             plane = cv2.warpAffine(
                 plane, move, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
