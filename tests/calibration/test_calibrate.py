@@ -19,8 +19,8 @@ def frames():
     return {c.id: (paint_frame(CROWNED, c),) for c in pair()}
 
 
-def white_on_green(frame, wanted):
-    del wanted
+def white_on_green(frame, regions):
+    assert regions
     is_sky = frame[..., 0] > 200
     return np.where(is_sky & (frame[..., 2] < 200), 0, np.clip((whiteness(frame) - 70) * 2, 0, 255)).astype(np.uint8)
 

@@ -6,7 +6,7 @@ import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.calibration.synthetic import CROWNED, camera, paint_frame
-from worker.calibration.segmentation import CORE_PX, Segmenter, fuse, reachable_tiles
+from worker.calibration.segmentation import REGION_PX, Region, Segmenter, fuse, reachable_regions
 
 WIDE = camera("left", (-1.0, -48.0, 12.0), (-20.0, 0.0), focal=1200, size=(1920, 1080))
 
@@ -25,8 +25,8 @@ def picture():
 
 
 def everywhere(frame):
-    height, width = frame.shape[:2]
-    return np.ones((-(-height // CORE_PX), -(-width // CORE_PX)), dtype=bool)
+    height, width = (-(-side // 32) * 32 for side in frame.shape[:2])
+    return [Region(left, 0, min(left + 416, width), height) for left in range(0, width, 416)]
 
 
 def test_tiled_equals_whole(segmenter, picture):
@@ -46,27 +46,49 @@ def test_the_number_of_threads_changes_nothing(segmenter, picture):
     np.testing.assert_array_equal(one(picture, everywhere(picture)), segmenter(picture, everywhere(picture)))
 
 
-def test_only_wanted_tiles_are_looked_at(segmenter, picture):
-    wanted = everywhere(picture)
-    wanted[:, 1:] = False
-    response = segmenter(picture, wanted)
-    assert (response[:, CORE_PX:] == 0).all()
-    np.testing.assert_array_equal(response[:, :CORE_PX], segmenter(picture, everywhere(picture))[:, :CORE_PX])
+def test_only_the_regions_are_looked_at(segmenter, picture):
+    part = Region(320, 224, 640, 480)
+    response = segmenter(picture, [part])
+    inside = np.s_[part.top : part.bottom, part.left : part.right]
+    np.testing.assert_array_equal(response[inside], segmenter(picture, everywhere(picture))[inside])
+    response[inside] = 0
+    assert not response.any()
 
 
-def test_every_line_of_a_slightly_moved_camera_is_in_a_reachable_tile():
-    wanted = reachable_tiles(CROWNED, WIDE, reach_px=120)
+def test_a_picture_smaller_than_the_grid_is_segmented(segmenter, picture):
+    small = picture[:210, :330]
+    assert segmenter(small, everywhere(small)).shape == (210, 330)
+
+
+@pytest.mark.parametrize("reach", [0, 40, 300])
+def test_every_line_of_a_slightly_moved_camera_is_in_a_region(reach):
+    regions = reachable_regions(CROWNED, WIDE, reach)
     pixels = WIDE.project(CROWNED.line_points().position)
-    for move in ([100, 0], [-100, 0], [0, 100], [0, -100]):
-        moved = pixels + move
-        inside = ((moved >= 0) & (moved <= [1919, 1079])).all(axis=1)
-        column, row = (moved[inside] // CORE_PX).astype(int).T
-        assert wanted[row, column].all()
+    for move in ([reach, 0], [-reach, 0], [0, reach], [0, -reach]):
+        x, y = (pixels + move).T
+        inside = (x >= 0) & (x <= 1919) & (y >= 0) & (y <= 1079)
+        covered = [(x >= r.left) & (x < r.right) & (y >= r.top) & (y < r.bottom) for r in regions]
+        assert np.any(covered, axis=0)[inside].all()
+
+
+def test_regions_lie_on_the_grid_and_are_of_bounded_size():
+    for region in reachable_regions(CROWNED, WIDE, 100):
+        sides = (region.left, region.top, region.right, region.bottom)
+        assert all(side % 32 == 0 for side in sides)
+        assert 0 < region.right - region.left <= REGION_PX
+        assert 0 < region.bottom - region.top <= REGION_PX
+
+
+def test_regions_do_not_overlap():
+    seen = np.zeros((1120, 1952), dtype=int)
+    for region in reachable_regions(CROWNED, WIDE, 100):
+        seen[region.top : region.bottom, region.left : region.right] += 1
+    assert seen.max() == 1
 
 
 def test_the_sky_is_not_looked_at():
-    steep = camera("left", (-1.0, -48.0, 12.0), (-20.0, 60.0), focal=1200, size=(1920, 1800))
-    assert not reachable_tiles(CROWNED, steep, reach_px=50)[0].any()
+    up = camera("left", (-1.0, -48.0, 12.0), (-20.0, 60.0), focal=1200, size=(1920, 1800))
+    assert min(region.top for region in reachable_regions(CROWNED, up, 50)) > 500
 
 
 def test_what_walks_by_vanishes_from_several_frames():

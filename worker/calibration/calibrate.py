@@ -11,17 +11,16 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Camera, Pose
+from worker.calibration.camera import Camera, Frame, Pose
 from worker.calibration.field import Field
 from worker.calibration.linemeasurement import whiteness
 from worker.calibration.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
 from worker.calibration.refinement import Refined, assess, refine
 from worker.calibration.registration import stitch_error_px
 from worker.calibration.search import COARSE_TO_FINE, ON_THE_GROUND, Found, Level, Strategy, search
-from worker.calibration.segmentation import fuse, reachable_tiles
+from worker.calibration.segmentation import Region, fuse, reachable_regions
 from worker.calibration.visibility import SeenLines
 
-Frame = NDArray[np.uint8]
 Response = NDArray[np.float32]
 Preset = Literal["esc", "paper", "scpr"]
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
@@ -35,10 +34,10 @@ SHARE_OF_JOB = {"segmentation": (0.0, 0.65), "evolution": (0.65, 0.85), "refinem
 
 
 class Segment(Protocol):
-    """Probability (H, W) in 0..255 of a marking for a BGR frame, on the wanted tiles; see `segmentation.Segmenter`."""
+    """Probability (H, W) in 0..255 of a marking, see `segmentation.Segmenter`."""
 
-    def __call__(self, frame: Frame, wanted: NDArray[np.bool_]) -> NDArray[np.uint8]:
-        """Look at the tiles that are `wanted`."""
+    def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
+        """Look at regions of a frame; 0 outside them."""
 
 
 @dataclass(frozen=True)
@@ -196,11 +195,11 @@ def _segment_all(
     done = 0
     responses = []
     for camera in cameras:
-        wanted = reachable_tiles(pitch, camera, CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
+        regions = reachable_regions(pitch, camera, CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
         seen = []
         for frame in frames[camera.id]:
             journey.at("segmentation", done / total)
-            seen.append(segment(frame, wanted))
+            seen.append(segment(frame, regions))
             done += 1
         responses.append(fuse(seen))
     return responses

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Frame = NDArray[np.uint8]
+"""A picture as a camera took it: (height, width, 3), blue, green, red."""
 
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 NEAREST_DEPTH_M = 0.1

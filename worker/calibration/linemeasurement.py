@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Array, Camera
+from worker.calibration.camera import Array, Camera, Frame
 from worker.calibration.field import LinePoints
 from worker.calibration.sampling import bilinear
 from worker.calibration.visibility import SeenLines
@@ -76,7 +76,7 @@ class Measurements:
         )
 
 
-def whiteness(frame: NDArray[np.uint8]) -> NDArray[np.float32]:
+def whiteness(frame: Frame) -> NDArray[np.float32]:
     """Brightness (H, W) in which paint stands out most: the darkest channel, which grass and clay lack."""
     blue, green, red = cv2.split(frame)
     return cv2.min(cv2.min(blue, green), red).astype(np.float32)

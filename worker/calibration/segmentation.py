@@ -7,22 +7,33 @@ as many pixels and blur what it stretches; the lens model is in the projection i
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Array, Camera
+from worker.calibration.camera import Array, Camera, Frame
 from worker.calibration.field import Field
 
 HALO_PX = 96
-"""Context a pixel's answer depends on (half the receptive field of four poolings, 94 px, on the network's grid)."""
-CORE_PX = 448
-"""Side of the square that one tile answers for."""
+"""Context that a pixel's answer depends on (four poolings reach 94 px), a multiple of what they pool."""
 GRID_PX = 32
-"""The network takes sides that are multiples of this."""
+"""Regions begin and end on this grid: then the network pools the same pixels together as in the whole frame."""
+REGION_PX = 832
+"""Largest width and height of a region: bounds the memory, whatever the size of the frame."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A rectangle of a frame, in pixels; `right` and `bottom` are the first column and row outside."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
 
 
 class Segmenter:
@@ -32,53 +43,70 @@ class Segmenter:
         options = ort.SessionOptions()
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
-        # The arena keeps the largest tile's memory and grows no further: all tiles have one size.
+        # Regions differ in size: memory planned for one does not fit the next.
+        options.enable_mem_pattern = False
         self.session = ort.InferenceSession(model, options, providers=["CPUExecutionProvider"])
         self.sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
         self.input_name = self.session.get_inputs()[0].name
 
-    def __call__(self, frame: NDArray[np.uint8], wanted: NDArray[np.bool_]) -> NDArray[np.uint8]:
-        """Probabilities of a BGR frame (H, W, 3) as (H, W) in 0..255.
+    def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
+        """Probabilities of a BGR frame (H, W, 3) as (H, W) in 0..255; 0 outside the regions.
 
-        `wanted` (rows, columns): which tiles to look at (see `reachable_tiles`); 0 elsewhere. Steps of 1/255 are finer
-        than the network knows and take away what threads change in the last digits.
+        Steps of 1/255 are finer than the network knows, and take away what threads change in the last digits.
         """
         height, width = frame.shape[:2]
         response = np.zeros((height, width), dtype=np.uint8)
-        bottom = wanted.shape[0] * CORE_PX - height + HALO_PX
-        right = wanted.shape[1] * CORE_PX - width + HALO_PX
-        padded = np.pad(frame, ((HALO_PX, bottom), (HALO_PX, right), (0, 0)), mode="reflect")
-        side = CORE_PX + 2 * HALO_PX
-        for row, column in np.argwhere(wanted):
-            top, left = row * CORE_PX, column * CORE_PX
-            tile = padded[top : top + side, left : left + side]
-            core = self._probabilities(tile)[HALO_PX:-HALO_PX, HALO_PX:-HALO_PX]
-            there = response[top : top + CORE_PX, left : left + CORE_PX]
-            there[...] = np.rint(core[: there.shape[0], : there.shape[1]] * 255)
+        beyond = HALO_PX + GRID_PX
+        padded = np.pad(frame, ((HALO_PX, beyond), (HALO_PX, beyond), (0, 0)), mode="reflect")
+        for region in regions:
+            seen = padded[region.top : region.bottom + 2 * HALO_PX, region.left : region.right + 2 * HALO_PX]
+            inner = self._probabilities(seen)[HALO_PX:-HALO_PX, HALO_PX:-HALO_PX]
+            there = response[region.top : region.bottom, region.left : region.right]
+            there[...] = np.rint(inner[: there.shape[0], : there.shape[1]] * 255)
         return response
 
-    def _probabilities(self, tile: NDArray[np.uint8]) -> NDArray[np.float32]:
-        rgb = tile[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
+    def _probabilities(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
+        rgb = picture[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
         (answer,) = self.session.run(None, {self.input_name: rgb})
         return np.asarray(answer, dtype=np.float32)[0, 0]
 
 
-def reachable_tiles(pitch: Field, camera: Camera, reach_px: float) -> NDArray[np.bool_]:
-    """Which tiles (rows, columns) a marking can fall into when it is at most `reach_px` from where the pose puts it."""
+def reachable_regions(pitch: Field, camera: Camera, reach_px: float) -> list[Region]:
+    """Where in the frame a marking can be that is at most `reach_px` from where the pose puts it.
+
+    Columns of `REGION_PX`, each cut to the rows that lines can reach there.
+    """
     width, height = camera.intrinsics.size
-    rows, columns = -(-height // CORE_PX), -(-width // CORE_PX)
     pixels = camera.project(pitch.line_points().position)
     pixels = pixels[np.isfinite(pixels).all(axis=1)]
-    near = _distance_to_tiles(pixels, rows, columns) <= reach_px
-    return np.any(near, axis=0)
+    return [
+        Region(left, top, min(left + REGION_PX, _up_to_grid(width)), bottom)
+        for left in range(0, width, REGION_PX)
+        for top, bottom in _rows(_near_columns(pixels, left, left + REGION_PX, reach_px), height, reach_px)
+    ]
 
 
-def _distance_to_tiles(pixels: Array, rows: int, columns: int) -> Array:
-    """Chebyshev distance (N, rows, columns) in px of each pixel (N, 2) to each tile."""
-    left, top = np.arange(columns) * CORE_PX, np.arange(rows) * CORE_PX
-    dx = np.maximum(left - pixels[:, :1], pixels[:, :1] - (left + CORE_PX - 1)).clip(min=0)
-    dy = np.maximum(top - pixels[:, 1:], pixels[:, 1:] - (top + CORE_PX - 1)).clip(min=0)
-    return np.maximum(dx[:, None, :], dy[:, :, None])
+def _near_columns(pixels: Array, left: int, right: int, reach_px: float) -> Array:
+    """Rows (K,) of the pixels (N, 2) that can come between two columns."""
+    return pixels[(pixels[:, 0] >= left - reach_px) & (pixels[:, 0] < right + reach_px), 1]
+
+
+def _rows(y: Array, height: int, reach_px: float) -> Iterator[tuple[int, int]]:
+    """Stretches of rows within `reach_px` of any of `y`, on the grid, each at most `REGION_PX`."""
+    y = np.sort(y[(y >= -reach_px) & (y <= height - 1 + reach_px)])
+    if len(y) == 0:
+        return
+    # Two stretches nearer to each other than their halos cost more apart than together.
+    for stretch in np.split(y, np.flatnonzero(np.diff(y) > 2 * (reach_px + HALO_PX)) + 1):
+        top = max(0, int(stretch[0] - reach_px)) // GRID_PX * GRID_PX
+        end = _up_to_grid(min(height, int(np.ceil(stretch[-1] + reach_px)) + 1))
+        count = -(-(end - top) // REGION_PX)
+        step = _up_to_grid(-(-(end - top) // count))
+        yield from ((row, min(row + step, end)) for row in range(top, end, step))
+
+
+def _up_to_grid(pixels: int) -> int:
+    return -(-pixels // GRID_PX) * GRID_PX
 
 
 def fuse(responses: Sequence[NDArray[np.uint8]]) -> NDArray[np.float32]:

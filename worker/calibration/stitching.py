@@ -15,10 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Array, Camera, Pose, inside
+from worker.calibration.camera import Array, Camera, Frame, Pose, inside
 from worker.calibration.field import Field, Marking, resample
 
-Frame = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
 # What no camera sees: dark grey rather than black, so that it reads as "outside" and not as "broken".
