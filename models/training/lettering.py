@@ -36,7 +36,7 @@ class Letters:
     colour: Colour
 
 
-def random_letters(rng: np.random.Generator, pitch: Field) -> tuple[Letters, ...]:
+def random_letters(rng: np.random.Generator, pitch: Field, paint: Colour) -> tuple[Letters, ...]:
     """Words and logos outside the boundary lines, none nearer than half a metre to a line."""
     found = []
     for _ in range(int(rng.integers(1, 6))):
@@ -56,7 +56,8 @@ def random_letters(rng: np.random.Generator, pitch: Field) -> tuple[Letters, ...
             along = (0.0, 1.0)
         if rng.random() < 0.3:  # to be read from the other side
             picture = np.ascontiguousarray(picture[::-1, ::-1])
-        colour = random_colour(rng, 0.9)
+        # Mostly the paint of the lines: colour must not tell them apart.
+        colour = paint if rng.random() < 0.75 else random_colour(rng, 0.8)
         found.append(Letters(picture, (float(corner[0]), float(corner[1])), along, TEXEL_M, colour))
     return tuple(found)
 

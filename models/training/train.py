@@ -26,7 +26,7 @@ from models.training.network import UNet, focal_loss
 EPOCH_STEPS = 100
 WARM_UP_EPOCHS = 2
 LEARNING_RATE = 1e-3
-LAST_RATE = 0.03  # of the first one
+LAST_RATE = 0.05  # of the first one
 WEIGHT_DECAY = 1e-4
 AVERAGE = 0.995
 SAVE_EVERY_S = 240

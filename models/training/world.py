@@ -84,6 +84,7 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
     rng = np.random.default_rng([conditions.world, 17])
     grass, other = _grass(rng, conditions)
     zones = _zones(rng, grass)
+    paint = _paint(rng)
     return World(
         grass=(grass, other),
         soil=hsv(rng.uniform(20, 55), rng.uniform(0.15, 0.5), rng.uniform(0.3, 0.65)),
@@ -94,7 +95,7 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
         tint_noise=Noise.draw(rng, {0.1: 0.15, 0.5: 0.25, 2.5: 0.4, 11.0: 0.6}),
         tint=((0.2 + 0.8 * conditions.variety) * rng.normal(0, 0.05, 3)).astype(np.float32),
         wear_noise=Noise.draw(rng, {0.05: 0.25, 0.2: 0.35, 0.8: 0.5, 3.0: 0.5, 9.0: 0.3}),
-        paint=_paint(rng),
+        paint=paint,
         paint_noise=Noise.draw(rng, {0.01: 0.35, 0.03: 0.3, 0.1: 0.3, 0.4: 0.3, 1.5: 0.4, 6.0: 0.4}),
         paint_opacity=float(rng.uniform(0.55, 1.0)),
         edge_noise=Noise.draw(rng, {0.015: 0.5, 0.05: 0.5, 0.3: 0.4, 3.0: 0.5}),
@@ -103,7 +104,7 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
         snow_noise=Noise.draw(rng, {0.3: 0.3, 1.5: 0.6, 6.0: 0.8}),
         zones=zones,
         walls=_walls(rng),
-        letters=random_letters(rng, pitch) if conditions.lettering else (),
+        letters=random_letters(rng, pitch, paint) if conditions.lettering else (),
         sun=(
             float(rng.uniform(0, 2 * np.pi)),
             float(np.radians(rng.uniform(8, 22) if conditions.long_shadows else rng.uniform(25, 65))),
@@ -146,7 +147,7 @@ def _grass(rng: np.random.Generator, conditions: Conditions) -> tuple[Colour, Co
 def _paint(rng: np.random.Generator) -> Colour:
     """White as cameras show it: from cream over grey to a strong blue or violet cast."""
     hue = rng.choice([rng.uniform(40, 60), rng.uniform(200, 280), rng.uniform(0, 360)], p=[0.25, 0.55, 0.2])
-    return hsv(hue, rng.uniform(0, 0.16), rng.uniform(0.72, 1.0))
+    return hsv(hue, rng.uniform(0, 0.22), rng.uniform(0.72, 1.0))
 
 
 def _zones(rng: np.random.Generator, grass: Colour) -> tuple[Zone, ...]:
