@@ -49,6 +49,9 @@ def test_cameras_have_names_of_their_own():
 def test_options_have_the_documented_defaults():
     assert Options().model_dump(exclude_none=True) == {
         "preset": "esc",
+        "generations": 100,
+        "parents": 64,
+        "offspring": 128,
         "stitch_weight": 0.5,
         "flat": False,
         "dry_run": False,
