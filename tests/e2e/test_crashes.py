@@ -96,8 +96,7 @@ def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):
     with service.http.stream("GET", f"/jobs/{job}/events") as events:
         next(events.iter_lines())
         assert service.stop() == 0
-    assert not alive(worker)
-    assert not alive(computing)
+    wait_for(lambda: not alive(worker) and not alive(computing))
 
 
 def test_a_crash_of_the_computation_costs_one_job(start):

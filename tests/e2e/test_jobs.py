@@ -247,7 +247,7 @@ def test_a_job_that_takes_too_long_is_ended(service, name):
     service.venue(name, "hang")
     job = service.end(service.submit(name, timeout_s=1).json()["id"])
     assert (job["status"], job["error"]["type"]) == ("failed", "/problems/job-timeout")
-    assert not any(alive(process) for process in service.begun(job["id"]))
+    wait_for(lambda: not any(alive(process) for process in service.begun(job["id"])))
 
 
 def test_live_jobs_go_first(service, name):
