@@ -90,6 +90,8 @@ class Crops:
             top, left = rng.integers(0, spare + 1, 2)
             crop = crop[top : top + size, left : left + size]
         crop = crop.astype(np.float32)
+        if rng.random() < 0.35:
+            _fringe(crop, rng)
         if rng.random() < 0.6:
             gain = np.exp(rng.normal(0, 0.15)) * np.exp(rng.normal(0, 0.06, 3))
             power = np.exp(rng.normal(0, 0.15))
@@ -100,6 +102,15 @@ class Crops:
             crop[..., :3] += rng.normal(0, rng.uniform(0, 8), (size, size, 1))
         crop[..., :3] = np.clip(crop[..., :3], 0, 255)
         return crop
+
+
+def _fringe(crop: NDArray[np.float32], rng: np.random.Generator) -> None:
+    """Move blue one way and red the other, as cheap lenses do towards the edges of the frame."""
+    move = rng.normal(0, 2.0, 2)
+    for channel, share in ((0, 1.0), (2, float(rng.uniform(-0.6, 0.2)))):
+        shift = np.array([[1, 0, share * move[0]], [0, 1, share * move[1]]])
+        plane = np.ascontiguousarray(crop[..., channel])
+        crop[..., channel] = cv2.warpAffine(plane, shift, plane.shape[::-1], borderMode=cv2.BORDER_REFLECT_101)
 
 
 def _warped(crop: NDArray[np.uint8], size: int, rng: np.random.Generator) -> NDArray[np.uint8]:

@@ -29,6 +29,7 @@ TILE, HALO = 512, 96
 TOLERANCE_PX = 3
 AROUND_PITCH_M = 5.0
 CLEAR_M = 1.0
+THRESHOLDS = (0.2, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.7)
 
 
 @dataclass(frozen=True)
@@ -127,28 +128,35 @@ def real(session: onnxruntime.InferenceSession, folder: Path, out: Path | None) 
     return figures
 
 
-def rendered(session: onnxruntime.InferenceSession, crops: int, seed: int = 2**20) -> dict[str, float]:
-    """Figures over rendered crops of venues that training never draws, per pixel at 0.5; false alarms: off lines."""
-    hits = answers = labels = alarms = clear = 0
+def rendered(session: onnxruntime.InferenceSession, crops: int, seed: int = 2**20) -> list[dict[str, float]]:
+    """Figures per pixel over rendered crops of venues that training never draws, one row per threshold.
+
+    False alarms: share of the pixels farther than `TOLERANCE_PX` from any marking.
+    """
+    totals = np.zeros((len(THRESHOLDS), 4))
+    labels = 0
     name = session.get_inputs()[0].name
     for index in range(crops):
         rendering = random_crop(np.random.default_rng([seed, index]))
         picture = rendering.frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
-        answer = session.run(None, {name: picture})[0][0, 0] > 0.5
+        probability = session.run(None, {name: picture})[0][0, 0]
         label = rendering.target > 0.5
         far = _distance_px(rendering.target > 0.05) > TOLERANCE_PX
-        hits += int((answer & label).sum())
-        answers += int(answer.sum())
         labels += int(label.sum())
-        alarms += int((answer & far).sum())
-        clear += int(far.sum())
-    return {
-        "iou": hits / max(answers + labels - hits, 1),
-        "f1": 2 * hits / max(answers + labels, 1),
-        "recall": hits / max(labels, 1),
-        "precision": hits / max(answers, 1),
-        "false_alarms": alarms / max(clear, 1),
-    }
+        for row, threshold in enumerate(THRESHOLDS):
+            answer = probability > threshold
+            totals[row] += [(answer & label).sum(), answer.sum(), (answer & far).sum(), far.sum()]
+    return [
+        {
+            "threshold": threshold,
+            "iou": hits / max(answers + labels - hits, 1),
+            "f1": 2 * hits / max(answers + labels, 1),
+            "recall": hits / max(labels, 1),
+            "precision": hits / max(answers, 1),
+            "false_alarms": alarms / max(clear, 1),
+        }
+        for threshold, (hits, answers, alarms, clear) in zip(THRESHOLDS, totals, strict=True)
+    ]
 
 
 def main() -> None:
@@ -161,8 +169,8 @@ def main() -> None:
     options = parser.parse_args()
     session = open_model(options.model)
     if options.rendered:
-        for name, value in rendered(session, options.rendered).items():
-            print(f"{name:13} {value:.4f}")
+        for row in rendered(session, options.rendered):
+            print("  ".join(f"{name} {value:.4f}" for name, value in row.items()))
     if options.real:
         for name, figures in real(session, options.real, options.write).items():
             print(f"{name:10} {figures}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import math
 from pathlib import Path
 
 import torch
@@ -32,9 +33,16 @@ class Probability(nn.Module):
         return torch.sigmoid(self.network(picture))
 
 
-def export(network: UNet, path: Path) -> dict[str, object]:
-    """Write the network to `path`; what the card records: file, opset, sha256, bytes."""
-    model = Probability(fold(network)).eval().cpu()
+def export(network: UNet, path: Path, threshold: float = 0.5) -> dict[str, object]:
+    """Write the network to `path`; what the card records: file, opset, sha256, bytes.
+
+    What the network calls `threshold` the exported model calls 0.5: focal loss leaves probabilities too near the middle,
+    and where the best threshold lies is found on rendered crops (`evaluate.py --rendered`).
+    """
+    folded = fold(network)
+    with torch.no_grad():
+        folded.head.bias -= math.log(threshold / (1 - threshold))
+    model = Probability(folded).eval().cpu()
     torch.onnx.export(
         model,
         (torch.zeros(1, 3, 64, 64),),
@@ -72,5 +80,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("--to", type=Path, default=MODEL_PATH)
+    parser.add_argument("--threshold", type=float, default=0.5, help="what becomes 0.5")
     options = parser.parse_args()
-    print(json.dumps(export(load(options.checkpoint), options.to), indent=1))
+    print(json.dumps(export(load(options.checkpoint), options.to, options.threshold), indent=1))

@@ -59,7 +59,7 @@ def _block(before: int, after: int) -> nn.Sequential:
     return nn.Sequential(*layers)
 
 
-def focal_loss(logits: Tensor, target: Tensor, gamma: float = 2.0, marked: float = 3.0) -> Tensor:
+def focal_loss(logits: Tensor, target: Tensor, gamma: float = 1.0, marked: float = 3.0) -> Tensor:
     """Focal loss for soft targets (both (N, 1, H, W)): cross entropy weighted by |target - probability|^gamma.
 
     Per marked pixel of the batch. A pixel has its least loss where probability and target agree, so the output stays a

@@ -55,7 +55,7 @@ def main() -> None:
     for worker in workers:
         worker.terminate()
     if training.elapsed_s >= training.budget_s and not options.no_export:
-        print(json.dumps(export(training.average, MODEL_PATH), indent=1))
+        print(json.dumps(export(training.average, MODEL_PATH, options.threshold), indent=1))
 
 
 class Training:
@@ -166,9 +166,10 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=1, help="processes that render")
     parser.add_argument("--shards", type=int, default=400, help=f"of {SHARD_CROPS} crops per worker")
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--gamma", type=float, default=2.0, help="of the focal loss")
+    parser.add_argument("--gamma", type=float, default=1.0, help="of the focal loss")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=Path, help="checkpoint whose weights to start from")
+    parser.add_argument("--threshold", type=float, default=0.4, help="probability that the exported model calls 0.5")
     parser.add_argument("--no-export", action="store_true")
     return parser.parse_args()
 

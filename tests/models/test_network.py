@@ -38,6 +38,15 @@ def test_pytorch_and_onnx_runtime_agree(network, tmp_path):
         np.testing.assert_allclose(answer, expected, atol=1e-4)
 
 
+def test_the_threshold_chosen_becomes_one_half(network, tmp_path):
+    picture = {"picture": np.random.default_rng(0).random((1, 3, 64, 64), dtype=np.float32)}
+    answers = []
+    for threshold in (0.5, 0.3):
+        export(network, tmp_path / "unet.onnx", threshold)
+        answers.append(onnxruntime.InferenceSession(str(tmp_path / "unet.onnx")).run(None, picture)[0])
+    np.testing.assert_array_equal(answers[0] > 0.3, answers[1] > 0.5)
+
+
 def test_folding_the_normalisation_changes_nothing(network):
     picture = torch.rand(1, 3, 64, 64)
     with torch.no_grad():
