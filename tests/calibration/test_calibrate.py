@@ -22,7 +22,7 @@ def frames():
 def white_on_green(frame, regions):
     assert regions
     is_sky = frame[..., 0] > 200
-    return np.where(is_sky & (frame[..., 2] < 200), 0, np.clip((whiteness(frame) - 70) * 2, 0, 255)).astype(np.uint8)
+    return np.where(is_sky & (frame[..., 2] < 200), 0, np.clip((whiteness(frame) - 70.0) * 2, 0, 255)).astype(np.uint8)
 
 
 def outdated():

@@ -7,7 +7,8 @@ import pytest
 
 from tests.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair
 from worker.calibration.groundobjective import GroundObjective
-from worker.calibration.objective import BlurredResponse, Objective, blurred_height
+from worker.calibration.lineprofile import blurred_line
+from worker.calibration.objective import BlurredResponse, Objective
 from worker.calibration.search import genome_of
 
 
@@ -91,7 +92,7 @@ def test_a_blurred_line_has_the_height_that_is_expected_of_it(sigma):
     picture[:, 340:352] = 1
     blurred = BlurredResponse.from_response(picture, sigma)
     height = blurred.at(np.array([[[345.5, 200.0]]]))[0, 0]
-    assert height == pytest.approx(float(blurred_height(np.array([12.0]), sigma)[0]), rel=0.05)
+    assert height == pytest.approx(float(blurred_line(np.array([12.0]), sigma)[0]), rel=0.05)
 
 
 def test_outside_the_picture_there_is_nothing():

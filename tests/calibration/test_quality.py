@@ -16,6 +16,9 @@ def scene():
     return one, paint_markings(CROWNED, one)
 
 
+PAIR = [(scene()[0], scene()[0])]
+
+
 def good():
     return CameraQuality(scene()[0], 0.9, 0.3, 0.2, Sigma(0.01, 0.01), Movement(0.5, 0.1, 12.0))
 
@@ -55,31 +58,43 @@ def test_a_pose_that_sees_no_pitch_explains_nothing():
 
 
 def test_a_good_result_passes_the_gate():
-    assert rejection([good(), good()], 0.3, Gate()) is None
+    assert rejection([good(), good()], PAIR, 0.3, Gate()) is None
 
 
 @pytest.mark.parametrize(
     ("change", "cause"),
     [
         ({"iou": 0.1}, "do not fit this pitch"),
-        ({"residual_px": None}, "too few lines"),
-        ({"sigma": None}, "too few lines"),
+        ({"residual_px": None}, "fewer than 30 points"),
+        ({"sigma": None}, "fewer than 30 points"),
         ({"residual_px": 9.0}, "px from where the pose puts them"),
         ({"sigma": Sigma(1.0, 0.1)}, "do not determine"),
         ({"sigma": Sigma(0.01, 2.0)}, "do not determine"),
-        ({"moved": Movement(20.0, 0.1, 300.0)}, "moved by 20.0 degrees"),
+        ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
         ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
         ({"iou_before": 0.99}, "stored pose fits the frame better"),
     ],
 )
 def test_the_gate_names_the_camera_and_the_cause(change, cause):
-    reason = rejection([replace(good(), **change)], None, Gate())
+    reason = rejection([replace(good(), **change)], [], None, Gate())
     assert reason.startswith("camera left: ")
     assert cause in reason
 
 
 def test_cameras_that_do_not_fit_each_other_do_not_pass():
-    assert "stitch error 4.00 px" in rejection([good(), good()], 4.0, Gate())
+    assert "stitch error 4.00 px" in rejection([good(), good()], PAIR, 4.0, Gate())
+
+
+def test_cameras_that_should_overlap_and_cannot_be_compared_do_not_pass():
+    assert "left and left should show the same markings" in rejection([good(), good()], PAIR, None, Gate())
+    assert rejection([good(), good()], [], None, Gate()) is None
+
+
+def test_every_bad_camera_is_named():
+    left, right = replace(good(), iou=0.1), replace(good(), camera=replace(scene()[0], id="right"), residual_px=9.0)
+    reason = rejection([left, right], [], None, Gate())
+    assert "camera left: " in reason
+    assert "camera right: " in reason
 
 
 def test_movement_is_told_in_degrees_metres_and_pixels():

@@ -5,9 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.calibration.synthetic import CROWNED, moved, paint_frame, paint_markings, pair
+from tests.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame, paint_markings, pair
 from worker.calibration.camera import rotation_angles_deg
 from worker.calibration.linemeasurement import expected_profiles, measure_lines, sliding_correlation, whiteness
+from worker.calibration.quality import Gate, Sigma
 from worker.calibration.refinement import assess, refine, tukey_weights
 from worker.calibration.registration import stitch_error_px
 
@@ -18,7 +19,7 @@ SMALL_SHIFT = (0.02, -0.03, 0.02)
 @cache
 def scene():
     cameras = pair()
-    brightness = [whiteness(paint_frame(CROWNED, c)) for c in cameras]
+    brightness = [whiteness(paint_frame(CROWNED, c)).astype(np.float32) for c in cameras]
     return cameras, brightness, [paint_markings(CROWNED, c) for c in cameras]
 
 
@@ -85,8 +86,8 @@ def test_the_error_is_of_the_size_of_its_sigma():
     rng = np.random.default_rng(0)
     noisy = [b + rng.normal(scale=12, size=b.shape).astype(np.float32) for b in brightness]
     refined = refine(CROWNED, cameras, noisy, responses, 0.5)
-    for camera, after, covariance in zip(cameras, refined.cameras, refined.covariance, strict=True):
-        error = after.pose.position - camera.pose.position
+    for before, after, covariance in zip(cameras, refined.cameras, refined.covariance, strict=True):
+        error = after.pose.position - before.pose.position
         assert (np.abs(error) < 4 * np.sqrt(np.diag(covariance)[3:])).all()
         assert np.sqrt(np.diag(covariance)[3:]).max() < 0.1
 
@@ -124,3 +125,13 @@ def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
     assert weights[-1] == 0
     assert weights[0] == 1
     assert (weights[:4] > 0.9).all()
+
+
+@pytest.mark.parametrize("distortion", [(), BARREL])
+def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(distortion):
+    one = camera("left", (-30.0, -48.0, 10.0), (-30.0, -34.0), focal=900, distortion=distortion, size=(960, 240))
+    brightness = whiteness(paint_frame(CROWNED, one)).astype(np.float32)
+    refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], [brightness], [paint_markings(CROWNED, one)], 0.5)
+    assert refined.residual_px[0] is not None
+    assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
+    assert Sigma.from_covariance(refined.covariance[0]).position_m > Gate().largest_sigma_m

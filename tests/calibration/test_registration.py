@@ -12,9 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings, pair
-from worker.calibration.camera import Array, Camera
+from worker.calibration.camera import Array, Camera, Pose, rotation_matrices, rotation_vectors
 from worker.calibration.field import Field
-from worker.calibration.registration import PIXEL_M, Registration, register_pair, stitch_error_px
+from worker.calibration.registration import PIXEL_M, Registration, pairs_in_common, register_pair, stitch_error_px
 
 LEFT, RIGHT = pair()
 FACING = camera("facing", (0.0, 48.0, 10.0), (0.0, 0.0))
@@ -171,3 +171,12 @@ def test_the_number_of_threads_changes_no_digit() -> None:
         for threads in (1, 2)
     )
     assert one == two
+
+
+@pytest.mark.parametrize("degrees", [6.0, -6.0])
+def test_a_halfway_line_that_has_slid_along_itself_is_no_registration(degrees: float) -> None:
+    # The circles are tens of metres apart, and the halfway line fits itself wherever it is.
+    turn = rotation_matrices(np.radians([degrees, 0.0, 0.0]))
+    pitched = RIGHT.with_pose(Pose(rotation_vectors(turn @ RIGHT.pose.matrix), RIGHT.pose.position))
+    assert register_pair(PITCH, LEFT, pitched, mask_of("left"), mask_of("right")) is None
+    assert pairs_in_common(PITCH, [LEFT, pitched]) == [(LEFT, pitched)]

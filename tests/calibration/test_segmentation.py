@@ -6,7 +6,8 @@ import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.calibration.synthetic import CROWNED, camera, paint_frame
-from worker.calibration.segmentation import REGION_PX, Region, Segmenter, fuse, reachable_regions
+from worker.calibration.sampling import median
+from worker.calibration.segmentation import REGION_PX, Region, Segmenter, reachable_regions
 
 WIDE = camera("left", (-1.0, -48.0, 12.0), (-20.0, 0.0), focal=1200, size=(1920, 1080))
 
@@ -94,7 +95,7 @@ def test_the_sky_is_not_looked_at():
 def test_what_walks_by_vanishes_from_several_frames():
     responses = [np.full((10, 10), 200, dtype=np.uint8) for _ in range(3)]
     responses[1][:, 5] = 0
-    np.testing.assert_allclose(fuse(responses), 200 / 255)
+    np.testing.assert_array_equal(median(responses), 200)
 
 
 def test_painted_lines_are_found_and_grass_is_not(segmenter, picture):

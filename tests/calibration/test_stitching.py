@@ -265,3 +265,11 @@ def test_an_overlay_of_a_pose_that_sees_no_pitch_is_the_frame_with_a_legend() ->
     assert (drawn[:400] == frame[:400]).all()
     assert (drawn[-80:] != frame[-80:]).any()
     assert cv2.absdiff(drawn, frame)[:, 300:].max() == 0
+
+
+@pytest.mark.parametrize("by", [(0.0, 0.0, 700.0), (1100.0, 0.0, 0.0), (0.0, -60.0, 60.0)])
+def test_a_preview_of_poses_that_are_far_off_stays_a_picture(by: tuple[float, float, float]) -> None:
+    lost = CAMERAS[1].with_pose(Pose(CAMERAS[1].pose.rotation, CAMERAS[1].pose.position + np.array(by)))
+    width, height = viewpoint(PITCH, [CAMERAS[0], lost], 960).size
+    assert width == 960
+    assert 140 <= height <= 960

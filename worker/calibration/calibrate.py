@@ -16,9 +16,10 @@ from worker.calibration.field import Field
 from worker.calibration.linemeasurement import whiteness
 from worker.calibration.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
 from worker.calibration.refinement import Refined, assess, refine
-from worker.calibration.registration import stitch_error_px
+from worker.calibration.registration import pairs_in_common, stitch_error_px
+from worker.calibration.sampling import median
 from worker.calibration.search import COARSE_TO_FINE, ON_THE_GROUND, Found, Level, Strategy, search
-from worker.calibration.segmentation import Region, fuse, reachable_regions
+from worker.calibration.segmentation import Region, reachable_regions
 from worker.calibration.visibility import SeenLines
 
 Response = NDArray[np.float32]
@@ -151,7 +152,7 @@ def calibrate(
         found = _evolve(pitch, cameras, responses, method, options, journey)
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
-        brightness = [_still([whiteness(frame) for frame in frames[camera.id]]) for camera in cameras]
+        brightness = [median([whiteness(frame) for frame in frames[camera.id]]) for camera in cameras]
         refined = method.finish(pitch, found.cameras, brightness, responses, options.stitch_weight)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(pitch, refined.cameras, by_id)
@@ -160,7 +161,7 @@ def calibrate(
         journey.at("refinement", 1.0)
     return Calibration(
         [CameraResult(q.camera.id, q.camera.pose, q.sigma, q.moved, q.iou, q.residual_px) for q in qualities],
-        rejection(qualities, stitch, Gate()),
+        rejection(qualities, pairs_in_common(pitch, refined.cameras), stitch, Gate()),
         stitch,
         stitch_before,
         found.loss,
@@ -201,7 +202,7 @@ def _segment_all(
             journey.at("segmentation", done / total)
             seen.append(segment(frame, regions))
             done += 1
-        responses.append(fuse(seen))
+        responses.append(median(seen) / np.float32(255))
     return responses
 
 
@@ -236,11 +237,6 @@ def _evolve(
     return Found(
         [found.cameras[0] for found in alone], float(np.mean([found.loss for found in alone])), options.generations
     )
-
-
-def _still(brightness: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
-    """What stays (H, W) in all frames of one camera: the median."""
-    return brightness[0] if len(brightness) == 1 else np.median(np.stack(brightness), axis=0).astype(np.float32)
 
 
 def _qualities(

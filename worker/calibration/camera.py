@@ -114,6 +114,11 @@ class Intrinsics:
     distortion: Array
     size: tuple[int, int]
 
+    @property
+    def relative_size(self) -> float:
+        """The longer side of the picture relative to a 4K frame's: what is given in 4K pixels scales by it."""
+        return max(self.size) / 3840
+
     @cached_property
     def coefficients(self) -> Array:
         """The 14 coefficients k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y, absent ones zero."""

@@ -7,7 +7,6 @@ brightness says where it fits best; the segmentation only says whether a bright 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import erf, sqrt
 
 import cv2
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, Frame
 from worker.calibration.field import LinePoints
+from worker.calibration.lineprofile import blurred_line
 from worker.calibration.sampling import bilinear
 from worker.calibration.visibility import SeenLines
 
@@ -36,8 +36,6 @@ PAINT_M = 0.01
 """Lines are painted to about a centimetre."""
 UNEVEN_GROUND_M = 0.015
 """And the ground swells by a little more, which from a low camera moves a far line by decimetres."""
-
-_erf = np.vectorize(erf, otypes=[float])
 
 
 @dataclass(frozen=True)
@@ -76,10 +74,10 @@ class Measurements:
         )
 
 
-def whiteness(frame: Frame) -> NDArray[np.float32]:
-    """Brightness (H, W) in which paint stands out most: the darkest channel, which grass and clay lack."""
+def whiteness(frame: Frame) -> NDArray[np.uint8]:
+    """Brightness (H, W) 0..255 in which paint stands out most: the darkest channel, which grass and clay lack."""
     blue, green, red = cv2.split(frame)
-    return cv2.min(cv2.min(blue, green), red).astype(np.float32)
+    return np.asarray(cv2.min(cv2.min(blue, green), red), dtype=np.uint8)
 
 
 def measure_lines(
@@ -157,8 +155,7 @@ def expected_profiles(width_px: Array, offsets_px: Array) -> Array:
     A filter reaches a third of the width (and `BESIDE_PX`) beyond each edge and is zero farther out.
     """
     half = width_px[:, None] / 2
-    blur = LENS_BLUR_PX * sqrt(2)
-    profile = 0.5 * (_erf((offsets_px + half) / blur) - _erf((offsets_px - half) / blur))
+    profile = blurred_line(width_px[:, None], LENS_BLUR_PX, offsets_px)
     inside = np.abs(offsets_px) <= half + width_px[:, None] / 3 + BESIDE_PX
     mean = np.sum(profile * inside, axis=1, keepdims=True) / np.sum(inside, axis=1, keepdims=True)
     profile = (profile - mean) * inside

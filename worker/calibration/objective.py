@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from math import erf, sqrt
+from math import sqrt
 
 import cv2
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, Intrinsics, inside, project
 from worker.calibration.field import Field, LinePoints
+from worker.calibration.lineprofile import blurred_line
 from worker.calibration.sampling import bilinear
 from worker.calibration.visibility import SeenLines
 
@@ -34,8 +35,6 @@ SURROUND = 3.0
 STITCH_OFFSETS = (-1.0, 0.0, 1.0)
 """Where across a line two cameras are compared, in units of the blur."""
 FEWEST_STITCH_POINTS = 20
-
-_erf = np.vectorize(erf, otypes=[float])
 
 
 class Objective:
@@ -55,13 +54,13 @@ class Objective:
     ) -> None:
         """`cameras` carry the poses the level starts from; `responses` are their segmentations (H, W) in 0..1.
 
-        `blur_px`: standard deviation of the blur for a picture 3840 px wide; other sizes scale it.
+        `blur_px`: standard deviation of the blur, in pixels of a 4K frame.
         """
         lines = pitch.line_points()
         self.singles = []
         views = []
         for camera, response in zip(cameras, responses, strict=True):
-            sigma = max(blur_px * camera.intrinsics.size[0] / 3840, 0.7)
+            sigma = max(blur_px * camera.intrinsics.relative_size, 0.7)
             blurred = BlurredResponse.from_response(response, sigma)
             surround = BlurredResponse.from_response(response, SURROUND * sigma)
             self.singles.append(SingleTerm.build(lines, camera, blurred.minus(surround), sigma))
@@ -110,11 +109,6 @@ class BlurredResponse:
         return bilinear(self.values, (pixels + 0.5) / self.shrink - 0.5)
 
 
-def blurred_height(width_px: Array, sigma: float) -> Array:
-    """Height at the centre of a line of height 1 and `width_px` (N,) after a blur of `sigma` px."""
-    return _erf(width_px / (2 * sqrt(2) * sigma))
-
-
 @dataclass(frozen=True)
 class View:
     """One camera at the pose a level starts from, and its blurred response."""
@@ -138,7 +132,7 @@ class SingleTerm:
     def build(cls, lines: LinePoints, camera: Camera, band: BlurredResponse, sigma: float) -> SingleTerm:
         """The term for the markings that `camera` sees where it stands, against its band-passed response."""
         seen = SeenLines.from_camera(lines, camera).thinned(max(sigma / 2, 2.0))
-        height = blurred_height(seen.width_px, sigma) - blurred_height(seen.width_px, SURROUND * sigma)
+        height = blurred_line(seen.width_px, sigma) - blurred_line(seen.width_px, SURROUND * sigma)
         weight = seen.length_px / max(float(np.sum(height * seen.length_px)), 1e-12)
         return cls(
             seen.points.position,
@@ -181,7 +175,8 @@ class StitchTerm:
         ]
         seen = SeenLines.from_camera(both, first.camera).thinned(max(first.sigma, 2.0))
         other = SeenLines.from_camera(seen.points, second.camera)
-        if len(seen) < FEWEST_STITCH_POINTS or len(other) != len(seen):
+        seen = seen[other.index]
+        if len(seen) < FEWEST_STITCH_POINTS:
             return None
         blur_m = 0.5 * (first.sigma / seen.px_per_metre + second.sigma / other.px_per_metre)
         shifts = np.array(STITCH_OFFSETS)[:, None, None] * blur_m[:, None] * seen.points.normal
@@ -191,8 +186,8 @@ class StitchTerm:
             np.tile(seen.length_px, copies).astype(np.float32),
             (first, second),
             (
-                np.tile(blurred_height(seen.width_px, first.sigma), copies).astype(np.float32),
-                np.tile(blurred_height(other.width_px, second.sigma), copies).astype(np.float32),
+                np.tile(blurred_line(seen.width_px, first.sigma), copies).astype(np.float32),
+                np.tile(blurred_line(other.width_px, second.sigma), copies).astype(np.float32),
             ),
             (i, j),
         )

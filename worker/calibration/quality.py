@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, inside, rotation_angles_deg
 from worker.calibration.field import Field
+from worker.calibration.refinement import FEWEST_MEASUREMENTS
 from worker.calibration.visibility import SeenLines
 
 TOLERANCE_PX = 3.0
-"""How far from its edge a line still counts as explained, in a picture 3840 px wide."""
+"""How far from its edge a line still counts as explained, in pixels of a 4K frame."""
 AROUND_PITCH_M = 1.0
 MARKING = 0.5
 """Probability from which a pixel counts as a marking."""
@@ -22,11 +23,11 @@ MARKING = 0.5
 
 @dataclass(frozen=True)
 class Gate:
-    """Limits a result has to keep to replace the stored poses. Pixels are those of a picture 3840 px wide."""
+    """Limits a result has to keep to replace the stored poses. Pixels are those of a 4K frame."""
 
     least_iou: float = 0.45
     iou_loss: float = 0.03
-    largest_residual_px: float = 3.0
+    largest_residual_px: float = 2.0
     largest_sigma_deg: float = 0.2
     largest_sigma_m: float = 0.5
     largest_rotation_deg: float = 8.0
@@ -96,7 +97,7 @@ def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) ->
     expected = float(weight.sum())
     if expected == 0:
         return 0.0
-    tolerance = TOLERANCE_PX * camera.intrinsics.size[0] / 3840
+    tolerance = max(TOLERANCE_PX * camera.intrinsics.relative_size, 1.0)
     found = float(weight[_strongest(response, tolerance)[_rounded(seen.pixel)] > MARKING * coverage].sum())
     marked = (response > MARKING).astype(np.uint8)
     explained = _band(seen, camera.intrinsics.size, tolerance)
@@ -106,12 +107,23 @@ def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) ->
     return found / (expected + beside)
 
 
-def rejection(qualities: Sequence[CameraQuality], stitch_error_px: float | None, gate: Gate) -> str | None:
-    """Why a result must not replace the stored poses, naming the camera and what to do; None when it may."""
-    for quality in qualities:
-        reason = _camera_rejection(quality, gate)
-        if reason is not None:
-            return f"camera {quality.camera.id}: {reason}"
+def rejection(
+    qualities: Sequence[CameraQuality],
+    in_common: Sequence[tuple[Camera, Camera]],
+    stitch_error_px: float | None,
+    gate: Gate,
+) -> str | None:
+    """Why a result must not replace the stored poses, naming each camera and what to do; None when it may.
+
+    `in_common`: the pairs of cameras whose views should register; `stitch_error_px` is None when they do not.
+    """
+    reasons = [(quality.camera.id, _camera_rejection(quality, gate)) for quality in qualities]
+    bad = [f"camera {name}: {reason}" for name, reason in reasons if reason is not None]
+    if bad:
+        return "; ".join(bad)
+    if in_common and stitch_error_px is None:
+        pairs = ", ".join(f"{first.id} and {second.id}" for first, second in in_common)
+        return f"the views of {pairs} should show the same markings but cannot be brought together; look at the preview"
     if stitch_error_px is not None and stitch_error_px > gate.largest_stitch_error_px:
         return (
             f"the cameras do not fit each other: stitch error {stitch_error_px:.2f} px, at most "
@@ -121,7 +133,7 @@ def rejection(qualities: Sequence[CameraQuality], stitch_error_px: float | None,
 
 
 def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
-    scale = quality.camera.intrinsics.size[0] / 3840
+    scale = quality.camera.intrinsics.relative_size
     moved = quality.moved
     if quality.iou < gate.least_iou:
         return (
@@ -129,7 +141,7 @@ def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
         )
     if quality.residual_px is None or quality.sigma is None:
-        return "too few lines could be measured in the frame; is the view free and lit?"
+        return f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?"
     if quality.residual_px > gate.largest_residual_px * scale:
         return (
             f"lines are {quality.residual_px:.1f} px from where the pose puts them, at most "
@@ -142,8 +154,9 @@ def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
         )
     if moved.rotation_deg > gate.largest_rotation_deg or moved.position_m > gate.largest_shift_m:
         return (
-            f"moved by {moved.rotation_deg:.1f} degrees and {moved.position_m:.2f} m, farther than a fixed camera does "
-            f"({gate.largest_rotation_deg} degrees, {gate.largest_shift_m} m); if it was moved, store a new first pose"
+            f"turned by {moved.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
+            f"{moved.position_m:.2f} m (at most {gate.largest_shift_m}); if somebody moved the camera, store a new "
+            "first pose"
         )
     if quality.iou < quality.iou_before - gate.iou_loss:
         return f"the stored pose fits the frame better (IoU {quality.iou_before:.2f}, new {quality.iou:.2f})"
@@ -174,7 +187,7 @@ def _band(seen: SeenLines, size: tuple[int, int], tolerance: float) -> NDArray[n
 
 
 def _pitch_area(pitch: Field, camera: Camera) -> NDArray[np.uint8]:
-    """1 inside the pitch and `AROUND_PITCH_M` around it, at a quarter of the picture's detail."""
+    """1 inside the pitch and `AROUND_PITCH_M` around it, at an eighth of the picture's detail."""
     coarse = camera.intrinsics.scaled(0.125)
     width, height = coarse.size
     x, y = np.meshgrid(np.arange(width), np.arange(height))

@@ -1,9 +1,12 @@
-"""The finish: all cameras at once onto the measured lines, by a robust Levenberg-Marquardt, and how sure that is.
+"""The finish: all cameras at once onto the measured lines, by a robust Gauss-Newton, and how sure that is.
 
 Residuals are distances across lines. A single residual is how far a camera puts a marking from where it sees it, a
 stitch residual how far apart two cameras put the same piece of line on the ground. Both are divided by their expected
 errors; at `stitch_weight` 0.5 they count as these say. Paint and ground that are not where the model has them move
 both cameras' views of a line alike, so the stitch residual has only the error of the measurement.
+
+A weak prior holds each camera near where the search left it. Where lines tell something it changes nothing. Where they
+do not (a lone touchline) it keeps the camera from running away along them, and the covariance says how little is known.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from worker.calibration.field import Field, LinePoints
 from worker.calibration.linemeasurement import NOISE_PX, UNEVEN_GROUND_M, Measurements, measure_lines
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0)
-"""How far from where the pose expects it a line is looked for, round by round, in a picture 3840 px wide."""
+"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
 ASSESSING_SEARCH_PX = 8.0
 STEPS_PER_ROUND = 4
 TUKEY = 4.685
@@ -30,7 +33,8 @@ CLUSTER_POINTS = 8
 """Line points (25 cm apart) whose errors of paint and measurement are taken as one."""
 SWELL_M = 8.0
 """Over how far the ground keeps its error: the correlation length of `UNEVEN_GROUND_M`."""
-DAMPING = 1e-6
+PRIOR_RAD, PRIOR_M = 0.03, 1.0
+"""Standard deviation, per axis, of where a camera is before any line is measured."""
 JACOBIAN_STEP = 1e-5
 
 
@@ -75,8 +79,9 @@ def refine(
     for search in SEARCH_PX:
         measured = _measure_all(pitch, here, brightness, responses, search)
         for _ in range(STEPS_PER_ROUND):
-            here = _step(here, measured, stitch_weight)
-    return _assessed(pitch, here, measured, stitch_weight)
+            here = _step(here, cameras, measured, stitch_weight)
+    # Judged by a wider search than the last round's, which could not see an error larger than itself.
+    return assess(pitch, here, brightness, responses, stitch_weight)
 
 
 def assess(
@@ -88,12 +93,8 @@ def assess(
 ) -> Refined:
     """What the lines say of poses that are left as they are; arguments as for `refine`."""
     measured = _measure_all(pitch, cameras, brightness, responses, ASSESSING_SEARCH_PX)
-    return _assessed(pitch, list(cameras), measured, stitch_weight)
-
-
-def _assessed(pitch: Field, cameras: list[Camera], measured: Sequence[Measurements], stitch_weight: float) -> Refined:
     residuals = [_residual_px(camera, found) for camera, found in zip(cameras, measured, strict=True)]
-    return Refined(cameras, _covariances(pitch.line_points(), cameras, measured, stitch_weight), residuals)
+    return Refined(list(cameras), _covariances(pitch.line_points(), cameras, measured, stitch_weight), residuals)
 
 
 def _measure_all(
@@ -105,25 +106,23 @@ def _measure_all(
 ) -> list[Measurements]:
     lines = pitch.line_points()
     return [
-        measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.size[0] / 3840)
+        measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.relative_size)
         for camera, bright, response in zip(cameras, brightness, responses, strict=True)
     ]
 
 
-def _step(cameras: list[Camera], measured: Sequence[Measurements], stitch_weight: float) -> list[Camera]:
-    """One damped Gauss-Newton step for all cameras together."""
+def _step(
+    cameras: list[Camera], found: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float
+) -> list[Camera]:
+    """One Gauss-Newton step for all cameras together; `found`: where the search left them."""
     rows = _all_residuals(cameras, measured, stitch_weight)
     weighted = rows.jacobian * rows.weight[:, None]
     # einsum rather than BLAS: the same sum to the last digit whatever the number of threads.
     normal = np.einsum("mi,mj->ij", weighted, rows.jacobian)
     gradient = np.einsum("mi,m->i", weighted, rows.value)
-    free = np.flatnonzero(np.diag(normal) > 0)
-    if len(free) == 0:
-        return cameras
-    damped = normal[np.ix_(free, free)]
-    damped = damped + DAMPING * np.diag(np.diag(damped))
-    move = np.zeros(len(normal))
-    move[free] = np.linalg.solve(damped, -gradient[free])
+    prior = _prior(len(cameras))
+    away = np.concatenate([_change(before, now) for before, now in zip(found, cameras, strict=True)])
+    move = np.linalg.solve(normal + np.diag(prior), -gradient - prior * away)
     return [moved(camera, change) for camera, change in zip(cameras, move.reshape(-1, 6), strict=True)]
 
 
@@ -131,6 +130,17 @@ def moved(camera: Camera, change: Array) -> Camera:
     """The camera turned by change[:3] (rad, in its own frame) and shifted by change[3:] (m, in the world)."""
     rotation = rotation_vectors(rotation_matrices(change[:3]) @ camera.pose.matrix)
     return camera.with_pose(Pose(rotation, camera.pose.position + change[3:]))
+
+
+def _change(before: Camera, after: Camera) -> Array:
+    """The change (6,) that `moved` makes `after` of `before` with."""
+    turn = rotation_vectors(after.pose.matrix @ before.pose.matrix.T)
+    return np.concatenate([turn, after.pose.position - before.pose.position])
+
+
+def _prior(count: int) -> Array:
+    """Information (6 N,) on each number of `count` cameras before any line is measured."""
+    return np.tile([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3, count)
 
 
 def _all_residuals(cameras: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float) -> Residuals:
@@ -221,7 +231,7 @@ def tukey_weights(values: Array) -> Array:
 def _covariances(
     lines: LinePoints, cameras: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float
 ) -> list[Array | None]:
-    """Covariance (6, 6) per camera: H^-1 (measurement + ground) H^-1 with the normal matrix H.
+    """Covariance (6, 6) per camera: H^-1 (measurement + ground + prior) H^-1 with the normal matrix H.
 
     Measurement: the residuals themselves, those of two metres of line taken as one, never less than expected. Ground:
     heights that are off by `UNEVEN_GROUND_M` and alike over `SWELL_M`. They move every line on a swell the same way, in
@@ -230,7 +240,7 @@ def _covariances(
     rows = _all_residuals(cameras, measured, stitch_weight)
     weighted = rows.jacobian * rows.weight[:, None]
     normal = np.einsum("mi,mj->ij", weighted, rows.jacobian)
-    free = np.flatnonzero(np.diag(normal) > 0)
+    prior = np.diag(_prior(len(cameras)))
     patches, patch = np.unique(rows.point // CLUSTER_POINTS, return_inverse=True)
     by_residual = _sum_by(patch, len(patches), weighted * rows.value[:, None])
     by_rise = _sum_by(patch, len(patches), weighted * rows.rise[:, None])
@@ -242,12 +252,12 @@ def _covariances(
     meat = np.maximum(np.diag(expected), np.diag(measurement))
     growth = np.sqrt(meat / np.maximum(np.diag(measurement), 1e-300))
     ground = np.einsum("ci,cj->ij", by_rise, np.einsum("cd,dj->cj", heights, by_rise))
-    inverse = np.linalg.pinv(normal[np.ix_(free, free)], hermitian=True)
-    total = (measurement * growth[:, None] * growth[None, :] + ground)[np.ix_(free, free)]
-    full = np.zeros(normal.shape)
-    full[np.ix_(free, free)] = inverse @ total @ inverse
-    blocks = [full[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] for i in range(len(cameras))]
-    return [block if np.diag(block).all() else None for block in blocks]
+    inverse = np.linalg.inv(normal + prior)
+    full = inverse @ (measurement * growth[:, None] * growth[None, :] + ground + prior) @ inverse
+    return [
+        full[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] if len(found) >= FEWEST_MEASUREMENTS else None
+        for i, found in enumerate(measured)
+    ]
 
 
 def _sum_by(group: NDArray[np.intp], groups: int, rows: Array) -> Array:

@@ -61,6 +61,8 @@ LOOSE_M = 0.1
 # Below these the views show nothing in common.
 LEAST_SUPPORT_M = 4.0
 LEAST_CORRELATION = 0.3
+# As much line across a direction holds the views in it.
+HOLDING_M = 8.0
 
 
 @dataclass(frozen=True)
@@ -83,15 +85,27 @@ class Registration:
 
 
 def stitch_error_px(pitch: Field, cameras: Sequence[Camera], responses: Mapping[str, Response]) -> float | None:
-    """The worst disagreement of any two cameras around the pitch centre, 1 px = 10 cm; None if no two can be compared.
+    """The worst disagreement of any two cameras around the pitch centre, 1 px = 10 cm.
 
+    None if no two cameras have markings in common, or if those of two that have (`pairs_in_common`) do not register.
     `responses[camera.id]`: float32 (height, width), probability 0..1 of a marking in each pixel of the raw frame.
     """
-    found = (
+    found = [
         register_pair(pitch, first, second, responses[first.id], responses[second.id])
+        for first, second in pairs_in_common(pitch, cameras)
+    ]
+    errors = [pair.error_px for pair in found if pair is not None]
+    return max(errors) if errors and len(errors) == len(found) else None
+
+
+def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camera, Camera]]:
+    """The pairs of cameras that, by their poses, see enough of the same markings to be compared."""
+    return [
+        (first, second)
         for first, second in combinations(cameras, 2)
-    )
-    return max((pair.error_px for pair in found if pair is not None), default=None)
+        if (centre := _reference_point(pitch, first, second)) is not None
+        and _directions_in_common(pitch, first, second, centre) > 0
+    ]
 
 
 def register_pair(
@@ -109,6 +123,9 @@ def register_pair(
     best = max(fits, key=lambda fit: fit.support * fit.correlation, default=None)
     if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
         return None
+    # A halfway line fits itself wherever it is slid to. Where a circle should have held it, that is no registration.
+    if best.told < _directions_in_common(pitch, first, second, centre):
+        return None
     dx, dy = best.displacement / PIXEL_M
     return Registration(float(dx), float(dy), best.support, (first.id, second.id))
 
@@ -124,6 +141,17 @@ def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | Non
     common: Array = points[seen, :2]
     nearest = common[np.argmin(np.linalg.norm(common, axis=1))]
     return np.asarray(common[np.linalg.norm(common - nearest, axis=1) < FINE_HALF_M].mean(axis=0))
+
+
+def _directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
+    """In how many directions, 0 to 2, the markings that both cameras should see around a point (2,) can hold a view."""
+    lines = pitch.line_points(0.5)
+    seen = np.all(
+        [inside(camera.project(lines.position), camera.intrinsics.size) for camera in (first, second)], axis=0
+    )
+    near = np.abs(lines.position[:, :2] - centre).max(axis=1) < FINE_HALF_M
+    across = lines.normal[seen & near, :2]
+    return int(np.count_nonzero(np.linalg.eigvalsh(lines.spacing * across.T @ across) > HOLDING_M))
 
 
 def _guesses(pitch: Field, sights: Sequence[Sight], centre: Array) -> list[tuple[Array, Array]]:
@@ -143,9 +171,10 @@ def _guesses(pitch: Field, sights: Sequence[Sight], centre: Array) -> list[tuple
 
 @dataclass(frozen=True)
 class _Fit:
-    """`displacement` (2,) m as far as the markings tell it, metres of marking in common, and how alike they are."""
+    """`displacement` (2,) m in the directions that are told, metres of marking in common, and how alike they are."""
 
     displacement: Array
+    told: int
     support: float
     correlation: float
 
@@ -166,7 +195,8 @@ def _fit(pitch: Field, sights: Sequence[Sight], middle: Array, shift: Array) -> 
 
     variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
     told = directions[:, variance < LOOSE_M**2]
-    return _Fit(told @ told.T @ at_middle @ fine.moves, fine.common_area_m2 / pitch.line_width, fine.correlation)
+    displacement = told @ told.T @ at_middle @ fine.moves
+    return _Fit(displacement, told.shape[1], fine.common_area_m2 / pitch.line_width, fine.correlation)
 
 
 def _square(middle: Array, half_m: float, step_m: float) -> Array:

@@ -107,9 +107,3 @@ def _rows(y: Array, height: int, reach_px: float) -> Iterator[tuple[int, int]]:
 
 def _up_to_grid(pixels: int) -> int:
     return -(-pixels // GRID_PX) * GRID_PX
-
-
-def fuse(responses: Sequence[NDArray[np.uint8]]) -> NDArray[np.float32]:
-    """Responses (H, W) of several frames of one camera as one in 0..1: the median, in which what walks by vanishes."""
-    still = responses[0] if len(responses) == 1 else np.median(np.stack(responses), axis=0)
-    return still.astype(np.float32) / np.float32(255)

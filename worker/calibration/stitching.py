@@ -27,6 +27,8 @@ BACKDROP = 38
 TOO_WIDE_DEG, STANDING_BACK_DEG = 80.0, 60.0
 # The preview shows this much around the visible pitch, in widths and heights of it in the picture.
 AROUND_SIDES, AROUND_ABOVE, AROUND_BELOW = 0.03, 0.8, 0.15
+# Least and largest height of the preview in widths.
+HEIGHT_TO_WIDTH = 0.15, 1.0
 # A row or column at the edge of the preview stays if no more than this part of it is unseen.
 UNSEEN_AT_EDGE = 0.03
 # "Infinity": far beyond any parallax between cameras, near enough for float64.
@@ -156,6 +158,9 @@ def viewpoint(pitch: Field, cameras: Sequence[Camera], width: int) -> Viewpoint:
     seen = [_visible_pitch(pitch, camera) for camera in cameras]
     aim = Viewpoint(_stand(cameras, seen), 1.0, (0.0, 0.0), (0, 0))
     left, right, top, bottom = _window(pitch, aim, cameras, np.concatenate(seen))
+    # Poses that are far off make slivers; those are the ones somebody has to look at.
+    middle, half = (top + bottom) / 2, np.clip((bottom - top) / 2, *(np.array(HEIGHT_TO_WIDTH) * (right - left) / 2))
+    top, bottom = middle - half, middle + half
     focal = width / (right - left)
     size = (width, max(1, round(focal * (bottom - top))))
     return Viewpoint(aim.pose, focal, (-focal * left - 0.5, -focal * top - 0.5), size)
