@@ -1,4 +1,4 @@
-# Everything a user or CI runs. Needs Python 3.11 to 3.13 and make, nothing else.
+# Everything a user or CI runs. Needs Python 3.11 to 3.13 and make; `make lock`, for developers, needs uv.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -31,7 +31,7 @@ bench-real: setup
 	$(BIN)/python -m tests.benchmarks.real_pair
 
 $(VENV)/.train: $(VENV)/.installed
-	$(BIN)/pip install --quiet --disable-pip-version-check '.[train]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'
 	touch $@
 
 train: $(VENV)/.train
