@@ -36,7 +36,7 @@ class Probability(nn.Module):
 def export(network: UNet, path: Path, threshold: float = 0.5) -> dict[str, object]:
     """Write the network to `path`; what the card records: file, opset, sha256, bytes.
 
-    What the network calls `threshold` the exported model calls 0.5: focal loss leaves probabilities too near the middle,
+    What the network calls `threshold` the exported model calls 0.5: focal loss leaves probabilities near the middle,
     and where the best threshold lies is found on rendered crops (`evaluate.py --rendered`).
     """
     folded = fold(network)
