@@ -97,7 +97,7 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
         wear_noise=Noise.draw(rng, {0.05: 0.25, 0.2: 0.35, 0.8: 0.5, 3.0: 0.5, 9.0: 0.3}),
         paint=paint,
         paint_noise=Noise.draw(rng, {0.01: 0.35, 0.03: 0.3, 0.1: 0.3, 0.4: 0.3, 1.5: 0.4, 6.0: 0.4}),
-        paint_opacity=float(rng.uniform(0.55, 1.0)),
+        paint_opacity=float(1 - (0.4 + 0.6 * conditions.variety) * rng.uniform(0, 0.45)),
         edge_noise=Noise.draw(rng, {0.015: 0.5, 0.05: 0.5, 0.3: 0.4, 3.0: 0.5}),
         bumps=Noise.draw(rng, {7.0: 0.012, 20.0: 0.02}),
         cloud_noise=Noise.draw(rng, {25.0: 0.7, 60.0: 1.0}),

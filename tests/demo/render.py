@@ -19,7 +19,7 @@ from worker.calibration.field import Field
 
 HERE = Path(__file__).parent
 SIZE = (3840, 2160)
-WORLD = 41
+WORLD = 56
 MOVED_M, MOVED_DEG = 0.16, 1.0
 LARGEST_BYTES = 3_000_000
 
@@ -42,7 +42,7 @@ def cameras() -> list[Camera]:
 
 def conditions() -> Conditions:
     """A sunny afternoon."""
-    return replace(Conditions.fair(WORLD), long_shadows=0.0, lettering=True)
+    return replace(Conditions.fair(WORLD), wear=0.04)
 
 
 def outdated(pose: Pose, rng: np.random.Generator) -> Pose:
