@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from contextlib import nullcontext
 from types import TracebackType
 from typing import Self
@@ -22,7 +23,10 @@ from service.settings import Settings
 
 # What open requests get to end in, and after them the worker.
 GRACE_S = 5
+# Between two starts of a worker: doubled as long as it dies young.
 RESTART_AFTER_S = 1.0
+RESTART_AT_LEAST_EVERY_S = 30.0
+YOUNG_S = 10.0
 log = structlog.get_logger()
 
 
@@ -97,12 +101,24 @@ class KeptWorker:
             self._process.kill()
 
     def _keep(self) -> None:
+        pause = RESTART_AFTER_S
         while not self._stopping.is_set():
+            begun = time.monotonic()
+            self._live_once()
+            if time.monotonic() - begun > YOUNG_S:
+                pause = RESTART_AFTER_S
+            self._stopping.wait(pause)
+            pause = min(2 * pause, RESTART_AT_LEAST_EVERY_S)
+
+    def _live_once(self) -> None:
+        try:
             self._process = self._start()
-            code = self._process.wait()
-            if not self._stopping.is_set():
-                log.error("worker died, starting another", code=code)
-                self._stopping.wait(RESTART_AFTER_S)
+        except OSError as error:
+            log.error("no worker can be started", error=str(error))
+            return
+        code = self._process.wait()
+        if not self._stopping.is_set():
+            log.error("worker died, starting another", code=code)
 
     def _start(self) -> subprocess.Popen[bytes]:
         data = ["--data", str(self._settings.data)]

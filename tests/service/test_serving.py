@@ -1,0 +1,39 @@
+import sys
+from itertools import pairwise
+
+import pytest
+from structlog.testing import capture_logs
+
+from service import serving
+from service.settings import Settings
+from tests.e2e.running import wait_for
+
+
+@pytest.fixture
+def starts(tmp_path, monkeypatch):
+    """Instead of Python a script that notes when it was started and ends at once."""
+    noted = tmp_path / "starts"
+    noted.touch()
+    script = tmp_path / "script"
+    script.write_text(f"#!/bin/sh\ndate +%s.%N >> {noted}\nexit 2\n")
+    script.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(script))
+    monkeypatch.setattr(serving, "RESTART_AFTER_S", 0.1)
+    monkeypatch.setattr(serving, "RESTART_AT_LEAST_EVERY_S", 0.4)
+    return lambda: [float(line) for line in noted.read_text().split()]
+
+
+def test_a_worker_that_refuses_to_start_is_started_ever_more_rarely(starts, tmp_path):
+    with serving.KeptWorker(Settings(data=tmp_path)):
+        wait_for(lambda: len(starts()) >= 5)
+    pauses = [after - before for before, after in pairwise(starts())]
+    assert all(pause >= least for pause, least in zip(pauses, (0.1, 0.2, 0.4, 0.4), strict=False))
+
+
+def test_a_worker_that_cannot_be_started_is_tried_again(starts, tmp_path):
+    script = tmp_path / "script"
+    script.rename(tmp_path / "away")
+    with capture_logs() as logs, serving.KeptWorker(Settings(data=tmp_path)):
+        wait_for(lambda: "no worker can be started" in [entry["event"] for entry in logs])
+        (tmp_path / "away").rename(script)
+        wait_for(starts)
