@@ -24,9 +24,12 @@ class Blobs:
         """Store an object; when this returns it survives a crash, of the machine too."""
         obstore.put(self._store, path, data)
         if self._folder:
-            # A bucket promises durability; a folder only after its pages have reached the disk.
-            _sync(self._folder / path)
-            _sync((self._folder / path).parent)
+            # A bucket promises durability; a file has it only after its pages have reached the disk, and the entry of
+            # each folder on the way to it, of which any may be new.
+            place = self._folder / path
+            _sync(place)
+            for folder in place.parents[: len(Path(path).parts)]:
+                _sync(folder)
 
     def get(self, path: str) -> bytes | None:
         """An object, or None if there is none."""

@@ -89,3 +89,11 @@ def test_blobs_are_kept_and_removed_by_folder(tmp_path):
     assert blobs.get("frames/a/left/0") is None
     assert blobs.get("frames/ab/left/0") == b"2"
     blobs.check()
+
+
+def test_a_blob_reaches_the_disk_with_every_folder_on_the_way_to_it(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr("service.store.blobs._sync", synced.append)
+    Blobs((tmp_path / "blobs").as_uri()).put("frames/a/left/0", b"1")
+    ways = ("frames/a/left/0", "frames/a/left", "frames/a", "frames", "")
+    assert synced == [tmp_path / "blobs" / way for way in ways]
