@@ -6,9 +6,10 @@ What a command needs is imported where it runs: the client's commands start in a
 from __future__ import annotations
 
 import json
+import os
 import secrets
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeVar
@@ -51,7 +52,7 @@ def main() -> None:
     try:
         app()
     except Refused as refused:
-        _fail(_in_words(refused), BUSY if refused.busy else FAILED)
+        _fail(_in_words(str(refused), refused.members), BUSY if refused.busy else FAILED)
     except httpx.TransportError as error:
         _fail(f"The service cannot be reached: {error or type(error).__name__}", FAILED)
 
@@ -126,9 +127,12 @@ def run(
     """The same calibration without a server. Exit codes as of `calibrate`."""
     from service import frames as border
     from service.problems import Problem
-    from worker import job
 
     settings, chosen = _settings(), _options(options)
+    # Before NumPy is loaded, which the next line does.
+    os.environ |= settings.native_environment
+    from worker import job
+
     stored = _checked(VenueIn, venue.read_text(), str(venue)).stored()
     files = {camera: [path.read_bytes() for path in paths] for camera, paths in _files(frames).items()}
     if chosen.seed is None:
@@ -141,7 +145,7 @@ def run(
         with _bar() as show:
             outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
     except Problem as problem:
-        _fail(problem.detail, FAILED)
+        _fail(_in_words(problem.detail, problem.parts), FAILED)
     except job.Failure as failure:
         _fail(failure.error.detail, FAILED)
     output.mkdir(parents=True, exist_ok=True)
@@ -250,6 +254,8 @@ def _checked(model: type[M], text: str, source: str) -> M:
 def _verdict(job: Job) -> int:
     if job.result is not None:
         return _gate(job.result)
+    if job.status == "cancelled":
+        err.print(f"Job {job.id} was cancelled before it had a result.")
     _explain(job.error)
     return FAILED
 
@@ -284,9 +290,10 @@ def _waiting(job: Job) -> str:
     return f"queued, {job.queue_position}." if job.queue_position else "starting"
 
 
-def _in_words(refused: Refused) -> str:
-    lines = [str(refused)]
-    lines += [f"  {finding.get('where')}: {finding.get('message')}" for finding in refused.members.get("errors", [])]
+def _in_words(headline: str, members: Mapping[str, Any]) -> str:
+    lines = [headline]
+    lines += [f"  {part}: {json.dumps(members[part])}" for part in ("expected", "got") if part in members]
+    lines += [f"  {finding.get('where')}: {finding.get('message')}" for finding in members.get("errors", [])]
     return "\n".join(lines)
 
 

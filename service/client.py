@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -14,6 +15,8 @@ from service.schemas import Job, Venue, VenueIn, Venues
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
+# How long a service may be away from somebody who follows a job: a restart, a database that comes back.
+PATIENCE_S = 60.0
 
 
 class Refused(Exception):  # noqa: N818
@@ -95,10 +98,18 @@ class Client:
         return Job.model_validate(self._json("POST", f"/jobs/{job_id}/cancel"))
 
     def follow(self, job: Job, show: Callable[[Job], None], every_s: float = 0.5) -> Job:
-        """Wait for the end of a job, showing what it does meanwhile."""
+        """Wait for the end of a job, showing what it does meanwhile. The service may be away for a minute."""
+        answered = time.monotonic()
         while job.open:
             show(job)
-            job = self.job(job.id, wait_s=every_s)
+            try:
+                job = self.job(job.id, wait_s=every_s)
+                answered = time.monotonic()
+            except (httpx.TransportError, Refused) as error:
+                passing = isinstance(error, httpx.TransportError) or error.busy
+                if not passing or time.monotonic() - answered > PATIENCE_S:
+                    raise
+                time.sleep(every_s)
         return job
 
     def url_of(self, path: str) -> str:

@@ -64,6 +64,13 @@ class Settings(BaseSettings):
         return self.blob_url or (self.data.absolute() / "blobs").as_uri()
 
     @property
+    def native_environment(self) -> dict[str, str]:
+        """What a process that computes needs in its environment before NumPy and OpenCV are loaded."""
+        # Arrays as small as a population's gain nothing from BLAS threads; ONNX Runtime and OpenCV get `threads`.
+        single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        return {**single, "OPENCV_IO_MAX_IMAGE_PIXELS": str(self.max_frame_pixels)}
+
+    @property
     def listens_beyond_this_machine(self) -> bool:
         """Whether others can reach the port."""
         try:

@@ -37,8 +37,8 @@ class Service:
         }
         self.start()
 
-    def start(self) -> None:
-        command = [sys.executable, "-m", "service.cli", *self.arguments, "--port", "0"]
+    def start(self, port: int = 0) -> None:
+        command = [sys.executable, "-m", "service.cli", *self.arguments, "--port", str(port)]
         self.log = (self.data / "log").open("ab")
         self.process = subprocess.Popen(command, env=self.environment, stdout=subprocess.PIPE, stderr=self.log)
         self.url = self.process.stdout.readline().decode().strip().rpartition(" ")[2]

@@ -2,6 +2,7 @@ import json
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
@@ -57,6 +58,28 @@ def test_the_exit_code_tells_how_a_calibration_ended(service, esc, name, behavio
         assert "the lines do not fit" in answer.stderr
 
 
+def test_a_job_that_was_cancelled_is_told(service, esc, name):
+    service.venue(name, "hang")
+    with ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(esc, "calibrate", name, *FRAMES, "--wait")
+        job = wait_for(lambda: service.http.get("/jobs", params={"venue": name}).json()["jobs"])[0]["id"]
+        service.http.post(f"/jobs/{job}/cancel")
+    assert answer.result().returncode == 1
+    assert f"Job {job} was cancelled" in answer.result().stderr
+
+
+def test_who_follows_a_job_waits_for_a_service_that_comes_back(start, esc):
+    service = start().ready()
+    service.venue("v", "accept 2")
+    with ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(esc, "calibrate", "v", *FRAMES, "--wait", url=service.url)
+        service.running(wait_for(lambda: service.http.get("/jobs").json()["jobs"])[0]["id"])
+        service.kill()
+        service.start(httpx.URL(service.url).port)
+    assert answer.result().returncode == 0, answer.result().stderr
+    assert json.loads(answer.result().stdout)["attempt"] == 2
+
+
 def test_without_wait_the_job_is_told(service, esc, name):
     service.venue(name)
     told = json.loads(esc("calibrate", name, *FRAMES, "--options", '{"seed": 3}').stdout)
@@ -86,6 +109,36 @@ def test_refused_frames_and_an_absent_service_are_failures(service, esc, name):
     absent = esc("calibrate", name, *FRAMES, url="http://127.0.0.1:9")
     assert (absent.returncode, "cannot be reached" in absent.stderr) == (1, True)
     assert "Traceback" not in refused.stderr + absent.stderr
+
+
+def test_a_frame_of_another_size_is_refused_with_both_sizes(service, esc, name, tmp_path):
+    service.venue(name)
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name)))
+    (tmp_path / "left.png").write_bytes(png(32, 40))
+    for arguments in (("calibrate", name, *FRAMES), ("run", "venue.json", *FRAMES, "-o", "out")):
+        refused = esc(*arguments)
+        assert refused.returncode == 1
+        assert "expected: [64, 48]" in refused.stderr
+        assert "got: [32, 40]" in refused.stderr
+
+
+def test_without_a_server_native_code_finds_the_environment_of_a_workers_child(service, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue("v")))
+    (tmp_path / "numpy.py").write_text(
+        "import os\nprint(os.environ['OPENBLAS_NUM_THREADS'], os.environ['OPENCV_IO_MAX_IMAGE_PIXELS'])\nos._exit(0)"
+    )
+    files = [tmp_path / f"{side}.png" for side in ("left", "right")]
+    for file in files:
+        file.write_bytes(png())
+    frames = [f"{file.stem}={file}" for file in files]
+    answer = subprocess.run(
+        [sys.executable, "-u", "-m", "service.cli", "run", str(tmp_path / "venue.json"), *frames, "-o", "out"],
+        env=service.environment | {"PYTHONPATH": str(tmp_path), "ESC_MAX_FRAME_PIXELS": "4096"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert answer.stdout == "1 4096\n"
 
 
 def test_nobody_listens_to_the_world_by_accident(esc):
