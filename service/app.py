@@ -8,7 +8,6 @@ from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
 
 import obstore.exceptions
-import sqlalchemy as sa
 import structlog
 from fastapi import FastAPI, Request
 from starlette.responses import Response
@@ -24,7 +23,7 @@ from service.queue import migrate as migrate_queue
 from service.routes import calibrate, documented, health, jobs, venues
 from service.settings import Settings
 from service.store.blobs import Blobs
-from service.store.engine import connect, migrate
+from service.store.engine import AWAY, connect, migrate
 from service.store.jobs import Jobs
 from service.store.venues import Venues
 from service.store.workers import Workers
@@ -87,10 +86,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 def _answer_outages(app: FastAPI) -> None:
     """A database or a bucket that is away is no mistake of the service: 503, try again."""
 
-    @app.exception_handler(sa.exc.OperationalError)
-    @app.exception_handler(sa.exc.TimeoutError)
-    @app.exception_handler(obstore.exceptions.BaseError)
-    @app.exception_handler(OSError)
     async def away(_: Request, error: Exception) -> Response:
         log.error("storage is away", exc_info=error)
         return Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}).response()
+
+    for error in (*AWAY, obstore.exceptions.BaseError, OSError):
+        app.add_exception_handler(error, away)

@@ -43,6 +43,16 @@ def _engine(url: str) -> sa.Engine:
     return engine
 
 
+# Why the queue does not begin a job again.
+ENDED = {
+    QueueStatus.MAX_RECOVERY_ATTEMPTS_EXCEEDED.value: f"It was begun {1 + BEGINS_AGAIN} times, and each time its "
+    "worker ended before it did",
+    QueueStatus.ERROR.value: "Its last attempt broke off with an error before it could write down how it ended",
+    QueueStatus.SUCCESS.value: "Its last attempt ended without having written down how",
+    QueueStatus.CANCELLED.value: "It was taken out of the queue",
+}
+
+
 class Queue:
     """The half of the HTTP service: puts jobs in."""
 
@@ -97,13 +107,7 @@ class WorkerQueue:
         """Put the jobs of dead workers back into the queue. Private to the engine: its version is pinned exactly."""
         DBOS._recover_pending_workflows(list(dead_workers))
 
-    def given_up(self, job_ids: Collection[str]) -> list[str]:
-        """Which of these jobs the queue will not begin again."""
-        ended = [
-            QueueStatus.SUCCESS.value,
-            QueueStatus.ERROR.value,
-            QueueStatus.CANCELLED.value,
-            QueueStatus.MAX_RECOVERY_ATTEMPTS_EXCEEDED.value,
-        ]
-        found = DBOS.list_workflows(workflow_ids=list(job_ids), status=ended, load_input=False, load_output=False)
-        return [workflow.workflow_id for workflow in found]
+    def given_up(self, job_ids: Collection[str]) -> dict[str, str]:
+        """Which of these jobs the queue will not begin again, and why in words."""
+        found = DBOS.list_workflows(workflow_ids=list(job_ids), status=list(ENDED), load_input=False, load_output=False)
+        return {workflow.workflow_id: ENDED[workflow.status] for workflow in found}

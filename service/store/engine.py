@@ -14,6 +14,8 @@ from alembic.config import Config
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 WRITES = "esc_writes"
+# What is raised while the database is away or locked: trying again later can help.
+AWAY = (sa.exc.OperationalError, sa.exc.TimeoutError)
 # Any number, the same everywhere: serialises writers that must see each other's rows on PostgreSQL.
 LOCK = 0x45_53_43
 
