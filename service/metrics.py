@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from typing import get_args
 
 from prometheus_client import CollectorRegistry, Counter, Histogram
 from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
+from service.schemas import Status
 from service.store.jobs import Jobs
 from service.store.workers import Workers
-
-STATES = ("queued", "running", "succeeded", "failed", "cancelled")
 
 
 class Metrics:
@@ -44,7 +44,7 @@ class _Stored(Collector):
         """Read the database."""
         counts = self._jobs.counts()
         jobs = GaugeMetricFamily("esc_jobs", "Jobs by state.", labels=["status"])
-        for status in STATES:
+        for status in get_args(Status):
             jobs.add_metric([status], counts.get(status, 0))
         yield jobs
         oldest = self._jobs.oldest_queued_at()

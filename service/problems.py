@@ -40,6 +40,7 @@ KINDS: dict[str, Kind] = {
     "venue-not-found": Kind(404, "There is no such venue"),
     "venue-id-mismatch": Kind(422, "The venue's id differs from the address"),
     "venue-changed": Kind(412, "The venue is not the one the request expects"),
+    "venue-replaced": Kind(409, "The venue was changed during the upload"),
     "venue-busy": Kind(409, "The venue has an active job"),
     # Frames.
     "unknown-camera": Kind(422, "The venue has no such camera"),
@@ -58,12 +59,11 @@ KINDS: dict[str, Kind] = {
     "picture-not-found": Kind(404, "There is no such picture"),
     "idempotency-key-reused": Kind(422, "The idempotency key was used for other content"),
     "queue-full": Kind(429, "Too many jobs are waiting"),
-    "calibration-failed": Kind(422, "The frames cannot be calibrated"),
     "no-markings-in-view": Kind(422, "The stored pose of a camera sees no markings"),
     "model-missing": Kind(503, "The segmentation network is missing"),
     "job-timeout": Kind(504, "The job took longer than it may"),
     "job-crashed": Kind(500, "The computation broke off"),
-    "job-abandoned": Kind(500, "The job was given up after several attempts"),
+    "job-abandoned": Kind(500, "The job was given up"),
     # The service.
     "unavailable": Kind(503, "The service cannot answer right now"),
     "internal-error": Kind(500, "The service made a mistake"),

@@ -141,6 +141,15 @@ class CameraIn(_Lens):
 
     pose: PoseIn
 
+    @model_validator(mode="after")
+    def _above_the_pitch(self) -> Self:
+        height = Pose.of(self.pose).position[2]
+        if height <= 0:
+            raise ValueError(
+                f"camera {self.id} stands at z = {height:.6g} m: z points up, and a camera must be above the pitch"
+            )
+        return self
+
 
 class Camera(_Lens):
     """A camera of a venue with its stored pose."""
@@ -229,6 +238,11 @@ class Venue(_Place):
 
     cameras: list[Camera]
 
+    @property
+    def poses(self) -> dict[str, Pose]:
+        """Where each camera stands and looks, by its id."""
+        return {camera.id: camera.pose for camera in self.cameras}
+
     def with_poses(self, poses: dict[str, Pose]) -> Venue:
         """The same venue, cameras moved."""
         cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
@@ -237,6 +251,10 @@ class Venue(_Place):
     def calibrates_like(self, other: Venue) -> bool:
         """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
         return self.field == other.field and self.cameras == other.cameras
+
+    def films_like(self, other: Venue) -> bool:
+        """Whether frames of the one are frames of the other: same pitch and lenses, wherever the cameras stand."""
+        return self.calibrates_like(other.with_poses(self.poses))
 
 
 class Venues(Wire):

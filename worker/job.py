@@ -82,7 +82,7 @@ def main(job_id: str, run_token: str) -> None:
         return
     for name, picture in outcome.pictures.items():
         blobs.put(f"{picture_folder(job_id, run_token)}/{name}.jpg", picture)
-    say(Message(result=outcome.result))
+    say(Message(result=outcome.result, pictures=list(outcome.pictures)))
 
 
 def solve(
@@ -106,8 +106,7 @@ def solve(
             pitch, cameras, frames, segmenter, _engine_options(options), lambda step: report(_progress(step))
         )
     except CalibrationError as error:
-        kind = error.kind if error.kind in KINDS else "calibration-failed"
-        raise Failure(kind, error.detail, error.camera) from error
+        raise Failure(error.kind, error.detail, error.camera) from error
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
     drawing = time.perf_counter()
     pictures = _draw(pitch.flat() if options.flat else pitch, cameras, found, frames)
@@ -160,8 +159,14 @@ def _decode(camera: schemas.Camera, files: Sequence[bytes]) -> list[Picture]:
             frame = None
         if frame is None:
             raise Failure("broken-image", f"A frame of camera {camera.id} cannot be decoded; grab it again.", camera.id)
-        if [frame.shape[1], frame.shape[0]] != camera.image_size:
-            raise Failure("frame-size", f"A frame of camera {camera.id} decodes to another size.", camera.id)
+        (height, width), wanted = frame.shape[:2], camera.image_size
+        if [width, height] != wanted:
+            raise Failure(
+                "frame-size",
+                f"A frame of camera {camera.id} decodes to {width}x{height} pixels; its intrinsics are for "
+                f"{wanted[0]}x{wanted[1]}.",
+                camera.id,
+            )
         frames.append(np.asarray(frame, dtype=np.uint8))
     return frames
 

@@ -8,11 +8,13 @@ from service.schemas import JobError, Progress, Result
 
 
 class Message(BaseModel):
-    """One line: exactly one of the three. `error` and `result` are the program's last word."""
+    """One line: exactly one of progress, result and error. `error` and `result` are the program's last word."""
 
     progress: Progress | None = None
     result: Result | None = None
     error: JobError | None = None
+    # Beside a result: the pictures that lie in the folder of the attempt.
+    pictures: list[str] = []
 
     def line(self) -> str:
         """The line, to be printed."""

@@ -15,9 +15,10 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, TypeVar
 
 import structlog
 from pydantic import ValidationError
@@ -26,9 +27,9 @@ from service import lifeline
 from service.problems import KINDS, type_of
 from service.queue import WorkerQueue
 from service.queue import migrate as migrate_queue
-from service.schemas import JobError
+from service.schemas import JobError, Progress
 from service.settings import Settings
-from service.store.engine import connect, migrate
+from service.store.engine import AWAY, connect, migrate
 from service.store.jobs import Jobs, Task
 from service.store.workers import Workers
 from worker.message import Message
@@ -38,12 +39,22 @@ SWEEP_S = 3.0
 # Twice as often as a cancellation needs to reach the child.
 LOOK_S = 0.5
 PROGRESS_S = 0.25
+# How long the database may be away, beyond the time the job has anyway, before its end is lost.
+OUTAGE_S = 60.0
+TRY_AGAIN_S = 1.0
 LONGEST_LINE = 16 * 1024 * 1024
+# For a process that has closed its output.
+ENDING_S = 10.0
+Answer = TypeVar("Answer")
 log = structlog.get_logger()
 
 
 class AlreadyRunning(Exception):  # noqa: N818
     """A worker of this name runs on this machine."""
+
+
+class NoMessage(Exception):  # noqa: N818
+    """What a child writes is not what a program of jobs writes."""
 
 
 def run(settings: Settings) -> None:
@@ -110,59 +121,78 @@ class Worker:
 
     def _reconcile(self) -> None:
         silent = self._jobs.unchanged_for(self._settings.takeover_after_s)
-        for job_id in self._queue.given_up(silent) if silent else []:
-            log.error("job given up", job=job_id)
-            self._jobs.abandon(job_id, _error("job-abandoned", "Its worker died each time; see the worker's log."))
+        given_up = self._queue.given_up(silent) if silent else {}
+        for job_id, why in given_up.items():
+            log.error("job given up", job=job_id, why=why)
+            self._jobs.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log."))
 
     def _attempt(self, job_id: str) -> None:
         """One attempt of a job, from its beginning to a state that is written down."""
-        task = self._jobs.begin(job_id)
+        begun = time.monotonic()
+        task = _insist(lambda: self._jobs.begin(job_id), begun + OUTAGE_S)
         if task is None:
             return
+        limit_s = task.options.timeout_s or self._settings.job_timeout_s
         with structlog.contextvars.bound_contextvars(job=job_id):
             log.info("job begins", venue=task.venue.id)
-            begun = time.monotonic()
-            self._compute(task)
+            try:
+                end = self._compute(task, limit_s)
+                _insist(lambda: self._write_down(task, end), begun + limit_s + OUTAGE_S)
+            except Exception as error:  # an attempt that raises would leave the job open and nobody at it
+                log.exception("job broke off")
+                crashed = _error("job-crashed", f"The attempt broke off: {_in_words(error)}")
+                _insist(lambda: self._jobs.fail(task, crashed), time.monotonic() + OUTAGE_S)
             log.info("job ends", seconds=round(time.monotonic() - begun, 2))
 
-    def _compute(self, task: Task) -> None:
-        limit_s = task.options.timeout_s or self._settings.job_timeout_s
+    def _compute(self, task: Task, limit_s: float) -> Message | None:
+        """The last word about the job; None if it was taken away."""
         deadline = time.monotonic() + limit_s
         shown = 0.0
         with Child(self._settings, task) as child:
             for message in child.messages():
-                if message is None and not self._jobs.keep(task):
-                    log.info("job taken away")
-                    return
+                if message is None and self._lost(task):
+                    return None
                 if time.monotonic() > deadline:
-                    self._jobs.fail(task, _error("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
-                    return
+                    return Message(error=_error("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
                 if message is None:
                     continue
-                if message.result is not None:
-                    self._jobs.finish(task, message.result)
-                    return
-                if message.error is not None:
-                    self._jobs.fail(task, message.error)
-                    return
+                if message.result is not None or message.error is not None:
+                    return message
                 if message.progress is not None and time.monotonic() - shown >= PROGRESS_S:
-                    self._jobs.report(task, message.progress)
+                    self._show(task, message.progress)
                     shown = time.monotonic()
-            self._jobs.fail(task, _error("job-crashed", child.how_it_ended()))
+            return Message(error=_error("job-crashed", child.how_it_ended()))
+
+    def _lost(self, task: Task) -> bool:
+        """Whether the job went to a cancellation or to another attempt; while the database is away, nobody can say."""
+        try:
+            return not self._jobs.keep(task)
+        except AWAY:
+            log.warning("cannot give a sign of life", exc_info=True)
+            return False
+
+    def _show(self, task: Task, progress: Progress) -> None:
+        with suppress(*AWAY):
+            self._jobs.report(task, progress)
+
+    def _write_down(self, task: Task, end: Message | None) -> None:
+        if end is None:
+            log.info("job taken away")
+        elif end.result is not None:
+            self._jobs.finish(task, end.result, end.pictures)
+        elif end.error is not None:
+            self._jobs.fail(task, end.error)
 
 
 class Child:
     """The process that computes one job; killed when the `with` block is left."""
 
     def __init__(self, settings: Settings, task: Task) -> None:
-        # Arrays as small as a population's gain nothing from BLAS threads; ONNX Runtime and OpenCV get `threads`.
-        single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        bomb = {"OPENCV_IO_MAX_IMAGE_PIXELS": str(settings.max_frame_pixels)}
         self._process = subprocess.Popen(
             [*settings.job_program, task.job_id, task.run_token],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
-            env=os.environ | _as_environment(settings) | single | bomb | lifeline.for_child(),
+            env=os.environ | _as_environment(settings) | settings.native_environment | lifeline.for_child(),
         )
         assert self._process.stdout is not None
         self._output: IO[bytes] = self._process.stdout
@@ -183,9 +213,11 @@ class Child:
             while True:
                 if selector.select(LOOK_S):
                     chunk = os.read(descriptor, 65536)
-                    if not chunk or len(pending) > LONGEST_LINE:
+                    if not chunk:
                         return
                     *lines, pending = (pending + chunk).split(b"\n")
+                    if len(pending) > LONGEST_LINE:
+                        raise NoMessage(f"its program wrote a line of more than {LONGEST_LINE} bytes")
                     yield from (message for line in lines if (message := _understood(line)))
                 if time.monotonic() - looked >= LOOK_S:
                     looked = time.monotonic()
@@ -193,7 +225,10 @@ class Child:
 
     def how_it_ended(self) -> str:
         """For the job's error, after the output has ended."""
-        code = self._process.wait()
+        try:
+            code = self._process.wait(ENDING_S)
+        except subprocess.TimeoutExpired:
+            return "Its process closed its output and went on with no result; see the worker's log."
         if code == -signal.SIGKILL:
             return "Its process was killed, most likely for lack of memory."
         if code < 0:
@@ -213,6 +248,23 @@ def _understood(line: bytes) -> Message | None:
     except ValidationError:
         log.warning("not understood", line=line[:500].decode(errors="replace"))
         return None
+
+
+def _insist(write: Callable[[], Answer], until: float) -> Answer:
+    """Do it, again and again while the database is away, until the monotonic time `until`."""
+    while True:
+        try:
+            return write()
+        except AWAY:
+            if time.monotonic() > until:
+                raise
+            log.warning("the database is away, trying again", exc_info=True)
+            time.sleep(TRY_AGAIN_S)
+
+
+def _in_words(error: Exception) -> str:
+    """The first line: a database's error goes on with its statement."""
+    return (str(error).splitlines() or [""])[0][:300] or type(error).__name__
 
 
 def _error(kind: str, detail: str) -> JobError:

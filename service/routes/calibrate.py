@@ -19,7 +19,7 @@ from service.routes.documented import problems, reference
 from service.routes.jobs import RETRY_AFTER_S, job_answer
 from service.routes.venues import no_such_venue
 from service.schemas import OPTIONS_PART, Job, Options, Venue
-from service.store.jobs import KeyReused, QueueFull, Submission, VenueBusy, new_job_id
+from service.store.jobs import KeyReused, QueueFull, Submission, VenueBusy, VenueGone, VenueReplaced, new_job_id
 
 router = APIRouter(tags=["jobs"])
 
@@ -68,10 +68,11 @@ async def calibrate(
         raise no_such_venue(venue_id)
     # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time.
     async with request.form(max_files=2000, max_fields=100, max_part_size=LONGEST_OPTIONS) as form:
-        return await run_in_threadpool(_submit, context, stored.venue, form, idempotency_key)
+        return await run_in_threadpool(submit, context, stored, form, idempotency_key)
 
 
-def _submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None) -> Response:
+def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None) -> Response:
+    """Make a form a job of `venue`, which is the venue as it was before the form arrived."""
     options = _options(form)
     files = _files(venue, form, context)
     content_hash = _check(context, venue, files, options)
@@ -84,16 +85,18 @@ def _submit(context: Context, venue: Venue, form: FormData, idempotency_key: str
         paths = _store(context, job_id, files)
         submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths)
         job, new = context.jobs.submit(submission, context.settings.queue_limit, context.queue.enqueue)
-    except (KeyReused, VenueBusy, QueueFull) as refusal:
+    except (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull) as refusal:
         context.blobs.delete_under(_folder(job_id))
-        raise _in_words(refusal, context) from None
+        raise _in_words(refusal, venue, context) from None
     if not new:
         context.blobs.delete_under(_folder(job_id))
     # After any other error the frames stay: whether the transaction was committed is then not known.
     return job_answer(job, status=202 if new else 200)
 
 
-def _in_words(refusal: KeyReused | VenueBusy | QueueFull, context: Context) -> Problem:
+def _in_words(
+    refusal: KeyReused | VenueBusy | VenueGone | VenueReplaced | QueueFull, venue: Venue, context: Context
+) -> Problem:
     match refusal:
         case KeyReused():
             return Problem("idempotency-key-reused", "Use a new key for new frames.", job=refusal.job_id)
@@ -103,6 +106,14 @@ def _in_words(refusal: KeyReused | VenueBusy | QueueFull, context: Context) -> P
                 f"Wait for job {refusal.job_id} of the same venue or cancel it.",
                 headers={"Retry-After": str(RETRY_AFTER_S), "Location": f"/jobs/{refusal.job_id}"},
                 job=refusal.job_id,
+            )
+        case VenueGone():
+            return no_such_venue(venue.id)
+        case VenueReplaced():
+            return Problem(
+                "venue-replaced",
+                "Its pitch, cameras or lenses were changed while the frames arrived; see that they fit and send again.",
+                headers={"Retry-After": str(RETRY_AFTER_S)},
             )
         case QueueFull():
             waiting = context.settings.queue_limit

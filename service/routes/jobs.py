@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import AsyncIterable, Callable
 from typing import Annotated, Any
 
@@ -31,7 +30,7 @@ JPEG: dict[int | str, dict[str, Any]] = {
 def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
     """The one form a job leaves in: body, ETag, Location of a new one, Retry-After while it is open."""
     body = job.model_dump_json().encode()
-    tag = hashlib.sha256(body).hexdigest()[:32]
+    tag = etags.of(body)
     headers = {"ETag": etags.quoted(tag), "Cache-Control": "no-cache"}
     if job.open:
         headers["Retry-After"] = str(RETRY_AFTER_S)

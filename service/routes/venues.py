@@ -11,7 +11,6 @@ from service.context import InContext, VenueIdPath
 from service.problems import Problem
 from service.routes.documented import problems
 from service.schemas import ID_PATTERN, PoseHistory, Venue, VenueIn, Venues
-from service.store.venues import StoredVenue
 
 router = APIRouter(prefix="/venues", tags=["venues"])
 
@@ -34,17 +33,18 @@ def put_venue(
     if venue.id != venue_id:
         raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
 
-    def allow(before: StoredVenue | None) -> None:
-        tag = before.revision if before else None
+    def allow(before: Venue | None) -> None:
+        tag = _tag(before) if before else None
         if if_match is not None and not etags.names(if_match, tag):
             raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)
         if if_none_match is not None and etags.names(if_none_match, tag):
             raise Problem("venue-changed", "The venue is already there.", got=tag)
 
-    stored, new = context.venues.put(venue.stored(), allow)
-    response.headers["ETag"] = etags.quoted(stored.revision)
+    stored = venue.stored()
+    new = context.venues.put(stored, allow)
+    response.headers["ETag"] = etags.quoted(_tag(stored))
     response.status_code = 201 if new else 200
-    return stored.venue
+    return stored
 
 
 @router.get("")
@@ -70,11 +70,11 @@ def get_venue(
     stored = context.venues.get(venue_id)
     if stored is None:
         raise no_such_venue(venue_id)
-    tag = etags.quoted(stored.revision)
-    if if_none_match is not None and etags.names(if_none_match, stored.revision):
-        return Response(status_code=304, headers={"ETag": tag})
-    response.headers["ETag"] = tag
-    return stored.venue
+    tag = _tag(stored)
+    if if_none_match is not None and etags.names(if_none_match, tag):
+        return Response(status_code=304, headers={"ETag": etags.quoted(tag)})
+    response.headers["ETag"] = etags.quoted(tag)
+    return stored
 
 
 @router.get("/{venue_id}/poses", responses=problems(404))
@@ -96,12 +96,17 @@ def list_poses(
 def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[str | None, Header()] = None) -> None:
     """Forget a venue and the history of its poses; its jobs stay."""
 
-    def allow(before: StoredVenue | None, active_job: str | None) -> None:
+    def allow(before: Venue | None, active_job: str | None) -> None:
         if before is None:
             raise no_such_venue(venue_id)
         if active_job is not None:
             raise Problem("venue-busy", "Wait for the job or cancel it.", job=active_job)
-        if if_match is not None and not etags.names(if_match, before.revision):
-            raise Problem("venue-changed", "Read the venue again and decide.", got=before.revision)
+        tag = _tag(before)
+        if if_match is not None and not etags.names(if_match, tag):
+            raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)
 
     context.venues.delete(venue_id, allow)
+
+
+def _tag(venue: Venue) -> str:
+    return etags.of(venue.model_dump_json().encode())

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import time
 import uuid
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -20,10 +20,11 @@ import sqlalchemy as sa
 from service.schemas import OPEN, Job, JobError, Options, Progress, Result, Status, Venue
 from service.store import tables
 from service.store.engine import reading, serialise, writing
-from service.store.venues import StoredVenue, find_venue, save_poses, save_venue
+from service.store.venues import find_venue, save_poses, save_venue
 
 PRIORITIES = {"live": 1, "routine": 100}
 CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
+DONE = Progress(stage="preview", fraction=1.0)
 j = tables.jobs.c
 
 
@@ -51,6 +52,14 @@ class VenueBusy(Exception):  # noqa: N818
 
     def __init__(self, job_id: str) -> None:
         self.job_id = job_id
+
+
+class VenueGone(Exception):  # noqa: N818
+    """The venue was deleted while its frames arrived."""
+
+
+class VenueReplaced(Exception):  # noqa: N818
+    """The pitch or a lens of the venue was changed while its frames arrived: they were checked against another one."""
 
 
 class QueueFull(Exception):  # noqa: N818
@@ -99,13 +108,21 @@ class Jobs:
     def submit(
         self, submission: Submission, queue_limit: int, enqueue: Callable[[sa.Connection, str, int], None]
     ) -> tuple[Job, bool]:
-        """Row and queue entry in one transaction, or the job that the content already is; also says which."""
+        """Row and queue entry in one transaction, or the job that the content already is; also says which.
+
+        The job begins from the poses that hold now: others may have been found since the upload began.
+        """
         now = datetime.now(UTC)
         with writing(self._engine) as connection:
             serialise(connection)
             same = self._duplicate(connection, submission.venue.id, submission.idempotency_key, submission.content_hash)
             if same is not None:
                 return self._read(connection, same), False
+            venue = find_venue(connection, submission.venue.id)
+            if venue is None:
+                raise VenueGone
+            if not venue.films_like(submission.venue):
+                raise VenueReplaced
             waiting = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued"))
             if waiting is not None and waiting >= queue_limit:
                 raise QueueFull
@@ -119,7 +136,7 @@ class Jobs:
                     options=submission.options.model_dump(mode="json"),
                     content_hash=submission.content_hash,
                     idempotency_key=submission.idempotency_key,
-                    venue_document=submission.venue.model_dump(mode="json"),
+                    venue_document=venue.model_dump(mode="json"),
                     frames=submission.frames,
                     created_at=now,
                     updated_at=now,
@@ -234,21 +251,31 @@ class Jobs:
                 sa.update(tables.jobs).where(*_fence(task)).values(progress=progress.model_dump(), **_changed())
             )
 
-    def finish(self, task: Task, result: Result) -> None:
-        """End a job with a result; if it is accepted the stored poses move in the same transaction."""
+    def finish(self, task: Task, result: Result, pictures: Sequence[str]) -> None:
+        """End a job with a result and the names of its pictures.
+
+        If the result is accepted the stored poses move in the same transaction.
+        """
         with writing(self._engine) as connection:
             serialise(connection)
             if connection.scalar(sa.select(j.id).where(*_fence(task))) is None:
                 return
             now_stored = find_venue(connection, task.venue.id)
-            if result.accepted and (now_stored is None or not now_stored.venue.calibrates_like(task.venue)):
+            if result.accepted and (now_stored is None or not now_stored.calibrates_like(task.venue)):
                 result = result.model_copy(
                     update={"accepted": False, "rejected_because": "the venue was changed while the job ran"}
                 )
-            self._end(connection, _fence(task), "succeeded", result=result.model_dump(mode="json"))
+            self._end(
+                connection,
+                _fence(task),
+                "succeeded",
+                result=result.model_dump(mode="json"),
+                pictures=list(pictures),
+                progress=DONE.model_dump(),
+            )
             if result.accepted and not task.options.dry_run and now_stored is not None:
                 poses = {camera.id: camera.pose for camera in result.cameras}
-                save_venue(connection, StoredVenue(now_stored.venue.with_poses(poses), now_stored.revision + 1))
+                save_venue(connection, now_stored.with_poses(poses))
                 save_poses(connection, task.venue.id, poses, "calibration", task.job_id)
 
     def fail(self, task: Task, error: JobError) -> None:
@@ -338,8 +365,6 @@ def _changed() -> dict[str, Any]:
 def _links(row: Any) -> dict[str, str]:
     base = f"/jobs/{row.id}"
     links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel", "venue": f"/venues/{row.venue}"}
-    if row.result is not None:
-        links["preview"] = f"{base}/preview.jpg"
-        links["birdseye"] = f"{base}/birdseye.jpg"
-        links |= {f"overlay/{camera}": f"{base}/overlay/{camera}.jpg" for camera in row.frames}
-    return links
+    # `overlay_left` in the store is `overlay/left` in an address.
+    names = [name.replace("_", "/", 1) for name in row.pictures or ()]
+    return links | {name: f"{base}/{name}.jpg" for name in names}

@@ -25,8 +25,6 @@ venues = sa.Table(
     "venues",
     metadata,
     sa.Column("id", sa.String(64), primary_key=True),
-    # Counts every change of the document; it is the ETag.
-    sa.Column("revision", sa.Integer, nullable=False),
     # schemas.Venue, with the poses that hold now.
     sa.Column("document", sa.JSON, nullable=False),
     sa.Column("updated_at", Instant, nullable=False),
@@ -68,6 +66,8 @@ jobs = sa.Table(
     sa.Column("revision", sa.Integer, nullable=False, default=1),
     sa.Column("progress", sa.JSON(none_as_null=True)),
     sa.Column("result", sa.JSON(none_as_null=True)),
+    # Names of the pictures that were made: not every pose can be drawn.
+    sa.Column("pictures", sa.JSON(none_as_null=True)),
     sa.Column("error", sa.JSON(none_as_null=True)),
     sa.Column("created_at", Instant, nullable=False),
     sa.Column("started_at", Instant),

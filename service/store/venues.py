@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import sqlalchemy as sa
@@ -13,21 +12,13 @@ from service.store import tables
 from service.store.engine import reading, serialise, writing
 
 
-@dataclass(frozen=True)
-class StoredVenue:
-    """A venue and the count of its changes."""
-
-    venue: Venue
-    revision: int
-
-
 class Venues:
     """The venues in the database."""
 
     def __init__(self, engine: sa.Engine) -> None:
         self._engine = engine
 
-    def get(self, venue_id: str) -> StoredVenue | None:
+    def get(self, venue_id: str) -> Venue | None:
         """One venue."""
         with reading(self._engine) as connection:
             return find_venue(connection, venue_id)
@@ -40,22 +31,19 @@ class Venues:
         with reading(self._engine) as connection:
             return [Venue.model_validate(document) for document in connection.scalars(query)]
 
-    def put(self, venue: Venue, allow: Callable[[StoredVenue | None], None]) -> tuple[StoredVenue, bool]:
-        """Store a venue unless `allow` raises at the sight of what is there; also says whether it is new."""
+    def put(self, venue: Venue, allow: Callable[[Venue | None], None]) -> bool:
+        """Store a venue unless `allow` raises at the sight of what is there; says whether it is new."""
         with writing(self._engine) as connection:
             serialise(connection)
             before = find_venue(connection, venue.id)
             allow(before)
-            if before is not None and before.venue == venue:
-                return before, False
-            poses = {camera.id: camera.pose for camera in venue.cameras}
-            stored = StoredVenue(venue, before.revision + 1 if before else 1)
-            known = {camera.id: camera.pose for camera in before.venue.cameras} if before else {}
-            save_venue(connection, stored)
-            save_poses(connection, venue.id, {c: pose for c, pose in poses.items() if known.get(c) != pose}, "put")
-            return stored, before is None
+            known = before.poses if before else {}
+            moved = {camera: pose for camera, pose in venue.poses.items() if known.get(camera) != pose}
+            save_venue(connection, venue)
+            save_poses(connection, venue.id, moved, "put")
+            return before is None
 
-    def delete(self, venue_id: str, allow: Callable[[StoredVenue | None, str | None], None]) -> None:
+    def delete(self, venue_id: str, allow: Callable[[Venue | None, str | None], None]) -> None:
         """Forget a venue and its poses unless `allow` raises at the sight of it or of its active job."""
         with writing(self._engine) as connection:
             serialise(connection)
@@ -81,25 +69,19 @@ class Venues:
             ]
 
 
-def find_venue(connection: sa.Connection, venue_id: str) -> StoredVenue | None:
+def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:
     """One venue, inside the caller's transaction."""
-    query = sa.select(tables.venues.c.document, tables.venues.c.revision).where(tables.venues.c.id == venue_id)
-    row = connection.execute(query).one_or_none()
-    return None if row is None else StoredVenue(Venue.model_validate(row.document), row.revision)
+    document = connection.scalar(sa.select(tables.venues.c.document).where(tables.venues.c.id == venue_id))
+    return None if document is None else Venue.model_validate(document)
 
 
-def save_venue(connection: sa.Connection, stored: StoredVenue) -> None:
-    """Write a venue of a new revision, inside the caller's transaction."""
-    values = {
-        "document": stored.venue.model_dump(mode="json"),
-        "revision": stored.revision,
-        "updated_at": datetime.now(UTC),
-    }
+def save_venue(connection: sa.Connection, venue: Venue) -> None:
+    """Create or replace a venue, inside the caller's serialised transaction."""
+    values = {"document": venue.model_dump(mode="json"), "updated_at": datetime.now(UTC)}
     table = tables.venues
-    if stored.revision == 1:
-        connection.execute(sa.insert(table).values(id=stored.venue.id, **values))
-    else:
-        connection.execute(sa.update(table).where(table.c.id == stored.venue.id).values(**values))
+    replaced = connection.execute(sa.update(table).where(table.c.id == venue.id).values(**values))
+    if replaced.rowcount == 0:
+        connection.execute(sa.insert(table).values(id=venue.id, **values))
 
 
 def save_poses(

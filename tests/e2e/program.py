@@ -44,10 +44,13 @@ def main(job_id: str, run_token: str) -> None:
         case "chatter":
             print("this is not a message", flush=True)
         case "fail":
-            say(error=JobError(type="/problems/calibration-failed", title="", detail="It is black.", camera="left"))
+            say(error=JobError(type="/problems/no-markings-in-view", title="", detail="It is black.", camera="left"))
             return
     blobs = Blobs(settings.home_blob_url)
-    for name in ("preview", "birdseye", *(f"overlay_{camera.id}" for camera in task.venue.cameras)):
+    pictures = ["preview", "birdseye", *(f"overlay_{camera.id}" for camera in task.venue.cameras)]
+    if behaviour == "reject":
+        pictures.remove("preview")
+    for name in pictures:
         blobs.put(f"{picture_folder(job_id, run_token)}/{name}.jpg", JPEG)
     cameras = [
         CameraResult(
@@ -73,7 +76,8 @@ def main(job_id: str, run_token: str) -> None:
             provenance=Provenance(
                 software="0", model_sha256="0", seed=task.options.seed, options=task.options.model_dump()
             ),
-        )
+        ),
+        pictures=pictures,
     )
 
 

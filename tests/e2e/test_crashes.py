@@ -3,8 +3,10 @@
 import os
 import signal
 import socket
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 
 from tests.e2e.running import alive, children, wait_for
 
@@ -109,10 +111,35 @@ def test_a_crash_of_the_computation_costs_one_job(start):
     assert service.worker() == worker
 
 
+def test_a_program_that_cannot_be_started_fails_the_job_and_says_so(start):
+    service = start("up", ESC_JOB_PROGRAM='["/nonexistent/program"]').ready()
+    job = service.end(service.submit(service.venue("v")).json()["id"])
+    assert (job["status"], job["attempt"], job["error"]["type"]) == ("failed", 1, "/problems/job-crashed")
+    assert "No such file or directory: '/nonexistent/program'" in job["error"]["detail"]
+
+
+def test_a_job_goes_on_while_the_database_is_away(start):
+    service = start().ready()
+    service.venue("v", "accept 1")
+    job = service.submit("v").json()["id"]
+    service.running(job)
+    (computing,) = service.begun(job)
+    with closing(sqlite3.connect(service.data / "esc.sqlite", timeout=30, isolation_level=None)) as database:
+        database.execute("ALTER TABLE jobs RENAME TO away")
+        wait_for(lambda: not alive(computing))
+        wait_for(lambda: "the database is away, trying again" in (service.data / "log").read_text())
+        assert service.http.get(f"/jobs/{job}").status_code == 503
+        database.execute("ALTER TABLE away RENAME TO jobs")
+    ended = service.end(job)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
+    assert poses(service, "v") == [-0.875, -0.875]
+
+
 def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):
     service = start().ready()
     job = service.end(service.submit(service.venue("v", "kill-worker")).json()["id"])
     assert (job["status"], job["attempt"]) == ("failed", 3)
     assert job["error"]["type"] == "/problems/job-abandoned"
+    assert "begun 3 times" in job["error"]["detail"]
     service.ready()
     assert service.end(service.submit(service.venue("w")).json()["id"])["status"] == "succeeded"

@@ -26,10 +26,10 @@ def test_a_job_goes_from_frames_to_poses_and_pictures(service, name):
 
 
 def test_an_accepted_result_moves_the_stored_poses(service, name):
-    service.venue(name)
+    tag = service.http.get(f"/venues/{service.venue(name)}").headers["etag"]
     result = service.end(service.submit(name).json()["id"])["result"]
     answer = service.http.get(f"/venues/{name}")
-    assert answer.headers["etag"] == '"2"'
+    assert answer.headers["etag"] != tag
     assert [c["pose"] for c in answer.json()["cameras"]] == [c["pose"] for c in result["cameras"]]
 
 
@@ -47,11 +47,11 @@ def test_the_poses_that_held_before_stay_in_the_history(service, name):
 @pytest.mark.parametrize(("behaviour", "options"), [("reject", {}), ("fail", {}), ("accept", {"dry_run": True})])
 def test_any_other_result_leaves_them_untouched(service, name, behaviour, options):
     service.venue(name, behaviour)
-    before = service.http.get(f"/venues/{name}").json()
+    before = service.http.get(f"/venues/{name}")
     job = service.end(service.submit(name, **options).json()["id"])
     assert job["status"] == ("failed" if behaviour == "fail" else "succeeded")
     answer = service.http.get(f"/venues/{name}")
-    assert (answer.json(), answer.headers["etag"]) == (before, '"1"')
+    assert (answer.json(), answer.headers["etag"]) == (before.json(), before.headers["etag"])
 
 
 def test_a_rejection_gives_its_reason_and_its_pictures(service, name):
@@ -61,10 +61,24 @@ def test_a_rejection_gives_its_reason_and_its_pictures(service, name):
     assert service.http.get(job["links"]["overlay/left"]).status_code == 200
 
 
+def test_only_pictures_that_were_made_are_linked(service, name):
+    service.venue(name, "reject")
+    job = service.end(service.submit(name).json()["id"])
+    assert {"birdseye", "overlay/left", "overlay/right"} <= set(job["links"])
+    assert "preview" not in job["links"]
+    assert service.http.get(f"/jobs/{job['id']}/preview.jpg").status_code == 404
+
+
+def test_a_job_that_succeeded_is_wholly_done(service, name):
+    service.venue(name, "accept 0.5")
+    job = service.end(service.submit(name).json()["id"])
+    assert (job["status"], job["progress"]["fraction"]) == ("succeeded", 1.0)
+
+
 def test_a_failure_names_the_camera_and_the_cause(service, name):
     service.venue(name, "fail")
     job = service.end(service.submit(name).json()["id"])
-    assert (job["error"]["type"], job["error"]["camera"]) == ("/problems/calibration-failed", "left")
+    assert (job["error"]["type"], job["error"]["camera"]) == ("/problems/no-markings-in-view", "left")
     picture = service.http.get(f"/jobs/{job['id']}/preview.jpg")
     assert (picture.status_code, picture.json()["type"]) == (404, "/problems/picture-not-found")
 

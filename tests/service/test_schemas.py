@@ -40,6 +40,16 @@ def test_a_matrix_of_another_resolution_is_noticed():
         VenueIn.model_validate(document)
 
 
+@pytest.mark.parametrize("place", ["position", "translation"])
+@pytest.mark.parametrize("height", [0.0, -7.84])
+def test_a_camera_under_the_pitch_is_named(place, height):
+    pose = Pose.at([1.675, 0.372, -0.462], [-1.48, -49.49, height - 1e-9])
+    camera = VENUE_EXAMPLE["cameras"][0] | {"pose": pose.model_dump(include={"rotation", place})}
+    document = VENUE_EXAMPLE | {"cameras": [camera]}
+    with pytest.raises(ValidationError, match=r"camera left stands at .* z points up, .* above the pitch"):
+        VenueIn.model_validate(document)
+
+
 def test_cameras_have_names_of_their_own():
     document = VENUE_EXAMPLE | {"cameras": VENUE_EXAMPLE["cameras"] * 2}
     with pytest.raises(ValidationError, match="same id"):

@@ -127,6 +127,12 @@ def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, f
     assert (failure.value.error.type, failure.value.error.camera) == ("/problems/broken-image", "right")
 
 
+def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, settings):
+    files["right"] = [cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()]
+    with pytest.raises(job.Failure, match=r"right decodes to 64x48 pixels; .* 320x180"):
+        job.solve(venue, files, Options(), settings, lambda _: None)
+
+
 def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, asked, settings, monkeypatch):
     def calibrate(*_):
         raise engine.CalibrationError("left", "no-markings-in-view", "store another pose")
