@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.training.evaluate import MODEL_PATH, judge, open_model, segment
+from models.training.render import Conditions, render_frame
+from worker.calibration.camera import Camera, Intrinsics, Pose
+from worker.calibration.field import Field
+
+
+@pytest.fixture(scope="module")
+def model():
+    return open_model()
+
+
+def test_the_card_names_this_very_file():
+    content = MODEL_PATH.read_bytes()
+    assert hashlib.sha256(content).hexdigest() in MODEL_PATH.with_name("README.md").read_text()
+    assert len(content) <= 12_000_000
+
+
+def test_the_interface_is_the_contract(model):
+    [given], [answer] = model.get_inputs(), model.get_outputs()
+    assert (given.type, answer.type) == ("tensor(float)", "tensor(float)")
+    for shape in ((1, 3, 64, 96), (2, 3, 32, 160)):
+        [probability] = model.run(None, {given.name: np.full(shape, 0.4, np.float32)})
+        assert probability.shape == (shape[0], 1, *shape[2:])
+        assert 0 <= probability.min() <= probability.max() <= 1
+
+
+def test_it_finds_the_lines_of_a_pitch_it_has_not_seen_and_little_else(model):
+    field = Field(100.0, 64.0, 0.12, np.array([[-15.0, 0.0, 0.3], [15.0, 0.0, 0.3]]))
+    lens = Intrinsics(
+        np.array([[900.0, 0, 639.5], [0, 900.0, 359.5], [0, 0, 1]]), np.array([-0.3, 0.09, 0, 0, 0]), (1280, 720)
+    )
+    camera = Camera("left", lens, Pose.looking_at([-2.0, -46.0, 11.0], [-24.0, -8.0, 0.0]))
+    frame = render_frame(field, camera, replace(Conditions.fair(56), wear=0.04), np.random.default_rng(0)).frame
+    figures = judge(field, camera, segment(model, frame))
+    assert figures.recall > 0.6
+    assert figures.precision > 0.8
+    assert figures.false_alarms < 0.002
