@@ -35,7 +35,7 @@ $(VENV)/.train: $(VENV)/.installed
 	touch $@
 
 train: $(VENV)/.train
-	$(BIN)/python -m models.training.train
+	OMP_WAIT_POLICY=passive nice -n 10 $(BIN)/python -m models.training.train
 
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --group dev -o requirements.lock pyproject.toml

@@ -18,13 +18,13 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
+from models import MODEL_PATH
 from models.training.crops import random_crop
 from models.training.noise import Plane
 from models.training.surface import ground_patch, marking_distance, marking_shares, window_rays
 from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field
 
-MODEL_PATH = Path(__file__).parents[1] / "unet.onnx"
 TILE, HALO = 512, 96
 TOLERANCE_PX = 3
 AROUND_PITCH_M = 5.0

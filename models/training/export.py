@@ -1,4 +1,4 @@
-"""Export to ONNX: `python -m models.training.export runs/unet/checkpoint.pt`.
+"""Export to ONNX: `python -m models.training.export runs/unet/checkpoint.pt --to runs/unet/unet.onnx`.
 
 One input, float32 N x 3 x H x W, RGB in 0..1; one output, float32 N x 1 x H x W, probability of a field marking. H and
 W are free multiples of 32; batch normalisation is folded into the convolutions.
@@ -17,7 +17,6 @@ from torch import Tensor, nn
 
 from models.training.network import UNet
 
-MODEL_PATH = Path(__file__).parents[1] / "unet.onnx"
 OPSET = 18
 
 
@@ -79,7 +78,7 @@ def load(checkpoint: Path) -> UNet:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("checkpoint", type=Path)
-    parser.add_argument("--to", type=Path, default=MODEL_PATH)
+    parser.add_argument("--to", type=Path, required=True, help="float32; `quantise.py` makes the served model of it")
     parser.add_argument("--threshold", type=float, default=0.5, help="what becomes 0.5")
     options = parser.parse_args()
     print(json.dumps(export(load(options.checkpoint), options.to, options.threshold), indent=1))

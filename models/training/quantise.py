@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
+from models import MODEL_PATH
 from models.training.crops import random_crop
 
-MODEL_PATH = Path(__file__).parents[1] / "unet.onnx"
 CROPS = 96
 # Worlds that training never draws.
 SEED = 2**21

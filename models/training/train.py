@@ -1,7 +1,7 @@
 """Train the U-Net on rendered pitches: `python -m models.training.train`.
 
 Starts where it stopped when called again. The default budget is two hours: enough for a usable model on two cores.
-Ends with the export to `models/unet.onnx`.
+Ends with the export, quantised, to `models/unet.onnx`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ import torch
 from torch import Tensor
 from tqdm import tqdm
 
+from models import MODEL_PATH
 from models.training.cache import SHARD_CROPS, Crops, start_workers
-from models.training.export import MODEL_PATH, export
+from models.training.export import export
 from models.training.network import UNet, focal_loss
+from models.training.quantise import quantise
 
 EPOCH_STEPS = 100
 WARM_UP_EPOCHS = 2
@@ -55,7 +57,9 @@ def main() -> None:
     for worker in workers:
         worker.terminate()
     if training.elapsed_s >= training.budget_s and not options.no_export:
-        print(json.dumps(export(training.average, MODEL_PATH, options.threshold), indent=1))
+        exported = options.run / "unet.onnx"
+        export(training.average, exported, options.threshold)
+        print(json.dumps(quantise(exported, MODEL_PATH), indent=1))
 
 
 class Training:

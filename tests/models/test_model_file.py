@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.training.evaluate import MODEL_PATH, judge, open_model, segment
+from models import MODEL_PATH
+from models.training.evaluate import judge, open_model, segment
 from models.training.render import Conditions, render_frame
 from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field

@@ -8,6 +8,7 @@ torch = pytest.importorskip("torch", reason="needs the extra `train`: pip instal
 
 from models.training.export import export, fold  # noqa: E402
 from models.training.network import UNet, focal_loss  # noqa: E402
+from models.training.quantise import quantise  # noqa: E402
 
 pytestmark = [pytest.mark.train, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
 
@@ -47,6 +48,19 @@ def test_the_threshold_chosen_becomes_one_half(network, tmp_path):
     np.testing.assert_array_equal(answers[0] > 0.3, answers[1] > 0.5)
 
 
+def test_eight_bits_say_nearly_the_same(network, tmp_path):
+    export(network, tmp_path / "unet.onnx")
+    card = quantise(tmp_path / "unet.onnx", tmp_path / "eight.onnx", crops=2)
+    assert card["bytes"] < 0.4 * (tmp_path / "unet.onnx").stat().st_size
+    picture = {"picture": np.random.default_rng(0).random((1, 3, 64, 96), dtype=np.float32)}
+    answers = [
+        onnxruntime.InferenceSession(str(tmp_path / name), providers=["CPUExecutionProvider"]).run(None, picture)[0]
+        for name in ("unet.onnx", "eight.onnx")
+    ]
+    assert answers[1].dtype == np.float32
+    assert np.abs(answers[0] - answers[1]).mean() < 0.02
+
+
 def test_folding_the_normalisation_changes_nothing(network):
     picture = torch.rand(1, 3, 64, 64)
     with torch.no_grad():
@@ -62,6 +76,7 @@ def test_the_loss_is_least_where_probability_and_coverage_agree():
 
 
 def test_a_few_steps_learn_a_bright_stripe(network):
+    torch.manual_seed(0)
     picture = torch.full((1, 3, 32, 32), 0.3)
     target = torch.zeros(1, 1, 32, 32)
     picture[:, :, 14:18], target[:, :, 14:18] = 0.9, 1.0
