@@ -14,7 +14,6 @@ from pathlib import Path
 import httpx
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from service.client import Client
 from service.schemas import Job, VenueIn
@@ -78,18 +77,17 @@ def show(job: Job) -> None:
     if job.result is None:
         console.print(f"[red]{job.status}[/]: {job.error.detail if job.error else ''}")
         return
-    table = Table("camera", "rotation (rad)", "position (m)", "moved", "sigma", "residual")
     for camera in job.result.cameras:
-        sigma = camera.sigma
-        table.add_row(
-            camera.id,
-            " ".join(f"{number:.5f}" for number in camera.pose.rotation),
-            " ".join(f"{number:.3f}" for number in camera.pose.position),
-            f"{camera.moved.rotation_deg:.2f}°, {100 * camera.moved.position_m:.1f} cm, {camera.moved.pixels:.0f} px",
-            f"{sigma.rotation_deg:.3f}°, {100 * sigma.position_m:.1f} cm" if sigma else "unknown",
-            f"{camera.residual_px:.2f} px" if camera.residual_px is not None else "unknown",
+        moved, sigma = camera.moved, camera.sigma
+        sure = f"{sigma.rotation_deg:.3f}°, {100 * sigma.position_m:.1f} cm" if sigma else "unknown"
+        residual = f"{camera.residual_px:.2f} px" if camera.residual_px is not None else "unknown"
+        console.print(
+            f"[bold]{camera.id}[/]\n"
+            f"  rotation     {' '.join(f'{number:9.5f}' for number in camera.pose.rotation)} rad, world to camera\n"
+            f"  position     {' '.join(f'{number:9.3f}' for number in camera.pose.position)} m from the pitch centre\n"
+            f"  moved        {moved.rotation_deg:.2f}°, {100 * moved.position_m:.1f} cm, {moved.pixels:.0f} px\n"
+            f"  sigma        {sure}; lines fit to {residual}; markings explained {100 * camera.iou:.0f} %"
         )
-    console.print(table)
     before, after = job.result.stitch_error_before_px, job.result.stitch_error_px
     console.print(f"Stitch error   before {_px(before)}, after [bold]{_px(after)}[/] (1 px = 10 cm on the pitch)")
     verdict = "[green]accepted[/]" if job.result.accepted else f"[red]rejected[/]: {job.result.rejected_because}"
