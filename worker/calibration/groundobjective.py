@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Array, Camera, rotation_matrices
+from worker.calibration.camera import Array, Camera, inside, rotation_matrices
 from worker.calibration.field import Field
+from worker.calibration.sampling import bilinear
 
 PIXELS_PER_METRE = 10.0
 TEMPLATE_BLURS_PX = (1.0, 2.0, 4.0)
@@ -107,8 +108,7 @@ class _PinholeView:
         size = np.ceil(right_bottom - left_top).astype(int) + 1
         x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
         plane = (np.stack([x, y], axis=-1) + left_top) / lens.matrix[0, 0]
-        raw = np.nan_to_num(lens.distort(plane), nan=-1e4).astype(np.float32)
-        undistorted = cv2.remap(response, raw[..., 0], raw[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        undistorted = bilinear(response, lens.distort(plane))
         return cls(np.rint(undistorted * 255).astype(np.uint8), matrix)
 
 
@@ -138,9 +138,7 @@ class _Grid:
     def visible(self, camera: Camera) -> Binary:
         """255 where `camera` sees the ground."""
         pixels = camera.project(self.surface.reshape(-1, 3))
-        width, height = camera.intrinsics.size
-        with np.errstate(invalid="ignore"):
-            seen = ((pixels >= 0) & (pixels <= [width - 1, height - 1])).all(axis=1)
+        seen = inside(pixels, camera.intrinsics.size)
         return (255 * seen).astype(np.uint8).reshape(self.size[::-1])
 
     def template(self, pitch: Field) -> Binary:
@@ -158,8 +156,8 @@ class _Grid:
 class _Warp:
     """A view's markings above 0.5 on the grid, where the camera saw the ground at the start.
 
-    One entry per plane of the roof: the corner of the box that holds what is seen of it, the mask (h, w) in that box,
-    and the matrices (4, 3) and (3, 3) that lift a pixel of the box to a point (x, y, z, 1) of the plane.
+    One entry per plane of the roof: left and top of the box that holds what is seen of it, the mask (h, w) in that box,
+    and the matrix (4, 3) that lifts a pixel of the box to a point (x, y, z, 1) of the plane.
     """
 
     view: _PinholeView

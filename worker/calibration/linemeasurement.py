@@ -98,9 +98,10 @@ def measure_lines(
         )
         for low, high, sampling in WIDTH_CLASSES_PX
     ]
+    index = np.concatenate([m.index for m in found])
     return Measurements(
-        np.concatenate([m.index for m in found]),
-        lines[np.concatenate([m.index for m in found])],
+        index,
+        lines[index],
         np.concatenate([m.pixel for m in found]),
         np.concatenate([m.normal for m in found]),
         np.concatenate([m.px_per_metre for m in found]),
@@ -139,14 +140,7 @@ def _measure_class(
         & (bilinear(response, pixel) >= LEAST_RESPONSE)
         & np.isfinite(profiles).all(axis=1)
     )
-    return Measurements(
-        seen.index[good],
-        seen.points[good],
-        pixel[good],
-        seen.normal[good],
-        seen.px_per_metre[good],
-        seen.px_per_metre_up[good],
-    )
+    return Measurements(seen.index, seen.points, pixel, seen.normal, seen.px_per_metre, seen.px_per_metre_up)[good]
 
 
 def expected_profiles(width_px: Array, offsets_px: Array) -> Array:

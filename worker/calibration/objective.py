@@ -102,7 +102,7 @@ class BlurredResponse:
     def minus(self, coarser: BlurredResponse) -> BlurredResponse:
         """The difference to a coarser blur of the same picture."""
         size = (self.values.shape[1], self.values.shape[0])
-        return BlurredResponse(self.values - cv2.resize(coarser.values, size, dst=None), self.shrink)
+        return BlurredResponse(self.values - cv2.resize(coarser.values, size), self.shrink)
 
     def at(self, pixels: Array) -> Response:
         """Values (P, N) at pixels (P, N, 2) of the full-size picture; 0 outside it and at NaN."""

@@ -71,6 +71,16 @@ class Segmenter:
         return np.asarray(answer, dtype=np.float32)[0, 0]
 
 
+def whole_frame(size: tuple[int, int]) -> list[Region]:
+    """Regions that cover all of a frame of `size` (width, height)."""
+    width, height = (_up_to_grid(side) for side in size)
+    return [
+        Region(left, top, min(left + REGION_PX, width), min(top + REGION_PX, height))
+        for left in range(0, width, REGION_PX)
+        for top in range(0, height, REGION_PX)
+    ]
+
+
 def reachable_regions(pitch: Field, camera: Camera, reach_px: float) -> list[Region]:
     """Where in the frame a marking can be that is at most `reach_px` from where the pose puts it.
 

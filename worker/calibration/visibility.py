@@ -34,10 +34,10 @@ class SeenLines:
     px_per_metre_up: Array
 
     @classmethod
-    def from_camera(cls, lines: LinePoints, camera: Camera, margin_px: float = 0.0) -> SeenLines:
-        """The points that fall into the picture, at least `margin_px` from its border."""
+    def from_camera(cls, lines: LinePoints, camera: Camera) -> SeenLines:
+        """The points that fall into the picture."""
         pixel = camera.project(lines.position)
-        index = np.flatnonzero(inside(pixel, camera.intrinsics.size, margin_px))
+        index = np.flatnonzero(inside(pixel, camera.intrinsics.size))
         lines, pixel = lines[index], pixel[index]
         along = (camera.project(lines.position + STEP_M * lines.tangent) - pixel) / STEP_M
         across = (camera.project(lines.position + STEP_M * lines.normal) - pixel) / STEP_M
