@@ -15,7 +15,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from models import MODEL_PATH
@@ -24,8 +23,8 @@ from models.training.noise import Plane
 from models.training.surface import ground_patch, marking_distance, marking_shares, window_rays
 from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field
+from worker.calibration.segmentation import Segmenter, whole_frame
 
-TILE, HALO = 512, 96
 TOLERANCE_PX = 3
 AROUND_PITCH_M = 5.0
 CLEAR_M = 1.0
@@ -70,29 +69,6 @@ def _distance_px(mask: NDArray[np.bool_]) -> Plane:
     return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
 
 
-def segment(session: onnxruntime.InferenceSession, frame: NDArray[np.uint8]) -> Plane:
-    """Probability (H, W) of a frame (H, W, 3) blue green red, tile by tile."""
-    height, width = frame.shape[:2]
-    rows, columns = -(-height // TILE) * TILE, -(-width // TILE) * TILE
-    padded = cv2.copyMakeBorder(frame, HALO, HALO + rows - height, HALO, HALO + columns - width, cv2.BORDER_REFLECT_101)
-    probability = np.empty((rows, columns), np.float32)
-    name = session.get_inputs()[0].name
-    for top in range(0, rows, TILE):
-        for left in range(0, columns, TILE):
-            tile = padded[top : top + TILE + 2 * HALO, left : left + TILE + 2 * HALO, ::-1]
-            picture = tile.transpose(2, 0, 1)[None].astype(np.float32) / 255
-            answer = session.run(None, {name: picture})[0][0, 0]
-            probability[top : top + TILE, left : left + TILE] = answer[HALO:-HALO, HALO:-HALO]
-    return probability[:height, :width]
-
-
-def open_model(path: Path = MODEL_PATH, threads: int = 2) -> onnxruntime.InferenceSession:
-    """An ONNX session on the CPU."""
-    settings = onnxruntime.SessionOptions()
-    settings.intra_op_num_threads = threads
-    return onnxruntime.InferenceSession(str(path), settings, providers=["CPUExecutionProvider"])
-
-
 def real_cameras(folder: Path) -> tuple[Field, dict[str, Camera]]:
     """The pitch and the cameras, with the poses of `reference.json`, of a folder of real frames."""
     venue = json.loads((folder / "venue.json").read_text())
@@ -111,7 +87,7 @@ def real_cameras(folder: Path) -> tuple[Field, dict[str, Camera]]:
     return field, cameras
 
 
-def real(session: onnxruntime.InferenceSession, folder: Path, out: Path | None) -> dict[str, Figures]:
+def real(segmenter: Segmenter, folder: Path, out: Path | None) -> dict[str, Figures]:
     """Figures per frame of a folder of real frames; the probabilities as pictures in `out`."""
     field, cameras = real_cameras(folder)
     figures = {}
@@ -120,26 +96,25 @@ def real(session: onnxruntime.InferenceSession, folder: Path, out: Path | None) 
         if camera is None:
             continue
         frame = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-        probability = segment(session, frame)
-        figures[path.stem] = judge(field, camera, probability)
+        response = segmenter(frame, whole_frame(camera.intrinsics.size))
+        figures[path.stem] = judge(field, camera, response / np.float32(255))
         if out:
             out.mkdir(parents=True, exist_ok=True)
-            cv2.imwrite(str(out / f"{path.stem}.png"), np.round(probability * 255).astype(np.uint8))
+            cv2.imwrite(str(out / f"{path.stem}.png"), response)
     return figures
 
 
-def rendered(session: onnxruntime.InferenceSession, crops: int, seed: int = 2**20) -> list[dict[str, float]]:
+def rendered(segmenter: Segmenter, crops: int, seed: int = 2**20) -> list[dict[str, float]]:
     """Figures per pixel over rendered crops of venues that training never draws, one row per threshold.
 
     False alarms: share of the pixels farther than `TOLERANCE_PX` from any marking.
     """
     totals = np.zeros((len(THRESHOLDS), 4))
     labels = 0
-    name = session.get_inputs()[0].name
     for index in range(crops):
         rendering = random_crop(np.random.default_rng([seed, index]))
         picture = rendering.frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
-        probability = session.run(None, {name: picture})[0][0, 0]
+        probability = segmenter.session.run(None, {segmenter.input_name: picture})[0][0, 0]
         label = rendering.target > 0.5
         far = _distance_px(rendering.target > 0.05) > TOLERANCE_PX
         labels += int(label.sum())
@@ -167,12 +142,12 @@ def main() -> None:
     parser.add_argument("--real", type=Path, help="folder of real frames")
     parser.add_argument("--write", type=Path, help="folder for the probability maps")
     options = parser.parse_args()
-    session = open_model(options.model)
+    segmenter = Segmenter(options.model, threads=2)
     if options.rendered:
-        for row in rendered(session, options.rendered):
+        for row in rendered(segmenter, options.rendered):
             print("  ".join(f"{name} {value:.4f}" for name, value in row.items()))
     if options.real:
-        for name, figures in real(session, options.real, options.write).items():
+        for name, figures in real(segmenter, options.real, options.write).items():
             print(f"{name:10} {figures}")
 
 

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 from models import MODEL_PATH
-from models.training.evaluate import judge, open_model, segment
+from models.training.evaluate import judge
 from models.training.render import Conditions, render_frame
 from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field
+from worker.calibration.segmentation import Segmenter, whole_frame
 
 
 @pytest.fixture(scope="module")
 def model():
-    return open_model()
+    return Segmenter(MODEL_PATH, threads=2)
 
 
 def test_the_card_names_this_very_file():
@@ -25,10 +26,10 @@ def test_the_card_names_this_very_file():
 
 
 def test_the_interface_is_the_contract(model):
-    [given], [answer] = model.get_inputs(), model.get_outputs()
+    [given], [answer] = model.session.get_inputs(), model.session.get_outputs()
     assert (given.type, answer.type) == ("tensor(float)", "tensor(float)")
     for shape in ((1, 3, 64, 96), (2, 3, 32, 160)):
-        [probability] = model.run(None, {given.name: np.full(shape, 0.4, np.float32)})
+        [probability] = model.session.run(None, {given.name: np.full(shape, 0.4, np.float32)})
         assert probability.shape == (shape[0], 1, *shape[2:])
         assert 0 <= probability.min() <= probability.max() <= 1
 
@@ -40,7 +41,7 @@ def test_it_finds_the_lines_of_a_pitch_it_has_not_seen_and_little_else(model):
     )
     camera = Camera("left", lens, Pose.looking_at([-2.0, -46.0, 11.0], [-24.0, -8.0, 0.0]))
     frame = render_frame(field, camera, replace(Conditions.fair(56), wear=0.04), np.random.default_rng(0)).frame
-    figures = judge(field, camera, segment(model, frame))
+    figures = judge(field, camera, model(frame, whole_frame(lens.size)) / np.float32(255))
     assert figures.recall > 0.6
     assert figures.precision > 0.8
     assert figures.false_alarms < 0.002

@@ -7,7 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from worker.calibration.camera import Camera, Intrinsics, Pose
+from models.training.evaluate import real_cameras
+from worker.calibration.camera import Camera, Pose
 from worker.calibration.field import Field
 
 FOLDER = Path(__file__).parents[3] / "shared" / "real" / "tsukuba"
@@ -25,27 +26,11 @@ class RealPair:
 
     @classmethod
     def load(cls) -> "RealPair":
-        venue = json.loads((FOLDER / "venue.json").read_text())
-        field = venue["field"]
-        cameras = [
-            Camera(
-                c["id"],
-                Intrinsics(
-                    np.array(c["intrinsics"]["matrix"], dtype=float),
-                    np.array(c["intrinsics"]["distortion"], dtype=float),
-                    tuple(c["image_size"]),
-                ),
-                Pose(np.array(c["pose"]["rotation"]), np.array(c["pose"]["position"])),
-            )
-            for c in venue["cameras"]
-        ]
-        return cls(
-            Field(field["length_m"], field["width_m"], field["line_width_m"], np.array(field["ridge"])),
-            cameras,
-            venue,
-            json.loads((FOLDER / "starts.json").read_text()),
-            json.loads((FOLDER / "keypoints.json").read_text()),
+        pitch, cameras = real_cameras(FOLDER)
+        venue, starts, clicks = (
+            json.loads((FOLDER / name).read_text()) for name in ("venue.json", "starts.json", "keypoints.json")
         )
+        return cls(pitch, list(cameras.values()), venue, starts, clicks)
 
     def files(self, moment: str = "000") -> dict[str, Path]:
         return {camera.id: FOLDER / f"{camera.id}_{moment}.jpg" for camera in self.cameras}
