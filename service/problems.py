@@ -61,6 +61,7 @@ KINDS: dict[str, Kind] = {
     "queue-full": Kind(429, "Too many jobs are waiting"),
     "no-markings-in-view": Kind(422, "The stored pose of a camera sees no markings"),
     "model-missing": Kind(503, "The segmentation network is missing"),
+    "provider-missing": Kind(503, "The network cannot run on what ESC_PROVIDER names"),
     "job-timeout": Kind(504, "The job took longer than it may"),
     "job-crashed": Kind(500, "The computation broke off"),
     "job-abandoned": Kind(500, "The job was given up"),

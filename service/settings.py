@@ -41,6 +41,9 @@ class Settings(BaseSettings):
     # The worker.
     worker_name: str = Field(default_factory=socket.gethostname, description="Unique per worker and stable.")
     jobs_at_once: int = Field(1, ge=1)
+    provider: Literal["cpu", "cuda", "openvino"] = Field(
+        "cpu", description="What runs the network; all but `cpu` need their own build of ONNX Runtime."
+    )
     threads: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="Per job.")
     job_timeout_s: float = Field(600, gt=0, description="For jobs that name no limit of their own.")
     job_program: list[str] = Field(

@@ -32,11 +32,12 @@ from worker.calibration import stitching
 from worker.calibration.calibrate import CalibrationError, calibrate
 from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field
-from worker.calibration.segmentation import Segmenter
+from worker.calibration.segmentation import ProviderMissing, Segmenter
 from worker.message import Message
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
+PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
 # The engine's report ends with the refinement; what is left is drawing.
 PREVIEW_FRACTION = 0.96
 log = structlog.get_logger()
@@ -100,7 +101,7 @@ def solve(
     frames = {camera.id: _decode(camera, files[camera.id]) for camera in venue.cameras}
     decoded = time.perf_counter()
     pitch, cameras = _pitch(venue.field), [_camera(camera) for camera in venue.cameras]
-    segmenter = Segmenter(settings.model, threads=settings.threads)
+    segmenter = _segmenter(settings)
     try:
         found = calibrate(
             pitch, cameras, frames, segmenter, _engine_options(options), lambda step: report(_progress(step))
@@ -122,6 +123,13 @@ def solve(
         options=options.model_dump(mode="json"),
     )
     return Outcome(_result(found, timings, provenance), pictures)
+
+
+def _segmenter(settings: Settings) -> Segmenter:
+    try:
+        return Segmenter(settings.model, settings.threads, PROVIDERS[settings.provider])
+    except ProviderMissing as missing:
+        raise Failure("provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for.") from missing
 
 
 def _line_to_parent() -> Callable[[Message], None]:

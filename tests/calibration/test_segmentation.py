@@ -7,7 +7,14 @@ import pytest
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.calibration.synthetic import CROWNED, camera, paint_frame
 from worker.calibration.sampling import median
-from worker.calibration.segmentation import REGION_PX, Region, Segmenter, reachable_regions
+from worker.calibration.segmentation import (
+    REGION_PX,
+    Region,
+    Segmenter,
+    reachable_regions,
+    shrinking,
+    whole_frame,
+)
 
 WIDE = camera("left", (-1.0, -48.0, 12.0), (-20.0, 0.0), focal=1200, size=(1920, 1080))
 
@@ -78,6 +85,38 @@ def test_regions_lie_on_the_grid_and_are_of_bounded_size():
         assert all(side % 32 == 0 for side in sides)
         assert 0 < region.right - region.left <= REGION_PX
         assert 0 < region.bottom - region.top <= REGION_PX
+
+
+@pytest.mark.parametrize(("width", "factor"), [(640, 1), (1920, 1), (2560, 1), (3072, 2), (3840, 2), (7680, 4)])
+def test_the_network_sees_about_two_thousand_columns(width, factor):
+    assert shrinking((width, width * 9 // 16)) == factor
+
+
+def test_a_large_frame_is_seen_shrunk_and_answered_at_its_own_size(segmenter, picture):
+    small = np.hstack([picture[200:456], picture[200:456]])
+    large = cv2.resize(small, (2 * small.shape[1], 2 * small.shape[0]), interpolation=cv2.INTER_NEAREST)
+    size = large.shape[1::-1]
+    assert shrinking(size) == 2
+    answer, expected = segmenter(large, whole_frame(size)), segmenter(small, whole_frame(small.shape[1::-1]))
+    assert answer.shape == large.shape[:2]
+    np.testing.assert_array_equal(answer, cv2.resize(expected, size, interpolation=cv2.INTER_LINEAR))
+
+
+@pytest.mark.parametrize("size", [(1921, 1081), (3073, 1729), (3847, 2159), (330, 210)])
+def test_frames_of_any_size_are_segmented_to_their_last_pixel(segmenter, size):
+    frame = np.zeros((size[1], size[0], 3), np.uint8)
+    regions = whole_frame(size)
+    assert max(region.right for region in regions) >= size[0]
+    assert max(region.bottom for region in regions) >= size[1]
+    assert segmenter(frame, regions[-1:]).shape == frame.shape[:2]
+
+
+def test_regions_of_a_large_frame_stay_on_the_grid_when_it_is_shrunk():
+    large = camera("left", (-1.0, -48.0, 12.0), (-20.0, 0.0), focal=2400, size=(3840, 2160))
+    for region in reachable_regions(CROWNED, large, 200):
+        small = region.shrunk(2)
+        assert all(side % 32 == 0 for side in (small.left, small.top, small.right, small.bottom))
+        assert max(small.right - small.left, small.bottom - small.top) <= REGION_PX
 
 
 def test_regions_do_not_overlap():

@@ -60,8 +60,8 @@ def asked(monkeypatch):
     class Segmenter:
         sha256 = "f" * 64
 
-        def __init__(self, model, threads):
-            pass
+        def __init__(self, model, threads, provider):
+            assert provider == "CPUExecutionProvider"
 
     monkeypatch.setattr(job, "calibrate", calibrate)
     monkeypatch.setattr(job, "Segmenter", Segmenter)
@@ -148,6 +148,12 @@ def test_a_missing_network_fails_and_says_where_it_should_be(venue, files, setti
     gone = settings.model_copy(update={"model": settings.model / "nowhere"})
     with pytest.raises(job.Failure, match="nowhere"):
         job.solve(venue, files, Options(), gone, lambda _: None)
+
+
+def test_a_provider_that_is_not_installed_fails_and_says_what_to_set(venue, files):
+    with pytest.raises(job.Failure, match=r"no CUDAExecutionProvider, only .* ESC_PROVIDER=cpu") as failure:
+        job.solve(venue, files, Options(), Settings(threads=1, provider="cuda"), lambda _: None)
+    assert failure.value.error.type == "/problems/provider-missing"
 
 
 def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, settings, monkeypatch):
