@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check bench-real train lock clean
+.PHONY: setup demo test check bench-real bench-segmentation train lock clean
 
 setup: $(VENV)/.installed
 
@@ -29,6 +29,9 @@ check: setup
 
 bench-real: setup
 	$(BIN)/python -m tests.benchmarks.real_pair
+
+bench-segmentation: $(VENV)/.train
+	$(BIN)/python -m tests.benchmarks.segmentation
 
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'

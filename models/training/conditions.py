@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 LIGHTS = ("sun", "cloud", "floodlight")
+
+NAMED: dict[str, dict[str, object]] = {
+    "sun": {"light": "sun"},
+    "cloud": {"light": "cloud"},
+    "floodlight": {"light": "floodlight"},
+    "long shadows": {"light": "sun", "long_shadows": 0.8},
+    "worn lines": {"light": "cloud", "wear": 0.75},
+    "rain": {"light": "cloud", "rain": 0.7},
+}
+"""What a table of conditions compares, each against fair weather and an ordinary pitch."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +51,12 @@ class Conditions:
     def fair(cls, world: int = 0) -> Conditions:
         """A clean, sunny afternoon on well-kept natural grass."""
         return cls(world=world)
+
+    @classmethod
+    def named(cls, name: str, rng: np.random.Generator) -> Conditions:
+        """One of `NAMED`; whatever it does not name is random, but fair."""
+        fair = {"long_shadows": 0.0, "rain": 0.0, "fog": 0.0, "snow": 0.0, "wear": 0.15}
+        return replace(cls.random(rng), **{**fair, **NAMED[name]})
 
     @classmethod
     def random(cls, rng: np.random.Generator) -> Conditions:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,8 +17,26 @@ CROP_SIZE = 288
 KINDS = {"marking": 0.22, "near marking": 0.26, "steep marking": 0.16, "pitch": 0.1, "outside": 0.2, "frame": 0.06}
 
 
+@dataclass(frozen=True)
+class View:
+    """A window (x, y, width, height) of what a camera sees of a pitch."""
+
+    field: Field
+    camera: Camera
+    window: tuple[int, int, int, int]
+
+    def rendered(self, conditions: Conditions, rng: np.random.Generator) -> Rendering:
+        """The window under some conditions; `rng` is the sensor's."""
+        return render_window(self.field, self.camera, conditions, self.window, rng)
+
+
 def random_crop(rng: np.random.Generator, size: int = CROP_SIZE) -> Rendering:
     """A square window of `size` pixels of a frame that exists nowhere else."""
+    return random_view(rng, size).rendered(Conditions.random(rng), rng)
+
+
+def random_view(rng: np.random.Generator, size: int = CROP_SIZE) -> View:
+    """A square window of `size` pixels of a random camera at a random pitch, where there is something to learn."""
     while True:
         field = random_field(rng)
         camera = random_camera(rng, field)
@@ -25,7 +45,7 @@ def random_crop(rng: np.random.Generator, size: int = CROP_SIZE) -> Rendering:
             break
     corner = np.round(middle + rng.uniform(-0.45, 0.45, 2) * size - size / 2).astype(int)
     corner = np.clip(corner, 0, np.array(camera.intrinsics.size) - size)
-    return render_window(field, camera, Conditions.random(rng), (int(corner[0]), int(corner[1]), size, size), rng)
+    return View(field, camera, (int(corner[0]), int(corner[1]), size, size))
 
 
 def _interesting(rng: np.random.Generator, field: Field, camera: Camera) -> NDArray[np.float64] | None:

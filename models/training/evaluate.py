@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import MODEL_PATH
-from models.training.crops import random_crop
+from models.training.conditions import NAMED
+from models.training.crops import random_crop, random_view
 from models.training.noise import Plane
+from models.training.render import Conditions, Rendering
 from models.training.surface import ground_patch, marking_distance, marking_shares, window_rays
 from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field
@@ -28,6 +30,8 @@ from worker.calibration.segmentation import Segmenter, whole_frame
 TOLERANCE_PX = 3
 AROUND_PITCH_M = 5.0
 CLEAR_M = 1.0
+# Seed of worlds that training never draws.
+UNSEEN = 2**20
 THRESHOLDS = (0.2, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.7)
 
 
@@ -104,34 +108,49 @@ def real(segmenter: Segmenter, folder: Path, out: Path | None) -> dict[str, Figu
     return figures
 
 
-def rendered(segmenter: Segmenter, crops: int, seed: int = 2**20) -> list[dict[str, float]]:
-    """Figures per pixel over rendered crops of venues that training never draws, one row per threshold.
+def rendered(segmenter: Segmenter, crops: int, seed: int = UNSEEN) -> list[dict[str, float]]:
+    """Figures per pixel over rendered crops of venues that training never draws, one row per threshold."""
+    counts = sum(
+        (_count(segmenter, random_crop(np.random.default_rng([seed, index]))) for index in range(crops)),
+        start=np.zeros((len(THRESHOLDS), 5)),
+    )
+    return [{"threshold": threshold, **_shares(*row)} for threshold, row in zip(THRESHOLDS, counts, strict=True)]
 
-    False alarms: share of the pixels farther than `TOLERANCE_PX` from any marking.
-    """
-    totals = np.zeros((len(THRESHOLDS), 4))
-    labels = 0
-    for index in range(crops):
-        rendering = random_crop(np.random.default_rng([seed, index]))
-        picture = rendering.frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
-        probability = segmenter.session.run(None, {segmenter.input_name: picture})[0][0, 0]
-        label = rendering.target > 0.5
-        far = _distance_px(rendering.target > 0.05) > TOLERANCE_PX
-        labels += int(label.sum())
-        for row, threshold in enumerate(THRESHOLDS):
-            answer = probability > threshold
-            totals[row] += [(answer & label).sum(), answer.sum(), (answer & far).sum(), far.sum()]
-    return [
-        {
-            "threshold": threshold,
-            "iou": hits / max(answers + labels - hits, 1),
-            "f1": 2 * hits / max(answers + labels, 1),
-            "recall": hits / max(labels, 1),
-            "precision": hits / max(answers, 1),
-            "false_alarms": alarms / max(clear, 1),
-        }
-        for threshold, (hits, answers, alarms, clear) in zip(THRESHOLDS, totals, strict=True)
-    ]
+
+def by_condition(segmenter: Segmenter, views: int, seed: int = UNSEEN) -> dict[str, dict[str, float]]:
+    """Figures per pixel at 0.5 under each of the named conditions, over the same views of the same venues."""
+    figures = {}
+    for name in NAMED:
+        counts = np.zeros((len(THRESHOLDS), 5))
+        for index in range(views):
+            rng = np.random.default_rng([seed, 1, index])
+            view = random_view(rng)
+            counts += _count(segmenter, view.rendered(Conditions.named(name, rng), rng))
+        figures[name] = _shares(*counts[THRESHOLDS.index(0.5)])
+    return figures
+
+
+def _count(segmenter: Segmenter, rendering: Rendering) -> NDArray[np.float64]:
+    """Pixels per threshold: hits, answers, labels, answers far from any marking, pixels far from any marking."""
+    picture = rendering.frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
+    probability = segmenter.session.run(None, {segmenter.input_name: picture})[0][0, 0]
+    label = rendering.target > 0.5
+    far = _distance_px(rendering.target > 0.05) > TOLERANCE_PX
+    answers = [probability > threshold for threshold in THRESHOLDS]
+    return np.array(
+        [((answer & label).sum(), answer.sum(), label.sum(), (answer & far).sum(), far.sum()) for answer in answers],
+        dtype=float,
+    )
+
+
+def _shares(hits: float, answers: float, labels: float, alarms: float, clear: float) -> dict[str, float]:
+    return {
+        "iou": hits / max(answers + labels - hits, 1),
+        "f1": 2 * hits / max(answers + labels, 1),
+        "recall": hits / max(labels, 1),
+        "precision": hits / max(answers, 1),
+        "false_alarms": alarms / max(clear, 1),
+    }
 
 
 def main() -> None:

@@ -7,6 +7,7 @@ W are free multiples of 32; batch normalisation is folded into the convolutions.
 from __future__ import annotations
 
 import argparse
+import copy
 import hashlib
 import json
 import math
@@ -15,7 +16,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from models.training.network import UNet
+from models.training.network import LEAK, UNet
 
 OPSET = 18
 
@@ -58,9 +59,7 @@ def export(network: UNet, path: Path, threshold: float = 0.5) -> dict[str, objec
 
 def fold(network: UNet) -> UNet:
     """A copy whose batch normalisation is part of its convolutions."""
-    folded = UNet()
-    folded.load_state_dict({name: value.cpu().float() for name, value in network.state_dict().items()})
-    folded.eval()
+    folded = copy.deepcopy(network).cpu().float().eval()
     for block in (*folded.down, *folded.up):
         for index in (0, 3):
             block[index] = nn.utils.fusion.fuse_conv_bn_eval(block[index], block[index + 1])
@@ -68,9 +67,9 @@ def fold(network: UNet) -> UNet:
     return folded
 
 
-def load(checkpoint: Path) -> UNet:
+def load(checkpoint: Path, leak: float = LEAK) -> UNet:
     """The averaged weights of a checkpoint."""
-    network = UNet()
+    network = UNet(leak)
     network.load_state_dict(torch.load(checkpoint, map_location="cpu", weights_only=True)["average"])
     return network.eval()
 

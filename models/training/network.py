@@ -18,14 +18,14 @@ class UNet(nn.Module):
     The paper names no normalisation. Batch normalisation is added: it trains faster, and folds into the convolutions.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, leak: float = LEAK) -> None:
         super().__init__()
         self.register_buffer("mean", torch.tensor(MEAN).view(1, 3, 1, 1))
         self.register_buffer("spread", torch.tensor(SPREAD).view(1, 3, 1, 1))
         before = (3, *FILTERS[:-1])
-        self.down = nn.ModuleList(_block(a, b) for a, b in zip(before, FILTERS, strict=True))
+        self.down = nn.ModuleList(_block(a, b, leak) for a, b in zip(before, FILTERS, strict=True))
         self.grow = nn.ModuleList(nn.ConvTranspose2d(b, a, 2, stride=2) for a, b in _steps_up())
-        self.up = nn.ModuleList(_block(2 * a, a) for a, _ in _steps_up())
+        self.up = nn.ModuleList(_block(2 * a, a, leak) for a, _ in _steps_up())
         self.head = nn.Conv2d(FILTERS[0], 1, 1)
         # Nearly every pixel is no marking: start by saying so.
         nn.init.constant_(self.head.bias, -4.0)
@@ -48,13 +48,13 @@ def _steps_up() -> list[tuple[int, int]]:
     return list(zip(FILTERS[-2::-1], FILTERS[:0:-1], strict=True))
 
 
-def _block(before: int, after: int) -> nn.Sequential:
+def _block(before: int, after: int, leak: float) -> nn.Sequential:
     layers: list[nn.Module] = []
     for channels in (before, after):
         layers += [
             nn.Conv2d(channels, after, 3, padding=1, bias=False),
             nn.BatchNorm2d(after),
-            nn.LeakyReLU(LEAK, inplace=True),
+            nn.LeakyReLU(leak, inplace=True),
         ]
     return nn.Sequential(*layers)
 

@@ -2,6 +2,9 @@
 
 Starts where it stopped when called again. The default budget is two hours: enough for a usable model on two cores.
 Ends with the export, quantised, to `models/unet.onnx`.
+
+    python -m models.training.train --device cuda --batch 64 --workers 14 --minutes 240
+    python -m models.training.train --run runs/longer --start runs/unet/checkpoint.pt --minutes 60
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import json
 import signal
 import threading
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +26,7 @@ from tqdm import tqdm
 from models import MODEL_PATH
 from models.training.cache import SHARD_CROPS, Crops, start_workers
 from models.training.export import export
-from models.training.network import UNet, focal_loss
+from models.training.network import LEAK, UNet, focal_loss
 from models.training.quantise import quantise
 
 EPOCH_STEPS = 100
@@ -32,6 +36,7 @@ LAST_RATE = 0.05  # of the first one
 WEIGHT_DECAY = 1e-4
 AVERAGE = 0.995
 SAVE_EVERY_S = 240
+BAR = "{percentage:5.1f}% |{bar}| {elapsed}<{remaining} {postfix}"
 
 
 def main() -> None:
@@ -43,11 +48,12 @@ def main() -> None:
     if device.type == "cpu":
         torch.set_num_threads(options.threads)
     options.run.mkdir(parents=True, exist_ok=True)
-    workers = start_workers(options.run / "crops", options.seed, options.workers, options.shards)
-    crops = Crops(options.run / "crops", np.random.default_rng([options.seed, 1]))
+    folder = options.crops or options.run / "crops"
+    workers = start_workers(folder, options.seed, options.workers, options.shards)
+    crops = Crops(folder, np.random.default_rng([options.seed, 1]))
     while crops.refresh() < 4 * SHARD_CROPS:
         time.sleep(1)
-    training = Training(device, 60 * options.minutes, options.gamma)
+    training = Training(device, Budget(60 * options.minutes, options.steps), options.leak, options.gamma)
     checkpoint = options.run / "checkpoint.pt"
     if checkpoint.exists():
         training.load(checkpoint)
@@ -56,27 +62,44 @@ def main() -> None:
     train(training, crops, options, checkpoint)
     for worker in workers:
         worker.terminate()
-    if training.elapsed_s >= training.budget_s and not options.no_export:
+    if training.done >= 1 and not options.no_export:
         exported = options.run / "unet.onnx"
         export(training.average, exported, options.threshold)
         print(json.dumps(quantise(exported, MODEL_PATH), indent=1))
 
 
+@dataclass(frozen=True)
+class Budget:
+    """How long to train: by the clock, so that a slow machine finishes too; or by steps, to compare recipes."""
+
+    seconds: float
+    steps: int | None = None
+
+    def spent(self, seconds: float, steps: int) -> float:
+        """The share 0..1 that is used up."""
+        return min(1.0, steps / self.steps if self.steps else seconds / self.seconds)
+
+
 class Training:
     """Network, running average of its weights, optimiser and schedule."""
 
-    def __init__(self, device: torch.device, budget_s: float, gamma: float) -> None:
+    def __init__(self, device: torch.device, budget: Budget, leak: float, gamma: float) -> None:
         torch.manual_seed(0)
-        self.device, self.budget_s, self.gamma = device, budget_s, gamma
+        self.device, self.budget, self.gamma = device, budget, gamma
         self.step, self.elapsed_s = 0, 0.0
-        self.network = UNet().to(device, memory_format=torch.channels_last)
+        self.network = UNet(leak).to(device, memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.network).eval()
         self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
 
+    @property
+    def done(self) -> float:
+        """The share 0..1 of the schedule that is behind."""
+        return self.budget.spent(self.elapsed_s, self.step)
+
     def learning_rate(self) -> float:
-        """Two epochs of warm-up, then exponentially down; by the clock, so that a slow machine finishes too."""
+        """Two epochs of warm-up, then exponentially down."""
         warm = min(1.0, (self.step + 1) / (WARM_UP_EPOCHS * EPOCH_STEPS))
-        return LEARNING_RATE * warm * LAST_RATE ** min(1.0, self.elapsed_s / self.budget_s)
+        return LEARNING_RATE * warm * LAST_RATE**self.done
 
     def learn(self, pictures: Tensor, targets: Tensor) -> float:
         """One step; the loss."""
@@ -137,16 +160,16 @@ def train(training: Training, crops: Crops, options: argparse.Namespace, checkpo
     saved = before = time.monotonic()
     losses: list[float] = []
     log = (options.run / "log.jsonl").open("a")
-    progress = tqdm(total=round(training.budget_s), initial=round(training.elapsed_s), unit="s", mininterval=5)
+    progress = tqdm(total=100, initial=100 * training.done, unit="%", mininterval=5, bar_format=BAR)
     stopped = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stopped.set())
-    while training.elapsed_s < training.budget_s and not stopped.is_set():
+    while training.done < 1 and not stopped.is_set():
         pictures, targets = crops.batch(options.batch, options.size)
         losses.append(training.learn(torch.from_numpy(pictures), torch.from_numpy(targets)))
         now = time.monotonic()
         training.elapsed_s += now - before
-        progress.update(now - before)
         before = now
+        progress.update(100 * training.done - progress.n)
         if training.step % EPOCH_STEPS == 0:
             line = {"step": training.step, "loss": float(np.mean(losses)), "crops": crops.refresh()}
             progress.set_postfix(line)
@@ -162,7 +185,8 @@ def train(training: Training, crops: Crops, options: argparse.Namespace, checkpo
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--run", type=Path, default=Path("runs/unet"), help="folder of crops, checkpoint and log")
+    parser.add_argument("--run", type=Path, default=Path("runs/unet"), help="folder of checkpoint and log")
+    parser.add_argument("--crops", type=Path, help="folder of rendered crops, which runs may share; RUN/crops")
     parser.add_argument("--device", default="auto", help="auto, cpu or cuda")
     parser.add_argument("--minutes", type=float, default=120.0, help="budget of the whole schedule")
     parser.add_argument("--batch", type=int, default=6)
@@ -170,7 +194,9 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=1, help="processes that render")
     parser.add_argument("--shards", type=int, default=400, help=f"of {SHARD_CROPS} crops per worker")
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--gamma", type=float, default=1.0, help="of the focal loss")
+    parser.add_argument("--steps", type=int, help="budget in steps instead of minutes")
+    parser.add_argument("--gamma", type=float, default=1.0, help="of the focal loss; 0 is cross entropy")
+    parser.add_argument("--leak", type=float, default=LEAK, help="slope of LeakyReLU below 0; 0 is ReLU")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=Path, help="checkpoint whose weights to start from")
     parser.add_argument("--threshold", type=float, default=0.45, help="probability that the exported model calls 0.5")

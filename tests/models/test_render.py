@@ -2,10 +2,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
-from models.training.conditions import LIGHTS
+from models.training.conditions import LIGHTS, NAMED
+from models.training.crops import random_view
 from models.training.render import Conditions, render_frame, render_window
 from models.training.venues import random_camera, random_field
 from worker.calibration.camera import Camera, Intrinsics, Pose, inside
@@ -50,6 +52,28 @@ def test_a_line_covers_as_many_pixels_as_its_area_in_the_picture():
     above = Camera("top", lens, Pose.looking_at([0.0, 20.0, 10.0], [0.0, 20.1, 0.0]))
     mask = render_frame(FIELD.flat(), above, EMPTY, rng()).mask
     assert mask.sum(axis=1)[100:140] == pytest.approx(12.0, abs=0.4)
+
+
+def test_the_mask_of_a_lens_without_distortion_is_the_distorted_one_undistorted():
+    bent, lens = camera(), camera().intrinsics
+    straight = Camera("left", replace(lens, distortion=np.zeros(5)), bent.pose)
+    expected = render_frame(FIELD, straight, EMPTY, rng()).mask
+    undistorted = cv2.undistort(render_frame(FIELD, bent, EMPTY, rng()).mask, lens.matrix, lens.distortion)
+    # Undistorting blurs, so that areas are compared, not pixels: means of 5 x 5.
+    inner = np.s_[110:-20, 60:-60]
+    difference = cv2.blur(undistorted, (5, 5))[inner] - cv2.blur(expected, (5, 5))[inner]
+    assert expected[inner].mean() > 0.01
+    assert np.abs(difference).max() < 0.1
+
+
+def test_the_same_view_under_each_condition_has_the_same_markings():
+    view = random_view(np.random.default_rng(8), 96)
+    renderings = {name: view.rendered(replace(Conditions.named(name, rng()), players=0), rng()) for name in NAMED}
+    # Worn lines are broken, and their mask with them.
+    masks = [rendering.mask for name, rendering in renderings.items() if name != "worn lines"]
+    assert masks[0].any()
+    assert all(np.array_equal(mask, masks[0]) for mask in masks)
+    assert not np.array_equal(renderings["sun"].frame, renderings["rain"].frame)
 
 
 def test_the_same_seed_gives_the_same_picture():
