@@ -13,6 +13,7 @@ from worker.calibration.camera import (
     Pose,
     inside,
     project,
+    project_planes,
     rotation_angles_deg,
     rotation_matrices,
     rotation_vectors,
@@ -131,3 +132,15 @@ def test_a_smaller_copy_of_a_picture_keeps_every_point_in_its_place():
     half = full.scaled(0.5)
     rays = np.array([[0.1, -0.2], [0.4, 0.3]])
     np.testing.assert_allclose((full.distort(rays) + 0.5) / 2 - 0.5, half.distort(rays))
+
+
+def test_single_precision_is_good_for_a_hundredth_of_a_pixel():
+    camera = Camera("a", lens([-0.34, 0.1, 0.001, -0.002, 0.01]), Pose.looking_at([-1.0, -48.0, 9.0], [-20.0, 0, 0]))
+    points = np.random.default_rng(0).uniform([-52, -34, 0], [52, 34, 0.4], (3000, 3))
+    rotations, positions = camera.pose.rotation[None], camera.pose.position[None]
+    planes = project_planes(points.T.astype(np.float32), rotations, positions, camera.intrinsics)
+    assert {plane.dtype for plane in planes} == {np.dtype(np.float32)}
+    exact = camera.project(points)
+    seen = inside(exact, camera.intrinsics.size)
+    assert seen.sum() > 300
+    np.testing.assert_allclose(np.stack(planes, axis=-1)[0][seen], exact[seen], atol=0.01)

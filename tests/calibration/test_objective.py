@@ -91,14 +91,14 @@ def test_a_blurred_line_has_the_height_that_is_expected_of_it(sigma):
     picture = np.zeros((400, 700), dtype=np.float32)
     picture[:, 340:352] = 1
     blurred = BlurredResponse.from_response(picture, sigma)
-    height = blurred.at(np.array([[[345.5, 200.0]]]))[0, 0]
+    height = blurred.at(np.array([[345.5]]), np.array([[200.0]]))[0, 0]
     assert height == pytest.approx(float(blurred_line(np.array([12.0]), sigma)[0]), rel=0.05)
 
 
 def test_outside_the_picture_there_is_nothing():
     blurred = BlurredResponse.from_response(np.ones((100, 100), dtype=np.float32), 2.0)
-    outside = np.array([[[-50.0, 20.0], [20.0, 1e9], [np.nan, np.nan], [np.inf, 3.0]]])
-    np.testing.assert_array_equal(blurred.at(outside), 0)
+    column, row = np.array([[-50.0, 20.0, np.nan, np.inf]]), np.array([[20.0, 1e9, np.nan, 3.0]])
+    np.testing.assert_array_equal(blurred.at(column, row), 0)
 
 
 def test_the_papers_objective_prefers_the_truth_too():

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Plane = NDArray[np.floating[Any]]
+"""One coordinate of many points, in the precision of whoever asks."""
 Frame = NDArray[np.uint8]
 """A picture as a camera took it: (height, width, 3), blue, green, red."""
 
@@ -152,8 +155,11 @@ class Intrinsics:
 
     def distort(self, rays: Array) -> Array:
         """Undistorted image coordinates at depth 1, (..., 2), to pixels (..., 2); NaN beyond `largest_radius`."""
-        k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = self.coefficients[:12]
-        x, y = rays[..., 0], rays[..., 1]
+        return np.stack(self.distort_planes(rays[..., 0], rays[..., 1]), axis=-1)
+
+    def distort_planes(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
+        """`distort` for columns and rows (...) apart, in their own precision: what large populations take."""
+        k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y = self.coefficients.tolist()
         r2 = x * x + y * y
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
         if k4 or k5 or k6:
@@ -163,14 +169,14 @@ class Intrinsics:
         if p1 or p2 or s1 or s2 or s3 or s4:
             xd = xd + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (s1 + s2 * r2)
             yd = yd + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (s3 + s4 * r2)
-        if self.coefficients[12] or self.coefficients[13]:
-            homogeneous = np.stack([xd, yd, np.ones_like(xd)], axis=-1) @ self.tilt.T
-            xd = homogeneous[..., 0] / homogeneous[..., 2]
-            yd = homogeneous[..., 1] / homogeneous[..., 2]
-        (fx, skew, cx), (_, fy, cy) = self.matrix[0], self.matrix[1, 0:3]
-        pixels = np.stack([fx * xd + skew * yd + cx, fy * yd + cy], axis=-1)
-        pixels[r2 > self.largest_radius**2] = np.nan
-        return pixels
+        if tau_x or tau_y:
+            (a, b, c), (d, e, f), (g, h, i) = self.tilt.tolist()
+            depth = g * xd + h * yd + i
+            xd, yd = (a * xd + b * yd + c) / depth, (d * xd + e * yd + f) / depth
+        (fx, skew, cx), (_, fy, cy) = self.matrix[:2].tolist()
+        column, row = fx * xd + skew * yd + cx, fy * yd + cy
+        beyond = r2 > self.largest_radius**2
+        return np.where(beyond, np.nan, column), np.where(beyond, np.nan, row)
 
     def undistort(self, pixels: ArrayLike, iterations: int = 20) -> Array:
         """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
@@ -262,12 +268,17 @@ def project(points: Array, rotations: Array, positions: Array, intrinsics: Intri
     points (N, 3) metres; rotations (P, 3) rad; positions (P, 3) metres. Returns pixels (P, N, 2), NaN where a point is
     behind the camera or outside what the lens model covers.
     """
+    return np.stack(project_planes(points.T, rotations, positions, intrinsics), axis=-1)
+
+
+def project_planes(points: Plane, rotations: Array, positions: Array, intrinsics: Intrinsics) -> tuple[Plane, Plane]:
+    """`project` for points (3, N), to columns and rows (P, N) apart, in the precision of the points."""
     matrices = rotation_matrices(rotations)
     # R (X - C) as R X - R C: one product for the whole population.
-    in_camera = np.einsum("pij,nj->pin", matrices, points) - (matrices @ positions[..., None])
-    depth = in_camera[:, 2]
+    turned = matrices.astype(points.dtype) @ points
+    x, y, depth = np.moveaxis(turned - (matrices @ positions[..., None]).astype(points.dtype), 1, 0)
     depth = np.where(depth > NEAREST_DEPTH_M, depth, np.nan)
-    return intrinsics.distort(np.stack([in_camera[:, 0] / depth, in_camera[:, 1] / depth], axis=-1))
+    return intrinsics.distort_planes(x / depth, y / depth)
 
 
 def inside(pixels: Array, size: tuple[int, int], margin: float = 0.0) -> NDArray[np.bool_]:

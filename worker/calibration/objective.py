@@ -20,10 +20,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Array, Camera, Intrinsics, inside, project
+from worker.calibration.camera import Array, Camera, Intrinsics, Plane, inside, project_planes
 from worker.calibration.field import Field, LinePoints
 from worker.calibration.lineprofile import blurred_line
-from worker.calibration.sampling import bilinear
+from worker.calibration.sampling import bilinear_planes
 from worker.calibration.visibility import SeenLines
 
 Response = NDArray[np.float32]
@@ -104,9 +104,11 @@ class BlurredResponse:
         size = (self.values.shape[1], self.values.shape[0])
         return BlurredResponse(self.values - cv2.resize(coarser.values, size), self.shrink)
 
-    def at(self, pixels: Array) -> Response:
-        """Values (P, N) at pixels (P, N, 2) of the full-size picture; 0 outside it and at NaN."""
-        return bilinear(self.values, (pixels + 0.5) / self.shrink - 0.5)
+    def at(self, column: Plane, row: Plane) -> Response:
+        """Values (P, N) at pixels of the full-size picture; 0 outside it and at NaN."""
+        if self.shrink == 1:
+            return bilinear_planes(self.values, column, row)
+        return bilinear_planes(self.values, (column + 0.5) / self.shrink - 0.5, (row + 0.5) / self.shrink - 0.5)
 
 
 @dataclass(frozen=True)
@@ -122,9 +124,9 @@ class View:
 class SingleTerm:
     """L_single of one camera: how much of its expected markings its segmentation lacks."""
 
-    points: Array
-    height: Array
-    weight: Array
+    points: Plane
+    height: Response
+    weight: Response
     band: BlurredResponse
     intrinsics: Intrinsics
 
@@ -135,7 +137,7 @@ class SingleTerm:
         height = blurred_line(seen.width_px, sigma) - blurred_line(seen.width_px, SURROUND * sigma)
         weight = seen.length_px / max(float(np.sum(height * seen.length_px)), 1e-12)
         return cls(
-            seen.points.position,
+            seen.points.position.T.astype(np.float32),
             height.astype(np.float32),
             weight.astype(np.float32),
             band,
@@ -144,10 +146,10 @@ class SingleTerm:
 
     def losses(self, poses: Array) -> Array:
         """1 - agreement (P,) for poses (P, 2, 3); agreement is 1 where every point has its expected height."""
-        if len(self.points) == 0:
+        if self.points.shape[1] == 0:
             return np.ones(len(poses))
-        pixels = project(self.points, poses[:, 0], poses[:, 1], self.intrinsics)
-        earned = np.clip(self.band.at(pixels), -self.height, self.height)
+        column, row = project_planes(self.points, poses[:, 0], poses[:, 1], self.intrinsics)
+        earned = np.clip(self.band.at(column, row), -self.height, self.height)
         return 1.0 - np.sum(earned * self.weight, axis=1, dtype=float)
 
 
@@ -160,10 +162,10 @@ class StitchTerm:
     is farther away is not taken for one that disagrees.
     """
 
-    points: Array
-    weight: Array
+    points: Plane
+    weight: Response
     views: tuple[View, View]
-    heights: tuple[Array, Array]
+    heights: tuple[Response, Response]
     indices: tuple[int, int]
 
     @classmethod
@@ -182,7 +184,7 @@ class StitchTerm:
         shifts = np.array(STITCH_OFFSETS)[:, None, None] * blur_m[:, None] * seen.points.normal
         copies = len(STITCH_OFFSETS)
         return cls(
-            (seen.points.position + shifts).reshape(-1, 3),
+            (seen.points.position + shifts).reshape(-1, 3).T.astype(np.float32),
             np.tile(seen.length_px, copies).astype(np.float32),
             (first, second),
             (
@@ -196,7 +198,8 @@ class StitchTerm:
         """1 - IoU (P,) for the poses of all cameras (P, N, 2, 3)."""
         a, b = (
             np.minimum(
-                view.blurred.at(project(self.points, *poses_of(poses, index), view.camera.intrinsics)) / height, 1
+                view.blurred.at(*project_planes(self.points, *poses_of(poses, index), view.camera.intrinsics)) / height,
+                1,
             )
             for view, height, index in zip(self.views, self.heights, self.indices, strict=True)
         )
