@@ -365,6 +365,9 @@ class JobError(Wire):
     camera: str | None = None
 
 
+# What a key allows; each one includes those before it.
+Scope = Literal["read", "calibrate", "admin"]
+
 Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 OPEN: tuple[Status, ...] = ("queued", "running")
 

@@ -95,3 +95,19 @@ workers = sa.Table(
     sa.Column("started_at", Instant, nullable=False),
     sa.Column("seen_at", Instant, nullable=False),
 )
+
+api_keys = sa.Table(
+    "api_keys",
+    metadata,
+    sa.Column("name", sa.String(64), primary_key=True),
+    # SHA-256 of the key, which itself is nowhere.
+    sa.Column("hash", sa.String(64), nullable=False),
+    # schemas.Scope.
+    sa.Column("scope", sa.String(16), nullable=False),
+    sa.Column("created_at", Instant, nullable=False),
+    # Null: never.
+    sa.Column("expires_at", Instant),
+    # To the minute; null: not yet.
+    sa.Column("last_used_at", Instant),
+    sa.Index("api_keys_by_hash", "hash", unique=True),
+)

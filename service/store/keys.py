@@ -1,0 +1,109 @@
+"""API keys: how they are made, and all SQL about them. What is stored is a hash; the key itself is seen once."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import sqlalchemy as sa
+
+from service.schemas import Scope
+from service.store.engine import reading, serialise, writing
+from service.store.tables import api_keys
+
+PREFIX = "esc_"
+k = api_keys.c
+
+
+@dataclass(frozen=True)
+class Key:
+    """What is known about a key."""
+
+    name: str
+    hash: str
+    scope: Scope
+    created_at: datetime
+    expires_at: datetime | None
+    last_used_at: datetime | None
+
+    @property
+    def expired(self) -> bool:
+        """Whether its time is over."""
+        return self.expires_at is not None and self.expires_at <= datetime.now(UTC)
+
+
+class KeyExists(Exception):  # noqa: N818
+    """There is a key of this name."""
+
+
+def new_key() -> str:
+    """256 random bits behind a prefix that people, and scanners for leaked secrets, recognise."""
+    return PREFIX + secrets.token_urlsafe(32)
+
+
+def hash_of(key: str) -> str:
+    """What is stored of a key and what it is looked up by: its SHA-256.
+
+    Slow and salted hashes are for passwords, which people choose and others guess. Nobody guesses 256 random bits, so a
+    fast hash gives nothing away, and it can be looked up: how long that takes depends on the hash of what was sent,
+    which nobody can steer, and tells nothing about a key.
+    """
+    return hashlib.sha256(key.encode()).hexdigest()
+
+
+class Keys:
+    """The keys in the database."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def add(self, name: str, scope: Scope, expires_at: datetime | None = None) -> str:
+        """Make a key and return it: the only time that it can be seen."""
+        key = new_key()
+        with writing(self._engine) as connection:
+            serialise(connection)
+            if connection.scalar(sa.select(k.name).where(k.name == name)) is not None:
+                raise KeyExists
+            connection.execute(
+                sa.insert(api_keys).values(
+                    name=name, hash=hash_of(key), scope=scope, created_at=datetime.now(UTC), expires_at=expires_at
+                )
+            )
+        return key
+
+    def remove(self, name: str) -> bool:
+        """Forget a key; says whether it was there."""
+        with writing(self._engine) as connection:
+            return connection.execute(sa.delete(api_keys).where(k.name == name)).rowcount == 1
+
+    def all(self) -> list[Key]:
+        """Every key, by name."""
+        with reading(self._engine) as connection:
+            return [_key(row) for row in connection.execute(sa.select(api_keys).order_by(k.name))]
+
+    def any(self) -> bool:
+        """Whether there is a key. An expired one counts: time alone must not open a service."""
+        with reading(self._engine) as connection:
+            return connection.scalar(sa.select(k.name).limit(1)) is not None
+
+    def find(self, hash_: str) -> Key | None:
+        """The key with this hash."""
+        with reading(self._engine) as connection:
+            row = connection.execute(sa.select(api_keys).where(k.hash == hash_)).one_or_none()
+        return None if row is None else _key(row)
+
+    def note_uses(self, last: Mapping[str, datetime]) -> None:
+        """Write down when keys, by their hashes, were last used; another process may have noted a later use."""
+        earlier = sa.or_(k.last_used_at.is_(None), k.last_used_at < sa.bindparam("at"))
+        update = sa.update(api_keys).where(k.hash == sa.bindparam("of"), earlier)
+        with writing(self._engine) as connection:
+            connection.execute(
+                update.values(last_used_at=sa.bindparam("at")), [{"of": hash_, "at": at} for hash_, at in last.items()]
+            )
+
+
+def _key(row: sa.Row[tuple[object, ...]]) -> Key:
+    return Key(**row._mapping)
