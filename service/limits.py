@@ -1,0 +1,44 @@
+"""How often somebody may do something: token buckets, in the memory of one process."""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable
+
+# Part of a token that may be missing: sums of floats are not exact.
+ROUNDING = 1e-3
+
+
+class Buckets:
+    """A bucket per name. A full one holds `burst` tokens, and `per_s` tokens a second flow in.
+
+    Kept is one number per name, the moment at which its bucket will be full again: a full bucket and one that was never
+    heard of are the same, so memory is bounded by forgetting, of `at_most` names, those that are full soonest.
+    """
+
+    def __init__(
+        self, per_s: float, burst: int, *, at_most: int = 10_000, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._interval_s = 1 / per_s
+        # With less than this missing there is a token.
+        self._slack_s = (burst - 1 + ROUNDING) / per_s
+        self._at_most = at_most
+        self._clock = clock
+        self._full_at: dict[str, float] = {}
+
+    def __len__(self) -> int:
+        return len(self._full_at)
+
+    def wait_s(self, name: str) -> float:
+        """How long until there is a token; 0: there is one."""
+        now = self._clock()
+        return max(0.0, self._full_at.get(name, now) - now - self._slack_s)
+
+    def take(self, name: str) -> None:
+        """Take a token, on credit if there is none."""
+        now = self._clock()
+        self._full_at[name] = max(self._full_at.get(name, now), now) + self._interval_s
+        if len(self._full_at) > self._at_most:
+            kept = heapq.nlargest(self._at_most // 2, self._full_at.items(), key=lambda entry: entry[1])
+            self._full_at = dict(kept)
