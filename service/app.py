@@ -14,6 +14,7 @@ from starlette.responses import Response
 
 from service import problems
 from service.access import Access
+from service.auth import Gate
 from service.bodylimit import BodyLimit
 from service.context import Context
 from service.metrics import Metrics
@@ -25,6 +26,7 @@ from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.engine import AWAY, connect, migrate
 from service.store.jobs import Jobs
+from service.store.keys import Keys
 from service.store.venues import Venues
 from service.store.workers import Workers
 from service.watch import Watch
@@ -57,7 +59,7 @@ def open_context(settings: Settings) -> Context:
     engine = connect(settings.home_database_url)
     migrate(engine)
     migrate_queue(settings.home_database_url)
-    jobs_, workers = Jobs(engine), Workers(engine)
+    jobs_, workers, keys = Jobs(engine), Workers(engine), Keys(engine)
     return Context(
         settings=settings,
         engine=engine,
@@ -68,17 +70,21 @@ def open_context(settings: Settings) -> Context:
         workers=workers,
         watch=Watch(jobs_.states),
         metrics=Metrics(jobs_, workers, settings.takeover_after_s),
+        keys=keys,
+        gate=Gate(keys, settings),
     )
 
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
-    watching = asyncio.create_task(context.watch.run())
+    beside = [asyncio.create_task(context.watch.run()), asyncio.create_task(context.gate.run())]
     yield
-    watching.cancel()
-    with suppress(asyncio.CancelledError):
-        await watching
+    for task in beside:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+    await context.gate.write_uses()
     context.queue.close()
     context.engine.dispose()
 

@@ -8,12 +8,14 @@ from typing import Annotated, cast
 from fastapi import Depends, Path, Request
 from sqlalchemy import Engine
 
+from service.auth import Gate
 from service.metrics import Metrics
 from service.queue import Queue
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.jobs import Jobs
+from service.store.keys import Keys
 from service.store.venues import Venues
 from service.store.workers import Workers
 from service.watch import Watch
@@ -32,6 +34,8 @@ class Context:
     workers: Workers
     watch: Watch
     metrics: Metrics
+    keys: Keys
+    gate: Gate
 
 
 def _context(request: Request) -> Context:

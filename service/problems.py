@@ -36,6 +36,13 @@ KINDS: dict[str, Kind] = {
     "method-not-allowed": Kind(405, "This address does not take this method"),
     "body-too-large": Kind(413, "The request is too large"),
     "not-multipart": Kind(415, "Frames come as multipart/form-data"),
+    # Who may call.
+    "key-missing": Kind(401, "A key is needed"),
+    "key-unknown": Kind(401, "The key is not known"),
+    "key-expired": Kind(401, "The key has expired"),
+    "scope-too-small": Kind(403, "The key does not allow this"),
+    "rate-limited": Kind(429, "Too many requests with this key"),
+    "too-many-unknown-keys": Kind(429, "Too many unknown keys from this address"),
     # Venues.
     "venue-not-found": Kind(404, "There is no such venue"),
     "venue-id-mismatch": Kind(422, "The venue's id differs from the address"),

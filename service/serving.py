@@ -20,6 +20,7 @@ from fastapi import FastAPI
 from service import lifeline
 from service.app import create_app
 from service.settings import Settings
+from service.store.keys import Keys
 
 # What open requests get to end in, and after them the worker.
 GRACE_S = 5
@@ -36,13 +37,10 @@ class CannotListen(Exception):  # noqa: N818
 
 def serve(settings: Settings, *, with_worker: bool) -> None:
     """Answer requests until SIGTERM or SIGINT."""
-    if settings.listens_beyond_this_machine and not settings.allow_unauthenticated:
-        raise CannotListen(
-            f"Whoever can reach {settings.host} could use the service: it has no authentication yet. Listen on "
-            "127.0.0.1, put a proxy that authenticates in front of it, or set ESC_ALLOW_UNAUTHENTICATED=true."
-        )
     listener = _listen(settings)
-    server = _Server(create_app(settings))
+    app = create_app(settings)
+    _see_to_keys(settings, app.state.context.keys)
+    server = _Server(app)
     # Uvicorn raises the signal again after its shutdown, which would end the process before the worker is stopped.
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, server.handle_exit)
@@ -50,6 +48,19 @@ def serve(settings: Settings, *, with_worker: bool) -> None:
         host, port = listener.getsockname()[:2]
         print(f"ESC listens on http://{host}:{port}", flush=True)
         server.run(sockets=[listener])
+
+
+def _see_to_keys(settings: Settings, keys: Keys) -> None:
+    """Nobody listens to the world by accident."""
+    if settings.auth == "off":
+        if keys.any():
+            log.warning("there are keys, but ESC_AUTH=off: anyone may call")
+    elif settings.listens_beyond_this_machine and not keys.any():
+        raise CannotListen(
+            f"Nobody could use the service on {settings.host}: it has no keys yet, and beyond this machine it asks for "
+            "them. Make one with: esc key add NAME --scope admin. Or listen on 127.0.0.1; or, if a proxy in front "
+            "decides who may call, set ESC_AUTH=off."
+        )
 
 
 def _listen(settings: Settings) -> socket.socket:

@@ -29,7 +29,13 @@ class Settings(BaseSettings):
     # Listening.
     host: str = "127.0.0.1"
     port: int = Field(8000, ge=0, le=65535, description="0 takes a free one and says which.")
-    allow_unauthenticated: bool = Field(False, description="Listen beyond this machine although anyone may call.")
+    auth: Literal["auto", "off"] = Field(
+        "auto",
+        description="`auto`: callers need a key as soon as there is one, and anyway beyond this machine. `off`: anyone "
+        "may call, from anywhere.",
+    )
+    rate_per_s: float = Field(250, gt=0, description="Requests of one key to one API process.")
+    rate_burst: int = Field(500, ge=1, description="Requests of one key at once, after a pause.")
 
     # What a client may send.
     max_body_mb: float = Field(256, gt=0)

@@ -15,13 +15,14 @@ from starlette.datastructures import FormData, UploadFile
 from service import frames as border
 from service.context import Context, InContext, VenueIdPath
 from service.problems import Problem, invalid
-from service.routes.documented import problems, reference
+from service.routes.documented import needs, problems, reference
+from service.routes.guarded import Guarded
 from service.routes.jobs import RETRY_AFTER_S, job_answer
 from service.routes.venues import no_such_venue
 from service.schemas import OPTIONS_PART, Job, Options, Venue
 from service.store.jobs import KeyReused, QueueFull, Submission, VenueBusy, VenueGone, VenueReplaced, new_job_id
 
-router = APIRouter(tags=["jobs"])
+router = APIRouter(tags=["jobs"], route_class=Guarded)
 
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
 LONGEST_OPTIONS = 64 * 1024
@@ -52,7 +53,7 @@ UPLOAD: dict[str, Any] = {
         200: {"model": Job, "description": "This content is already a job"},
         **problems(404, 409, 413, 415, 422, 429),
     },
-    openapi_extra=UPLOAD,
+    openapi_extra=UPLOAD | needs("calibrate"),
 )
 async def calibrate(
     venue_id: VenueIdPath,

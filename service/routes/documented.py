@@ -1,4 +1,4 @@
-"""How problems and uploads appear in the OpenAPI document."""
+"""How problems, uploads and scopes appear in the OpenAPI document."""
 
 from __future__ import annotations
 
@@ -8,10 +8,21 @@ from typing import Any
 from fastapi import FastAPI
 
 from service.problems import MEDIA_TYPE
-from service.schemas import Options, ProblemDetails
+from service.schemas import Options, ProblemDetails, Scope
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
 MODELS = (Options, ProblemDetails)
+KEY_SCHEME = "key"
+SECURITY_SCHEMES = {
+    KEY_SCHEME: {
+        "type": "http",
+        "scheme": "bearer",
+        "description": "A key made by `esc key add`. `calibrate` includes `read`, `admin` includes both. A service "
+        "that listens on loopback and has no keys asks for none.",
+    }
+}
+# Of a route that anybody may call.
+FOR_ALL: dict[str, Any] = {"security": []}
 
 
 class DocumentedApp(FastAPI):
@@ -21,12 +32,18 @@ class DocumentedApp(FastAPI):
         """The OpenAPI document."""
         document = super().openapi()
         document["components"]["schemas"] |= {model.__name__: model.model_json_schema() for model in MODELS}
+        document["components"]["securitySchemes"] = SECURITY_SCHEMES
         return document
 
 
 def reference(model: type[Options | ProblemDetails]) -> dict[str, str]:
     """A schema that points to one of `MODELS`."""
     return {"$ref": f"#/components/schemas/{model.__name__}"}
+
+
+def needs(scope: Scope) -> dict[str, Any]:
+    """Of a route that needs a key; OpenAPI 3.1 lets a requirement of any scheme list the roles it needs."""
+    return {"security": [{KEY_SCHEME: [scope]}]}
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:

@@ -10,19 +10,20 @@ from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
 from service.context import Context, InContext
 from service.problems import KINDS, Problem, type_of
-from service.routes.documented import problems
+from service.routes.documented import FOR_ALL, needs, problems
+from service.routes.guarded import Guarded
 from service.schemas import Health
 
-router = APIRouter(tags=["health"])
+router = APIRouter(tags=["health"], route_class=Guarded)
 
 
-@router.get("/livez")
+@router.get("/livez", openapi_extra=FOR_ALL)
 async def livez() -> Health:
     """The process answers."""
     return Health(status="ok")
 
 
-@router.get("/readyz", responses={503: {"model": Health}})
+@router.get("/readyz", openapi_extra=FOR_ALL, responses={503: {"model": Health}})
 def readyz(context: InContext, response: Response) -> Health:
     """Everything a job needs is there: database, files, a worker with a sign of life, the network it computes with."""
     parts = {"database": _database(context), "blobs": _blobs(context), **_worker(context)}
@@ -31,13 +32,18 @@ def readyz(context: InContext, response: Response) -> Health:
     return Health(status="ok" if ready else "unavailable", parts=parts)
 
 
-@router.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
+@router.get(
+    "/metrics",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {}}}},
+)
 def metrics(context: InContext) -> Response:
     """For Prometheus."""
     return Response(generate_latest(context.metrics.registry), media_type=CONTENT_TYPE_PLAIN_0_0_4)
 
 
-@router.get("/problems/{kind}", responses=problems(404))
+@router.get("/problems/{kind}", openapi_extra=FOR_ALL, responses=problems(404))
 async def explain(kind: Annotated[str, Path(max_length=64)]) -> dict[str, str | int]:
     """What the `type` of a problem means."""
     if kind not in KINDS:

@@ -12,11 +12,12 @@ from starlette.concurrency import run_in_threadpool
 from service import etags
 from service.context import Context, InContext, JobIdPath
 from service.problems import Problem
-from service.routes.documented import problems
+from service.routes.documented import needs, problems
+from service.routes.guarded import Guarded
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, Job, Jobs, Status
 from service.store.jobs import State
 
-router = APIRouter(prefix="/jobs", tags=["jobs"])
+router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
 RETRY_AFTER_S = 2
 LONGEST_WAIT_S = 60
@@ -51,7 +52,7 @@ def _existing(job_id: JobIdPath, context: InContext) -> Job:
 Existing = Annotated[Job, Depends(_existing)]
 
 
-@router.get("")
+@router.get("", openapi_extra=needs("read"))
 def list_jobs(
     context: InContext,
     venue: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
@@ -65,7 +66,12 @@ def list_jobs(
     return Jobs(jobs=page[:limit], next_cursor=page[limit - 1].id if more else None)
 
 
-@router.get("/{job_id}", response_model=Job, responses={304: {"description": "Unchanged"}, **problems(404)})
+@router.get(
+    "/{job_id}",
+    openapi_extra=needs("read"),
+    response_model=Job,
+    responses={304: {"description": "Unchanged"}, **problems(404)},
+)
 async def get_job(
     job: Existing,
     context: InContext,
@@ -79,14 +85,16 @@ async def get_job(
     return job_answer(job, if_none_match=if_none_match)
 
 
-@router.post("/{job_id}/cancel", response_model=Job, responses=problems(404))
+@router.post("/{job_id}/cancel", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404))
 def cancel_job(job: Existing, context: InContext) -> Response:
     """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
     context.jobs.cancel(job.id)
     return job_answer(context.jobs.get(job.id) or job)
 
 
-@router.get("/{job_id}/events", response_class=EventSourceResponse, responses=problems(404))
+@router.get(
+    "/{job_id}/events", openapi_extra=needs("read"), response_class=EventSourceResponse, responses=problems(404)
+)
 async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerSentEvent]:
     """The job as server-sent events: `progress` whenever it changes, `end` when it has ended."""
     while True:
@@ -101,19 +109,28 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
         await context.watch.until(job.id, _later_than(state), EVENT_AT_LEAST_EVERY_S)
 
 
-@router.get("/{job_id}/preview.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get(
+    "/{job_id}/preview.jpg", openapi_extra=needs("read"), response_class=Response, responses={**JPEG, **problems(404)}
+)
 def preview(job: Existing, context: InContext) -> Response:
     """One wide view stitched from all cameras."""
     return _picture(context, job, "preview")
 
 
-@router.get("/{job_id}/birdseye.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get(
+    "/{job_id}/birdseye.jpg", openapi_extra=needs("read"), response_class=Response, responses={**JPEG, **problems(404)}
+)
 def birdseye(job: Existing, context: InContext) -> Response:
     """The pitch from above, 10 px/m."""
     return _picture(context, job, "birdseye")
 
 
-@router.get("/{job_id}/overlay/{camera}.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get(
+    "/{job_id}/overlay/{camera}.jpg",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={**JPEG, **problems(404)},
+)
 def overlay(job: Existing, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext) -> Response:
     """A camera's frame with the field drawn on it, before and after."""
     return _picture(context, job, f"overlay_{camera}")

@@ -9,10 +9,11 @@ from fastapi import APIRouter, Header, Query, Response
 from service import etags
 from service.context import InContext, VenueIdPath
 from service.problems import Problem
-from service.routes.documented import problems
+from service.routes.documented import needs, problems
+from service.routes.guarded import Guarded
 from service.schemas import ID_PATTERN, PoseHistory, Venue, VenueIn, Venues
 
-router = APIRouter(prefix="/venues", tags=["venues"])
+router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 
 
 def no_such_venue(venue_id: str) -> Problem:
@@ -20,7 +21,7 @@ def no_such_venue(venue_id: str) -> Problem:
     return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
 
 
-@router.put("/{venue_id}", responses={201: {"model": Venue}, **problems(412, 422)})
+@router.put("/{venue_id}", openapi_extra=needs("admin"), responses={201: {"model": Venue}, **problems(412, 422)})
 def put_venue(
     venue_id: VenueIdPath,
     venue: VenueIn,
@@ -47,7 +48,7 @@ def put_venue(
     return stored
 
 
-@router.get("")
+@router.get("", openapi_extra=needs("read"))
 def list_venues(
     context: InContext,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
@@ -59,7 +60,12 @@ def list_venues(
     return Venues(venues=page[:limit], next_cursor=page[limit - 1].id if more else None)
 
 
-@router.get("/{venue_id}", response_model=Venue, responses={304: {"description": "Unchanged"}, **problems(404)})
+@router.get(
+    "/{venue_id}",
+    openapi_extra=needs("read"),
+    response_model=Venue,
+    responses={304: {"description": "Unchanged"}, **problems(404)},
+)
 def get_venue(
     venue_id: VenueIdPath,
     response: Response,
@@ -77,7 +83,7 @@ def get_venue(
     return stored
 
 
-@router.get("/{venue_id}/poses", responses=problems(404))
+@router.get("/{venue_id}/poses", openapi_extra=needs("read"), responses=problems(404))
 def list_poses(
     venue_id: VenueIdPath,
     context: InContext,
@@ -92,7 +98,7 @@ def list_poses(
     return PoseHistory(poses=[pose for _, pose in page[:limit]], next_cursor=page[limit - 1][0] if more else None)
 
 
-@router.delete("/{venue_id}", status_code=204, responses=problems(404, 409, 412))
+@router.delete("/{venue_id}", openapi_extra=needs("admin"), status_code=204, responses=problems(404, 409, 412))
 def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[str | None, Header()] = None) -> None:
     """Forget a venue and the history of its poses; its jobs stay."""
 

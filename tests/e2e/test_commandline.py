@@ -141,12 +141,6 @@ def test_without_a_server_native_code_finds_the_environment_of_a_workers_child(s
     assert answer.stdout == "1 4096\n"
 
 
-def test_nobody_listens_to_the_world_by_accident(esc):
-    answer = esc("serve", "--host", "0.0.0.0", "--port", "0")
-    assert answer.returncode == 2
-    assert "ESC_ALLOW_UNAUTHENTICATED" in answer.stderr
-
-
 def test_a_port_in_use_is_told(service, esc):
     answer = esc("serve", "--port", str(httpx.URL(service.url).port))
     assert answer.returncode == 2

@@ -1,0 +1,40 @@
+"""Routes that insist on the scope that their documentation names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from service.routes.documented import KEY_SCHEME, problems
+from service.schemas import Scope
+
+
+class Guarded(APIRoute):
+    """A route with `openapi_extra=needs(...)`: its security requirement is what is documented and what is checked.
+
+    It is checked before the body is read; FastAPI reads a body before it calls any dependency.
+    """
+
+    def __init__(self, path: str, endpoint: Callable[..., Any], **rest: Any) -> None:
+        security = (rest.get("openapi_extra") or {}).get("security")
+        if security is None:
+            raise TypeError(f"{path} must say who may call it: openapi_extra=needs(a scope) or =FOR_ALL")
+        self.needed: Scope | None = security[0][KEY_SCHEME][0] if security else None
+        if self.needed:
+            rest["responses"] = {**problems(401, 403, 429), **(rest.get("responses") or {})}
+        super().__init__(path, endpoint, **rest)
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Check, then handle."""
+        handle, needed = super().get_route_handler(), self.needed
+        if needed is None:
+            return handle
+
+        async def guarded(request: Request) -> Response:
+            await request.app.state.context.gate.admit(request, needed)
+            return await handle(request)
+
+        return guarded
