@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import secrets
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import httpx
 import typer
@@ -22,9 +24,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service import lifeline, logs
 from service.client import Client, Refused
-from service.schemas import Job, JobError, Options, Result, VenueIn
+from service.schemas import ID_PATTERN, Job, JobError, Options, Result, Scope, VenueIn
 from service.schemas import Progress as Step
 from service.settings import Settings
+
+if TYPE_CHECKING:
+    from service.store.keys import Keys
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
 M = TypeVar("M", bound=BaseModel)
@@ -33,12 +38,27 @@ LOCAL = "http://127.0.0.1:8000"
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False)
 venue_app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
 job_app = typer.Typer(no_args_is_help=True, help="Jobs of a running service.")
+key_app = typer.Typer(no_args_is_help=True, help="API keys, in the database of this machine's service.")
 app.add_typer(venue_app, name="venue")
 app.add_typer(job_app, name="job")
+app.add_typer(key_app, name="key")
 err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
 
+
+def _as_header(key: str | None) -> str | None:
+    """A key read from a file brings its line end along; what else no header takes is told here, not by the socket."""
+    if key is None:
+        return None
+    if not re.fullmatch(r"[\x21-\x7e]+", key.strip()):
+        raise typer.BadParameter("a key is letters, digits and signs, without spaces")
+    return key.strip()
+
+
 Url = Annotated[str, typer.Option("--url", envvar="ESC_URL", help="The service.")]
-ApiKey = Annotated[str | None, typer.Option("--api-key", envvar="ESC_API_KEY", help="Sent as bearer token.")]
+ApiKey = Annotated[
+    str | None,
+    typer.Option("--api-key", envvar="ESC_API_KEY", callback=_as_header, help="Sent as bearer token.", metavar="KEY"),
+]
 Data = Annotated[Path | None, typer.Option("--data", help="Folder of the embedded home (ESC_DATA).")]
 Host = Annotated[str | None, typer.Option("--host", help="Address to listen on (ESC_HOST).")]
 Port = Annotated[int | None, typer.Option("--port", help="0 takes a free one (ESC_PORT).")]
@@ -52,7 +72,7 @@ def main() -> None:
     try:
         app()
     except Refused as refused:
-        _fail(_in_words(str(refused), refused.members), BUSY if refused.busy else FAILED)
+        _fail(_in_words(str(refused), refused.members) + _hint(refused.status), BUSY if refused.busy else FAILED)
     except httpx.TransportError as error:
         _fail(f"The service cannot be reached: {error or type(error).__name__}", FAILED)
 
@@ -205,7 +225,75 @@ def cancel_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
         _print(client.cancel(job))
 
 
+# Who may call
+
+
+@key_app.command("add")
+def add_key(
+    name: Annotated[str, typer.Argument(help="Of who will use it: a machine, a person.")],
+    scope: Annotated[Scope, typer.Option("--scope", help="Each includes those before it.")],
+    days: Annotated[int | None, typer.Option("--days", min=1, max=36500, help="How long it is good.")] = None,
+    data: Data = None,
+) -> None:
+    """Make a key and print it, this once: what is stored is its hash."""
+    from service.store.keys import KeyExists
+
+    if not re.fullmatch(ID_PATTERN, name):
+        _fail(f"{name!r} is no name of a key: up to 64 of a-z, 0-9, - and _, the first a letter or a digit.", USAGE)
+    with _keys(data) as keys:
+        try:
+            key = keys.add(name, scope, datetime.now(UTC) + timedelta(days) if days else None)
+        except KeyExists:
+            _fail(f"There is a key {name} already: remove it first, or take another name.", USAGE)
+    print(key)
+    err.print("Keep it: it is not shown again. Its user sets ESC_API_KEY, or sends it as `Authorization: Bearer ...`.")
+
+
+@key_app.command("list")
+def list_keys(data: Data = None) -> None:
+    """Print a line per key: name, scope, when it was made, when (to the minute) last used, until when it is good."""
+    with _keys(data) as keys:
+        for key in keys.all():
+            used, until = (f"{at:%Y-%m-%dT%H:%MZ}" if at else "-" for at in (key.last_used_at, key.expires_at))
+            state = " (expired)" if key.expired else ""
+            print(f"{key.name}\t{key.scope}\t{key.created_at:%Y-%m-%dT%H:%MZ}\t{used}\t{until}{state}")
+
+
+@key_app.command("remove")
+def remove_key(name: str, data: Data = None) -> None:
+    """Forget a key."""
+    from service.auth import BELIEVED_FOR_S
+
+    with _keys(data) as keys:
+        if not keys.remove(name):
+            _fail(f"There is no key {name}; esc key list names those there are.", FAILED)
+        left = keys.any()
+    err.print(f"Removed. A service that runs may take it for {BELIEVED_FOR_S:.0f} s more.")
+    if not left:
+        err.print("No key is left: a service on loopback will let anyone on this machine call after its next start.")
+
+
 # Parts
+
+
+@contextmanager
+def _keys(data: Path | None) -> Iterator[Keys]:
+    """The keys of the service whose folder or database the settings name."""
+    from service.store.engine import AWAY, UnsupportedDatabase, connect, migrate
+    from service.store.keys import Keys
+
+    settings = _settings(data=data)
+    try:
+        engine = connect(settings.home_database_url)
+        # Keys of another folder open nothing, and nothing else would tell.
+        err.print(f"Keys in {engine.url.render_as_string(hide_password=True)}")
+        migrate(engine)
+        yield Keys(engine)
+        engine.dispose()
+    except UnsupportedDatabase as error:
+        _fail(str(error), USAGE)
+    except (*AWAY, OSError) as error:
+        _fail(f"The database cannot be used: {getattr(error, 'orig', error)}", FAILED)
 
 
 def _serve(settings: Settings, *, with_worker: bool) -> None:
@@ -295,6 +383,16 @@ def _in_words(headline: str, members: Mapping[str, Any]) -> str:
     lines += [f"  {part}: {json.dumps(members[part])}" for part in ("expected", "got") if part in members]
     lines += [f"  {finding.get('where')}: {finding.get('message')}" for finding in members.get("errors", [])]
     return "\n".join(lines)
+
+
+def _hint(status: int) -> str:
+    match status:
+        case 401:
+            return "\n  Set ESC_API_KEY to a key of this service. On its machine: esc key add NAME --scope calibrate"
+        case 403:
+            return "\n  Set ESC_API_KEY to a key that may. On the machine of the service: esc key list"
+        case _:
+            return ""
 
 
 def _print(what: BaseModel | dict[str, str]) -> None:

@@ -1,0 +1,224 @@
+"""Keys against a real server: who gets in where."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+
+import httpx
+import pytest
+from fastapi.routing import iter_route_contexts
+
+from service.app import create_app
+from service.auth import BELIEVED_FOR_S
+from service.routes.guarded import Guarded
+from service.settings import Settings
+from service.store.engine import connect, migrate
+from service.store.keys import Keys
+from tests.e2e.running import Service, png, upload, venue, wait_for
+
+SCOPES = ("read", "calibrate", "admin")
+OPEN = {"/livez", "/readyz", "/problems/{kind}"}
+# FastAPI's own pages: what the service can do is no secret.
+DOCUMENTS = {"/openapi.json", "/docs", "/docs/oauth2-redirect", "/redoc"}
+NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "DELETE": "admin"}
+JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"
+
+
+def keys_in(folder):
+    engine = connect(Settings(data=folder).home_database_url)
+    migrate(engine)
+    return Keys(engine)
+
+
+def bearer(key):
+    return {"Authorization": f"Bearer {key}"}
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory):
+    """A key of each scope, and the folder they are for."""
+    folder = tmp_path_factory.mktemp("guarded")
+    store = keys_in(folder)
+    return folder, {scope: store.add(scope, scope) for scope in SCOPES}
+
+
+@pytest.fixture(scope="module")
+def guarded(keys):
+    """A service that has keys."""
+    running = Service(keys[0])
+    yield running
+    assert running.stop() == 0
+
+
+@pytest.fixture(scope="module")
+def key(keys):
+    return keys[1]
+
+
+@pytest.fixture(scope="module")
+def routes(tmp_path_factory):
+    """Every method and path of the application."""
+    app = create_app(Settings(data=tmp_path_factory.mktemp("routes")))
+    yield list(iter_route_contexts(app.routes))
+    app.state.context.queue.close()
+    app.state.context.engine.dispose()
+
+
+def esc(folder, *arguments, **environment):
+    command = [sys.executable, "-m", "service.cli", *arguments]
+    return subprocess.run(
+        command,
+        env=os.environ | {"ESC_DATA": str(folder), **environment},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
+    for route in routes:
+        if not isinstance(route.original_route, Guarded):
+            assert route.path in DOCUMENTS, f"{route.path} is not guarded"
+            continue
+        (method,) = route.methods
+        needed = None if route.path in OPEN else NEEDED[method]
+        path = route.path.format(job_id=JOB, venue_id="nowhere", camera="left", kind="not-found")
+        for caller in (None, *SCOPES):
+            answer = guarded.http.request(method, path, headers=bearer(key[caller]) if caller else {})
+            if needed is None or (caller and SCOPES.index(caller) >= SCOPES.index(needed)):
+                expected = "let in"
+            else:
+                expected = 403 if caller else 401
+            got = answer.status_code if answer.status_code in (401, 403) else "let in"
+            assert (method, route.path, caller, got) == (method, route.path, caller, expected)
+
+
+def test_the_document_says_which_scope_a_route_needs(guarded):
+    document = guarded.http.get("/openapi.json").json()
+    assert document["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
+    assert document["paths"]["/venues/{venue_id}"]["put"]["security"] == [{"key": ["admin"]}]
+    assert {"401", "403", "429"} <= document["paths"]["/venues/{venue_id}"]["put"]["responses"].keys()
+    assert document["paths"]["/livez"]["get"]["security"] == []
+
+
+def test_refusals_are_problems_that_name_the_way_in(guarded, key):
+    missing = guarded.http.get("/jobs")
+    assert (missing.status_code, missing.headers["content-type"]) == (401, "application/problem+json")
+    assert (missing.headers["www-authenticate"], missing.json()["type"]) == ("Bearer", "/problems/key-missing")
+    unknown = guarded.http.get("/jobs", headers=bearer("esc_unknown"))
+    assert unknown.headers["www-authenticate"] == 'Bearer error="invalid_token"'
+    assert (unknown.status_code, unknown.json()["type"]) == (401, "/problems/key-unknown")
+    small = guarded.http.put("/venues/v", json=venue("v"), headers=bearer(key["calibrate"]))
+    assert (small.status_code, small.json()["type"]) == (403, "/problems/scope-too-small")
+    assert (small.json()["expected"], small.json()["got"]) == ("admin", "calibrate")
+
+
+def test_a_body_is_not_looked_at_before_the_key(guarded):
+    answer = guarded.http.put("/venues/v", content=b"{", headers={"Content-Type": "application/json"})
+    assert answer.status_code == 401
+
+
+def test_from_the_venue_to_the_pose_with_the_keys_that_suffice(guarded, key, name):
+    guarded.http.put(f"/venues/{name}", json=venue(name), headers=bearer(key["admin"])).raise_for_status()
+    sent = guarded.http.post(f"/venues/{name}/calibrate", files=upload(), headers=bearer(key["calibrate"]))
+    assert sent.status_code == 202
+    with guarded.http.stream("GET", f"/jobs/{sent.json()['id']}/events", headers=bearer(key["read"])) as events:
+        assert "event: end" in events.read().decode()
+
+
+def test_the_command_line_sends_its_key_and_helps_without_one(guarded, key, name, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name)))
+    for side in ("left", "right"):
+        # Too large for the buffers of a socket: what refuses it must read it, or its answer is lost.
+        (tmp_path / f"{side}.png").write_bytes(png() + bytes(30_000_000))
+
+    def call(*arguments, api_key=""):
+        return esc(tmp_path, *arguments, ESC_URL=guarded.url, ESC_API_KEY=api_key)
+
+    put = call("venue", "put", "venue.json", api_key=key["admin"] + "\n")
+    assert put.returncode == 0, put.stderr
+    small = call("venue", "put", "venue.json", api_key=key["calibrate"])
+    assert (small.returncode, "a key of scope admin; calibrate has calibrate" in small.stderr) == (1, True)
+    for wrong in ("", "esc_unknown"):
+        refused = call("calibrate", name, "left=left.png", "right=right.png", "--wait", api_key=wrong)
+        assert refused.returncode == 1
+        assert "Set ESC_API_KEY" in refused.stderr
+        assert "esc_unknown" not in refused.stderr
+    odd = call("venue", "list", api_key="zwei Wörter")
+    assert (odd.returncode, "without spaces" in odd.stderr, "Wörter" in odd.stderr) == (2, True, False)
+
+
+def test_keys_are_made_listed_and_removed_on_the_machine_of_the_service(start, tmp_path):
+    service = start("serve")
+    assert service.http.get("/jobs").status_code == 200
+    made = esc(service.data, "key", "add", "cron", "--scope", "calibrate", "--days", "30")
+    key = made.stdout.strip()
+    assert (made.returncode, key.startswith("esc_")) == (0, True)
+    wait_for(lambda: service.http.get("/jobs").status_code == 401, BELIEVED_FOR_S + 5)
+    assert service.http.get("/jobs", headers=bearer(key)).status_code == 200
+    assert service.stop() == 0
+
+    name, scope, made_at, used_at, until = esc(service.data, "key", "list").stdout.strip().split("\t")
+    assert (name, scope) == ("cron", "calibrate")
+    assert made_at <= used_at < until
+    again = esc(service.data, "key", "add", "cron", "--scope", "read")
+    assert (again.returncode, "There is a key cron already" in again.stderr) == (2, True)
+
+    service.start()
+    assert service.http.get("/jobs", headers=bearer(key)).status_code == 200
+    removed = esc(service.data, "key", "remove", "cron")
+    assert (removed.returncode, "No key is left" in removed.stderr) == (0, True)
+    begun = time.monotonic()
+    wait_for(lambda: service.http.get("/jobs", headers=bearer(key)).status_code == 401)
+    assert time.monotonic() - begun < BELIEVED_FOR_S + 2
+    assert esc(service.data, "key", "remove", "cron").returncode == 1
+    assert key not in (service.data / "log").read_text()
+
+
+@pytest.mark.parametrize("arguments", [("Bad name", "--scope", "read"), ("x", "--scope", "all"), ("x",)])
+def test_a_key_needs_a_name_and_a_scope(tmp_path, arguments):
+    assert esc(tmp_path, "key", "add", *arguments).returncode == 2
+
+
+def test_beyond_this_machine_nobody_listens_without_keys(start, tmp_path):
+    alone = esc(tmp_path, "serve", "--host", "0.0.0.0", "--port", "0")
+    assert (alone.returncode, "esc key add NAME --scope admin" in alone.stderr) == (2, True)
+
+    key = keys_in(tmp_path / "esc").add("ops", "admin")
+    service = start("serve", "--host", "0.0.0.0")
+    url = f"http://127.0.0.1:{httpx.URL(service.url).port}"
+    assert httpx.get(f"{url}/jobs").status_code == 401
+    assert httpx.get(f"{url}/jobs", headers=bearer(key)).status_code == 200
+    assert httpx.get(f"{url}/livez").status_code == 200
+
+
+def test_where_a_proxy_decides_who_may_call_it_can_be_switched_off(start, tmp_path):
+    keys_in(tmp_path / "esc").add("ops", "admin")
+    service = start("serve", "--host", "0.0.0.0", ESC_AUTH="off")
+    assert httpx.get(f"http://127.0.0.1:{httpx.URL(service.url).port}/jobs").status_code == 200
+    assert "ESC_AUTH=off" in (service.data / "log").read_text()
+
+
+def test_a_key_that_asks_too_often_waits(start, tmp_path):
+    key = keys_in(tmp_path / "esc").add("hasty", "read")
+    service = start("serve", ESC_RATE_PER_S="0.5", ESC_RATE_BURST="5")
+    answers = [service.http.get("/jobs", headers=bearer(key)) for _ in range(7)]
+    assert [answer.status_code for answer in answers] == [200] * 5 + [429] * 2
+    assert answers[-1].json()["type"] == "/problems/rate-limited"
+    assert int(answers[-1].headers["retry-after"]) in (1, 2)
+    assert service.http.get("/livez").status_code == 200
+    time.sleep(int(answers[-1].headers["retry-after"]))
+    assert service.http.get("/jobs", headers=bearer(key)).status_code == 200
+
+
+def test_the_log_names_the_key_and_does_not_hold_it(guarded, key):
+    for caller in (*key.values(), "esc_guessed"):
+        guarded.http.get("/jobs", headers=bearer(caller))
+    log = (guarded.data / "log").read_text()
+    named = {line.get("key") for line in map(json.loads, log.splitlines()) if line.get("event") == "request"}
+    assert set(SCOPES) <= named
+    for secret in (*key.values(), "esc_guessed"):
+        assert secret not in log
