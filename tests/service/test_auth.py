@@ -5,11 +5,13 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 import sqlalchemy as sa
+from fastapi import APIRouter
 from starlette.requests import HTTPConnection
 from structlog.testing import capture_logs
 
 from service.auth import BELIEVED_FOR_S, GUESS_EVERY_S, GUESSES, Gate
 from service.problems import Problem
+from service.routes.guarded import Guarded
 from service.settings import Settings
 from service.store.engine import connect, migrate
 from service.store.keys import Keys
@@ -204,3 +206,8 @@ def test_a_refused_key_is_not_in_the_log(gate, keys):
     with capture_logs() as logs:
         answer(gate, "esc_secret")
     assert logs == [{"event": "unknown key", "address": "192.0.2.1", "log_level": "warning"}]
+
+
+def test_a_route_that_does_not_say_who_may_call_it_cannot_be_made():
+    with pytest.raises(TypeError, match="/new must say who may call it"):
+        APIRouter(route_class=Guarded).get("/new")(lambda: None)
