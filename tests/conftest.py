@@ -1,0 +1,66 @@
+"""What a machine may lack, and the homes that tests run in."""
+
+import importlib.util
+import os
+
+import pytest
+
+from tests.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
+
+# What tests can do without, and how to enable those that cannot.
+PARTS = {
+    "postgres": "install PostgreSQL (Debian: apt-get install postgresql)",
+    "s3": "install the packages of the group dev (make setup), moto among them",
+    "browser": "install Chromium (Debian: apt-get install chromium)",
+}
+
+
+def required():
+    """The parts that must not be missing here: ESC_TEST_REQUIRE=postgres,s3,browser."""
+    return {part.strip() for part in os.environ.get("ESC_TEST_REQUIRE", "").split(",")} - {""}
+
+
+def pytest_configure(config):
+    unknown = required() - PARTS.keys()
+    if unknown:
+        known = ", ".join(PARTS)
+        raise pytest.UsageError(f"ESC_TEST_REQUIRE names {', '.join(sorted(unknown))}; known are {known}")
+
+
+@pytest.fixture(scope="session")
+def missing():
+    """Call it with a part that is not there: the test is skipped, or fails where the part is required."""
+
+    def missing(part):
+        end = pytest.fail if part in required() else pytest.skip
+        end(f"no {part} on this machine; to run this test, {PARTS[part]}")
+
+    return missing
+
+
+@pytest.fixture(scope="session")
+def postgres(missing):
+    binaries = postgres_binaries()
+    if binaries is None:
+        missing("postgres")
+    with postgres_server(binaries) as url:
+        yield url
+
+
+@pytest.fixture(scope="session")
+def bucket(missing):
+    if not importlib.util.find_spec("moto"):
+        missing("s3")
+    with s3_server() as url:
+        yield url
+
+
+@pytest.fixture(scope="session")
+def servers(postgres, bucket):
+    return Servers(postgres, bucket)
+
+
+@pytest.fixture(scope="session")
+def home(request):
+    """Where a test keeps its state: the embedded home, or what `in_both_homes` says."""
+    return request.getfixturevalue("servers") if getattr(request, "param", "") == "servers" else Embedded()

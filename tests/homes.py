@@ -1,0 +1,179 @@
+"""The two homes of the service: a folder, and servers that are started for the tests from what the machine has."""
+
+import os
+import pwd
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import httpx
+import obstore
+import psycopg
+import pytest
+from obstore.store import from_url
+
+STARTING_S = 60
+BUCKET = "esc-tests"
+# On a test: which home, or homes, it runs in. What it builds, it builds in the home that the fixture `home` gives.
+in_both_homes = pytest.mark.parametrize("home", ["embedded", "servers"], indirect=True, scope="session")
+on_servers = pytest.mark.parametrize("home", ["servers"], indirect=True, scope="session")
+
+
+class Embedded:
+    """SQLite and a folder, as without any setting."""
+
+    def database_url(self, folder: Path) -> str:
+        return f"sqlite:///{folder}/esc.sqlite"
+
+    def blob_url(self, folder: Path) -> str:
+        return (folder / "blobs").as_uri()
+
+    def settings(self, folder: Path) -> dict[str, str]:
+        return {}
+
+    @contextmanager
+    def database_away(self, folder: Path) -> Iterator[None]:
+        with closing(sqlite3.connect(folder / "esc.sqlite", timeout=30, isolation_level=None)) as database:
+            database.execute("ALTER TABLE jobs RENAME TO away")
+            yield
+            database.execute("ALTER TABLE away RENAME TO jobs")
+
+
+class Servers:
+    """PostgreSQL and S3: a database and a part of the bucket for each folder that would be a home."""
+
+    def __init__(self, postgres: str, bucket: str) -> None:
+        self._postgres = postgres
+        self._bucket = bucket
+        self._names: dict[Path, str] = {}
+
+    def database_url(self, folder: Path) -> str:
+        if folder not in self._names:
+            self._names[folder] = f"home_{len(self._names)}"
+            self._administer(f"CREATE DATABASE {self._names[folder]}")
+        return self._postgres.format(self._names[folder])
+
+    def blob_url(self, folder: Path) -> str:
+        return f"{self._bucket}/{folder.relative_to(folder.anchor)}"
+
+    def settings(self, folder: Path) -> dict[str, str]:
+        return {"database_url": self.database_url(folder), "blob_url": self.blob_url(folder)}
+
+    @contextmanager
+    def database_away(self, folder: Path) -> Iterator[None]:
+        name = self._names[folder]
+        self._administer(f"ALTER DATABASE {name} ALLOW_CONNECTIONS false")
+        self._administer(f"SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = '{name}'")
+        yield
+        self._administer(f"ALTER DATABASE {name} ALLOW_CONNECTIONS true")
+
+    def _administer(self, statement: str) -> None:
+        """Do something to a database from outside of it."""
+        with psycopg.connect(self._postgres.format("postgres"), autocommit=True) as connection:
+            connection.execute(statement)
+
+
+Home = Embedded | Servers
+
+
+def environment(settings: dict[str, str]) -> dict[str, str]:
+    """Settings for another process."""
+    return {f"ESC_{name.upper()}": value for name, value in settings.items()}
+
+
+def files(blob_url: str, folder: str = "") -> list[str]:
+    """The paths of everything that lies in a home."""
+    return sorted(entry["path"] for page in obstore.list(from_url(blob_url), folder) for entry in page)
+
+
+def postgres_binaries() -> Path | None:
+    """Where `initdb` and `postgres` are: on the path, or where Debian keeps each version; the newest."""
+    debian = sorted(Path("/usr/lib/postgresql").glob("*/bin"), key=lambda folder: int(folder.parent.name))
+    on_path = shutil.which("initdb")
+    folders = [*debian, *([Path(on_path).resolve().parent] if on_path else [])]
+    return next((folder for folder in reversed(folders) if (folder / "postgres").exists()), None)
+
+
+@contextmanager
+def postgres_server(binaries: Path) -> Iterator[str]:
+    """A server on a socket that only this user reaches; gives its URL with `{}` for the name of a database."""
+    # Not below pytest's folder: PostgreSQL refuses to run as root, and nobody else may look in there.
+    folder = Path(tempfile.mkdtemp(prefix="esc-postgres-"))
+    somebody = _who_may_run_postgres(folder)
+    log = folder / "log"
+    initialise = ["initdb", "-D", folder / "data", "-U", "esc", "-E", "UTF8", "--locale=C", "-A", "trust", "--no-sync"]
+    # Nothing of it must survive a power cut.
+    hasty = ["-c", "fsync=off", "-c", "synchronous_commit=off", "-c", "full_page_writes=off"]
+    serve = ["postgres", "-D", folder / "data", "-k", folder, "-c", "listen_addresses=", *hasty]
+    url = f"postgresql://esc@/{{}}?host={folder}"
+    try:
+        with log.open("wb") as output:
+            started = {"cwd": folder, "stdout": output, "stderr": output, **somebody}
+            subprocess.run([binaries / initialise[0], *initialise[1:]], check=True, **started)
+            server = subprocess.Popen([binaries / serve[0], *serve[1:]], **started)
+        try:
+            _wait_until_it_answers(url.format("postgres"), server, log)
+            yield url
+        finally:
+            server.send_signal(signal.SIGQUIT)
+            server.wait(STARTING_S)
+    finally:
+        shutil.rmtree(folder)
+
+
+def _who_may_run_postgres(folder: Path) -> dict:
+    """Whom to run it as: PostgreSQL refuses root. The folder becomes theirs."""
+    if os.geteuid() != 0:
+        return {}
+    user = next(user for name in ("postgres", "nobody") for user in pwd.getpwall() if user.pw_name == name)
+    os.chown(folder, user.pw_uid, user.pw_gid)
+    return {"user": user.pw_uid, "group": user.pw_gid, "extra_groups": []}
+
+
+def _wait_until_it_answers(url: str, server: subprocess.Popen, log: Path) -> None:
+    end = time.monotonic() + STARTING_S
+    while True:
+        try:
+            psycopg.connect(url).close()
+            return
+        except psycopg.OperationalError:
+            assert server.poll() is None, log.read_text()
+            assert time.monotonic() < end, log.read_text()
+            time.sleep(0.05)
+
+
+@contextmanager
+def s3_server() -> Iterator[str]:
+    """A server in a process of its own; gives the URL of a bucket, and the environment says how to reach it."""
+    server = subprocess.Popen(
+        [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        address = next(line.split()[-1] for line in server.stderr if "Running on" in line)
+        # It says a line per request, which nobody reads.
+        threading.Thread(target=server.stderr.read, daemon=True).start()
+        httpx.put(f"{address}/{BUCKET}").raise_for_status()
+        with pytest.MonkeyPatch.context() as patch:
+            for name, value in {
+                "AWS_ENDPOINT_URL": address,
+                "AWS_ALLOW_HTTP": "true",
+                "AWS_ACCESS_KEY_ID": "key",
+                "AWS_SECRET_ACCESS_KEY": "secret",
+            }.items():
+                patch.setenv(name, value)
+            yield f"s3://{BUCKET}"
+    finally:
+        server.kill()
+        server.wait()
+        server.stderr.close()
