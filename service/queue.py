@@ -14,6 +14,8 @@ import sqlalchemy as sa
 from dbos import DBOS, DBOSClient, DBOSConfig
 from dbos import WorkflowStatusString as QueueStatus
 
+from service.store.engine import postgresql
+
 APPLICATION = "esc"
 QUEUE = "calibration"
 WORKFLOW = "calibrate"
@@ -31,7 +33,7 @@ def migrate(url: str) -> None:
 def _engine(url: str) -> sa.Engine:
     """The queue's own engine: its SQL expects the driver to begin transactions, ours does not."""
     if not url.startswith("sqlite"):
-        return sa.create_engine(sa.make_url(url).set(drivername="postgresql+psycopg"), pool_pre_ping=True)
+        return postgresql(url)
     engine = sa.create_engine(url)
 
     @sa.event.listens_for(engine, "connect")

@@ -6,7 +6,9 @@ import sqlite3
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import sqlalchemy as sa
 from alembic import command
@@ -14,10 +16,22 @@ from alembic.config import Config
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 WRITES = "esc_writes"
-# What is raised while the database is away or locked: trying again later can help.
-AWAY = (sa.exc.OperationalError, sa.exc.TimeoutError)
+# How a transaction that reads is to see one state; every transaction of SQLite does.
+SNAPSHOT: dict[str, dict[str, Any]] = {"sqlite": {}, "postgresql": {"isolation_level": "REPEATABLE READ"}}
+# What is raised while the database is away, locked or changing its machine: trying again later can help.
+AWAY = (sa.exc.OperationalError, sa.exc.InterfaceError, sa.exc.InternalError, sa.exc.TimeoutError)
 # Any number, the same everywhere: serialises writers that must see each other's rows on PostgreSQL.
 LOCK = 0x45_53_43
+# What libpq is told unless the URL says otherwise. A server that is out of reach is given up after seconds, and what a
+# machine held that vanished in the middle of a transaction is free again within a minute.
+PATIENCE = {
+    "connect_timeout": "5",
+    "keepalives_idle": "10",
+    "keepalives_interval": "5",
+    "keepalives_count": "3",
+    "tcp_user_timeout": "30000",
+    "options": "-c idle_in_transaction_session_timeout=60s",
+}
 
 
 class UnsupportedDatabase(Exception):  # noqa: N818
@@ -28,7 +42,7 @@ def connect(url: str) -> sa.Engine:
     """An engine on SQLite in WAL mode or on PostgreSQL."""
     parsed = sa.make_url(url)
     if parsed.get_backend_name() != "sqlite":
-        return sa.create_engine(parsed.set(drivername="postgresql+psycopg"), pool_pre_ping=True)
+        return postgresql(url)
     if sys.version_info >= (3, 12) and sqlite3.sqlite_version_info < (3, 42):
         raise UnsupportedDatabase(
             f"Python {sys.version_info.major}.{sys.version_info.minor} here has SQLite {sqlite3.sqlite_version}; "
@@ -40,6 +54,13 @@ def connect(url: str) -> sa.Engine:
     sa.event.listen(engine, "connect", _set_up_sqlite)
     sa.event.listen(engine, "begin", _begin_sqlite)
     return engine
+
+
+def postgresql(url: str) -> sa.Engine:
+    """An engine on PostgreSQL."""
+    parsed = sa.make_url(url)
+    patient = parsed.set(drivername="postgresql+psycopg", query=PATIENCE | parsed.query)
+    return sa.create_engine(patient, pool_pre_ping=True)
 
 
 def _set_up_sqlite(connection: sqlite3.Connection, _: object) -> None:
@@ -61,7 +82,7 @@ def _begin_sqlite(connection: sa.Connection) -> None:
 @contextmanager
 def reading(engine: sa.Engine) -> Iterator[sa.Connection]:
     """A transaction that sees one state of the database and takes no lock."""
-    with engine.connect() as connection, connection.begin():
+    with engine.connect().execution_options(**SNAPSHOT[engine.dialect.name]) as connection, connection.begin():
         yield connection
 
 
@@ -76,6 +97,14 @@ def serialise(connection: sa.Connection) -> None:
     """Wait until no other transaction that called this is open; on SQLite a writer is alone anyway."""
     if connection.dialect.name == "postgresql":
         connection.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
+
+
+def clock(connection: sa.Connection) -> datetime:
+    """The time by the one clock that every process of the service goes by, on whatever machine it runs."""
+    if connection.dialect.name == "postgresql":
+        now: datetime = connection.execute(sa.select(sa.func.clock_timestamp())).scalar_one()
+        return now
+    return datetime.now(UTC)
 
 
 def migrate(engine: sa.Engine) -> None:

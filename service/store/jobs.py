@@ -258,7 +258,8 @@ class Jobs:
         """
         with writing(self._engine) as connection:
             serialise(connection)
-            if connection.scalar(sa.select(j.id).where(*_fence(task))) is None:
+            # Locked: a cancellation must come before this end or after it, not between the row and the poses.
+            if connection.scalar(sa.select(j.id).where(*_fence(task)).with_for_update()) is None:
                 return
             now_stored = find_venue(connection, task.venue.id)
             if result.accepted and (now_stored is None or not now_stored.calibrates_like(task.venue)):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
-from service.store.engine import reading, writing
+from service.store.engine import clock, reading, writing
 from service.store.tables import workers
 
 
@@ -20,15 +20,15 @@ class SeenWorker:
 
 
 class Workers:
-    """The workers in the database."""
+    """The workers in the database. Their times are the database's: the clocks of several machines differ."""
 
     def __init__(self, engine: sa.Engine) -> None:
         self._engine = engine
 
     def enter(self, name: str, model_sha256: str | None) -> None:
         """A worker starts."""
-        now = datetime.now(UTC)
         with writing(self._engine) as connection:
+            now = clock(connection)
             connection.execute(sa.delete(workers).where(workers.c.name == name))
             connection.execute(
                 sa.insert(workers).values(name=name, model_sha256=model_sha256, started_at=now, seen_at=now)
@@ -37,25 +37,28 @@ class Workers:
     def beat(self, name: str) -> bool:
         """A worker is alive; False if the others have given it up, then it must enter again."""
         with writing(self._engine) as connection:
-            beat = sa.update(workers).where(workers.c.name == name).values(seen_at=datetime.now(UTC))
+            beat = sa.update(workers).where(workers.c.name == name).values(seen_at=clock(connection))
             return connection.execute(beat).rowcount == 1
 
     def alive(self, silence_s: float) -> list[SeenWorker]:
         """The workers that were seen within `silence_s`."""
-        query = sa.select(workers.c.name, workers.c.model_sha256).where(workers.c.seen_at >= _ago(silence_s))
         with reading(self._engine) as connection:
+            recent = workers.c.seen_at >= _ago(connection, silence_s)
+            query = sa.select(workers.c.name, workers.c.model_sha256).where(recent)
             return [SeenWorker(row.name, row.model_sha256) for row in connection.execute(query)]
 
     def silent(self, silence_s: float) -> list[str]:
         """The workers that were not."""
         with reading(self._engine) as connection:
-            return list(connection.scalars(sa.select(workers.c.name).where(workers.c.seen_at < _ago(silence_s))))
+            old = workers.c.seen_at < _ago(connection, silence_s)
+            return list(connection.scalars(sa.select(workers.c.name).where(old)))
 
     def leave(self, name: str, silence_s: float) -> None:
         """Forget a worker, unless it has come back meanwhile."""
         with writing(self._engine) as connection:
-            connection.execute(sa.delete(workers).where(workers.c.name == name, workers.c.seen_at < _ago(silence_s)))
+            old = workers.c.seen_at < _ago(connection, silence_s)
+            connection.execute(sa.delete(workers).where(workers.c.name == name, old))
 
 
-def _ago(seconds: float) -> datetime:
-    return datetime.now(UTC) - timedelta(seconds=seconds)
+def _ago(connection: sa.Connection, seconds: float) -> datetime:
+    return clock(connection) - timedelta(seconds=seconds)
