@@ -1,0 +1,144 @@
+"""Data of every schema that was released, brought up to date, and read as if it had always been there."""
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+import sqlalchemy as sa
+from alembic import command
+from alembic.config import Config
+from alembic.script import ScriptDirectory
+
+from service.schemas import VENUE_EXAMPLE, Options, VenueIn
+from service.store.engine import MIGRATIONS, connect, migrate, writing
+from service.store.jobs import Jobs
+from service.store.keys import Keys
+from service.store.venues import Venues
+from service.store.workers import Workers
+from tests.homes import in_both_homes
+
+REVISIONS = [script.revision for script in ScriptDirectory(str(MIGRATIONS)).walk_revisions()]
+NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
+VENUE = VenueIn.model_validate(VENUE_EXAMPLE).stored()
+DONE, WAITING = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "01KAJ3Q6WZ5T3Y8R0N4M2C7B1E"
+FRAMES = {"left": [f"frames/{WAITING}/left/0"]}
+RESULT = {
+    "accepted": True,
+    "rejected_because": None,
+    "cameras": [
+        {
+            "id": "left",
+            "pose": VENUE.cameras[0].pose.model_dump(),
+            "sigma": None,
+            "moved": {"rotation_deg": 0.0, "position_m": 0.1, "pixels": 2.0},
+            "iou": 0.9,
+            "residual_px": 1.0,
+        }
+    ],
+    "stitch_error_px": None,
+    "stitch_error_before_px": None,
+    "loss": 0.1,
+    "generations": 10,
+    "timings_s": {"decode": 0.1},
+    "provenance": {"software": "0.1.0", "model_sha256": "f" * 64, "seed": 7, "options": {}},
+}
+
+
+def job(id_, **values):
+    return {
+        "id": id_,
+        "venue": VENUE.id,
+        "priority": 100,
+        "options": Options(seed=7).model_dump(mode="json"),
+        "content_hash": "c" * 64,
+        "venue_document": VENUE.model_dump(mode="json"),
+        "frames": FRAMES,
+        "attempt": 0,
+        "revision": 1,
+        "created_at": NOON,
+        "updated_at": NOON,
+        **values,
+    }
+
+
+# What each table held at the first revision, and what later ones added.
+ROWS = {
+    "venues": [{"id": VENUE.id, "document": VENUE.model_dump(mode="json"), "revision": 3, "updated_at": NOON}],
+    "pose_history": [
+        {
+            "venue": VENUE.id,
+            "camera": "left",
+            "pose": VENUE.cameras[0].pose.model_dump(),
+            "cause": "calibration",
+            "job": DONE,
+            "since": NOON,
+        }
+    ],
+    "jobs": [
+        job(DONE, status="succeeded", result=RESULT, run_token="t", idempotency_key="k", finished_at=NOON),
+        job(WAITING, status="queued"),
+    ],
+    "workers": [{"name": "w", "model_sha256": "f" * 64, "started_at": NOON, "seen_at": NOON}],
+    "api_keys": [{"name": "cron", "hash": "0" * 64, "scope": "calibrate", "created_at": NOON, "last_used_at": NOON}],
+}
+
+
+@pytest.fixture
+def old(home, tmp_path):
+    """Make a database as a release of that revision left it."""
+    engine = connect(home.database_url(tmp_path))
+
+    def old(revision):
+        with writing(engine) as connection:
+            config = Config()
+            config.set_main_option("script_location", str(MIGRATIONS))
+            config.attributes["connection"] = connection
+            command.upgrade(config, revision)
+            tables = sa.MetaData()
+            tables.reflect(connection)
+            for name in tables.tables.keys() & ROWS.keys():
+                insert_what_it_has_columns_for(connection, tables.tables[name], ROWS[name])
+        return engine
+
+    yield old
+    engine.dispose()
+
+
+def insert_what_it_has_columns_for(connection, table, rows):
+    for row in rows:
+        connection.execute(sa.insert(table).values({name: row[name] for name in row.keys() & table.columns.keys()}))
+
+
+@in_both_homes
+@pytest.mark.parametrize("revision", sorted(REVISIONS))
+def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
+    engine = old(revision)
+    migrate(engine)
+    venues, jobs = Venues(engine), Jobs(engine)
+    assert venues.get(VENUE.id) == VENUE
+    ((_, held),) = venues.poses(VENUE.id, None, 10)
+    assert (held.cause, held.job, held.since, held.pose) == ("calibration", DONE, NOON, VENUE.cameras[0].pose)
+    done = jobs.get(DONE)
+    assert (done.status, done.created_at, done.finished_at) == ("succeeded", NOON, NOON)
+    assert done.result.model_dump(mode="json") == RESULT
+    assert jobs.same_as(VENUE.id, "k", "c" * 64).id == DONE
+    assert jobs.get(WAITING).queue_position == 1
+    task = jobs.begin(WAITING)
+    assert (task.venue, task.options.seed, task.frames) == (VENUE, 7, FRAMES)
+    assert Workers(engine).silent(0) == ["w"]
+    keys = Keys(engine).all()
+    assert [(key.name, key.scope, key.last_used_at) for key in keys] == (
+        [("cron", "calibrate", NOON)] if revision >= "0003" else []
+    )
+
+
+@in_both_homes
+@pytest.mark.parametrize("revision", sorted(REVISIONS))
+def test_an_upgraded_database_takes_new_rows(old, revision):
+    engine = old(revision)
+    migrate(engine)
+    # Numbers go on where those of the old rows ended.
+    moved = VENUE.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
+    Venues(engine).put(VENUE.with_poses({"left": moved}), lambda _: None)
+    assert [held.cause for _, held in Venues(engine).poses(VENUE.id, None, 10)] == ["put", "calibration"]
+    key = Keys(engine).add("guest", "read", NOON + timedelta(days=36500))
+    assert key.startswith("esc_")
