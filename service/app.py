@@ -31,6 +31,8 @@ from service.store.venues import Venues
 from service.store.workers import Workers
 from service.watch import Watch
 
+# A client waits, and can come again.
+BLOB_PATIENCE_S = 10.0
 log = structlog.get_logger()
 
 
@@ -64,7 +66,7 @@ def open_context(settings: Settings) -> Context:
         settings=settings,
         engine=engine,
         queue=Queue(settings.home_database_url),
-        blobs=Blobs(settings.home_blob_url),
+        blobs=Blobs(settings.home_blob_url, BLOB_PATIENCE_S),
         venues=Venues(engine),
         jobs=jobs_,
         workers=workers,

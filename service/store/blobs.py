@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import os
+from datetime import timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlparse
 
 import obstore
 from obstore.store import LocalStore, ObjectStore, from_url
 
+if TYPE_CHECKING:
+    from obstore.store import BackoffConfig, RetryConfig
+
 
 class Blobs:
-    """Objects by path, in a folder (`file:` URL) or in what else obstore can reach (`s3:`)."""
+    """Objects by path, in a folder (`file:` URL) or in a bucket (`s3:` URL).
 
-    def __init__(self, url: str) -> None:
+    Whose bucket, and with which credentials, is read from the environment (`AWS_...`). A bucket that does not answer is
+    asked again for `patience_s`: long for who has computed for minutes, short where somebody waits for the answer.
+    """
+
+    def __init__(self, url: str, patience_s: float = 120.0) -> None:
         parsed = urlparse(url)
         self._folder = Path(unquote(parsed.path)) if parsed.scheme == "file" else None
         self._store: ObjectStore = (
-            LocalStore(self._folder, mkdir=True, automatic_cleanup=True) if self._folder else from_url(url)
+            LocalStore(self._folder, mkdir=True, automatic_cleanup=True)
+            if self._folder
+            else from_url(url, retry_config=_for(patience_s))
         )
 
     def put(self, path: str, data: bytes) -> None:
@@ -49,6 +60,12 @@ class Blobs:
             raise PermissionError(f"{self._folder} cannot be written")
         for _ in obstore.list(self._store, "readiness", chunk_size=1):
             break
+
+
+def _for(patience_s: float) -> RetryConfig:
+    """Ask again until the time is over, however often that is."""
+    pauses: BackoffConfig = {"init_backoff": timedelta(seconds=0.1), "max_backoff": timedelta(seconds=2), "base": 2}
+    return {"max_retries": 10_000, "retry_timeout": timedelta(seconds=patience_s), "backoff": pauses}
 
 
 def _sync(path: Path) -> None:

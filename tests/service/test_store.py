@@ -1,37 +1,36 @@
+import time
+
 import pytest
 import sqlalchemy as sa
+from obstore.exceptions import BaseError
 
 from service.schemas import VENUE_EXAMPLE, VenueIn
 from service.store import tables
 from service.store.blobs import Blobs
-from service.store.engine import connect, migrate
+from service.store.engine import migrate
 from service.store.jobs import Jobs, new_job_id
 from service.store.venues import Venues
 from service.store.workers import Workers
+from tests.homes import in_both_homes
 
 
-@pytest.fixture
-def engine(tmp_path):
-    engine = connect(f"sqlite:///{tmp_path}/esc.sqlite")
-    migrate(engine)
-    yield engine
-    engine.dispose()
-
-
+@in_both_homes
 def test_the_migrations_make_the_tables_that_the_code_knows(engine):
     found = sa.MetaData()
     found.reflect(engine)
     for name, table in tables.metadata.tables.items():
-        assert {c.name: (str(c.type), c.nullable) for c in found.tables[name].columns} == {
+        assert {c.name: (c.type.compile(engine.dialect), c.nullable) for c in found.tables[name].columns} == {
             c.name: (c.type.compile(engine.dialect), c.nullable) for c in table.columns
         }
         assert {index.name for index in found.tables[name].indexes} == {index.name for index in table.indexes}
 
 
+@in_both_homes
 def test_migrating_twice_changes_nothing(engine):
     migrate(engine)
 
 
+@in_both_homes
 def test_every_pose_that_held_is_remembered_with_its_cause(engine):
     venues = Venues(engine)
     venue = VenueIn.model_validate(VENUE_EXAMPLE).stored()
@@ -46,6 +45,7 @@ def test_every_pose_that_held_is_remembered_with_its_cause(engine):
     ]
 
 
+@in_both_homes
 def test_a_refused_put_changes_nothing(engine):
     venues = Venues(engine)
 
@@ -63,6 +63,7 @@ def test_job_ids_sort_by_time():
     assert ids[0][:8] == ids[2][:8]
 
 
+@in_both_homes
 def test_jobs_that_are_not_there_are_none(engine):
     jobs = Jobs(engine)
     assert jobs.get(new_job_id()) is None
@@ -70,6 +71,7 @@ def test_jobs_that_are_not_there_are_none(engine):
     assert jobs.states([new_job_id()]) == {}
 
 
+@in_both_homes
 def test_a_silent_worker_is_noticed_and_may_come_back(engine):
     workers = Workers(engine)
     workers.enter("w", None)
@@ -81,8 +83,9 @@ def test_a_silent_worker_is_noticed_and_may_come_back(engine):
     assert not workers.beat("w")
 
 
-def test_blobs_are_kept_and_removed_by_folder(tmp_path):
-    blobs = Blobs((tmp_path / "a folder").as_uri())
+@in_both_homes
+def test_blobs_are_kept_and_removed_by_folder(home, tmp_path):
+    blobs = Blobs(home.blob_url(tmp_path / "a folder"))
     blobs.put("frames/a/left/0", b"1")
     blobs.put("frames/ab/left/0", b"2")
     blobs.delete_under("frames/a")
@@ -97,3 +100,13 @@ def test_a_blob_reaches_the_disk_with_every_folder_on_the_way_to_it(tmp_path, mo
     Blobs((tmp_path / "blobs").as_uri()).put("frames/a/left/0", b"1")
     ways = ("frames/a/left/0", "frames/a/left", "frames/a", "frames", "")
     assert synced == [tmp_path / "blobs" / way for way in ways]
+
+
+def test_a_bucket_that_does_not_answer_is_asked_for_as_long_as_its_caller_is_patient(monkeypatch):
+    for name, value in {"ENDPOINT_URL": "http://127.0.0.1:1", "ALLOW_HTTP": "true", "ACCESS_KEY_ID": "k"}.items():
+        monkeypatch.setenv(f"AWS_{name}", value)
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "s")
+    begun = time.monotonic()
+    with pytest.raises(BaseError):
+        Blobs("s3://bucket", patience_s=1).put("frames/a/left/0", b"1")
+    assert 1 < time.monotonic() - begun < 10
