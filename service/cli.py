@@ -102,12 +102,12 @@ def worker(
     data: Data = None, name: Annotated[str | None, typer.Option("--name", help="Unique and stable.")] = None
 ) -> None:
     """A worker alone."""
-    from service.store.engine import UnsupportedDatabase
     from worker import process
 
     try:
-        process.run(_settings(data=data, worker_name=name))
-    except (process.AlreadyRunning, UnsupportedDatabase) as error:
+        with _database_told():
+            process.run(_settings(data=data, worker_name=name))
+    except process.AlreadyRunning as error:
         _fail(str(error), USAGE)
 
 
@@ -279,30 +279,41 @@ def remove_key(name: str, data: Data = None) -> None:
 @contextmanager
 def _keys(data: Path | None) -> Iterator[Keys]:
     """The keys of the service whose folder or database the settings name."""
-    from service.store.engine import AWAY, UnsupportedDatabase, connect, migrate
+    from service.store.engine import connect, migrate
     from service.store.keys import Keys
 
     settings = _settings(data=data)
-    try:
+    with _database_told():
         engine = connect(settings.home_database_url)
         # Keys of another folder open nothing, and nothing else would tell.
-        err.print(f"Keys in {engine.url.render_as_string(hide_password=True)}")
+        err.print(f"Keys in {engine.url.set(query={}).render_as_string(hide_password=True)}")
         migrate(engine)
         yield Keys(engine)
         engine.dispose()
+
+
+@contextmanager
+def _database_told() -> Iterator[None]:
+    """What is wrong with the database is a line: it is wrong at the start, or not of this program's making."""
+    import sqlalchemy as sa
+
+    from service.store.engine import UnsupportedDatabase
+
+    try:
+        yield
     except UnsupportedDatabase as error:
         _fail(str(error), USAGE)
-    except (*AWAY, OSError) as error:
+    except (sa.exc.DBAPIError, OSError) as error:
         _fail(f"The database cannot be used: {getattr(error, 'orig', error)}", FAILED)
 
 
 def _serve(settings: Settings, *, with_worker: bool) -> None:
     from service import serving
-    from service.store.engine import UnsupportedDatabase
 
     try:
-        serving.serve(settings, with_worker=with_worker)
-    except (serving.CannotListen, UnsupportedDatabase) as error:
+        with _database_told():
+            serving.serve(settings, with_worker=with_worker)
+    except serving.CannotListen as error:
         _fail(str(error), USAGE)
 
 

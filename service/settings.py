@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import re
 import socket
 import sys
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+# Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
+DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
+BLOB_URL = re.compile(r"(file|s3)://.+")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
 
@@ -23,7 +27,7 @@ class Settings(BaseSettings):
     # Where things live.
     data: Path = Field(Path("esc-data"), description="Folder of the embedded home: database, frames, pictures.")
     database_url: str | None = Field(None, description="SQLAlchemy URL; absent: SQLite in the data folder.")
-    blob_url: str | None = Field(None, description="obstore URL of frames and pictures; absent: the data folder.")
+    blob_url: str | None = Field(None, description="s3: or file: URL of frames and pictures; absent: the data folder.")
     model: Path = Field(MODEL_BESIDE_THE_CODE, description="The segmentation network, an ONNX file.")
 
     # Listening.
@@ -61,6 +65,21 @@ class Settings(BaseSettings):
     # Being watched.
     log_format: Literal["json", "console"] = "json"
     log_level: Literal["debug", "info", "warning", "error"] = "info"
+
+    @field_validator("database_url")
+    @classmethod
+    def _is_of_a_database(cls, url: str | None) -> str | None:
+        # What was given may hold a password: it is not repeated.
+        if url is not None and not DATABASE_URL.fullmatch(url):
+            raise ValueError("expected is postgresql://user:password@host:5432/name or sqlite:////folder/esc.sqlite")
+        return url
+
+    @field_validator("blob_url")
+    @classmethod
+    def _is_of_a_store(cls, url: str | None) -> str | None:
+        if url is not None and not BLOB_URL.fullmatch(url):
+            raise ValueError("expected is s3://bucket, s3://bucket/folder or file:///folder")
+        return url
 
     @property
     def home_database_url(self) -> str:

@@ -1,4 +1,5 @@
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -152,6 +153,20 @@ def test_a_wrong_setting_is_told(start, tmp_path):
     answer = subprocess.run(command, env={"ESC_QUEUE_LIMIT": "many"}, capture_output=True, text=True, timeout=60)
     assert answer.returncode == 2
     assert "ESC_QUEUE_LIMIT" in answer.stderr
+
+
+@pytest.mark.parametrize("command", [("serve", "--port", "0"), ("worker",)])
+def test_a_database_out_of_reach_is_told_in_a_line(tmp_path, command):
+    answer = subprocess.run(
+        [sys.executable, "-m", "service.cli", *command],
+        env=os.environ | {"ESC_DATA": str(tmp_path), "ESC_DATABASE_URL": "postgresql://esc:secret@127.0.0.1:1/esc"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (answer.returncode, "The database cannot be used: " in answer.stderr) == (1, True)
+    assert "Traceback" not in answer.stderr
+    assert "secret" not in answer.stderr
 
 
 def test_ctrl_c_ends_it_cleanly(start):
