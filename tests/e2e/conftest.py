@@ -5,22 +5,25 @@ import re
 import pytest
 
 from tests.e2e.running import Service
+from tests.homes import environment
 
 
 @pytest.fixture(scope="session")
-def service(tmp_path_factory):
-    running = Service(tmp_path_factory.mktemp("esc")).ready()
+def service(home, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("esc")
+    running = Service(folder, **environment(home.settings(folder))).ready()
     yield running
     assert running.stop() == 0
 
 
 @pytest.fixture
-def start(tmp_path):
-    """Start services of one's own; all of them on one folder unless told otherwise."""
+def start(home, tmp_path):
+    """Start services of one's own; all of them in one home unless told otherwise."""
     started = []
 
     def start(*arguments, **settings):
-        started.append(Service(tmp_path / "esc", *arguments, **settings))
+        folder = tmp_path / "esc"
+        started.append(Service(folder, *arguments, **environment(home.settings(folder)) | settings))
         return started[-1]
 
     yield start

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import httpx
 
+from tests.homes import files
+
 PROGRAM = [sys.executable, str(Path(__file__).parent / "program.py")]
 DEADLINE_S = 30
 SIZE = (64, 48)
@@ -89,6 +91,18 @@ class Service:
     def running(self, job_id: str) -> dict:
         """The job once its program has said something."""
         return wait_for(lambda: (job := self.job(job_id))["progress"] and job)
+
+    def files(self, folder: str) -> list[str]:
+        """What the service has stored."""
+        return files(self.blob_url, folder)
+
+    @property
+    def database_url(self) -> str:
+        return self.environment.get("ESC_DATABASE_URL", f"sqlite:///{self.data}/esc.sqlite")
+
+    @property
+    def blob_url(self) -> str:
+        return self.environment.get("ESC_BLOB_URL", (self.data / "blobs").as_uri())
 
     def begun(self, job_id: str) -> list[int]:
         """The process of each attempt of a job."""

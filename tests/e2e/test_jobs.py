@@ -4,9 +4,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from service.store.blobs import Blobs
 from tests.e2e.running import SIZE, alive, png, upload, venue, wait_for
+from tests.homes import in_both_homes
 
 
+@in_both_homes
 def test_a_job_goes_from_frames_to_poses_and_pictures(service, name):
     service.venue(name)
     answer = service.submit(name, generations=12)
@@ -25,6 +28,7 @@ def test_a_job_goes_from_frames_to_poses_and_pictures(service, name):
         assert (picture.status_code, picture.headers["content-type"]) == (200, "image/jpeg")
 
 
+@in_both_homes
 def test_an_accepted_result_moves_the_stored_poses(service, name):
     tag = service.http.get(f"/venues/{service.venue(name)}").headers["etag"]
     result = service.end(service.submit(name).json()["id"])["result"]
@@ -83,6 +87,7 @@ def test_a_failure_names_the_camera_and_the_cause(service, name):
     assert (picture.status_code, picture.json()["type"]) == (404, "/problems/picture-not-found")
 
 
+@in_both_homes
 def test_a_venue_changed_meanwhile_keeps_its_new_poses(service, name):
     service.venue(name, "accept 1")
     job = service.submit(name).json()["id"]
@@ -117,6 +122,7 @@ def test_the_seed_is_the_callers_or_one_is_chosen_and_told(service, name):
 # One active job per venue, and the same content once
 
 
+@in_both_homes
 def test_the_same_frames_give_the_running_job_back_and_others_a_conflict(service, name):
     service.venue(name, "accept 2")
     job = service.submit(name).json()["id"]
@@ -156,6 +162,7 @@ def test_a_key_that_is_none_is_refused(service, name, key):
     assert service.submit(name, headers=headers).status_code == 422
 
 
+@in_both_homes
 def test_many_submissions_at_once_are_one_job(service, name):
     service.venue(name, "accept 1")
     with ThreadPoolExecutor(8) as pool:
@@ -163,7 +170,7 @@ def test_many_submissions_at_once_are_one_job(service, name):
     assert sorted(answer.status_code for answer in answers) == [200] * 7 + [202]
     job = {answer.json()["id"] for answer in answers}
     assert len(job) == 1
-    assert len(list(service.data.glob(f"blobs/frames/{next(iter(job))}/*"))) == 2
+    assert len(service.files(f"frames/{next(iter(job))}")) == 2
 
 
 # Following a job
@@ -201,6 +208,7 @@ def test_an_unchanged_job_is_not_sent_again(service, name):
     assert "retry-after" not in answer.headers
 
 
+@in_both_homes
 def test_events_tell_the_progress_and_the_end(service, name):
     service.venue(name, "accept 1")
     job = service.submit(name).json()["id"]
@@ -228,6 +236,7 @@ def test_jobs_are_listed_newest_first_in_pages(service, name):
 # Ending a job early
 
 
+@in_both_homes
 def test_a_running_job_is_cancelled_within_two_seconds(service, name):
     service.venue(name, "hang")
     job = service.submit(name).json()["id"]
@@ -241,6 +250,7 @@ def test_a_running_job_is_cancelled_within_two_seconds(service, name):
     assert service.http.post(f"/jobs/{job}/cancel").json() == service.job(job)
 
 
+@in_both_homes
 def test_a_queued_job_is_cancelled_at_once_and_never_begins(service, name):
     busy = service.submit(service.venue(f"{name}-a", "hang")).json()["id"]
     service.running(busy)
@@ -264,6 +274,7 @@ def test_a_job_that_takes_too_long_is_ended(service, name):
     wait_for(lambda: not any(alive(process) for process in service.begun(job["id"])))
 
 
+@in_both_homes
 def test_live_jobs_go_first(service, name):
     busy = service.submit(service.venue(f"{name}-a", "hang")).json()["id"]
     service.running(busy)
@@ -274,14 +285,16 @@ def test_live_jobs_go_first(service, name):
     assert service.end(live["id"])["finished_at"] < service.end(routine["id"])["started_at"]
 
 
+@in_both_homes
 def test_a_full_queue_says_so_and_when_to_come_again(start):
     full = start("serve", ESC_QUEUE_LIMIT="2")
     answers = [full.submit(full.venue(f"venue-{number}")) for number in range(3)]
     assert [answer.status_code for answer in answers] == [202, 202, 429]
     assert (answers[2].json()["type"], answers[2].headers["retry-after"]) == ("/problems/queue-full", "30")
-    assert len(list(full.data.glob("blobs/frames/*"))) == 2
+    assert len(full.files("frames")) == 2 * len(("left", "right"))
 
 
+@in_both_homes
 def test_nothing_is_ready_without_a_worker(start):
     answer = start("serve").http.get("/readyz")
     assert (answer.status_code, answer.json()["parts"]["worker"]) == (503, "none gave a sign of life")
@@ -301,8 +314,9 @@ def test_what_a_request_is_called_stays(service):
     assert len(odd) == 32
 
 
+@in_both_homes
 def test_the_frames_that_were_sent_are_the_frames_that_are_kept(service, name):
     service.venue(name)
     job = service.submit(name, 5).json()["id"]
     service.end(job)
-    assert (service.data / f"blobs/frames/{job}/left/0").read_bytes() == png(*SIZE, shade=5)
+    assert Blobs(service.blob_url).get(f"frames/{job}/left/0") == png(*SIZE, shade=5)

@@ -13,21 +13,12 @@ from service.auth import BELIEVED_FOR_S, GUESS_EVERY_S, GUESSES, Gate
 from service.problems import Problem
 from service.routes.guarded import Guarded
 from service.settings import Settings
-from service.store.engine import connect, migrate
 from service.store.keys import Keys
 from tests.service.test_limits import Clock
 
 JUST_BEFORE, JUST_AFTER = BELIEVED_FOR_S - 0.1, BELIEVED_FOR_S + 0.1
 # `esc calibrate --wait` asks so often for a job.
 FOLLOWS_PER_S = 2
-
-
-@pytest.fixture
-def engine(tmp_path):
-    engine = connect(f"sqlite:///{tmp_path}/esc.sqlite")
-    migrate(engine)
-    yield engine
-    engine.dispose()
 
 
 @pytest.fixture

@@ -3,18 +3,15 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.store.engine import connect, migrate
 from service.store.keys import KeyExists, Keys, hash_of
+from tests.homes import in_both_homes
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 
 
 @pytest.fixture
-def keys(tmp_path):
-    engine = connect(f"sqlite:///{tmp_path}/esc.sqlite")
-    migrate(engine)
-    yield Keys(engine)
-    engine.dispose()
+def keys(engine):
+    return Keys(engine)
 
 
 def test_a_key_is_256_random_bits_behind_a_prefix(keys):
@@ -31,6 +28,7 @@ def test_on_the_disk_there_is_the_hash_and_nowhere_the_key(keys, tmp_path):
     assert key.removeprefix("esc_").encode() not in kept
 
 
+@in_both_homes
 def test_a_key_is_found_until_it_is_removed(keys):
     key = keys.add("cron", "calibrate", NOON)
     found = keys.find(hash_of(key))
@@ -41,6 +39,7 @@ def test_a_key_is_found_until_it_is_removed(keys):
     assert not keys.remove("cron")
 
 
+@in_both_homes
 def test_a_name_is_of_one_key(keys):
     keys.add("cron", "read")
     with pytest.raises(KeyExists):
@@ -48,6 +47,7 @@ def test_a_name_is_of_one_key(keys):
     assert [key.scope for key in keys.all()] == ["read"]
 
 
+@in_both_homes
 def test_an_expired_key_is_still_a_key(keys):
     assert not keys.any()
     keys.add("old", "read", datetime.now(UTC) - timedelta(seconds=1))
@@ -55,6 +55,7 @@ def test_an_expired_key_is_still_a_key(keys):
     assert keys.all()[0].expired
 
 
+@in_both_homes
 def test_a_use_that_another_process_noted_later_stays(keys):
     of = {name: hash_of(keys.add(name, "read")) for name in ("a", "b")}
     keys.note_uses({of["a"]: NOON + timedelta(minutes=1)})

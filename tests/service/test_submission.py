@@ -11,11 +11,14 @@ from service.routes import calibrate
 from service.schemas import VenueIn
 from service.settings import Settings
 from tests.e2e.running import png, venue
+from tests.homes import files, in_both_homes
+
+pytestmark = in_both_homes
 
 
 @pytest.fixture
-def context(tmp_path):
-    context = open_context(Settings(data=tmp_path))
+def context(home, tmp_path):
+    context = open_context(Settings(data=tmp_path, **home.settings(tmp_path)))
     yield context
     context.queue.close()
     context.engine.dispose()
@@ -37,7 +40,7 @@ def form():
 def refused(context, read, form):
     with pytest.raises(Problem) as problem:
         calibrate.submit(context, read, form, None)
-    assert [file for file in (context.settings.data / "blobs").rglob("*") if file.is_file()] == []
+    assert files(context.settings.home_blob_url) == []
     return problem.value.members()
 
 
