@@ -35,7 +35,6 @@ from service.store.workers import Workers
 from worker.message import Message
 
 BEAT_S = 2.0
-SWEEP_S = 3.0
 # Twice as often as a cancellation needs to reach the child.
 LOOK_S = 0.5
 PROGRESS_S = 0.25
@@ -94,15 +93,18 @@ class Worker:
 
     def look_after(self, stop: threading.Event) -> None:
         """Give signs of life, take over from the dead, end what the queue has given up."""
-        swept = 0.0
+        beaten, judging_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):
             try:
                 if not self._workers.beat(self._settings.worker_name):
                     self._enter()
-                if time.monotonic() - swept > SWEEP_S:
+                before, beaten = beaten, time.monotonic()
+                if beaten - before > 2 * BEAT_S:
+                    # The database was away and nobody could give a sign of life: silence proves nothing yet.
+                    judging_from = beaten + self._settings.takeover_after_s
+                if beaten >= judging_from:
                     self._take_over()
-                    self._reconcile()
-                    swept = time.monotonic()
+                self._reconcile()
             except Exception:  # the database is away: the next round tries again
                 log.warning("cannot look after the jobs", exc_info=True)
 

@@ -3,12 +3,15 @@
 import os
 import signal
 import socket
-import sqlite3
 import subprocess
 import sys
-from contextlib import closing
+import time
 
 from tests.e2e.running import alive, children, wait_for
+from tests.homes import in_both_homes, on_servers
+
+# Beyond the silence: until a worker looks, takes the job out of the queue and begins.
+TAKING_OVER_S = 5
 
 
 def poses(service, venue):
@@ -33,26 +36,36 @@ def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
     assert service.worker() != worker
 
 
+@in_both_homes
 def test_a_worker_on_another_machine_takes_over(start, tmp_path):
-    service = start("serve")
+    silence_s = 3
+    service = start("serve", ESC_TAKEOVER_AFTER_S=str(silence_s))
     service.venue("v", "accept 3")
-    first, second = (worker(service, number) for number in (1, 2))
+    workers = [worker(service, tmp_path / f"machine-{number}", f"worker-{number}") for number in (1, 2)]
+    service.ready()
     job = service.submit("v").json()["id"]
     service.running(job)
-    doomed = first if children(first.pid) else second
+    (doomed,) = (worker for worker in workers if children(worker.pid))
+    (computing,) = children(doomed.pid)
     doomed.kill()
-    doomed.wait()
+    killed = time.monotonic()
+    wait_for(lambda: service.job(job)["attempt"] == 2)
+    assert time.monotonic() - killed < silence_s + TAKING_OVER_S
+    assert not alive(computing)
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 2)
     assert poses(service, "v") == [-0.875, -0.875]
-    for process in (first, second):
+    assert len(service.http.get("/venues/v/poses").json()["poses"]) == 2 * len(("put", "calibration"))
+    for process in workers:
         process.kill()
         process.wait()
 
 
-def worker(service, number):
-    command = [sys.executable, "-m", "service.cli", "worker", "--name", f"worker-{number}"]
-    return subprocess.Popen(command, env=service.environment, stderr=service.log)
+def worker(service, folder, name):
+    """A worker with nothing but the addresses of its home."""
+    command = [sys.executable, "-m", "service.cli", "worker", "--name", name]
+    home = {"ESC_DATA": str(folder), "ESC_DATABASE_URL": service.database_url, "ESC_BLOB_URL": service.blob_url}
+    return subprocess.Popen(command, env=service.environment | home, stderr=service.log)
 
 
 def test_two_workers_of_one_name_do_not_run_on_one_machine(start):
@@ -78,6 +91,7 @@ def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     assert poses(service, "v") == [-0.875, -0.875]
 
 
+@in_both_homes
 def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
     service = start().ready()
     service.venue("v")
@@ -118,21 +132,39 @@ def test_a_program_that_cannot_be_started_fails_the_job_and_says_so(start):
     assert "No such file or directory: '/nonexistent/program'" in job["error"]["detail"]
 
 
-def test_a_job_goes_on_while_the_database_is_away(start):
+@in_both_homes
+def test_a_job_goes_on_while_the_database_is_away(start, home):
     service = start().ready()
     service.venue("v", "accept 1")
     job = service.submit("v").json()["id"]
     service.running(job)
     (computing,) = service.begun(job)
-    with closing(sqlite3.connect(service.data / "esc.sqlite", timeout=30, isolation_level=None)) as database:
-        database.execute("ALTER TABLE jobs RENAME TO away")
+    with home.database_away(service.data):
         wait_for(lambda: not alive(computing))
         wait_for(lambda: "the database is away, trying again" in (service.data / "log").read_text())
         assert service.http.get(f"/jobs/{job}").status_code == 503
-        database.execute("ALTER TABLE away RENAME TO jobs")
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
     assert poses(service, "v") == [-0.875, -0.875]
+    # The queue has come back too.
+    assert service.end(service.submit("v", 1).json()["id"])["status"] == "succeeded"
+
+
+@on_servers
+def test_a_long_absence_of_the_database_is_no_workers_death(start, home, tmp_path):
+    silence_s = 3
+    service = start("up", ESC_TAKEOVER_AFTER_S=str(silence_s)).ready()
+    other = worker(service, tmp_path / "other", "other")
+    wait_for(lambda: '"other"' in (service.data / "log").read_text())
+    service.venue("v", "accept 7")
+    job = service.submit("v").json()["id"]
+    service.running(job)
+    with home.database_away(service.data):
+        time.sleep(silence_s + 2)
+    ended = service.end(job)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
+    other.kill()
+    other.wait()
 
 
 def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):
