@@ -24,6 +24,7 @@ from service.routes import calibrate, documented, health, jobs, venues
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.engine import AWAY, connect, migrate
+from service.store.expiry import Expiry
 from service.store.jobs import Jobs
 from service.store.venues import Venues
 from service.store.workers import Workers
@@ -65,6 +66,7 @@ def open_context(settings: Settings) -> Context:
         blobs=Blobs(settings.home_blob_url),
         venues=Venues(engine),
         jobs=jobs_,
+        expiry=Expiry(engine),
         workers=workers,
         watch=Watch(jobs_.states),
         metrics=Metrics(jobs_, workers, settings.takeover_after_s),

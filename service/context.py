@@ -13,6 +13,7 @@ from service.queue import Queue
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN
 from service.settings import Settings
 from service.store.blobs import Blobs
+from service.store.expiry import Expiry
 from service.store.jobs import Jobs
 from service.store.venues import Venues
 from service.store.workers import Workers
@@ -29,6 +30,7 @@ class Context:
     blobs: Blobs
     venues: Venues
     jobs: Jobs
+    expiry: Expiry
     workers: Workers
     watch: Watch
     metrics: Metrics

@@ -57,6 +57,7 @@ KINDS: dict[str, Kind] = {
     # Jobs.
     "job-not-found": Kind(404, "There is no such job"),
     "picture-not-found": Kind(404, "There is no such picture"),
+    "picture-deleted": Kind(410, "The picture was deleted"),
     "idempotency-key-reused": Kind(422, "The idempotency key was used for other content"),
     "queue-full": Kind(429, "Too many jobs are waiting"),
     "no-markings-in-view": Kind(422, "The stored pose of a camera sees no markings"),

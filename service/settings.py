@@ -52,6 +52,12 @@ class Settings(BaseSettings):
     )
     takeover_after_s: float = Field(10, gt=2, description="Silence after which another worker takes a job over.")
 
+    # What is kept, counted from the end of a job.
+    keep_frames_days: float = Field(2, ge=0)
+    keep_pictures_days: float = Field(14, ge=0, description="Those of a venue's last accepted job stay.")
+    keep_jobs_days: float = Field(400, ge=2, description="With them idempotency keys; the last accepted job stays.")
+    tidy_every_s: float = Field(600, gt=0, description="How often a worker looks for what is past its time.")
+
     # Being watched.
     log_format: Literal["json", "console"] = "json"
     log_level: Literal["debug", "info", "warning", "error"] = "info"

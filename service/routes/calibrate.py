@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
+from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request, Response
@@ -19,12 +20,23 @@ from service.routes.documented import problems, reference
 from service.routes.jobs import RETRY_AFTER_S, job_answer
 from service.routes.venues import no_such_venue
 from service.schemas import OPTIONS_PART, Job, Options, Venue
-from service.store.jobs import KeyReused, QueueFull, Submission, VenueBusy, VenueGone, VenueReplaced, new_job_id
+from service.store.jobs import (
+    KeyReused,
+    QueueFull,
+    Submission,
+    VenueBusy,
+    VenueGone,
+    VenueReplaced,
+    frame_folder,
+    new_job_id,
+)
 
 router = APIRouter(tags=["jobs"])
 
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
 LONGEST_OPTIONS = 64 * 1024
+# Longer than any upload takes from its first stored frame to its job.
+UPLOAD_GRACE = timedelta(hours=1)
 UPLOAD: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -82,14 +94,16 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
         if known is not None:
             return job_answer(known)
         seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
+        # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
+        context.expiry.expect_upload(job_id, datetime.now(UTC) + UPLOAD_GRACE)
         paths = _store(context, job_id, files)
         submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths)
         job, new = context.jobs.submit(submission, context.settings.queue_limit, context.queue.enqueue)
     except (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull) as refusal:
-        context.blobs.delete_under(_folder(job_id))
+        context.blobs.delete_under(frame_folder(job_id))
         raise _in_words(refusal, venue, context) from None
     if not new:
-        context.blobs.delete_under(_folder(job_id))
+        context.blobs.delete_under(frame_folder(job_id))
     # After any other error the frames stay: whether the transaction was committed is then not known.
     return job_answer(job, status=202 if new else 200)
 
@@ -165,7 +179,7 @@ def _store(context: Context, job_id: str, files: dict[str, list[UploadFile]]) ->
     for camera, uploads in files.items():
         paths[camera] = []
         for number, file in enumerate(uploads):
-            path = f"{_folder(job_id)}/{camera}/{number}"
+            path = f"{frame_folder(job_id)}/{camera}/{number}"
             file.file.seek(0)
             context.blobs.put(path, file.file.read())
             paths[camera].append(path)

@@ -14,7 +14,7 @@ from service.context import Context, InContext, JobIdPath
 from service.problems import Problem
 from service.routes.documented import problems
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, Job, Jobs, Status
-from service.store.jobs import State
+from service.store.jobs import Pictures, State
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
@@ -44,7 +44,8 @@ def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None)
 def _existing(job_id: JobIdPath, context: InContext) -> Job:
     job = context.jobs.get(job_id)
     if job is None:
-        raise Problem("job-not-found", "GET /jobs lists those there are.")
+        kept = f"{context.settings.keep_jobs_days:g} days"
+        raise Problem("job-not-found", f"GET /jobs lists those there are; they are deleted {kept} after their end.")
     return job
 
 
@@ -101,31 +102,39 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
         await context.watch.until(job.id, _later_than(state), EVENT_AT_LEAST_EVERY_S)
 
 
-@router.get("/{job_id}/preview.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get("/{job_id}/preview.jpg", response_class=Response, responses={**JPEG, **problems(404, 410)})
 def preview(job: Existing, context: InContext) -> Response:
     """One wide view stitched from all cameras."""
     return _picture(context, job, "preview")
 
 
-@router.get("/{job_id}/birdseye.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get("/{job_id}/birdseye.jpg", response_class=Response, responses={**JPEG, **problems(404, 410)})
 def birdseye(job: Existing, context: InContext) -> Response:
     """The pitch from above, 10 px/m."""
     return _picture(context, job, "birdseye")
 
 
-@router.get("/{job_id}/overlay/{camera}.jpg", response_class=Response, responses={**JPEG, **problems(404)})
+@router.get("/{job_id}/overlay/{camera}.jpg", response_class=Response, responses={**JPEG, **problems(404, 410)})
 def overlay(job: Existing, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext) -> Response:
     """A camera's frame with the field drawn on it, before and after."""
     return _picture(context, job, f"overlay_{camera}")
 
 
 def _picture(context: Context, job: Job, name: str) -> Response:
-    folder = context.jobs.picture_folder(job.id)
-    data = context.blobs.get(f"{folder}/{name}.jpg") if folder else None
-    if data is None:
+    pictures = context.jobs.pictures(job.id)
+    if pictures is None or name not in pictures.names:
         detail = "The job has not come to its pictures yet." if job.open else "The job made no such picture."
         raise Problem("picture-not-found", detail, job=job.id)
+    data = None if pictures.deleted else context.blobs.get(f"{pictures.folder}/{name}.jpg")
+    if data is None:
+        raise Problem("picture-deleted", _why_deleted(pictures, context.settings.keep_pictures_days), job=job.id)
     return Response(data, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=3600"})
+
+
+def _why_deleted(pictures: Pictures, keep_days: float) -> str:
+    if pictures.deleted:
+        return f"Pictures are deleted {keep_days:g} days after the end of their job; the job and its numbers stay."
+    return "The job made it, but its file is gone from the store, and not by the service."
 
 
 def _later_than(seen: State | None) -> Callable[[State], bool]:

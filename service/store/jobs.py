@@ -78,6 +78,15 @@ class Task:
 
 
 @dataclass(frozen=True)
+class Pictures:
+    """The pictures of a job that has a result: where they lie in the blob store, and whether they still do."""
+
+    folder: str
+    names: list[str]
+    deleted: bool
+
+
+@dataclass(frozen=True)
 class State:
     """What waiters watch: `revision` grows with every change."""
 
@@ -142,6 +151,9 @@ class Jobs:
                     updated_at=now,
                 )
             )
+            # From here on the frames are the job's.
+            folder = frame_folder(submission.job_id)
+            connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
             enqueue(connection, submission.job_id, priority)
             return self._read(connection, submission.job_id), True
 
@@ -190,12 +202,14 @@ class Jobs:
         with reading(self._engine) as connection:
             return {row.id: State(row.revision, row.status) for row in connection.execute(query)}
 
-    def picture_folder(self, job_id: str) -> str | None:
-        """Where the pictures of a job lie in the blob store, None if there are none (yet)."""
-        query = sa.select(j.run_token).where(j.id == job_id, j.result.is_not(None))
+    def pictures(self, job_id: str) -> Pictures | None:
+        """The pictures of a job, None if it has no result (yet)."""
+        query = sa.select(j.run_token, j.pictures, j.pictures_deleted_at).where(j.id == job_id, j.result.is_not(None))
         with reading(self._engine) as connection:
-            token = connection.scalar(query)
-            return None if token is None else picture_folder(job_id, token)
+            row = connection.execute(query).one_or_none()
+        if row is None:
+            return None
+        return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
     def counts(self) -> dict[str, int]:
         """How many jobs are in each state."""
@@ -349,9 +363,19 @@ class Jobs:
         return 1 + (count or 0)
 
 
+def frame_folder(job_id: str) -> str:
+    """Where the frames of a job lie in the blob store."""
+    return f"frames/{job_id}"
+
+
+def pictures_folder(job_id: str) -> str:
+    """Where the pictures of all attempts of a job lie in the blob store."""
+    return f"pictures/{job_id}"
+
+
 def picture_folder(job_id: str, run_token: str) -> str:
     """Each attempt has pictures of its own, so that one given up late cannot overwrite those of the next."""
-    return f"pictures/{job_id}/{run_token}"
+    return f"{pictures_folder(job_id)}/{run_token}"
 
 
 def _fence(task: Task) -> list[sa.ColumnElement[bool]]:
@@ -366,5 +390,5 @@ def _links(row: Any) -> dict[str, str]:
     base = f"/jobs/{row.id}"
     links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel", "venue": f"/venues/{row.venue}"}
     # `overlay_left` in the store is `overlay/left` in an address.
-    names = [name.replace("_", "/", 1) for name in row.pictures or ()]
+    names = [name.replace("_", "/", 1) for name in row.pictures or () if row.pictures_deleted_at is None]
     return links | {name: f"{base}/{name}.jpg" for name in names}

@@ -1,5 +1,6 @@
 """What became of the venue while its frames arrived."""
 
+from datetime import UTC, datetime
 from io import BytesIO
 
 import pytest
@@ -31,6 +32,10 @@ def read(context):
 
 @pytest.fixture
 def form():
+    return uploaded()
+
+
+def uploaded():
     return FormData([(camera, UploadFile(BytesIO(png()), filename="f")) for camera in ("left", "right")])
 
 
@@ -66,3 +71,20 @@ def test_frames_that_were_checked_against_another_venue_are_to_be_sent_again(con
     problem = refused(context, read, form)
     assert (problem["status"], problem["type"]) == (409, "/problems/venue-replaced")
     assert "send again" in problem["detail"]
+
+
+def test_frames_are_on_the_list_of_what_goes_until_they_are_a_job(context, read, form, monkeypatch):
+    later = datetime.now(UTC) + 2 * calibrate.UPLOAD_GRACE
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(context.jobs, "submit", killed)
+        with pytest.raises(KeyboardInterrupt):
+            calibrate.submit(context, read, form, None)
+    (folder,) = (context.settings.data / "blobs/frames").iterdir()
+    assert context.expiry.leftovers(datetime.now(UTC), 10) == []
+    assert context.expiry.leftovers(later, 10) == [f"frames/{folder.name}"]
+    assert calibrate.submit(context, read, uploaded(), None).status_code == 202
+    assert context.expiry.leftovers(later, 10) == [f"frames/{folder.name}"]
