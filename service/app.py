@@ -16,6 +16,7 @@ from service import problems
 from service.access import Access
 from service.bodylimit import BodyLimit
 from service.context import Context
+from service.disk import Disk
 from service.metrics import Metrics
 from service.problems import Problem
 from service.queue import Queue
@@ -58,18 +59,19 @@ def open_context(settings: Settings) -> Context:
     engine = connect(settings.home_database_url)
     migrate(engine)
     migrate_queue(settings.home_database_url)
-    jobs_, workers = Jobs(engine), Workers(engine)
+    jobs_, workers, disk = Jobs(engine), Workers(engine), Disk(settings)
     return Context(
         settings=settings,
         engine=engine,
         queue=Queue(settings.home_database_url),
         blobs=Blobs(settings.home_blob_url),
+        disk=disk,
         venues=Venues(engine),
         jobs=jobs_,
         expiry=Expiry(engine),
         workers=workers,
         watch=Watch(jobs_.states),
-        metrics=Metrics(jobs_, workers, settings.takeover_after_s),
+        metrics=Metrics(jobs_, workers, disk, settings.takeover_after_s),
     )
 
 

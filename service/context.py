@@ -8,6 +8,7 @@ from typing import Annotated, cast
 from fastapi import Depends, Path, Request
 from sqlalchemy import Engine
 
+from service.disk import Disk
 from service.metrics import Metrics
 from service.queue import Queue
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN
@@ -28,6 +29,7 @@ class Context:
     engine: Engine
     queue: Queue
     blobs: Blobs
+    disk: Disk
     venues: Venues
     jobs: Jobs
     expiry: Expiry

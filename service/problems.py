@@ -67,6 +67,7 @@ KINDS: dict[str, Kind] = {
     "job-crashed": Kind(500, "The computation broke off"),
     "job-abandoned": Kind(500, "The job was given up"),
     # The service.
+    "disk-full": Kind(507, "The disk is nearly full"),
     "unavailable": Kind(503, "The service cannot answer right now"),
     "internal-error": Kind(500, "The service made a mistake"),
 }

@@ -56,6 +56,7 @@ class Settings(BaseSettings):
     keep_frames_days: float = Field(2, ge=0)
     keep_pictures_days: float = Field(14, ge=0, description="Those of a venue's last accepted job stay.")
     keep_jobs_days: float = Field(400, ge=2, description="With them idempotency keys; the last accepted job stays.")
+    min_free_mb: float = Field(500, ge=0, description="With less free on the disk, uploads are refused.")
     tidy_every_s: float = Field(600, gt=0, description="How often a worker looks for what is past its time.")
 
     # Being watched.

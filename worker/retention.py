@@ -12,6 +12,7 @@ from datetime import UTC, datetime, timedelta
 
 import structlog
 
+from service.disk import Disk
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.expiry import Expiry
@@ -42,29 +43,36 @@ class Retention:
         self._expiry = expiry
         self._blobs = blobs
         self._workers = workers
+        self._disk = Disk(settings)
         self._forget_queued = forget_queued
         self._due = 0.0
 
     def look(self) -> float:
         """Do a round if one is due and this worker's to do; returns the seconds until it is worth looking again."""
-        if time.monotonic() < self._due or not self._chosen():
+        short = self._disk.short()
+        if (time.monotonic() < self._due and not short) or not self._chosen():
             return min(LOOK_S, self._settings.tidy_every_s)
-        if self.round(datetime.now(UTC)):
+        if self.round(datetime.now(UTC), short_of_room=short):
             return BREATH_S
         self._due = time.monotonic() + self._settings.tidy_every_s
         return min(LOOK_S, self._settings.tidy_every_s)
 
-    def round(self, now: datetime) -> bool:
-        """Delete up to a batch of each kind; says whether there is more."""
+    def round(self, now: datetime, *, short_of_room: bool = False) -> bool:
+        """Delete up to a batch of each kind; says whether there is more.
+
+        Short of room, the frames of jobs that have ended go before their time, the oldest first: nobody computes with
+        them any more, and without room no job could follow.
+        """
         keep = self._settings
+        keep_frames_days = 0 if short_of_room else keep.keep_frames_days
         counts = {
-            "frames": self._expiry.expire_frames(now - timedelta(days=keep.keep_frames_days), now, BATCH),
+            "frames": self._expiry.expire_frames(now - timedelta(days=keep_frames_days), now, BATCH),
             "pictures": self._expiry.expire_pictures(now - timedelta(days=keep.keep_pictures_days), now, BATCH),
             "jobs": self._delete_jobs(now - timedelta(days=keep.keep_jobs_days), now),
             "folders": self._sweep(now),
         }
         if any(counts.values()):
-            log.info("deleted what is past its time", **counts)
+            log.info("deleted what is past its time", short_of_room=short_of_room, **counts)
         return any(count == BATCH for count in counts.values())
 
     def _chosen(self) -> bool:

@@ -62,7 +62,7 @@ UPLOAD: dict[str, Any] = {
     response_model=Job,
     responses={
         200: {"model": Job, "description": "This content is already a job"},
-        **problems(404, 409, 413, 415, 422, 429),
+        **problems(404, 409, 413, 415, 422, 429, 507),
     },
     openapi_extra=UPLOAD,
 )
@@ -75,12 +75,25 @@ async def calibrate(
     """Submit a frame (or several) per camera. Follow the job at `Location`."""
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
         raise Problem("not-multipart", "Send each frame as a file part named by its camera, as curl -F does.")
-    stored = await run_in_threadpool(context.venues.get, venue_id)
-    if stored is None:
-        raise no_such_venue(venue_id)
+    stored = await run_in_threadpool(_expecting, context, venue_id)
     # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time.
     async with request.form(max_files=2000, max_fields=100, max_part_size=LONGEST_OPTIONS) as form:
         return await run_in_threadpool(submit, context, stored, form, idempotency_key)
+
+
+def _expecting(context: Context, venue_id: str) -> Venue:
+    """The venue that frames arrive for, if there is room for them: the upload is not read before."""
+    stored = context.venues.get(venue_id)
+    if stored is None:
+        raise no_such_venue(venue_id)
+    if context.disk.short():
+        raise Problem(
+            "disk-full",
+            f"Less than {context.disk.least_bytes / 1e6:.0f} MB are free where the service keeps its files. Free some, "
+            "keep frames and pictures for fewer days (ESC_KEEP_FRAMES_DAYS, ESC_KEEP_PICTURES_DAYS), or lower "
+            "ESC_MIN_FREE_MB.",
+        )
+    return stored
 
 
 def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None) -> Response:

@@ -55,3 +55,23 @@ def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(se
     assert (gone.status_code, gone.json()["type"]) == (410, "/problems/picture-deleted")
     never = service.http.get(f"/jobs/{job}/overlay/middle.jpg")
     assert (never.status_code, never.json()["type"]) == (404, "/problems/picture-not-found")
+
+
+def test_a_nearly_full_disk_refuses_uploads_and_says_what_to_do(start):
+    roomy = start().ready()
+    running = roomy.submit(roomy.venue("a", "accept 3")).json()["id"]
+    tight = start("serve", ESC_MIN_FREE_MB="1e9")
+    answer = tight.submit("a", 1)
+    assert (answer.status_code, answer.json()["type"]) == (507, "/problems/disk-full")
+    assert "ESC_KEEP_FRAMES_DAYS" in answer.json()["detail"]
+    ready = tight.http.get("/readyz")
+    assert ready.status_code == 503
+    assert ready.json()["parts"]["disk"].endswith("1000000000 needed: uploads are refused")
+    assert tight.end(running)["status"] == "succeeded"
+    assert tight.http.get(f"/jobs/{running}/preview.jpg").status_code == 200
+
+
+def test_the_free_room_is_a_metric(service):
+    (line,) = [line for line in service.http.get("/metrics").text.splitlines() if line.startswith("esc_disk_free")]
+    assert float(line.split()[1]) > 0
+    assert service.http.get("/readyz").json()["parts"]["disk"] == "ok"

@@ -143,3 +143,21 @@ def test_of_several_workers_one_tidies(stock, retention):
     stock.workers.leave("another", 0)
     retention.look()
     assert stock.files() == set()
+
+
+def test_short_of_room_frames_of_ended_jobs_go_at_once_and_nothing_else(stock, retention):
+    ended, running = stock.ended("a", ago(minutes=1)), stock.submitted("b")
+    stock.jobs.begin(running)
+    retention.round(NOW, short_of_room=True)
+    assert stock.files() == {f"pictures/{ended}", f"frames/{running}"}
+
+
+def test_a_full_disk_does_not_wait_for_the_next_round(tmp_path, forgotten):
+    stock = Stock(tmp_path, min_free_mb=1e12, tidy_every_s=3600)
+    retention = Retention(stock.settings, stock.expiry, stock.blobs, stock.workers, forgotten.extend)
+    stock.workers.enter("w", None)
+    retention.look()
+    stock.ended("a", datetime.now(UTC) - timedelta(minutes=1), accepted=None)
+    retention.look()
+    assert stock.files() == set()
+    stock.engine.dispose()
