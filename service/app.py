@@ -24,6 +24,7 @@ from service.queue import migrate as migrate_queue
 from service.routes import calibrate, documented, health, jobs, venues
 from service.settings import Settings
 from service.store.blobs import Blobs
+from service.store.deliveries import Deliveries
 from service.store.engine import AWAY, connect, migrate
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs
@@ -47,6 +48,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.context = context
     app.add_middleware(BodyLimit, largest=int(settings.max_body_mb * 1e6))
     app.add_middleware(Access, metrics=context.metrics)
+    documented.document_callback(app)
     problems.install(app)
     _answer_outages(app)
     for routes in (venues, calibrate, jobs, health):
@@ -71,7 +73,7 @@ def open_context(settings: Settings) -> Context:
         expiry=Expiry(engine),
         workers=workers,
         watch=Watch(jobs_.states),
-        metrics=Metrics(jobs_, workers, disk, settings.takeover_after_s),
+        metrics=Metrics(jobs_, workers, Deliveries(engine), disk, settings.takeover_after_s),
     )
 
 

@@ -59,6 +59,7 @@ KINDS: dict[str, Kind] = {
     "picture-not-found": Kind(404, "There is no such picture"),
     "picture-deleted": Kind(410, "The picture was deleted"),
     "idempotency-key-reused": Kind(422, "The idempotency key was used for other content"),
+    "callback-refused": Kind(422, "The callback address cannot be used"),
     "queue-full": Kind(429, "Too many jobs are waiting"),
     "no-markings-in-view": Kind(422, "The stored pose of a camera sees no markings"),
     "model-missing": Kind(503, "The segmentation network is missing"),

@@ -30,10 +30,12 @@ from service.queue import migrate as migrate_queue
 from service.schemas import JobError, Progress
 from service.settings import Settings
 from service.store.blobs import Blobs
+from service.store.deliveries import Deliveries
 from service.store.engine import AWAY, connect, migrate
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs, Task
 from service.store.workers import Workers
+from worker.callbacks import Callbacks
 from worker.message import Message
 from worker.retention import Retention
 
@@ -93,6 +95,7 @@ class Worker:
         self._retention = Retention(
             settings, Expiry(engine), Blobs(settings.home_blob_url), self._workers, self._queue.forget
         )
+        self._callbacks = Callbacks(settings, Deliveries(engine), self._jobs)
 
     def start(self) -> None:
         """Show up and take jobs."""
@@ -100,8 +103,12 @@ class Worker:
         self._queue.start()
 
     def look_after(self, stop: threading.Event) -> None:
-        """Give signs of life, take over from the dead, end what the queue has given up; beside that, tidy up."""
-        threading.Thread(target=_again_and_again, args=(self._retention.look, stop), daemon=True).start()
+        """Give signs of life, take over from the dead, end what the queue has given up.
+
+        Beside that, in threads of their own, tidy up and tell who asked for it of the ends of jobs.
+        """
+        for look in (self._retention.look, self._callbacks.look):
+            threading.Thread(target=_again_and_again, args=(look, stop), daemon=True).start()
         swept = 0.0
         while not stop.wait(BEAT_S):
             try:

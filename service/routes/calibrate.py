@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
+from service import callbacks
 from service import frames as border
 from service.context import Context, InContext, VenueIdPath
 from service.problems import Problem, invalid
@@ -99,6 +100,8 @@ def _expecting(context: Context, venue_id: str) -> Venue:
 def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None) -> Response:
     """Make a form a job of `venue`, which is the venue as it was before the form arrived."""
     options = _options(form)
+    if options.callback_url is not None:
+        callbacks.check(options.callback_url, context.settings)
     files = _files(venue, form, context)
     content_hash = _check(context, venue, files, options)
     job_id = new_job_id()

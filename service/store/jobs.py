@@ -19,6 +19,7 @@ import sqlalchemy as sa
 
 from service.schemas import OPEN, Job, JobError, Options, Progress, Result, Status, Venue
 from service.store import tables
+from service.store.deliveries import add_delivery
 from service.store.engine import reading, serialise, writing
 from service.store.venues import find_venue, save_poses, save_venue
 
@@ -281,6 +282,7 @@ class Jobs:
                 )
             self._end(
                 connection,
+                task.job_id,
                 _fence(task),
                 "succeeded",
                 result=result.model_dump(mode="json"),
@@ -295,12 +297,12 @@ class Jobs:
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
-            self._end(connection, _fence(task), "failed", error=error.model_dump())
+            self._end(connection, task.job_id, _fence(task), "failed", error=error.model_dump())
 
     def cancel(self, job_id: str) -> None:
         """End a job that is still open; its worker notices."""
         with writing(self._engine) as connection:
-            self._end(connection, [j.id == job_id, j.status.in_(OPEN)], "cancelled")
+            self._end(connection, job_id, _open(job_id), "cancelled")
 
     # Tidying
 
@@ -313,18 +315,25 @@ class Jobs:
     def abandon(self, job_id: str, error: JobError) -> None:
         """End an open job that the queue has given up."""
         with writing(self._engine) as connection:
-            self._end(connection, [j.id == job_id, j.status.in_(OPEN)], "failed", error=error.model_dump())
+            self._end(connection, job_id, _open(job_id), "failed", error=error.model_dump())
 
     # Parts
 
     def _end(
-        self, connection: sa.Connection, where: list[sa.ColumnElement[bool]], status: Status, **values: Any
+        self,
+        connection: sa.Connection,
+        job_id: str,
+        still: list[sa.ColumnElement[bool]],
+        status: Status,
+        **values: Any,
     ) -> None:
-        connection.execute(
-            sa.update(tables.jobs)
-            .where(*where)
-            .values(status=status, finished_at=datetime.now(UTC), **values, **_changed())
-        )
+        now = datetime.now(UTC)
+        end = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **_changed())
+        if connection.execute(end).rowcount == 0:
+            return
+        options = Options.model_validate(connection.scalar(sa.select(j.options).where(j.id == job_id)))
+        if options.callback_url is not None:
+            add_delivery(connection, job_id, options.callback_url, now)
 
     def _task(self, connection: sa.Connection, job_id: str) -> Task | None:
         row = connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one_or_none()
@@ -380,6 +389,10 @@ def picture_folder(job_id: str, run_token: str) -> str:
 
 def _fence(task: Task) -> list[sa.ColumnElement[bool]]:
     return [j.id == task.job_id, j.run_token == task.run_token, j.status == "running"]
+
+
+def _open(job_id: str) -> list[sa.ColumnElement[bool]]:
+    return [j.id == job_id, j.status.in_(OPEN)]
 
 
 def _changed() -> dict[str, Any]:

@@ -110,6 +110,20 @@ leftovers = sa.Table(
     sa.Index("leftovers_by_due", "due_at"),
 )
 
+# Who asked to be told of the end of a job: written with that end, attempted until it succeeds or is given up.
+deliveries = sa.Table(
+    "deliveries",
+    metadata,
+    sa.Column("job", sa.String(26), primary_key=True),
+    sa.Column("url", sa.String(2048), nullable=False),
+    # `waiting`, then `delivered` or `given-up`.
+    sa.Column("status", sa.String(16), nullable=False),
+    sa.Column("attempts", sa.Integer, nullable=False, default=0),
+    # Of the next attempt.
+    sa.Column("due_at", Instant, nullable=False),
+    sa.Index("deliveries_by_due", "status", "due_at"),
+)
+
 # The heartbeat of the workers.
 workers = sa.Table(
     "workers",

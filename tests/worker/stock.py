@@ -9,6 +9,7 @@ from service.schemas import CameraResult, JobError, Moved, Options, Pose, Proven
 from service.settings import Settings
 from service.store import tables
 from service.store.blobs import Blobs
+from service.store.deliveries import Deliveries
 from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs, Submission, new_job_id, picture_folder
@@ -23,7 +24,7 @@ class Stock:
         self.engine = connect(self.settings.home_database_url)
         migrate(self.engine)
         self.jobs, self.venues, self.workers = Jobs(self.engine), Venues(self.engine), Workers(self.engine)
-        self.expiry = Expiry(self.engine)
+        self.expiry, self.deliveries = Expiry(self.engine), Deliveries(self.engine)
         self.blobs = Blobs(self.settings.home_blob_url)
         self.enqueued: list[str] = []
 
