@@ -35,6 +35,7 @@ from service.store.jobs import (
 router = APIRouter(tags=["jobs"])
 
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
+KEY_DESCRIPTION = "The same key and the same content are the same job, for as long as that job is kept."
 LONGEST_OPTIONS = 64 * 1024
 # Longer than any upload takes from its first stored frame to its job.
 UPLOAD_GRACE = timedelta(hours=1)
@@ -71,7 +72,7 @@ async def calibrate(
     venue_id: VenueIdPath,
     request: Request,
     context: InContext,
-    idempotency_key: Annotated[str | None, Header(pattern=KEY_PATTERN)] = None,
+    idempotency_key: Annotated[str | None, Header(pattern=KEY_PATTERN, description=KEY_DESCRIPTION)] = None,
 ) -> Response:
     """Submit a frame (or several) per camera. Follow the job at `Location`."""
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
