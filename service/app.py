@@ -17,6 +17,7 @@ from service.access import Access
 from service.auth import Gate
 from service.bodylimit import BodyLimit
 from service.context import Context
+from service.disk import Disk
 from service.metrics import Metrics
 from service.problems import Problem
 from service.queue import Queue
@@ -24,7 +25,9 @@ from service.queue import migrate as migrate_queue
 from service.routes import calibrate, documented, health, jobs, venues
 from service.settings import Settings
 from service.store.blobs import Blobs
+from service.store.deliveries import Deliveries
 from service.store.engine import AWAY, connect, migrate
+from service.store.expiry import Expiry
 from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.venues import Venues
@@ -49,6 +52,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.context = context
     app.add_middleware(BodyLimit, largest=int(settings.max_body_mb * 1e6))
     app.add_middleware(Access, metrics=context.metrics)
+    documented.document_callback(app)
     problems.install(app)
     _answer_outages(app)
     for routes in (venues, calibrate, jobs, health):
@@ -61,17 +65,19 @@ def open_context(settings: Settings) -> Context:
     engine = connect(settings.home_database_url)
     migrate(engine)
     migrate_queue(settings.home_database_url)
-    jobs_, workers, keys = Jobs(engine), Workers(engine), Keys(engine)
+    jobs_, workers, keys, disk = Jobs(engine), Workers(engine), Keys(engine), Disk(settings)
     return Context(
         settings=settings,
         engine=engine,
         queue=Queue(settings.home_database_url),
         blobs=Blobs(settings.home_blob_url, BLOB_PATIENCE_S),
+        disk=disk,
         venues=Venues(engine),
         jobs=jobs_,
+        expiry=Expiry(engine),
         workers=workers,
         watch=Watch(jobs_.states),
-        metrics=Metrics(jobs_, workers, settings.takeover_after_s),
+        metrics=Metrics(jobs_, workers, Deliveries(engine), disk, settings.takeover_after_s),
         keys=keys,
         gate=Gate(keys, settings),
     )

@@ -9,11 +9,13 @@ from fastapi import Depends, Path, Request
 from sqlalchemy import Engine
 
 from service.auth import Gate
+from service.disk import Disk
 from service.metrics import Metrics
 from service.queue import Queue
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN
 from service.settings import Settings
 from service.store.blobs import Blobs
+from service.store.expiry import Expiry
 from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.venues import Venues
@@ -29,8 +31,10 @@ class Context:
     engine: Engine
     queue: Queue
     blobs: Blobs
+    disk: Disk
     venues: Venues
     jobs: Jobs
+    expiry: Expiry
     workers: Workers
     watch: Watch
     metrics: Metrics

@@ -64,7 +64,9 @@ KINDS: dict[str, Kind] = {
     # Jobs.
     "job-not-found": Kind(404, "There is no such job"),
     "picture-not-found": Kind(404, "There is no such picture"),
+    "picture-deleted": Kind(410, "The picture was deleted"),
     "idempotency-key-reused": Kind(422, "The idempotency key was used for other content"),
+    "callback-refused": Kind(422, "The callback address cannot be used"),
     "queue-full": Kind(429, "Too many jobs are waiting"),
     "no-markings-in-view": Kind(422, "The stored pose of a camera sees no markings"),
     "model-missing": Kind(503, "The segmentation network is missing"),
@@ -73,6 +75,7 @@ KINDS: dict[str, Kind] = {
     "job-crashed": Kind(500, "The computation broke off"),
     "job-abandoned": Kind(500, "The job was given up"),
     # The service.
+    "disk-full": Kind(507, "The disk is nearly full"),
     "unavailable": Kind(503, "The service cannot answer right now"),
     "internal-error": Kind(500, "The service made a mistake"),
 }

@@ -113,3 +113,7 @@ class WorkerQueue:
         """Which of these jobs the queue will not begin again, and why in words."""
         found = DBOS.list_workflows(workflow_ids=list(job_ids), status=list(ENDED), load_input=False, load_output=False)
         return {workflow.workflow_id: ENDED[workflow.status] for workflow in found}
+
+    def forget(self, job_ids: Collection[str]) -> None:
+        """Delete what the queue keeps about jobs that have ended; those it does not know are no error."""
+        DBOS.delete_workflows(list(job_ids))

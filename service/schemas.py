@@ -10,7 +10,7 @@ import math
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, HttpUrl, StringConstraints, model_validator
 
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
@@ -31,6 +31,8 @@ Position = Annotated[list[Metres], Field(min_length=3, max_length=3)]
 Rotation = Annotated[list[Radians], Field(min_length=3, max_length=3)]
 Row = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Side = Annotated[Whole, Field(ge=32, le=LARGEST_SIDE)]
+# Written as browsers understand it: 0x7f.1 is 127.0.0.1 from here on, for whoever looks at it.
+CallbackUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(lambda url: str(HttpUrl(url)))]
 
 
 class Wire(BaseModel):
@@ -296,6 +298,7 @@ class Options(Wire):
     dry_run: Flag = Field(False, description="Never move the stored poses.")
     priority: Literal["live", "routine"] = "routine"
     timeout_s: Annotated[Number, Field(ge=1, le=3600)] | None = Field(None, description="Absent: the service's.")
+    callback_url: CallbackUrl | None = Field(None, description="Told of the job's end, signed (Standard Webhooks).")
 
 
 class Progress(Wire):
@@ -413,6 +416,19 @@ class Job(Wire):
     def open(self) -> bool:
         """Whether anything can still change."""
         return self.status in OPEN
+
+
+class JobEvent(Wire):
+    """What a `callback_url` gets, at least once: a job has ended. Its id is the `webhook-id` of every attempt."""
+
+    type: Literal["job.succeeded", "job.failed", "job.cancelled"]
+    timestamp: datetime = Field(description="When the job ended.")
+    data: Job
+
+    @classmethod
+    def of(cls, job: Job) -> JobEvent:
+        """The event of an ended job."""
+        return cls.model_validate({"type": f"job.{job.status}", "timestamp": job.finished_at, "data": job})
 
 
 class Jobs(Wire):

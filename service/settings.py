@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import binascii
 import ipaddress
 import os
 import re
@@ -10,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 # Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
@@ -22,7 +24,9 @@ MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "une
 class Settings(BaseSettings):
     """What an operator may change. Sizes in megabytes are 10^6 bytes, times are in seconds."""
 
-    model_config = SettingsConfigDict(env_prefix="ESC_", env_file=".env", env_ignore_empty=True, extra="ignore")
+    model_config = SettingsConfigDict(
+        env_prefix="ESC_", env_file=".env", env_ignore_empty=True, extra="ignore", hide_input_in_errors=True
+    )
 
     # Where things live.
     data: Path = Field(Path("esc-data"), description="Folder of the embedded home: database, frames, pictures.")
@@ -62,6 +66,21 @@ class Settings(BaseSettings):
     )
     takeover_after_s: float = Field(10, gt=2, description="Silence after which another worker takes a job over.")
 
+    # What is kept, counted from the end of a job.
+    keep_frames_days: float = Field(2, ge=0)
+    keep_pictures_days: float = Field(14, ge=0, description="Those of a venue's last accepted job stay.")
+    keep_jobs_days: float = Field(400, ge=2, description="With them idempotency keys; the last accepted job stays.")
+    min_free_mb: float = Field(500, ge=0, description="With less free on the disk, uploads are refused.")
+    tidy_every_s: float = Field(600, gt=0, description="How often a worker looks for what is past its time.")
+
+    # Telling others of the end of a job.
+    webhook_secret: SecretStr | None = Field(
+        None,
+        description="`whsec_` and 24 to 64 bytes in base64; two, separated by a space, while one replaces another.",
+    )
+    callback_allow_http: bool = False
+    callback_allow_private: bool = Field(False, description="Call private, loopback and link-local addresses too.")
+
     # Being watched.
     log_format: Literal["json", "console"] = "json"
     log_level: Literal["debug", "info", "warning", "error"] = "info"
@@ -80,6 +99,17 @@ class Settings(BaseSettings):
         if url is not None and not BLOB_URL.fullmatch(url):
             raise ValueError("expected is s3://bucket, s3://bucket/folder or file:///folder")
         return url
+
+    @field_validator("webhook_secret")
+    @classmethod
+    def _keys(cls, secret: SecretStr | None) -> SecretStr | None:
+        webhook_keys(secret)
+        return secret
+
+    @property
+    def webhook_keys(self) -> list[bytes]:
+        """What callbacks are signed with; none: callbacks are refused."""
+        return webhook_keys(self.webhook_secret)
 
     @property
     def home_database_url(self) -> str:
@@ -105,3 +135,18 @@ class Settings(BaseSettings):
             return not ipaddress.ip_address(self.host).is_loopback
         except ValueError:
             return self.host != "localhost"
+
+
+def webhook_keys(secret: SecretStr | None) -> list[bytes]:
+    """The keys in a setting; the message of an error does not repeat them."""
+    keys = []
+    for part in secret.get_secret_value().split() if secret else ():
+        prefix, _, encoded = part.partition("_")
+        try:
+            key = base64.b64decode(encoded, validate=True)
+        except binascii.Error:
+            key = b""
+        if prefix != "whsec" or not 24 <= len(key) <= 64:
+            raise ValueError('must be whsec_ and 24 to 64 bytes in base64: echo "whsec_$(openssl rand -base64 32)"')
+        keys.append(key)
+    return keys

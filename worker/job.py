@@ -120,7 +120,8 @@ def solve(
         software=version("esc-calibration"),
         model_sha256=segmenter.sha256,
         seed=options.seed or 0,
-        options=options.model_dump(mode="json"),
+        # Who is told changes no number, and the address may be a secret.
+        options=options.model_dump(mode="json", exclude={"callback_url"}),
     )
     return Outcome(_result(found, timings, provenance), pictures)
 

@@ -29,10 +29,15 @@ from service.queue import WorkerQueue
 from service.queue import migrate as migrate_queue
 from service.schemas import JobError, Progress
 from service.settings import Settings
+from service.store.blobs import Blobs
+from service.store.deliveries import Deliveries
 from service.store.engine import AWAY, connect, migrate
+from service.store.expiry import Expiry
 from service.store.jobs import Jobs, Task
 from service.store.workers import Workers
+from worker.callbacks import Callbacks
 from worker.message import Message
+from worker.retention import Retention
 
 BEAT_S = 2.0
 # Twice as often as a cancellation needs to reach the child.
@@ -41,6 +46,7 @@ PROGRESS_S = 0.25
 # How long the database may be away, beyond the time the job has anyway, before its end is lost.
 OUTAGE_S = 60.0
 TRY_AGAIN_S = 1.0
+PUT_OFF_S = 10.0
 LONGEST_LINE = 16 * 1024 * 1024
 # For a process that has closed its output.
 ENDING_S = 10.0
@@ -85,6 +91,10 @@ class Worker:
         self._queue = WorkerQueue(
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt
         )
+        self._retention = Retention(
+            settings, Expiry(engine), Blobs(settings.home_blob_url), self._workers, self._queue.forget
+        )
+        self._callbacks = Callbacks(settings, Deliveries(engine), self._jobs)
 
     def start(self) -> None:
         """Show up and take jobs."""
@@ -92,7 +102,12 @@ class Worker:
         self._queue.start()
 
     def look_after(self, stop: threading.Event) -> None:
-        """Give signs of life, take over from the dead, end what the queue has given up."""
+        """Give signs of life, take over from the dead, end what the queue has given up.
+
+        Beside that, in threads of their own, tidy up and tell who asked for it of the ends of jobs.
+        """
+        for look in (self._retention.look, self._callbacks.look):
+            threading.Thread(target=_again_and_again, args=(look, stop), daemon=True).start()
         beaten, judging_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):
             try:
@@ -262,6 +277,17 @@ def _insist(write: Callable[[], Answer], until: float) -> Answer:
                 raise
             log.warning("the database is away, trying again", exc_info=True)
             time.sleep(TRY_AGAIN_S)
+
+
+def _again_and_again(look: Callable[[], float], stop: threading.Event) -> None:
+    """A duty that no job waits for; `look` says after how many seconds it wants to be called again."""
+    pause_s = 0.0
+    while not stop.wait(pause_s):
+        try:
+            pause_s = look()
+        except Exception:  # the database or the store is away: the next call tries again
+            log.warning("put off", duty=look.__qualname__, exc_info=True)
+            pause_s = PUT_OFF_S
 
 
 def _in_words(error: Exception) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
+from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request, Response
@@ -12,6 +13,7 @@ from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
+from service import callbacks
 from service import frames as border
 from service.context import Context, InContext, VenueIdPath
 from service.problems import Problem, invalid
@@ -20,12 +22,24 @@ from service.routes.guarded import Guarded
 from service.routes.jobs import RETRY_AFTER_S, job_answer
 from service.routes.venues import no_such_venue
 from service.schemas import OPTIONS_PART, Job, Options, Venue
-from service.store.jobs import KeyReused, QueueFull, Submission, VenueBusy, VenueGone, VenueReplaced, new_job_id
+from service.store.jobs import (
+    KeyReused,
+    QueueFull,
+    Submission,
+    VenueBusy,
+    VenueGone,
+    VenueReplaced,
+    frame_folder,
+    new_job_id,
+)
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
+KEY_DESCRIPTION = "The same key and the same content are the same job, for as long as that job is kept."
 LONGEST_OPTIONS = 64 * 1024
+# Longer than any upload takes from its first stored frame to its job.
+UPLOAD_GRACE = timedelta(hours=1)
 UPLOAD: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -51,7 +65,7 @@ UPLOAD: dict[str, Any] = {
     response_model=Job,
     responses={
         200: {"model": Job, "description": "This content is already a job"},
-        **problems(404, 409, 413, 415, 422, 429),
+        **problems(404, 409, 413, 415, 422, 429, 507),
     },
     openapi_extra=UPLOAD | needs("calibrate"),
 )
@@ -59,22 +73,37 @@ async def calibrate(
     venue_id: VenueIdPath,
     request: Request,
     context: InContext,
-    idempotency_key: Annotated[str | None, Header(pattern=KEY_PATTERN)] = None,
+    idempotency_key: Annotated[str | None, Header(pattern=KEY_PATTERN, description=KEY_DESCRIPTION)] = None,
 ) -> Response:
     """Submit a frame (or several) per camera. Follow the job at `Location`."""
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
         raise Problem("not-multipart", "Send each frame as a file part named by its camera, as curl -F does.")
-    stored = await run_in_threadpool(context.venues.get, venue_id)
-    if stored is None:
-        raise no_such_venue(venue_id)
+    stored = await run_in_threadpool(_expecting, context, venue_id)
     # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time.
     async with request.form(max_files=2000, max_fields=100, max_part_size=LONGEST_OPTIONS) as form:
         return await run_in_threadpool(submit, context, stored, form, idempotency_key)
 
 
+def _expecting(context: Context, venue_id: str) -> Venue:
+    """The venue that frames arrive for, if there is room for them: the upload is not read before."""
+    stored = context.venues.get(venue_id)
+    if stored is None:
+        raise no_such_venue(venue_id)
+    if context.disk.short():
+        raise Problem(
+            "disk-full",
+            f"Less than {context.disk.least_bytes / 1e6:.0f} MB are free where the service keeps its files. Free some, "
+            "keep frames and pictures for fewer days (ESC_KEEP_FRAMES_DAYS, ESC_KEEP_PICTURES_DAYS), or lower "
+            "ESC_MIN_FREE_MB.",
+        )
+    return stored
+
+
 def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None) -> Response:
     """Make a form a job of `venue`, which is the venue as it was before the form arrived."""
     options = _options(form)
+    if options.callback_url is not None:
+        callbacks.check(options.callback_url, context.settings)
     files = _files(venue, form, context)
     content_hash = _check(context, venue, files, options)
     job_id = new_job_id()
@@ -83,14 +112,16 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
         if known is not None:
             return job_answer(known)
         seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
+        # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
+        context.expiry.expect_upload(job_id, datetime.now(UTC) + UPLOAD_GRACE)
         paths = _store(context, job_id, files)
         submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths)
         job, new = context.jobs.submit(submission, context.settings.queue_limit, context.queue.enqueue)
     except (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull) as refusal:
-        context.blobs.delete_under(_folder(job_id))
+        context.blobs.delete_under(frame_folder(job_id))
         raise _in_words(refusal, venue, context) from None
     if not new:
-        context.blobs.delete_under(_folder(job_id))
+        context.blobs.delete_under(frame_folder(job_id))
     # After any other error the frames stay: whether the transaction was committed is then not known.
     return job_answer(job, status=202 if new else 200)
 
@@ -166,12 +197,8 @@ def _store(context: Context, job_id: str, files: dict[str, list[UploadFile]]) ->
     for camera, uploads in files.items():
         paths[camera] = []
         for number, file in enumerate(uploads):
-            path = f"{_folder(job_id)}/{camera}/{number}"
+            path = f"{frame_folder(job_id)}/{camera}/{number}"
             file.file.seek(0)
             context.blobs.put(path, file.file.read())
             paths[camera].append(path)
     return paths
-
-
-def _folder(job_id: str) -> str:
-    return f"frames/{job_id}"

@@ -8,7 +8,7 @@ from typing import Any
 from fastapi import FastAPI
 
 from service.problems import MEDIA_TYPE
-from service.schemas import Options, ProblemDetails, Scope
+from service.schemas import JobEvent, Options, ProblemDetails, Scope
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
 MODELS = (Options, ProblemDetails)
@@ -34,6 +34,18 @@ class DocumentedApp(FastAPI):
         document["components"]["schemas"] |= {model.__name__: model.model_json_schema() for model in MODELS}
         document["components"]["securitySchemes"] = SECURITY_SCHEMES
         return document
+
+
+def document_callback(app: FastAPI) -> None:
+    """Add to the document what a `callback_url` gets."""
+
+    @app.webhooks.post("job-ended", status_code=204, tags=["jobs"])
+    def job_ended(event: JobEvent) -> None:
+        """Sent when a job with a `callback_url` has ended, until it is answered with 2xx: ten more times in a day.
+
+        `webhook-id`, `webhook-timestamp` and `webhook-signature` are those of Standard Webhooks (`v1`, HMAC-SHA256 with
+        the secret of the service). The same event can arrive more than once; its `webhook-id` is the job's.
+        """
 
 
 def reference(model: type[Options | ProblemDetails]) -> dict[str, str]:

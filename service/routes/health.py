@@ -25,8 +25,8 @@ async def livez() -> Health:
 
 @router.get("/readyz", openapi_extra=FOR_ALL, responses={503: {"model": Health}})
 def readyz(context: InContext, response: Response) -> Health:
-    """Everything a job needs is there: database, files, a worker with a sign of life, the network it computes with."""
-    parts = {"database": _database(context), "blobs": _blobs(context), **_worker(context)}
+    """All that a job needs is there: database, files, room, a worker that gives signs of life, its network."""
+    parts = {"database": _database(context), "blobs": _blobs(context), "disk": _disk(context), **_worker(context)}
     ready = all(found == "ok" for found in parts.values())
     response.status_code = 200 if ready else 503
     return Health(status="ok" if ready else "unavailable", parts=parts)
@@ -65,6 +65,16 @@ def _blobs(context: Context) -> str:
     except Exception as error:  # whatever the store says
         return f"cannot be reached: {type(error).__name__}"
     return "ok"
+
+
+def _disk(context: Context) -> str:
+    try:
+        free = context.disk.free_bytes()
+    except OSError as error:
+        return f"cannot be read: {type(error).__name__}"
+    if free is None or free >= context.disk.least_bytes:
+        return "ok"
+    return f"{free / 1e6:.0f} MB free, {context.disk.least_bytes / 1e6:.0f} needed: uploads are refused"
 
 
 def _worker(context: Context) -> dict[str, str]:

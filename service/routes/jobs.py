@@ -15,7 +15,7 @@ from service.problems import Problem
 from service.routes.documented import needs, problems
 from service.routes.guarded import Guarded
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, Job, Jobs, Status
-from service.store.jobs import State
+from service.store.jobs import Pictures, State
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
@@ -45,7 +45,8 @@ def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None)
 def _existing(job_id: JobIdPath, context: InContext) -> Job:
     job = context.jobs.get(job_id)
     if job is None:
-        raise Problem("job-not-found", "GET /jobs lists those there are.")
+        kept = f"{context.settings.keep_jobs_days:g} days"
+        raise Problem("job-not-found", f"GET /jobs lists those there are; they are deleted {kept} after their end.")
     return job
 
 
@@ -110,7 +111,10 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
 
 
 @router.get(
-    "/{job_id}/preview.jpg", openapi_extra=needs("read"), response_class=Response, responses={**JPEG, **problems(404)}
+    "/{job_id}/preview.jpg",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={**JPEG, **problems(404, 410)},
 )
 def preview(job: Existing, context: InContext) -> Response:
     """One wide view stitched from all cameras."""
@@ -118,7 +122,10 @@ def preview(job: Existing, context: InContext) -> Response:
 
 
 @router.get(
-    "/{job_id}/birdseye.jpg", openapi_extra=needs("read"), response_class=Response, responses={**JPEG, **problems(404)}
+    "/{job_id}/birdseye.jpg",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={**JPEG, **problems(404, 410)},
 )
 def birdseye(job: Existing, context: InContext) -> Response:
     """The pitch from above, 10 px/m."""
@@ -129,7 +136,7 @@ def birdseye(job: Existing, context: InContext) -> Response:
     "/{job_id}/overlay/{camera}.jpg",
     openapi_extra=needs("read"),
     response_class=Response,
-    responses={**JPEG, **problems(404)},
+    responses={**JPEG, **problems(404, 410)},
 )
 def overlay(job: Existing, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext) -> Response:
     """A camera's frame with the field drawn on it, before and after."""
@@ -137,12 +144,20 @@ def overlay(job: Existing, camera: Annotated[str, Path(pattern=ID_PATTERN)], con
 
 
 def _picture(context: Context, job: Job, name: str) -> Response:
-    folder = context.jobs.picture_folder(job.id)
-    data = context.blobs.get(f"{folder}/{name}.jpg") if folder else None
-    if data is None:
+    pictures = context.jobs.pictures(job.id)
+    if pictures is None or name not in pictures.names:
         detail = "The job has not come to its pictures yet." if job.open else "The job made no such picture."
         raise Problem("picture-not-found", detail, job=job.id)
+    data = None if pictures.deleted else context.blobs.get(f"{pictures.folder}/{name}.jpg")
+    if data is None:
+        raise Problem("picture-deleted", _why_deleted(pictures, context.settings.keep_pictures_days), job=job.id)
     return Response(data, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=3600"})
+
+
+def _why_deleted(pictures: Pictures, keep_days: float) -> str:
+    if pictures.deleted:
+        return f"Pictures are deleted {keep_days:g} days after the end of their job; the job and its numbers stay."
+    return "The job made it, but its file is gone from the store, and not by the service."
 
 
 def _later_than(seen: State | None) -> Callable[[State], bool]:

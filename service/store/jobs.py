@@ -19,6 +19,7 @@ import sqlalchemy as sa
 
 from service.schemas import OPEN, Job, JobError, Options, Progress, Result, Status, Venue
 from service.store import tables
+from service.store.deliveries import add_delivery
 from service.store.engine import reading, serialise, writing
 from service.store.venues import find_venue, save_poses, save_venue
 
@@ -75,6 +76,15 @@ class Task:
     venue: Venue
     options: Options
     frames: dict[str, list[str]]
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """The pictures of a job that has a result: where they lie in the blob store, and whether they still do."""
+
+    folder: str
+    names: list[str]
+    deleted: bool
 
 
 @dataclass(frozen=True)
@@ -142,6 +152,9 @@ class Jobs:
                     updated_at=now,
                 )
             )
+            # From here on the frames are the job's.
+            folder = frame_folder(submission.job_id)
+            connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
             enqueue(connection, submission.job_id, priority)
             return self._read(connection, submission.job_id), True
 
@@ -190,12 +203,14 @@ class Jobs:
         with reading(self._engine) as connection:
             return {row.id: State(row.revision, row.status) for row in connection.execute(query)}
 
-    def picture_folder(self, job_id: str) -> str | None:
-        """Where the pictures of a job lie in the blob store, None if there are none (yet)."""
-        query = sa.select(j.run_token).where(j.id == job_id, j.result.is_not(None))
+    def pictures(self, job_id: str) -> Pictures | None:
+        """The pictures of a job, None if it has no result (yet)."""
+        query = sa.select(j.run_token, j.pictures, j.pictures_deleted_at).where(j.id == job_id, j.result.is_not(None))
         with reading(self._engine) as connection:
-            token = connection.scalar(query)
-            return None if token is None else picture_folder(job_id, token)
+            row = connection.execute(query).one_or_none()
+        if row is None:
+            return None
+        return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
     def counts(self) -> dict[str, int]:
         """How many jobs are in each state."""
@@ -268,6 +283,7 @@ class Jobs:
                 )
             self._end(
                 connection,
+                task.job_id,
                 _fence(task),
                 "succeeded",
                 result=result.model_dump(mode="json"),
@@ -282,12 +298,12 @@ class Jobs:
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
-            self._end(connection, _fence(task), "failed", error=error.model_dump())
+            self._end(connection, task.job_id, _fence(task), "failed", error=error.model_dump())
 
     def cancel(self, job_id: str) -> None:
         """End a job that is still open; its worker notices."""
         with writing(self._engine) as connection:
-            self._end(connection, [j.id == job_id, j.status.in_(OPEN)], "cancelled")
+            self._end(connection, job_id, _open(job_id), "cancelled")
 
     # Tidying
 
@@ -300,18 +316,25 @@ class Jobs:
     def abandon(self, job_id: str, error: JobError) -> None:
         """End an open job that the queue has given up."""
         with writing(self._engine) as connection:
-            self._end(connection, [j.id == job_id, j.status.in_(OPEN)], "failed", error=error.model_dump())
+            self._end(connection, job_id, _open(job_id), "failed", error=error.model_dump())
 
     # Parts
 
     def _end(
-        self, connection: sa.Connection, where: list[sa.ColumnElement[bool]], status: Status, **values: Any
+        self,
+        connection: sa.Connection,
+        job_id: str,
+        still: list[sa.ColumnElement[bool]],
+        status: Status,
+        **values: Any,
     ) -> None:
-        connection.execute(
-            sa.update(tables.jobs)
-            .where(*where)
-            .values(status=status, finished_at=datetime.now(UTC), **values, **_changed())
-        )
+        now = datetime.now(UTC)
+        end = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **_changed())
+        if connection.execute(end).rowcount == 0:
+            return
+        options = Options.model_validate(connection.scalar(sa.select(j.options).where(j.id == job_id)))
+        if options.callback_url is not None:
+            add_delivery(connection, job_id, options.callback_url, now)
 
     def _task(self, connection: sa.Connection, job_id: str) -> Task | None:
         row = connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one_or_none()
@@ -350,13 +373,27 @@ class Jobs:
         return 1 + (count or 0)
 
 
+def frame_folder(job_id: str) -> str:
+    """Where the frames of a job lie in the blob store."""
+    return f"frames/{job_id}"
+
+
+def pictures_folder(job_id: str) -> str:
+    """Where the pictures of all attempts of a job lie in the blob store."""
+    return f"pictures/{job_id}"
+
+
 def picture_folder(job_id: str, run_token: str) -> str:
     """Each attempt has pictures of its own, so that one given up late cannot overwrite those of the next."""
-    return f"pictures/{job_id}/{run_token}"
+    return f"{pictures_folder(job_id)}/{run_token}"
 
 
 def _fence(task: Task) -> list[sa.ColumnElement[bool]]:
     return [j.id == task.job_id, j.run_token == task.run_token, j.status == "running"]
+
+
+def _open(job_id: str) -> list[sa.ColumnElement[bool]]:
+    return [j.id == job_id, j.status.in_(OPEN)]
 
 
 def _changed() -> dict[str, Any]:
@@ -367,5 +404,5 @@ def _links(row: Any) -> dict[str, str]:
     base = f"/jobs/{row.id}"
     links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel", "venue": f"/venues/{row.venue}"}
     # `overlay_left` in the store is `overlay/left` in an address.
-    names = [name.replace("_", "/", 1) for name in row.pictures or ()]
+    names = [name.replace("_", "/", 1) for name in row.pictures or () if row.pictures_deleted_at is None]
     return links | {name: f"{base}/{name}.jpg" for name in names}

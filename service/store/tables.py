@@ -73,6 +73,9 @@ jobs = sa.Table(
     sa.Column("started_at", Instant),
     sa.Column("finished_at", Instant),
     sa.Column("updated_at", Instant, nullable=False),
+    # From then on the row answers for none of its files, whether or not the store is rid of them.
+    sa.Column("frames_deleted_at", Instant),
+    sa.Column("pictures_deleted_at", Instant),
     sa.Index("jobs_by_venue", "venue", "id"),
     sa.Index("jobs_by_status", "status", "priority", "id"),
     sa.Index("one_job_per_key", "venue", "idempotency_key", unique=True),
@@ -83,6 +86,42 @@ jobs = sa.Table(
         sqlite_where=sa.text("status IN ('queued', 'running')"),
         postgresql_where=sa.text("status IN ('queued', 'running')"),
     ),
+    sa.Index("jobs_by_end", "finished_at"),
+    sa.Index(
+        "jobs_with_frames",
+        "finished_at",
+        sqlite_where=sa.text("frames_deleted_at IS NULL"),
+        postgresql_where=sa.text("frames_deleted_at IS NULL"),
+    ),
+    sa.Index(
+        "jobs_with_pictures",
+        "finished_at",
+        sqlite_where=sa.text("pictures_deleted_at IS NULL"),
+        postgresql_where=sa.text("pictures_deleted_at IS NULL"),
+    ),
+)
+
+# Folders of the blob store that are deleted at `due_at`: what no row names any more, and an upload until it is a job.
+leftovers = sa.Table(
+    "leftovers",
+    metadata,
+    sa.Column("folder", sa.String(255), primary_key=True),
+    sa.Column("due_at", Instant, nullable=False),
+    sa.Index("leftovers_by_due", "due_at"),
+)
+
+# Who asked to be told of the end of a job: written with that end, attempted until it succeeds or is given up.
+deliveries = sa.Table(
+    "deliveries",
+    metadata,
+    sa.Column("job", sa.String(26), primary_key=True),
+    sa.Column("url", sa.String(2048), nullable=False),
+    # `waiting`, then `delivered` or `given-up`.
+    sa.Column("status", sa.String(16), nullable=False),
+    sa.Column("attempts", sa.Integer, nullable=False, default=0),
+    # Of the next attempt.
+    sa.Column("due_at", Instant, nullable=False),
+    sa.Index("deliveries_by_due", "status", "due_at"),
 )
 
 # The heartbeat of the workers.

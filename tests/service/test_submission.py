@@ -1,5 +1,6 @@
 """What became of the venue while its frames arrived."""
 
+from datetime import UTC, datetime
 from io import BytesIO
 
 import pytest
@@ -34,6 +35,10 @@ def read(context):
 
 @pytest.fixture
 def form():
+    return uploaded()
+
+
+def uploaded():
     return FormData([(camera, UploadFile(BytesIO(png()), filename="f")) for camera in ("left", "right")])
 
 
@@ -69,3 +74,20 @@ def test_frames_that_were_checked_against_another_venue_are_to_be_sent_again(con
     problem = refused(context, read, form)
     assert (problem["status"], problem["type"]) == (409, "/problems/venue-replaced")
     assert "send again" in problem["detail"]
+
+
+def test_frames_are_on_the_list_of_what_goes_until_they_are_a_job(context, read, form, monkeypatch):
+    later = datetime.now(UTC) + 2 * calibrate.UPLOAD_GRACE
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(context.jobs, "submit", killed)
+        with pytest.raises(KeyboardInterrupt):
+            calibrate.submit(context, read, form, None)
+    (folder,) = {path.rsplit("/", 2)[0] for path in files(context.settings.home_blob_url)}
+    assert context.expiry.leftovers(datetime.now(UTC), 10) == []
+    assert context.expiry.leftovers(later, 10) == [folder]
+    assert calibrate.submit(context, read, uploaded(), None).status_code == 202
+    assert context.expiry.leftovers(later, 10) == [folder]

@@ -1,0 +1,108 @@
+"""What is past its time: all SQL about it.
+
+Rows first, files after. A row stops answering for its files in the transaction that puts their folder on the list of
+leftovers, and the folder leaves the list once its files are gone. Whoever dies in between leaves an entry on the list:
+never a row that promises what is not there, never a file that nobody knows.
+
+The last accepted job of each venue, the one that brought its poses, is past no time, and neither are its pictures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from datetime import datetime
+
+import sqlalchemy as sa
+
+from service.store import tables
+from service.store.engine import reading, serialise, writing
+from service.store.jobs import frame_folder, pictures_folder
+
+j = tables.jobs.c
+h = tables.pose_history.c
+left = tables.leftovers.c
+LAST_ACCEPTED = (
+    sa.select(h.job)
+    .where(h.venue == j.venue, h.job.is_not(None))
+    .order_by(h.id.desc())
+    .limit(1)
+    .correlate(tables.jobs)
+    .scalar_subquery()
+)
+NOT_THE_LAST_ACCEPTED = j.id != sa.func.coalesce(LAST_ACCEPTED, "")
+
+
+class Expiry:
+    """What the database knows to be past its time."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def expire_frames(self, ended_before: datetime, now: datetime, limit: int) -> int:
+        """Let up to `limit` jobs that ended before a moment, the oldest first, have no frames; says how many."""
+        with writing(self._engine) as connection:
+            serialise(connection)
+            ids = self._ended(connection, ended_before, limit, j.frames_deleted_at.is_(None))
+            self._mark(connection, ids, frames_deleted_at=now)
+            self._leave(connection, [frame_folder(job_id) for job_id in ids], now)
+            return len(ids)
+
+    def expire_pictures(self, ended_before: datetime, now: datetime, limit: int) -> int:
+        """The same for pictures, but for those of the last accepted job of each venue."""
+        with writing(self._engine) as connection:
+            serialise(connection)
+            ids = self._ended(connection, ended_before, limit, j.pictures_deleted_at.is_(None), NOT_THE_LAST_ACCEPTED)
+            self._mark(connection, ids, pictures_deleted_at=now)
+            self._leave(connection, [pictures_folder(job_id) for job_id in ids], now)
+            return len(ids)
+
+    def old_jobs(self, ended_before: datetime, limit: int) -> list[str]:
+        """Up to `limit` jobs that ended before a moment, the oldest first, but for the last accepted of each venue."""
+        with reading(self._engine) as connection:
+            return self._ended(connection, ended_before, limit, NOT_THE_LAST_ACCEPTED)
+
+    def delete_jobs(self, job_ids: Collection[str], now: datetime) -> None:
+        """Forget ended jobs with everything that is theirs."""
+        with writing(self._engine) as connection:
+            serialise(connection)
+            connection.execute(sa.delete(tables.jobs).where(j.id.in_(job_ids), j.finished_at.is_not(None)))
+            connection.execute(sa.delete(tables.deliveries).where(tables.deliveries.c.job.in_(job_ids)))
+            self._leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)
+
+    def expect_upload(self, job_id: str, until: datetime) -> None:
+        """Frames are about to be stored; unless they have become this job by then they are nobody's."""
+        with writing(self._engine) as connection:
+            self._leave(connection, [frame_folder(job_id)], until)
+
+    def leftovers(self, now: datetime, limit: int) -> list[str]:
+        """Up to `limit` folders whose files are to be deleted."""
+        query = sa.select(left.folder).where(left.due_at <= now).order_by(left.due_at).limit(limit)
+        with reading(self._engine) as connection:
+            return list(connection.scalars(query))
+
+    def swept(self, folder: str) -> None:
+        """The files of a folder are gone."""
+        with writing(self._engine) as connection:
+            connection.execute(sa.delete(tables.leftovers).where(left.folder == folder))
+
+    def postpone(self, folder: str, until: datetime) -> None:
+        """The files of a folder cannot be deleted now."""
+        with writing(self._engine) as connection:
+            connection.execute(sa.update(tables.leftovers).where(left.folder == folder).values(due_at=until))
+
+    def _ended(
+        self, connection: sa.Connection, before: datetime, limit: int, *also: sa.ColumnElement[bool]
+    ) -> list[str]:
+        # Open jobs have no end.
+        query = sa.select(j.id).where(j.finished_at < before, *also).order_by(j.finished_at).limit(limit)
+        return list(connection.scalars(query))
+
+    def _mark(self, connection: sa.Connection, job_ids: Collection[str], **moment: datetime) -> None:
+        marked = sa.update(tables.jobs).where(j.id.in_(job_ids)).values(revision=j.revision + 1, **moment)
+        connection.execute(marked)
+
+    def _leave(self, connection: sa.Connection, folders: Collection[str], due_at: datetime) -> None:
+        connection.execute(sa.delete(tables.leftovers).where(left.folder.in_(folders)))
+        rows = [{"folder": folder, "due_at": due_at} for folder in folders]
+        if rows:
+            connection.execute(sa.insert(tables.leftovers), rows)

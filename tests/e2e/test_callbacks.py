@@ -1,0 +1,105 @@
+"""Callbacks of a whole service: whoever is killed when, the end of a job is told."""
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+from base64 import b64encode
+from contextlib import closing
+from datetime import UTC, datetime
+
+import pytest
+
+from service.settings import Settings
+from tests.e2e.running import wait_for
+from tests.worker.receiver import Receiver
+from worker import webhook
+
+SECRET = "whsec_" + b64encode(bytes(32)).decode()
+LOCAL = {"ESC_WEBHOOK_SECRET": SECRET, "ESC_CALLBACK_ALLOW_HTTP": "true", "ESC_CALLBACK_ALLOW_PRIVATE": "true"}
+
+
+class Holding(Receiver):
+    """Takes what comes, and answers when it is let go."""
+
+    def __init__(self) -> None:
+        self.go = threading.Event()
+        super().__init__()
+
+    def respond(self, request, status) -> None:
+        self.go.wait(60)
+        super().respond(request, status)
+
+
+@pytest.fixture
+def receiver():
+    hook = Holding()
+    yield hook
+    hook.go.set()
+    hook.close()
+
+
+def test_the_worker_that_is_killed_over_a_callback_sends_it_again_when_it_is_back(start, receiver):
+    service = start("up", **LOCAL).ready()
+    job = service.submit(service.venue("v"), callback_url=receiver.url).json()["id"]
+    ended = service.end(job)
+    wait_for(lambda: receiver.received)
+    os.kill(service.worker(), signal.SIGKILL)
+    receiver.go.set()
+    due_now(service, job)
+    wait_for(lambda: len(receiver.received) == 2)
+    first, second = receiver.received
+    assert (first.body, first.headers["webhook-id"]) == (second.body, job)
+    assert json.loads(second.body) == {"type": "job.succeeded", "timestamp": ended["finished_at"], "data": ended}
+    keys = Settings(webhook_secret=SECRET).webhook_keys
+    at = datetime.fromtimestamp(int(second.headers["webhook-timestamp"]), UTC)
+    assert second.headers.items() >= webhook.headers(job, at, second.body, keys).items()
+    wait_for(lambda: 'esc_callbacks{status="delivered"} 1.0' in service.http.get("/metrics").text)
+
+
+def due_now(service, job: str) -> None:
+    """Spare a test the time after which an attempt counts as lost."""
+    with closing(sqlite3.connect(service.data / "esc.sqlite", timeout=30, isolation_level=None)) as database:
+        database.execute("UPDATE deliveries SET due_at = '2026-01-01 00:00:00.000000' WHERE job = ?", (job,))
+
+
+def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver):
+    receiver.go.set()
+    service = start("serve", **LOCAL)
+    job = service.submit(service.venue("v"), callback_url=receiver.url).json()["id"]
+    service.http.post(f"/jobs/{job}/cancel")
+    service.kill()
+    service.start()
+    worker = subprocess.Popen([sys.executable, "-m", "service.cli", "worker"], env=service.environment)
+    wait_for(lambda: receiver.received)
+    assert json.loads(receiver.received[0].body)["type"] == "job.cancelled"
+    worker.kill()
+    worker.wait()
+
+
+def test_a_receiver_that_hangs_holds_up_no_job(start, receiver):
+    service = start("up", **LOCAL).ready()
+    for name in ("a", "b", "c"):
+        job = service.submit(service.venue(name), callback_url=receiver.url).json()["id"]
+        assert service.end(job)["status"] == "succeeded"
+    assert service.end(service.submit(service.venue("d")).json()["id"])["status"] == "succeeded"
+
+
+def test_without_a_secret_a_callback_is_refused_with_what_to_do(service, name):
+    answer = service.submit(service.venue(name), callback_url="https://example.com/told")
+    assert (answer.status_code, answer.json()["type"]) == (422, "/problems/callback-refused")
+    assert "ESC_WEBHOOK_SECRET" in answer.json()["detail"]
+    nonsense = service.submit(name, callback_url="told")
+    assert (nonsense.status_code, nonsense.json()["type"]) == (422, "/problems/invalid-request")
+    assert nonsense.json()["errors"][0]["where"] == "options.callback_url"
+
+
+def test_a_secret_that_is_none_is_refused_at_the_start(tmp_path):
+    command = [sys.executable, "-m", "service.cli", "up", "--data", str(tmp_path), "--port", "0"]
+    refused = subprocess.run(command, env=os.environ | {"ESC_WEBHOOK_SECRET": "topsecret"}, capture_output=True)
+    assert refused.returncode == 2
+    assert b"ESC_WEBHOOK_SECRET: " in refused.stderr
+    assert b"topsecret" not in refused.stderr

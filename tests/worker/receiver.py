@@ -1,0 +1,91 @@
+"""A receiver of webhooks on a real socket."""
+
+import ssl
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Received:
+    path: str
+    headers: dict[str, str]
+    body: bytes
+
+
+class Receiver:
+    """Answers with `statuses` one after the other, the last again and again; keeps what came in `received`."""
+
+    def __init__(self, *statuses: int, headers: dict | None = None, certificate: Path | None = None) -> None:
+        self.statuses = list(statuses) or [204]
+        self.headers = headers or {}
+        self.received: list[Received] = []
+        self.broken_off = threading.Event()
+        receiver = self
+
+        class Handler(BaseHTTPRequestHandler):
+            def do_POST(self):
+                receiver.answer(self)
+
+            def log_message(self, *_):
+                pass
+
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self._server.daemon_threads = True
+        if certificate is not None:
+            tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            tls.load_cert_chain(certificate)
+            self._server.socket = tls.wrap_socket(self._server.socket, server_side=True)
+        self.port = self._server.server_port
+        self.url = f"http://127.0.0.1:{self.port}/told?by=esc"
+        threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True).start()
+
+    def answer(self, request: BaseHTTPRequestHandler) -> None:
+        body = request.rfile.read(int(request.headers["content-length"]))
+        headers = {name.lower(): value for name, value in request.headers.items()}
+        self.received.append(Received(request.path, headers, body))
+        status = self.statuses.pop(0) if len(self.statuses) > 1 else self.statuses[0]
+        with suppress(OSError):
+            self.respond(request, status)
+
+    def respond(self, request: BaseHTTPRequestHandler, status: int) -> None:
+        request.send_response(status)
+        for name, value in self.headers.items():
+            request.send_header(name, value)
+        request.end_headers()
+
+    def close(self) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+
+
+class Silent(Receiver):
+    """Takes what comes and says nothing."""
+
+    def respond(self, request: BaseHTTPRequestHandler, status: int) -> None:
+        time.sleep(3600)
+
+
+class Dripping(Receiver):
+    """Sends a byte of its headers, and another, and another."""
+
+    def respond(self, request: BaseHTTPRequestHandler, status: int) -> None:
+        request.wfile.write(b"HTTP/1.1 200 OK\r\nX-Slow: ")
+        while True:
+            request.wfile.write(b"x")
+            time.sleep(0.05)
+
+
+class Endless(Receiver):
+    """Sends a body without an end."""
+
+    def respond(self, request: BaseHTTPRequestHandler, status: int) -> None:
+        super().respond(request, status)
+        try:
+            while True:
+                request.wfile.write(bytes(65536))
+        except OSError:
+            self.broken_off.set()

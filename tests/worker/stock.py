@@ -1,0 +1,89 @@
+"""A home on a real database and a real folder, filled with jobs that ended when a test says."""
+
+from datetime import datetime
+from pathlib import Path
+
+import sqlalchemy as sa
+
+from service.schemas import CameraResult, JobError, Moved, Options, Pose, Provenance, Result, Venue, VenueIn
+from service.settings import Settings
+from service.store import tables
+from service.store.blobs import Blobs
+from service.store.deliveries import Deliveries
+from service.store.engine import connect, migrate
+from service.store.expiry import Expiry
+from service.store.jobs import Jobs, Submission, new_job_id, picture_folder
+from service.store.venues import Venues
+from service.store.workers import Workers
+from tests.e2e.running import venue
+
+
+class Stock:
+    def __init__(self, data: Path, **settings) -> None:
+        self.settings = Settings(data=data, worker_name="w", **settings)
+        self.engine = connect(self.settings.home_database_url)
+        migrate(self.engine)
+        self.jobs, self.venues, self.workers = Jobs(self.engine), Venues(self.engine), Workers(self.engine)
+        self.expiry, self.deliveries = Expiry(self.engine), Deliveries(self.engine)
+        self.blobs = Blobs(self.settings.home_blob_url)
+        self.enqueued: list[str] = []
+
+    def submitted(self, venue_id: str, **options) -> str:
+        """A job that waits, with a frame."""
+        job_id = new_job_id()
+        frames = {"left": [f"frames/{job_id}/left/0"]}
+        self.blobs.put(frames["left"][0], b"frame")
+        submission = Submission(job_id, self._venue(venue_id), Options(seed=1, **options), job_id, None, frames)
+        self.jobs.submit(submission, 100, lambda _, job_id, __: self.enqueued.append(job_id))
+        return job_id
+
+    def ended(self, venue_id: str, at: datetime, *, accepted: bool | None = True, **options) -> str:
+        """A job that ended at a moment, with a picture; `accepted` None: it failed and has none."""
+        job_id = self.submitted(venue_id, **options)
+        task = self.jobs.begin(job_id)
+        if accepted is None:
+            self.jobs.fail(task, JobError(type="/problems/job-crashed", title="", detail=""))
+        else:
+            self.blobs.put(f"{picture_folder(job_id, task.run_token)}/preview.jpg", b"picture")
+            self.jobs.finish(task, result(task.venue, accepted), ["preview"])
+        with self.engine.begin() as connection:
+            connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job_id).values(finished_at=at))
+        return job_id
+
+    def files(self) -> set[str]:
+        """The jobs whose files are there: `frames/<job>` and `pictures/<job>`."""
+        folder = self.settings.data / "blobs"
+        return {"/".join(file.relative_to(folder).parts[:2]) for file in folder.rglob("*") if file.is_file()}
+
+    def _venue(self, venue_id: str) -> Venue:
+        stored = self.venues.get(venue_id)
+        if stored is None:
+            stored = VenueIn.model_validate(venue(venue_id)).stored()
+            self.venues.put(stored, lambda _: None)
+        return stored
+
+
+def result(of: Venue, accepted: bool) -> Result:
+    """A calibration that moved every camera by a millimetre."""
+    cameras = [
+        CameraResult(
+            id=camera.id,
+            pose=Pose.at(camera.pose.rotation, [camera.pose.position[0] + 0.001, *camera.pose.position[1:]]),
+            sigma=None,
+            moved=Moved(rotation_deg=0, position_m=0.001, pixels=1.0),
+            iou=0.9,
+            residual_px=1.0,
+        )
+        for camera in of.cameras
+    ]
+    return Result(
+        accepted=accepted,
+        rejected_because=None if accepted else "the lines do not fit",
+        cameras=cameras,
+        stitch_error_px=0.2,
+        stitch_error_before_px=10.0,
+        loss=0.1,
+        generations=1,
+        timings_s={},
+        provenance=Provenance(software="0", model_sha256="0", seed=1, options={}),
+    )

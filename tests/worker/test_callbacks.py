@@ -1,0 +1,324 @@
+import json
+import shutil
+import socket
+import subprocess
+import time
+from base64 import b64decode, b64encode
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from service.settings import Settings
+from tests.worker.receiver import Dripping, Endless, Receiver, Silent
+from tests.worker.stock import Stock
+from worker import webhook
+from worker.callbacks import ATTEMPT, Callbacks
+
+SECRET, OTHER_SECRET = ("whsec_" + b64encode(bytes([n]) * 32).decode() for n in (7, 8))
+LOCAL = {"webhook_secret": SECRET, "callback_allow_http": True, "callback_allow_private": True}
+
+
+class Clock:
+    def __init__(self) -> None:
+        # Deliveries are due from the end of their job, which the real clock told.
+        self.now = datetime.now(UTC) + timedelta(seconds=1)
+
+    def __call__(self) -> datetime:
+        return self.now
+
+    def goes_on(self, **time) -> None:
+        self.now += timedelta(**time)
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def stock(tmp_path):
+    """Makes homes with other settings than the usual; all of them are let go."""
+    stocks = []
+
+    def stock(**settings):
+        stocks.append(Stock(tmp_path, **(LOCAL | settings)))
+        return stocks[-1]
+
+    yield stock
+    for one in stocks:
+        one.engine.dispose()
+
+
+@pytest.fixture
+def receiver():
+    """Starts receivers."""
+    receivers = []
+
+    def receiver(kind=Receiver, *statuses, **more):
+        receivers.append(kind(*statuses, **more))
+        return receivers[-1]
+
+    yield receiver
+    for one in receivers:
+        one.close()
+
+
+def callbacks(stock, clock) -> Callbacks:
+    return Callbacks(stock.settings, stock.deliveries, stock.jobs, clock)
+
+
+def ended(stock, url: str, **more) -> str:
+    return stock.ended("v", datetime.now(UTC), callback_url=url, **more)
+
+
+def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
+    home, hook = stock(), receiver()
+    job = ended(home, hook.url)
+    callbacks(home, clock).look()
+    (told,) = hook.received
+    event = json.loads(told.body)
+    assert event["type"] == "job.succeeded"
+    assert event["data"] == json.loads(home.jobs.get(job).model_dump_json())
+    assert event["timestamp"] == event["data"]["finished_at"]
+    assert (told.path, told.headers["content-type"]) == ("/told?by=esc", "application/json")
+    assert told.headers["host"] == f"127.0.0.1:{hook.port}"
+    assert home.deliveries.counts() == {"delivered": 1}
+    clock.goes_on(days=2)
+    callbacks(home, clock).look()
+    assert len(hook.received) == 1
+
+
+@pytest.mark.parametrize("how", ["job.failed", "job.cancelled"])
+def test_every_end_is_told(stock, receiver, clock, how):
+    home, hook = stock(), receiver()
+    if how == "job.failed":
+        ended(home, hook.url, accepted=None)
+    else:
+        home.jobs.cancel(home.submitted("v", callback_url=hook.url))
+    callbacks(home, clock).look()
+    assert json.loads(hook.received[0].body)["type"] == how
+
+
+def test_a_job_that_asked_for_nothing_is_not_told_of(stock):
+    home = stock()
+    home.ended("v", datetime.now(UTC))
+    assert home.deliveries.counts() == {}
+
+
+def test_a_cancelled_job_is_told_of_once(stock):
+    home = stock()
+    job = home.submitted("v", callback_url="https://example.com/")
+    home.jobs.cancel(job)
+    home.jobs.cancel(job)
+    assert home.deliveries.counts() == {"waiting": 1}
+
+
+def test_signatures_are_those_of_standard_webhooks():
+    # The example of the specification's own libraries.
+    key = b64decode("MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw")
+    at = datetime.fromtimestamp(1614265330.9, UTC)
+    assert webhook.headers("msg_p5jXN8AQM9LWM0D4loKWxJek", at, b'{"test": 2432232314}', [key]) == {
+        "webhook-id": "msg_p5jXN8AQM9LWM0D4loKWxJek",
+        "webhook-timestamp": "1614265330",
+        "webhook-signature": "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE=",
+    }
+
+
+def test_while_a_secret_is_replaced_both_sign(stock, receiver, clock):
+    home, hook = stock(webhook_secret=f"{SECRET} {OTHER_SECRET}"), receiver()
+    job = ended(home, hook.url)
+    callbacks(home, clock).look()
+    (told,) = hook.received
+    each = [
+        webhook.headers(job, clock.now, told.body, Settings(webhook_secret=secret).webhook_keys)
+        for secret in (SECRET, OTHER_SECRET)
+    ]
+    assert told.headers.items() >= (each[0] | {"webhook-signature": told.headers["webhook-signature"]}).items()
+    assert told.headers["webhook-signature"] == " ".join(one["webhook-signature"] for one in each)
+
+
+# Again and again
+
+
+def test_what_fails_is_sent_again_after_ever_longer_pauses_with_the_same_id(stock, receiver, clock):
+    home, hook = stock(), receiver(Receiver, 500, 302, 404, 200)
+    job = ended(home, hook.url)
+    sender = callbacks(home, clock)
+    for pause_s in (0, 6, 33, 132):
+        clock.goes_on(seconds=pause_s - 4)
+        sender.look()
+        clock.goes_on(seconds=4)
+        sender.look()
+    assert [told.headers["webhook-id"] for told in hook.received] == [job] * 4
+    assert len({told.headers["webhook-timestamp"] for told in hook.received}) == 4
+    assert len({told.body for told in hook.received}) == 1
+    assert home.deliveries.counts() == {"delivered": 1}
+
+
+def test_after_a_day_it_is_given_up(stock, receiver, clock):
+    home, hook = stock(), receiver(Receiver, 500)
+    ended(home, hook.url)
+    sender, begun, last = callbacks(home, clock), clock.now, clock.now
+    while home.deliveries.counts() == {"waiting": 1}:
+        before = len(hook.received)
+        sender.look()
+        if len(hook.received) > before:
+            last = clock.now
+        clock.goes_on(minutes=10)
+    assert home.deliveries.counts() == {"given-up": 1}
+    assert len(hook.received) == 11
+    assert timedelta(hours=23) < last - begun < timedelta(hours=30)
+
+
+def test_a_receiver_that_is_gone_is_left_alone(stock, receiver, clock):
+    home, hook = stock(), receiver(Receiver, 410)
+    ended(home, hook.url)
+    sender = callbacks(home, clock)
+    sender.look()
+    clock.goes_on(days=1)
+    sender.look()
+    assert (len(hook.received), home.deliveries.counts()) == (1, {"given-up": 1})
+
+
+def test_a_receiver_may_ask_for_a_longer_pause(stock, receiver, clock):
+    home, hook = stock(), receiver(Receiver, 503, headers={"Retry-After": "600"})
+    ended(home, hook.url)
+    sender = callbacks(home, clock)
+    for seconds, arrived in ((0, 1), (590, 1), (80, 2)):
+        clock.goes_on(seconds=seconds)
+        sender.look()
+        assert len(hook.received) == arrived
+
+
+def test_a_sender_that_died_over_an_attempt_loses_nothing(stock, receiver, clock):
+    home, hook = stock(), receiver()
+    ended(home, hook.url)
+    assert home.deliveries.attempt(clock.now, clock.now + ATTEMPT, 8)
+    sender = callbacks(home, clock)
+    sender.look()
+    assert hook.received == []
+    clock.goes_on(seconds=ATTEMPT.total_seconds())
+    sender.look()
+    assert home.deliveries.counts() == {"delivered": 1}
+
+
+def test_two_workers_do_not_attempt_the_same(stock, clock):
+    home = stock()
+    ended(home, "https://example.com/")
+    assert len(home.deliveries.attempt(clock.now, clock.now + ATTEMPT, 8)) == 1
+    assert home.deliveries.attempt(clock.now, clock.now + ATTEMPT, 8) == []
+
+
+def test_a_worker_without_a_secret_sends_nothing_unsigned(stock, receiver, clock):
+    home, hook = stock(webhook_secret=None), receiver()
+    ended(home, hook.url)
+    callbacks(home, clock).look()
+    assert (hook.received, home.deliveries.counts()) == ([], {"waiting": 1})
+
+
+def test_one_address_that_cannot_be_called_holds_up_no_other(stock, receiver, clock):
+    home, hook = stock(), receiver()
+    for url in ("https://a..b/", "https://" + "a" * 70 + ".example/", "http://127.0.0.1:1/", hook.url):
+        ended(home, url)
+    callbacks(home, clock).look()
+    assert home.deliveries.counts() == {"delivered": 1, "waiting": 3}
+
+
+# Receivers that mean no good
+
+
+@pytest.mark.parametrize("kind", [Silent, Dripping])
+def test_no_receiver_holds_a_sender_longer_than_the_limit(stock, receiver, clock, monkeypatch, kind):
+    monkeypatch.setattr(webhook, "TIMEOUT_S", 0.5)
+    home, hook = stock(), receiver(kind)
+    ended(home, hook.url)
+    begun = time.monotonic()
+    callbacks(home, clock).look()
+    assert time.monotonic() - begun < 3
+    assert (len(hook.received), home.deliveries.counts()) == (1, {"waiting": 1})
+
+
+def test_of_an_endless_answer_only_the_beginning_is_read(stock, receiver, clock):
+    home, hook = stock(), receiver(Endless, 200)
+    ended(home, hook.url)
+    callbacks(home, clock).look()
+    assert home.deliveries.counts() == {"delivered": 1}
+    assert hook.broken_off.wait(10)
+
+
+def test_redirects_are_not_followed(stock, receiver, clock):
+    home, secret_place = stock(), receiver()
+    hook = receiver(Receiver, 307, headers={"Location": secret_place.url})
+    ended(home, hook.url)
+    callbacks(home, clock).look()
+    assert (len(hook.received), secret_place.received) == (1, [])
+    assert home.deliveries.counts() == {"waiting": 1}
+
+
+def names(monkeypatch, *answers: list[str]) -> list[str]:
+    """Let every name have these addresses, the last answer for ever; returns the list of names that were looked up."""
+    asked, left = [], list(answers)
+
+    def getaddrinfo(name, port, *_, **__):
+        asked.append(name)
+        answer = left.pop(0) if len(left) > 1 else left[0]
+        return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", (address, port)) for address in answer]
+
+    monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
+    return asked
+
+
+def test_a_name_with_any_address_inside_is_not_called(stock, receiver, clock, monkeypatch):
+    home, hook = stock(callback_allow_private=False), receiver()
+    ended(home, f"http://rebound.example:{hook.port}/")
+    names(monkeypatch, ["93.184.216.34", "127.0.0.1"])
+    callbacks(home, clock).look()
+    assert (hook.received, home.deliveries.counts()) == ([], {"waiting": 1})
+
+
+def test_the_connection_goes_to_the_address_that_was_checked(stock, receiver, clock, monkeypatch):
+    home, hook = stock(), receiver()
+    ended(home, f"http://rebound.example:{hook.port}/")
+    asked = names(monkeypatch, ["127.0.0.1"], ["127.0.0.99"])
+    callbacks(home, clock).look()
+    assert hook.received[0].headers["host"] == f"rebound.example:{hook.port}"
+    assert asked == ["rebound.example"]
+
+
+def test_an_address_that_does_not_answer_is_passed_over_for_the_next(stock, receiver, clock, monkeypatch):
+    home, hook = stock(), receiver()
+    ended(home, f"http://two.example:{hook.port}/")
+    names(monkeypatch, ["127.0.0.99", "127.0.0.1"])
+    callbacks(home, clock).look()
+    assert home.deliveries.counts() == {"delivered": 1}
+
+
+def test_proxies_of_the_environment_are_not_used(stock, receiver, clock, monkeypatch):
+    home, hook, proxy = stock(), receiver(), receiver()
+    monkeypatch.setenv("HTTP_PROXY", proxy.url)
+    monkeypatch.setenv("ALL_PROXY", proxy.url)
+    ended(home, hook.url)
+    callbacks(home, clock).look()
+    assert (len(hook.received), proxy.received) == (1, [])
+
+
+@pytest.mark.parametrize(("name", "told"), [("hook.example", 1), ("other.example", 0)])
+def test_the_certificate_is_checked_against_the_name(stock, receiver, clock, monkeypatch, tmp_path, name, told):
+    home, hook = stock(), receiver(certificate=certificate(tmp_path, "hook.example"))
+    monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "certificate.pem"))
+    names(monkeypatch, ["127.0.0.1"])
+    ended(home, f"https://{name}:{hook.port}/")
+    callbacks(home, clock).look()
+    assert len(hook.received) == told
+
+
+def certificate(folder, name):
+    """A certificate for a name, signed by itself, with its key."""
+    openssl = shutil.which("openssl") or pytest.skip("openssl is not installed")
+    file = folder / "certificate.pem"
+    kind = ["-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2"]
+    subject = ["-subj", f"/CN={name}", "-addext", f"subjectAltName=DNS:{name}"]
+    command = [openssl, "req", *kind, *subject, "-keyout", folder / "key.pem", "-out", file]
+    subprocess.run(command, check=True, capture_output=True)
+    file.write_bytes(file.read_bytes() + (folder / "key.pem").read_bytes())
+    return file

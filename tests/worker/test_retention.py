@@ -1,0 +1,163 @@
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from tests.worker.stock import Stock
+from worker.retention import Retention
+
+NOW = datetime(2026, 11, 21, 10, tzinfo=UTC)
+
+
+def ago(**time) -> datetime:
+    return NOW - timedelta(**time)
+
+
+@pytest.fixture
+def stock(tmp_path):
+    stock = Stock(tmp_path)
+    yield stock
+    stock.engine.dispose()
+
+
+@pytest.fixture
+def forgotten():
+    """What the queue was asked to forget."""
+    return []
+
+
+@pytest.fixture
+def retention(stock, forgotten):
+    return Retention(stock.settings, stock.expiry, stock.blobs, stock.workers, forgotten.extend)
+
+
+def test_frames_go_after_two_days_and_pictures_after_two_weeks(stock, retention):
+    failed = stock.ended("a", ago(days=3), accepted=None)
+    old, older = (stock.ended("a", ago(days=days), accepted=False) for days in (3, 15))
+    young = stock.ended("a", ago(days=1))
+    retention.round(NOW)
+    assert stock.files() == {f"pictures/{old}", f"pictures/{young}", f"frames/{young}"}
+    assert {job.id for job in stock.jobs.page("a", None, None, 10)} == {failed, old, older, young}
+
+
+def test_a_job_with_deleted_pictures_links_to_none(stock, retention):
+    job = stock.ended("a", ago(days=15), accepted=False)
+    assert "preview" in stock.jobs.get(job).links
+    retention.round(NOW)
+    assert "preview" not in stock.jobs.get(job).links
+    assert stock.jobs.pictures(job).deleted
+
+
+def test_jobs_go_after_400_days_and_the_queue_forgets_them(stock, retention, forgotten):
+    job = stock.ended("a", ago(days=401), accepted=False)
+    retention.round(NOW)
+    assert stock.jobs.get(job) is None
+    assert forgotten == [job]
+    assert stock.files() == set()
+
+
+def test_the_last_accepted_job_of_each_venue_stays_with_its_pictures(stock, retention):
+    before, last = stock.ended("a", ago(days=501)), stock.ended("a", ago(days=500))
+    rejected = stock.ended("a", ago(days=499), accepted=False)
+    dry = stock.ended("a", ago(days=499), dry_run=True)
+    other = stock.ended("b", ago(days=600))
+    retention.round(NOW)
+    assert [job for job in (before, last, rejected, dry, other) if stock.jobs.get(job)] == [last, other]
+    assert stock.files() == {f"pictures/{last}", f"pictures/{other}"}
+
+
+def test_nothing_of_a_deleted_venue_is_kept_for_ever(stock, retention):
+    stock.ended("a", ago(days=500))
+    stock.venues.delete("a", lambda *_: None)
+    retention.round(NOW)
+    assert (stock.jobs.page("a", None, None, 10), stock.files()) == ([], set())
+
+
+def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
+    queued, running = stock.submitted("a"), stock.submitted("b")
+    stock.jobs.begin(running)
+    retention.round(datetime(2099, 1, 1, tzinfo=UTC))
+    assert stock.files() == {f"frames/{queued}", f"frames/{running}"}
+    assert (stock.jobs.get(queued).status, stock.jobs.get(running).status) == ("queued", "running")
+    assert forgotten == []
+
+
+def test_frames_of_an_upload_that_became_no_job_go_after_their_grace(stock, retention):
+    stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", NOW)
+    stock.blobs.put("frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/left/0", b"frame")
+    retention.round(ago(seconds=1))
+    assert stock.files() == {"frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"}
+    retention.round(NOW)
+    assert stock.files() == set()
+
+
+def test_a_round_is_bounded_and_says_that_there_is_more(stock, retention, monkeypatch):
+    monkeypatch.setattr("worker.retention.BATCH", 2)
+    newest_first = [stock.ended("a", ago(days=3 + n), accepted=None) for n in range(3)]
+    assert retention.round(NOW)
+    assert stock.files() == {f"frames/{newest_first[0]}"}
+    assert not retention.round(NOW)
+    assert stock.files() == set()
+
+
+def test_a_round_that_breaks_off_is_finished_by_the_next(stock, retention, monkeypatch):
+    job = stock.ended("a", ago(days=15), accepted=False)
+
+    def killed(_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stock.blobs, "delete_under", killed)
+        with pytest.raises(KeyboardInterrupt):
+            retention.round(NOW)
+    # The row promises nothing any more, and the files are on the list.
+    assert stock.jobs.pictures(job).deleted
+    assert stock.files() == {f"frames/{job}", f"pictures/{job}"}
+    retention.round(NOW)
+    assert stock.files() == set()
+
+
+def test_a_folder_that_cannot_be_deleted_holds_up_no_other(stock, retention, monkeypatch):
+    stuck = stock.ended("a", ago(days=4), accepted=None)
+    stock.ended("a", ago(days=3), accepted=None)
+    delete_under = stock.blobs.delete_under
+
+    def refuse(folder):
+        if stuck in folder:
+            raise PermissionError(folder)
+        delete_under(folder)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stock.blobs, "delete_under", refuse)
+        retention.round(NOW)
+    assert stock.files() == {f"frames/{stuck}"}
+    retention.round(NOW + timedelta(hours=1))
+    assert stock.files() == set()
+
+
+def test_of_several_workers_one_tidies(stock, retention):
+    job = stock.ended("a", ago(days=3), accepted=None)
+    stock.workers.enter("another", None)
+    stock.workers.enter("w", None)
+    retention.look()
+    assert stock.files() == {f"frames/{job}"}
+    stock.workers.leave("another", 0)
+    retention.look()
+    assert stock.files() == set()
+
+
+def test_short_of_room_frames_of_ended_jobs_go_at_once_and_nothing_else(stock, retention):
+    ended, running = stock.ended("a", ago(minutes=1)), stock.submitted("b")
+    stock.jobs.begin(running)
+    retention.round(NOW, short_of_room=True)
+    assert stock.files() == {f"pictures/{ended}", f"frames/{running}"}
+
+
+def test_a_full_disk_does_not_wait_for_the_next_round(tmp_path, forgotten):
+    stock = Stock(tmp_path, min_free_mb=1e12, tidy_every_s=3600)
+    retention = Retention(stock.settings, stock.expiry, stock.blobs, stock.workers, forgotten.extend)
+    stock.workers.enter("w", None)
+    retention.look()
+    stock.ended("a", datetime.now(UTC) - timedelta(minutes=1), accepted=None)
+    retention.look()
+    assert stock.files() == set()
+    stock.engine.dispose()

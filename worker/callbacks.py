@@ -1,0 +1,97 @@
+"""Callbacks: who asked to be told of the end of a job is told, again and again for a day if need be."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
+
+import httpx
+import structlog
+
+from service.schemas import Job, JobEvent
+from service.settings import Settings
+from service.store.deliveries import Deliveries, Delivery
+from service.store.jobs import Jobs
+from worker import webhook
+
+LOOK_S = 1.0
+# Receivers that hang hold up others only when there are as many of them.
+AT_ONCE = 8
+# Longer than an attempt takes, looking its name up included.
+ATTEMPT = timedelta(seconds=120)
+# After the first attempt, the second, ...: five seconds to nine hours, about a day in all.
+PAUSES_S = (5, 30, 120, 600, 1800, 3600, 2 * 3600, 4 * 3600, 7 * 3600, 9 * 3600)
+# Jobs of many venues end together; their second attempts should not.
+JITTER = 0.1
+LONGEST_ASKED_S = 3600
+GONE = 410
+log = structlog.get_logger()
+
+
+class Callbacks:
+    """Sends what is due; `now` is the clock."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        deliveries: Deliveries,
+        jobs: Jobs,
+        now: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ) -> None:
+        self._settings = settings
+        self._deliveries = deliveries
+        self._jobs = jobs
+        self._now = now
+        self._tls = httpx.create_ssl_context()
+        self._senders = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="callback")
+
+    def look(self) -> float:
+        """Attempt what is due; returns the seconds until it is worth looking again."""
+        if not self._settings.webhook_keys:
+            # Only the API has the secret, or it was taken away meanwhile: to a worker that can sign they stay due.
+            return LOOK_S
+        now = self._now()
+        due = self._deliveries.attempt(now, now + ATTEMPT, AT_ONCE)
+        for sent in [self._senders.submit(self._attempt, delivery) for delivery in due]:
+            sent.result()
+        return 0.0 if len(due) == AT_ONCE else LOOK_S
+
+    def _attempt(self, delivery: Delivery) -> None:
+        job = self._jobs.get(delivery.job_id)
+        if job is None:
+            self._deliveries.end(delivery, "given-up")
+            return
+        with structlog.contextvars.bound_contextvars(job=job.id, attempt=delivery.attempt):
+            try:
+                answer = self._send(delivery.url, job)
+            except Exception as error:  # whatever comes of this address, it is one attempt of one delivery
+                self._failed(delivery, str(error) or type(error).__name__)
+                return
+            if 200 <= answer.status < 300:
+                self._deliveries.end(delivery, "delivered")
+                log.info("callback delivered")
+            elif answer.status == GONE:
+                self._give_up(delivery, "its receiver is gone (410)")
+            else:
+                self._failed(delivery, f"answered {answer.status}: {answer.text[:200]}", answer.retry_after_s)
+
+    def _send(self, url: str, job: Job) -> webhook.Answer:
+        body = JobEvent.of(job).model_dump_json().encode()
+        # A job ends once: its id is the id of the event, the same at every attempt.
+        signature = webhook.headers(job.id, self._now(), body, self._settings.webhook_keys)
+        private = self._settings.callback_allow_private
+        return webhook.send(url, body, signature, self._tls, allow_private=private)
+
+    def _failed(self, delivery: Delivery, why: str, asked_s: int = 0) -> None:
+        if delivery.attempt > len(PAUSES_S):
+            self._give_up(delivery, why)
+            return
+        pause_s = max(PAUSES_S[delivery.attempt - 1], min(asked_s, LONGEST_ASKED_S)) * random.uniform(1, 1 + JITTER)
+        self._deliveries.again(delivery, self._now() + timedelta(seconds=pause_s))
+        log.warning("callback failed", why=why, again_in_s=round(pause_s))
+
+    def _give_up(self, delivery: Delivery, why: str) -> None:
+        self._deliveries.end(delivery, "given-up")
+        log.error("callback given up", why=why)
