@@ -154,6 +154,8 @@ def calibrate(
         journey.at("refinement", 0.0)
         brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
         refined = method.finish(pitch, found.cameras, brightness, responses, options.stitch_weight)
+    with clock.measuring("quality"):
+        journey.at("refinement", 0.6)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(pitch, refined.cameras, by_id)
         stitch_before = stitch_error_px(pitch, cameras, by_id)
