@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check bench-real bench-segmentation train lock clean
+.PHONY: setup demo test check bench bench-real bench-segmentation train lock clean
 
 setup: $(VENV)/.installed
 
@@ -32,6 +32,14 @@ bench-real: setup
 
 bench-segmentation: $(VENV)/.train
 	$(BIN)/python -m tests.benchmarks.segmentation
+
+$(VENV)/.bench: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	touch $@
+
+# One BLAS thread, as the worker sets it.
+bench: $(VENV)/.bench
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.accuracy
 
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'

@@ -90,7 +90,7 @@ class Crops:
             top, left = rng.integers(0, spare + 1, 2)
             crop = crop[top : top + size, left : left + size]
         crop = crop.astype(np.float32)
-        if rng.random() < 0.45:
+        if rng.random() < 0.35:
             _fringe(crop, rng)
         if rng.random() < 0.6:
             gain = np.exp(rng.normal(0, 0.15)) * np.exp(rng.normal(0, 0.06, 3))
@@ -106,7 +106,7 @@ class Crops:
 
 def _fringe(crop: NDArray[np.float32], rng: np.random.Generator) -> None:
     """Move blue one way and red the other, as cheap lenses do towards the edges of the frame."""
-    move = rng.normal(0, rng.uniform(0.5, 5.0), 2)
+    move = rng.normal(0, 2.0, 2)
     for channel, share in ((0, 1.0), (2, float(rng.uniform(-0.6, 0.2)))):
         shift = np.array([[1, 0, share * move[0]], [0, 1, share * move[1]]])
         plane = np.ascontiguousarray(crop[..., channel])

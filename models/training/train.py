@@ -199,7 +199,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--leak", type=float, default=LEAK, help="slope of LeakyReLU below 0; 0 is ReLU")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", type=Path, help="checkpoint whose weights to start from")
-    parser.add_argument("--threshold", type=float, default=0.45, help="probability that the exported model calls 0.5")
+    parser.add_argument("--threshold", type=float, default=0.37, help="probability that the exported model calls 0.5")
     parser.add_argument("--no-export", action="store_true")
     return parser.parse_args()
 

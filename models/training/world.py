@@ -99,7 +99,7 @@ def build_world(pitch: Field, conditions: Conditions) -> World:
         paint_noise=Noise.draw(rng, {0.01: 0.35, 0.03: 0.3, 0.1: 0.3, 0.4: 0.3, 1.5: 0.4, 6.0: 0.4}),
         paint_opacity=float(1 - (0.4 + 0.6 * conditions.variety) * rng.uniform(0, 0.45)),
         edge_noise=Noise.draw(rng, {0.015: 0.5, 0.05: 0.5, 0.3: 0.4, 3.0: 0.5}),
-        bumps=Noise.draw(rng, {7.0: 0.012, 20.0: 0.02}),
+        bumps=Noise.draw(rng, {7.0: 0.012 * conditions.swell, 20.0: 0.02 * conditions.swell}),
         cloud_noise=Noise.draw(rng, {25.0: 0.7, 60.0: 1.0}),
         snow_noise=Noise.draw(rng, {0.3: 0.3, 1.5: 0.6, 6.0: 0.8}),
         zones=zones,

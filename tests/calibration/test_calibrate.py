@@ -8,7 +8,6 @@ import pytest
 from tests.calibration.synthetic import CROWNED, moved, paint_frame, pair
 from worker.calibration.calibrate import CalibrationError, Options, Stopped, calibrate
 from worker.calibration.camera import rotation_angles_deg
-from worker.calibration.linemeasurement import whiteness
 
 TURN = (0.006, -0.005, 0.004)
 SHIFT = (0.05, -0.06, 0.04)
@@ -21,8 +20,9 @@ def frames():
 
 def white_on_green(frame, regions):
     assert regions
-    is_sky = frame[..., 0] > 200
-    return np.where(is_sky & (frame[..., 2] < 200), 0, np.clip((whiteness(frame) - 70.0) * 2, 0, 255)).astype(np.uint8)
+    is_sky = (frame[..., 0] > 200) & (frame[..., 2] < 200)
+    whiteness = np.clip((frame.min(axis=-1) - 70.0) * 2, 0, 255)
+    return np.where(is_sky, 0, whiteness).astype(np.uint8)
 
 
 def outdated():

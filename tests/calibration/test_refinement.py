@@ -7,7 +7,7 @@ import pytest
 
 from tests.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame, paint_markings, pair
 from worker.calibration.camera import rotation_angles_deg
-from worker.calibration.linemeasurement import expected_profiles, measure_lines, sliding_correlation, whiteness
+from worker.calibration.linemeasurement import brightness_of, expected_profiles, measure_lines, sliding_correlation
 from worker.calibration.quality import Gate, Sigma
 from worker.calibration.refinement import assess, refine, tukey_weights
 from worker.calibration.registration import stitch_error_px
@@ -19,7 +19,7 @@ SMALL_SHIFT = (0.02, -0.03, 0.02)
 @cache
 def scene():
     cameras = pair()
-    brightness = [whiteness(paint_frame(CROWNED, c)).astype(np.float32) for c in cameras]
+    brightness = [brightness_of(paint_frame(CROWNED, c)).astype(np.float32) for c in cameras]
     return cameras, brightness, [paint_markings(CROWNED, c) for c in cameras]
 
 
@@ -130,8 +130,20 @@ def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
 @pytest.mark.parametrize("distortion", [(), BARREL])
 def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(distortion):
     one = camera("left", (-30.0, -48.0, 10.0), (-30.0, -34.0), focal=900, distortion=distortion, size=(960, 240))
-    brightness = whiteness(paint_frame(CROWNED, one)).astype(np.float32)
+    brightness = brightness_of(paint_frame(CROWNED, one)).astype(np.float32)
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], [brightness], [paint_markings(CROWNED, one)], 0.5)
     assert refined.residual_px[0] is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
     assert Sigma.from_covariance(refined.covariance[0]).position_m > Gate().largest_sigma_m
+
+
+def test_blue_that_the_lens_puts_elsewhere_moves_no_line():
+    one = pair()[0]
+    frame = paint_frame(CROWNED, one)
+    fringed = frame.copy()
+    fringed[:, 4:, 0] = frame[:, :-4, 0]
+    lines, response = CROWNED.line_points(), paint_markings(CROWNED, one)
+    here, there = (
+        measure_lines(lines, one, brightness_of(f).astype(np.float32), response, 6.0) for f in (frame, fringed)
+    )
+    np.testing.assert_array_equal(here.pixel, there.pixel)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.camera import Camera, Frame, Pose
 from worker.calibration.field import Field
-from worker.calibration.linemeasurement import whiteness
+from worker.calibration.linemeasurement import brightness_of
 from worker.calibration.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
 from worker.calibration.refinement import Refined, assess, refine
 from worker.calibration.registration import pairs_in_common, stitch_error_px
@@ -152,8 +152,10 @@ def calibrate(
         found = _evolve(pitch, cameras, responses, method, options, journey)
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
-        brightness = [median([whiteness(frame) for frame in frames[camera.id]]) for camera in cameras]
+        brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
         refined = method.finish(pitch, found.cameras, brightness, responses, options.stitch_weight)
+    with clock.measuring("quality"):
+        journey.at("refinement", 0.6)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(pitch, refined.cameras, by_id)
         stitch_before = stitch_error_px(pitch, cameras, by_id)

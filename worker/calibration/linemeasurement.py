@@ -74,10 +74,13 @@ class Measurements:
         )
 
 
-def whiteness(frame: Frame) -> NDArray[np.uint8]:
-    """Brightness (H, W) 0..255 in which paint stands out most: the darkest channel, which grass and clay lack."""
-    blue, green, red = cv2.split(frame)
-    return np.asarray(cv2.min(cv2.min(blue, green), red), dtype=np.uint8)
+def brightness_of(frame: Frame) -> NDArray[np.uint8]:
+    """Brightness (H, W) 0..255: the mean of green and red.
+
+    Lenses put blue elsewhere, up to some pixels towards the edges of the picture (the violet side of white lines). The
+    intrinsics are those of green, which makes most of the grey in which boards are found.
+    """
+    return np.asarray(cv2.addWeighted(frame[..., 1], 0.5, frame[..., 2], 0.5, 0), dtype=np.uint8)
 
 
 def measure_lines(
@@ -89,7 +92,7 @@ def measure_lines(
 ) -> Measurements:
     """The lines of `camera` found within `search_px` of where its pose expects them.
 
-    `brightness` (H, W) see `whiteness`; `response` (H, W) the segmentation in 0..1.
+    `brightness` (H, W) see `brightness_of`; `response` (H, W) the segmentation in 0..1.
     """
     seen = SeenLines.from_camera(lines, camera)
     found = [

@@ -73,7 +73,7 @@ def refine(
 ) -> Refined:
     """Measure the lines and move the cameras onto them, round by round with a narrower search.
 
-    `brightness` (H, W) of each frame (`linemeasurement.whiteness`); `responses` (H, W): segmentations in 0..1.
+    `brightness` (H, W) of each frame (`linemeasurement.brightness_of`); `responses` (H, W): segmentations in 0..1.
     """
     here = list(cameras)
     for search in SEARCH_PX:

@@ -19,6 +19,8 @@ from worker.calibration.objective import GENES, Objective
 MUTATION_RAD = 0.005
 MUTATION_M = 0.1
 DECAY = 0.95
+PATIENCE, STALLED_BY = 6, 1e-5
+"""Where a level has patience, it ends when its best loss fell by less than this in so many generations."""
 
 
 class Losses(Protocol):
@@ -30,14 +32,18 @@ class Losses(Protocol):
 
 @dataclass(frozen=True)
 class Level:
-    """A stretch of generations with one objective, and the strength of mutation at its start."""
+    """A stretch of generations with one objective, and the strength of mutation at its start.
+
+    `patience`: generations without progress after which it ends before its time; None: it never does.
+    """
 
     mutation: float
     objective: Callable[[Field, Sequence[Camera], Sequence[NDArray[np.float32]], float], Losses]
+    patience: int | None = None
 
 
 def _blurred(blur_px: float, mutation: float) -> Level:
-    return Level(mutation, partial(Objective, blur_px=blur_px))
+    return Level(mutation, partial(Objective, blur_px=blur_px), PATIENCE)
 
 
 COARSE_TO_FINE = (_blurred(48, 4), _blurred(16, 1.5), _blurred(6, 0.5), _blurred(2, 0.2), _blurred(0.8, 0.1))
@@ -88,15 +94,24 @@ def search(
     for level, generations in zip(levels, _shares(strategy.generations, len(levels)), strict=True):
         objective = level.objective(pitch, here, responses, strategy.stitch_weight)
         evolution.tell(candidates, objective.losses(candidates))
+        best = [evolution.best_loss]
         for generation in range(generations):
             children = evolution.ask(level.mutation * decay(generation))
             evolution.tell(children, objective.losses(children))
             done += 1
             on_generation(done, evolution.best_loss)
+            best.append(evolution.best_loss)
+            if _nothing_moves(best, level.patience):
+                break
         here = with_genome(cameras, evolution.best)
         loss = evolution.best_loss
         candidates = evolution.forget_losses()
     return Found(here, loss, done)
+
+
+def _nothing_moves(best: Sequence[float], patience: int | None) -> bool:
+    """Whether the last of the best losses is hardly below that of `patience` generations before."""
+    return patience is not None and len(best) > patience and best[-1 - patience] - best[-1] < STALLED_BY
 
 
 def genome_of(cameras: Sequence[Camera]) -> Array:

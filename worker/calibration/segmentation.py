@@ -26,8 +26,11 @@ HALO_PX = 96
 """Context that a pixel's answer depends on (four poolings reach 94 px), a multiple of what they pool."""
 GRID_PX = 32
 """Regions begin and end on this grid: then the network pools the same pixels together as in the whole frame."""
-REGION_PX = 832
-"""Largest width and height of a region: bounds the memory, whatever the size of the frame."""
+REGION_PX = 1920
+"""Largest width and height of a region: bounds the memory, whatever the size of the frame.
+
+As large as memory allows, one after the other: small ones pay for their halos, and batches of them gain nothing.
+"""
 WORKING_WIDTH_PX = 1920
 """About the width that the network sees frames at; the three lengths above are in pixels as it sees them."""
 

@@ -1,0 +1,329 @@
+"""`make bench`: how accurate, how wide and how fast the engine is, beside everything else that does the job.
+
+    python -m tests.benchmarks.accuracy --quick
+    python -m tests.benchmarks.accuracy --only table capture
+
+Rendered venues (`scenes`), frames through the real U-Net, Start errors as in the paper. Every run is written to
+`runs/bench/rows.jsonl` and not run again; remove the file after a change of the engine. Plots go to `docs/`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, replace
+
+import cv2
+import numpy as np
+
+from tests.benchmarks import plots
+from tests.benchmarks.methods import METHODS, SLOW, THREADS, Seen, engine
+from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, VENUES, Scene, scene, started
+from tests.benchmarks.truth import errors
+from worker.calibration.calibrate import Options, Progress, calibrate
+from worker.calibration.camera import Camera, rotation_angles_deg
+
+ROWS = FOLDER / "rows.jsonl"
+CAUGHT_M, CAUGHT_DEG = 0.01, 0.01
+SEEDS, STARTS = 3, 100
+QUICK_VENUES = ("pair-match-1", "pair-real-1", "one-real")
+PAPER = {
+    "Start": "14.3 ± 3.5 | 16.2 ± 1.3 | 2.1 ± 0.4 | 96.2 ± 0.9",
+    "Zhang (clicked corners)": "10.2 ± 1.1 | 5.0 ± 0.5 | 1.0 ± 0.1 | 98.3 ± 0.5",
+    "SCPR": "4.2 ± 0.6 | 0.5 ± 0.1 | 0.3 ± 0.0 | 99.1 ± 0.4",
+    "ESC `paper`": "0.3 ± 0.1 | 0.2 ± 0.0 | 0.1 ± 0.0 | 99.4 ± 0.2",
+    "ESC `esc`, flat": "0.7 ± 0.2 | 0.6 ± 0.1 | 0.4 ± 0.1 | ",
+    "ESC `esc`, no stitch term": "3.7 ± 0.6 | 0.2 ± 0.0 | 0.1 ± 0.0 | ",
+}
+WEIGHTS = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
+
+
+def main() -> None:
+    """Run what is asked for and print it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="three venues, one seed, ten starts, no slow presets")
+    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=list(SECTIONS))
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="of each method on each venue")
+    parser.add_argument("--slow-seeds", type=int, help="of the presets that take a minute")
+    parser.add_argument("--starts", type=int, default=STARTS, help="of each size, to be caught")
+    options = parser.parse_args()
+    options.venues = QUICK_VENUES if options.quick else tuple(VENUES)
+    if options.quick:
+        options.seeds, options.starts = 1, 10
+    if options.slow_seeds is None:
+        options.slow_seeds = 0 if options.quick else options.seeds
+    cv2.setNumThreads(THREADS)
+    for name in options.only:
+        print(f"\n## {name}\n", *SECTIONS[name](options), sep="\n", flush=True)
+
+
+def table(options: argparse.Namespace) -> Iterator[str]:
+    """The paper's table, on venues that match their model and on venues that do not."""
+    rows = [
+        row
+        for venue in options.venues
+        for method in METHODS
+        for row in _rows(venue, method, options.slow_seeds if method in SLOW else options.seeds)
+    ]
+    for title, matches in (("Lens and roof match the model", True), ("They do not, as in reality", False)):
+        yield f"{title}; mean ± sd over venues and seeds"
+        yield ""
+        yield "| | Stitch, px | TrE, cm | RoE, ° | IoU, % | s | paper: Stitch | TrE | RoE | IoU |"
+        yield "|---|---|---|---|---|---|---|---|---|---|"
+        for method in METHODS:
+            chosen = [row for row in rows if row["method"] == method and VENUES[row["venue"]][3] == matches]
+            if chosen:
+                yield f"| {method} | {_cells(chosen)} | {PAPER.get(method, ' | | | ')} |"
+        yield ""
+    yield from (f"![the table]({path})" for path in plots.table(rows))
+
+
+def _cells(rows: Sequence[dict]) -> str:
+    def cell(name: str, digits: int, factor: float = 1.0) -> str:
+        values = [factor * row[name] for row in rows if row[name] is not None]
+        return f"{np.mean(values):.{digits}f} ± {np.std(values):.{digits}f}" if values else ""
+
+    return " | ".join(
+        (cell("stitch_px", 2), cell("shift_cm", 2), cell("turn_deg", 3), cell("iou", 2, 100), cell("seconds", 1))
+    )
+
+
+def _rows(venue: str, method: str, seeds: int, light: str | None = None) -> Iterator[dict]:
+    """One row per seed: errors and seconds of a method from a start of the paper's size."""
+    for seed in range(seeds):
+        key = {"venue": venue, "light": light or VENUES[venue][2], "method": method, "seed": seed}
+        yield _remembered(key, lambda seed=seed: _judge(venue, light, METHODS[method], seed))
+
+
+def _judge(venue: str, light: str | None, method: Callable, seed: int) -> dict:
+    seen = _seen(venue, light)
+    answer = method(seen, started(seen.scene.cameras, np.random.default_rng([seed, 1])), seed)
+    return {**asdict(errors(seen.scene, answer.cameras)), "seconds": answer.seconds}
+
+
+def capture(options: argparse.Namespace) -> Iterator[str]:
+    """How many starts end where the same frames end when started from the truth."""
+    yield "| start | caught | missed and accepted | missed and rejected |"
+    yield "|---|---|---|---|"
+    for size in (1.0, 2.0):
+        rows = [
+            _remembered(
+                {"venue": venue, "start": number, "size": size}, lambda v=venue, n=number, s=size: _caught(v, n, s)
+            )
+            for number in range(options.starts)
+            for venue in [options.venues[number % len(options.venues)]]
+        ]
+        missed = [row for row in rows if not row["caught"]]
+        bad = sum(row["accepted"] for row in missed)
+        yield (
+            f"| {16.2 * size:.1f} cm, {2.1 * size:.1f}° | {len(rows) - len(missed)} of {len(rows)} | {bad} "
+            f"| {len(missed) - bad} |"
+        )
+
+
+def _caught(venue: str, number: int, size: float) -> dict:
+    seen = _seen(venue)
+    reference = _reference(venue)
+    answer = engine()(seen, started(seen.scene.cameras, np.random.default_rng([number, 2]), size), number)
+    assert answer.said is not None
+    apart = [_apart(a, b) for a, b in zip(answer.cameras, reference, strict=True)]
+    caught = all(shift <= CAUGHT_M and turn <= CAUGHT_DEG for shift, turn in apart)
+    return {
+        "caught": caught,
+        "accepted": answer.said.accepted,
+        "apart_m": max(shift for shift, _ in apart),
+        "apart_deg": max(turn for _, turn in apart),
+        "why": answer.said.rejected_because,
+    }
+
+
+def _apart(a: Camera, b: Camera) -> tuple[float, float]:
+    return (
+        float(np.linalg.norm(a.pose.position - b.pose.position)),
+        float(rotation_angles_deg(a.pose.rotation, b.pose.rotation)),
+    )
+
+
+def honesty(options: argparse.Namespace) -> Iterator[str]:
+    """Errors divided by the sigma that was answered with them: their spread should be near 1."""
+    ratios: dict[tuple[bool, str], list[float]] = {}
+    for venue in options.venues:
+        row = _remembered({"venue": venue, "sigma": True}, lambda v=venue: {"ratios": _ratios(v)})
+        for name, values in row["ratios"].items():
+            ratios.setdefault((VENUES[venue][3], name), []).extend(values)
+    yield "| | error / sigma, rms | cameras |"
+    yield "|---|---|---|"
+    for (matches, name), values in ratios.items():
+        kind = "match" if matches else "do not match"
+        yield f"| {name}, venues that {kind} | {np.sqrt(np.mean(np.square(values))):.2f} | {len(values)} |"
+
+
+def _ratios(venue: str) -> dict[str, list[float]]:
+    """Per camera, at every hour: the position's and the rotation's error over its sigma."""
+    found: dict[str, list[float]] = {"position": [], "rotation": []}
+    for hour in HOURS:
+        seen = _seen(venue, hour)
+        said = engine()(seen, seen.scene.cameras, 0).said
+        assert said is not None
+        for result, true in zip(said.cameras, seen.scene.cameras, strict=True):
+            shift, turn = _apart(true.with_pose(result.pose), true)
+            if result.sigma:
+                found["position"].append(shift / result.sigma.position_m)
+                found["rotation"].append(turn / result.sigma.rotation_deg)
+    return found
+
+
+def hours(options: argparse.Namespace) -> Iterator[str]:
+    """Four times of day."""
+    yield "| | Stitch, px | TrE, cm | RoE, ° | IoU, % | s |"
+    yield "|---|---|---|---|---|---|"
+    for light in HOURS:
+        rows = [row for venue in options.venues for row in _rows(venue, "ESC `esc`", 1, light)]
+        yield f"| {light} | {_cells(rows)} |"
+
+
+def tradeoff(options: argparse.Namespace) -> Iterator[str]:
+    """Stitch against metric accuracy over `stitch_weight`, on venues with several cameras that do not match."""
+    venues = [name for name in options.venues if not VENUES[name][3] and VENUES[name][0] != "one"]
+    yield "| stitch_weight | Stitch, px | TrE, cm | RoE, ° | IoU, % | s |"
+    yield "|---|---|---|---|---|---|"
+    rows = {}
+    for weight in WEIGHTS:
+        rows[weight] = [
+            _remembered(
+                {"venue": venue, "weight": weight},
+                lambda v=venue, w=weight: _judge(v, None, engine(stitch_weight=w), 0),
+            )
+            for venue in venues
+        ]
+        yield f"| {weight} | {_cells(rows[weight])} |"
+    yield ""
+    yield f"![the trade-off]({plots.tradeoff(rows)})"
+
+
+def times(_options: argparse.Namespace) -> Iterator[str]:
+    """Seconds of evolution and finish against cameras, pixels and generations."""
+    yield "| cameras | evolution, s | finish, s |"
+    yield "|---|---|---|"
+    four = _seen("four-real").scene
+    for count in range(1, 9):
+        yield f"| {count} | {_timed(_with_cameras(four, count))} |"
+    yield ""
+    yield "| pixels | evolution, s | finish, s |"
+    yield "|---|---|---|"
+    pair = _seen("pair-real-1").scene
+    for factor in (0.25, 0.5, 0.75, 1.0):
+        yield f"| {round(factor * SIZE[0])} x {round(factor * SIZE[1])} | {_timed(_resized(pair, factor))} |"
+    yield ""
+    yield "| generations | evolution, s | finish, s |"
+    yield "|---|---|---|"
+    for generations in (25, 50, 100, 200):
+        yield f"| {generations} | {_timed(pair, generations=generations)} |"
+
+
+def _timed(chosen: Scene, **options: int) -> str:
+    seen = Seen(chosen)
+    runs = []
+    for seed in range(3):
+        said = engine(**options)(seen, started(chosen.cameras, np.random.default_rng([seed, 1])), seed).said
+        assert said is not None
+        runs.append((said.timings_s["evolution"], said.timings_s["refinement"]))
+    evolution, refinement = np.median(runs, axis=0)
+    return f"{evolution:.2f} | {refinement:.2f}"
+
+
+def _with_cameras(chosen: Scene, count: int) -> Scene:
+    """The first `count` cameras; from the fifth on, the same ones again under other names."""
+    number = len(chosen.cameras)
+    several = [(chosen.cameras[i % number], f"{chosen.cameras[i % number].id}-{i // number}") for i in range(count)]
+    cameras = [replace(camera, id=name) for camera, name in several]
+    return replace(
+        chosen,
+        cameras=cameras,
+        real=cameras,
+        frames={name: [chosen.frames[camera.id][0].copy()] for camera, name in several},
+    )
+
+
+def _resized(chosen: Scene, factor: float) -> Scene:
+    cameras = [replace(camera, intrinsics=camera.intrinsics.scaled(factor)) for camera in chosen.cameras]
+    frames = {
+        camera.id: [cv2.resize(chosen.frames[camera.id][0], camera.intrinsics.size, interpolation=cv2.INTER_AREA)]
+        for camera in cameras
+    }
+    return replace(chosen, cameras=cameras, real=cameras, frames=frames)
+
+
+def convergence(_options: argparse.Namespace) -> Iterator[str]:
+    """The loss over the generations, level by level."""
+    seen = _seen("pair-real-1")
+    curves = []
+    for seed in range(3):
+        losses: list[float] = []
+
+        def note(step: Progress, losses: list[float] = losses) -> None:
+            if step.loss is not None:
+                losses.append(step.loss)
+
+        begin = started(seen.scene.cameras, np.random.default_rng([seed, 1]))
+        calibrate(seen.scene.pitch, begin, seen.scene.frames, seen.segment, Options(seed=seed), note)
+        curves.append(losses)
+    yield f"![the loss over the generations]({plots.convergence(curves)})"
+
+
+SECTIONS: dict[str, Callable[[argparse.Namespace], Iterator[str]]] = {
+    "table": table,
+    "capture": capture,
+    "honesty": honesty,
+    "tradeoff": tradeoff,
+    "hours": hours,
+    "times": times,
+    "convergence": convergence,
+}
+
+_kept: dict[tuple[str, str | None], Seen] = {}
+_references: dict[str, list[Camera]] = {}
+
+
+def _seen(venue: str, light: str | None = None) -> Seen:
+    """A scene and what the network says of it; the last few are kept."""
+    if (venue, light) not in _kept:
+        if len(_kept) > 12:
+            _kept.pop(next(iter(_kept)))
+        _kept[venue, light] = Seen(scene(venue, light))
+    return _kept[venue, light]
+
+
+def _reference(venue: str) -> list[Camera]:
+    """Where the frames of a venue end when they start from the truth."""
+    if venue not in _references:
+        seen = _seen(venue)
+        _references[venue] = engine()(seen, seen.scene.cameras, 10_000).cameras
+    return _references[venue]
+
+
+def _remembered(key: dict, run: Callable[[], dict]) -> dict:
+    """The row of a key, from the file or run now and appended to it."""
+    if not _remembered_rows and ROWS.exists():
+        for line in ROWS.read_text().splitlines():
+            row = json.loads(line)
+            _remembered_rows[json.dumps(row["key"], sort_keys=True)] = row
+    name = json.dumps(key, sort_keys=True)
+    if name not in _remembered_rows:
+        begin = time.perf_counter()
+        row = {"key": key, **{k: v for k, v in key.items() if k in ("venue", "method")}, **run()}
+        ROWS.parent.mkdir(parents=True, exist_ok=True)
+        with ROWS.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+        _remembered_rows[name] = row
+        print(f"  {key} {time.perf_counter() - begin:.0f} s", flush=True)
+    return _remembered_rows[name]
+
+
+_remembered_rows: dict[str, dict] = {}
+
+
+if __name__ == "__main__":
+    main()

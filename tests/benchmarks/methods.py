@@ -1,0 +1,146 @@
+"""Everything that is compared: each takes a scene and outdated cameras, and answers where it thinks they are."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import cma
+import cv2
+import numpy as np
+
+from models import MODEL_PATH
+from tests.benchmarks.scenes import Scene
+from worker.calibration.calibrate import Calibration, Options, calibrate
+from worker.calibration.camera import Camera, Frame, Pose, inside
+from worker.calibration.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD, genome_of, with_genome
+from worker.calibration.segmentation import Region, Segmenter, whole_frame
+
+THREADS = 2
+CLICK_NOISE_PX = 2.0
+
+
+@dataclass
+class Seen:
+    """A scene with its segmentations, made once by the real network and handed out to every method."""
+
+    scene: Scene
+    segmenter: Segmenter = field(default_factory=lambda: Segmenter(MODEL_PATH, THREADS))
+
+    def __post_init__(self) -> None:
+        size = self.scene.cameras[0].intrinsics.size
+        self.responses = {
+            id(frames[0]): self.segmenter(frames[0], whole_frame(size)) for frames in self.scene.frames.values()
+        }
+
+    def segment(self, frame: Frame, regions: Sequence[Region]) -> np.ndarray:
+        """What the network said, where it would have been asked."""
+        response = np.zeros_like(self.responses[id(frame)])
+        for region in regions:
+            part = np.s_[region.top : region.bottom, region.left : region.right]
+            response[part] = self.responses[id(frame)][part]
+        return response
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Poses, seconds they took from segmentations on, and what the engine said where it was the engine."""
+
+    cameras: list[Camera]
+    seconds: float
+    said: Calibration | None = None
+
+
+Method = Callable[[Seen, list[Camera], int], Answer]
+
+
+def start(_seen: Seen, cameras: list[Camera], _seed: int) -> Answer:
+    """Nothing at all: the outdated poses."""
+    return Answer(cameras, 0.0)
+
+
+def zhang(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
+    """Corners of the markings clicked with 2 px of noise, each camera's pose by OpenCV."""
+    rng = np.random.default_rng([seed, 3])
+    begin = time.perf_counter()
+    found = []
+    for camera, real in zip(cameras, seen.scene.real, strict=True):
+        points = seen.scene.pitch.lift(_corners(seen))
+        clicked = real.project(points)
+        known = inside(clicked, real.intrinsics.size)
+        clicked = clicked[known] + rng.normal(0, CLICK_NOISE_PX, (int(known.sum()), 2))
+        lens = camera.intrinsics
+        _, turn, move = cv2.solvePnP(
+            points[known],
+            clicked,
+            lens.matrix,
+            lens.distortion,
+            camera.pose.rotation.copy(),
+            camera.pose.translation.copy(),
+            useExtrinsicGuess=True,
+        )
+        found.append(camera.with_pose(Pose.from_translation(turn.ravel(), move.ravel())))
+    return Answer(found, time.perf_counter() - begin)
+
+
+def _corners(seen: Seen) -> np.ndarray:
+    """Where lines of a football pitch meet at an angle (K, 2), seen from the middle."""
+    pitch = seen.scene.pitch
+    half_line = pitch.line_width / 2
+    length, width = pitch.length / 2 - half_line, pitch.width / 2 - half_line
+    corners = [(0.0, width), (0.0, -width), (0.0, 9.15 - half_line), (0.0, -9.15 + half_line)]
+    for side in (-1, 1):
+        corners += [(side * length, width), (side * length, -width)]
+        for depth, half in ((16.5, 20.16), (5.5, 9.16)):
+            edge, across = length - depth + half_line, half - half_line
+            corners += [(side * x, y) for x in (edge, length) for y in (-across, across)]
+    return np.array(corners)
+
+
+def engine(**options: object) -> Method:
+    """The engine with some options."""
+
+    def run(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
+        asked = replace(Options(seed=seed), **options)
+        said = calibrate(seen.scene.pitch, cameras, seen.scene.frames, seen.segment, asked)
+        poses = [camera.with_pose(result.pose) for camera, result in zip(cameras, said.cameras, strict=True)]
+        return Answer(poses, said.timings_s["evolution"] + said.timings_s["refinement"], said)
+
+    return run
+
+
+def cma_es(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
+    """CMA-ES (pycma) in place of the paper's strategy: our objective level by level, as many evaluations, no finish."""
+    scene, options = seen.scene, Options()
+    responses = [seen.responses[id(scene.frames[camera.id][0])].astype(np.float32) / 255 for camera in cameras]
+    begin = time.perf_counter()
+    scale = np.tile([MUTATION_RAD] * 3 + [MUTATION_M] * 3, len(cameras))
+    here = list(cameras)
+    generations = options.generations // len(COARSE_TO_FINE)
+    for number, level in enumerate(COARSE_TO_FINE):
+        objective = level.objective(scene.pitch, here, responses, options.stitch_weight)
+        centre = genome_of(here)
+        strategy = cma.CMAEvolutionStrategy(
+            np.zeros(len(centre)),
+            level.mutation,
+            {"popsize": options.offspring, "seed": 10 * seed + number + 1, "verbose": -9},
+        )
+        for _ in range(generations):
+            asked = strategy.ask()
+            strategy.tell(asked, objective.losses(centre + scale * np.array(asked)).tolist())
+        here = with_genome(cameras, centre + scale * strategy.result.xbest)
+    return Answer(here, time.perf_counter() - begin)
+
+
+METHODS: dict[str, Method] = {
+    "Start": start,
+    "Zhang (clicked corners)": zhang,
+    "CMA-ES on our objective": cma_es,
+    "SCPR": engine(preset="scpr"),
+    "ESC `paper`": engine(preset="paper"),
+    "ESC `esc`": engine(),
+    "ESC `esc`, flat": engine(flat=True),
+    "ESC `esc`, no stitch term": engine(stitch_weight=0.0),
+}
+SLOW = ("SCPR", "ESC `paper`")
