@@ -8,12 +8,14 @@ import subprocess
 import sys
 import time
 import zlib
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import httpx
+import sqlalchemy as sa
 
+from service.store.engine import connect, writing
 from tests.homes import files
 
 PROGRAM = [sys.executable, str(Path(__file__).parent / "program.py")]
@@ -95,6 +97,14 @@ class Service:
     def files(self, folder: str) -> list[str]:
         """What the service has stored."""
         return files(self.blob_url, folder)
+
+    @contextmanager
+    def database(self) -> Iterator[sa.Connection]:
+        """A transaction beside the service."""
+        engine = connect(self.database_url)
+        with writing(engine) as connection:
+            yield connection
+        engine.dispose()
 
     @property
     def database_url(self) -> str:

@@ -3,18 +3,19 @@
 import json
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
 import threading
 from base64 import b64encode
-from contextlib import closing
 from datetime import UTC, datetime
 
 import pytest
+import sqlalchemy as sa
 
 from service.settings import Settings
+from service.store import tables
 from tests.e2e.running import wait_for
+from tests.homes import in_both_homes
 from tests.worker.receiver import Receiver
 from worker import webhook
 
@@ -42,6 +43,7 @@ def receiver():
     hook.close()
 
 
+@in_both_homes
 def test_the_worker_that_is_killed_over_a_callback_sends_it_again_when_it_is_back(start, receiver):
     service = start("up", **LOCAL).ready()
     job = service.submit(service.venue("v"), callback_url=receiver.url).json()["id"]
@@ -62,10 +64,12 @@ def test_the_worker_that_is_killed_over_a_callback_sends_it_again_when_it_is_bac
 
 def due_now(service, job: str) -> None:
     """Spare a test the time after which an attempt counts as lost."""
-    with closing(sqlite3.connect(service.data / "esc.sqlite", timeout=30, isolation_level=None)) as database:
-        database.execute("UPDATE deliveries SET due_at = '2026-01-01 00:00:00.000000' WHERE job = ?", (job,))
+    d = tables.deliveries
+    with service.database() as connection:
+        connection.execute(sa.update(d).where(d.c.job == job).values(due_at=datetime(2026, 1, 1, tzinfo=UTC)))
 
 
+@in_both_homes
 def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver):
     receiver.go.set()
     service = start("serve", **LOCAL)

@@ -1,23 +1,32 @@
 """A service that runs for months: what is past its time goes, and says so where somebody asks for it."""
 
-import sqlite3
-from contextlib import closing
 from datetime import UTC, datetime, timedelta
 
+import sqlalchemy as sa
+
+from service.store import tables
+from service.store.blobs import Blobs
 from tests.e2e.running import wait_for
+from tests.homes import in_both_homes
 
 
 def age(service, job: str, days: float) -> None:
     """Let a job have ended so many days ago."""
-    ended = (datetime.now(UTC) - timedelta(days=days)).strftime("%Y-%m-%d %H:%M:%S.%f")
-    with closing(database(service)) as connection:
-        connection.execute("UPDATE jobs SET finished_at = ? WHERE id = ?", (ended, job))
+    ended = datetime.now(UTC) - timedelta(days=days)
+    with service.database() as connection:
+        connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job).values(finished_at=ended))
 
 
-def database(service):
-    return sqlite3.connect(service.data / "esc.sqlite", timeout=30, isolation_level=None)
+def queued(service) -> set[str]:
+    """The jobs that the queue knows."""
+    with service.database() as connection:
+        schema = "dbos" if connection.dialect.name == "postgresql" else None
+        return set(
+            connection.scalars(sa.select(sa.table("workflow_status", sa.column("workflow_uuid"), schema=schema)))
+        )
 
 
+@in_both_homes
 def test_what_is_past_its_time_goes_and_says_so(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     service.venue("v", "reject")
@@ -27,8 +36,7 @@ def test_what_is_past_its_time_goes_and_says_so(start):
         for shade in range(3)
     )
     age(service, old, days=15)
-    wait_for(lambda: not (service.data / f"blobs/pictures/{old}").exists())
-    wait_for(lambda: not (service.data / f"blobs/frames/{old}").exists())
+    wait_for(lambda: not service.files(f"pictures/{old}") and not service.files(f"frames/{old}"))
     answer = service.http.get(f"/jobs/{old}/birdseye.jpg")
     assert (answer.status_code, answer.json()["type"]) == (410, "/problems/picture-deleted")
     assert "14 days" in answer.json()["detail"]
@@ -39,18 +47,16 @@ def test_what_is_past_its_time_goes_and_says_so(start):
     age(service, ancient, days=401)
     gone = wait_for(lambda: (answer := service.http.get(f"/jobs/{ancient}")).status_code == 404 and answer)
     assert gone.json()["type"] == "/problems/job-not-found"
-    with closing(database(service)) as connection:
-        queued = {row[0] for row in connection.execute("SELECT workflow_uuid FROM workflow_status")}
-    assert {ancient, old, young} & queued == {old, young}
+    assert {ancient, old, young} & queued(service) == {old, young}
     # The key went with its job.
     assert service.submit("v", headers=key).status_code == 202
 
 
+@in_both_homes
 def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(service, name):
     service.venue(name)
     job = service.end(service.submit(name).json()["id"])["id"]
-    for picture in service.data.glob(f"blobs/pictures/{job}/*/birdseye.jpg"):
-        picture.unlink()
+    Blobs(service.blob_url).delete_under(f"pictures/{job}")
     gone = service.http.get(f"/jobs/{job}/birdseye.jpg")
     assert (gone.status_code, gone.json()["type"]) == (410, "/problems/picture-deleted")
     never = service.http.get(f"/jobs/{job}/overlay/middle.jpg")

@@ -9,7 +9,9 @@ from alembic.config import Config
 from alembic.script import ScriptDirectory
 
 from service.schemas import VENUE_EXAMPLE, Options, VenueIn
+from service.store.deliveries import Deliveries
 from service.store.engine import MIGRATIONS, connect, migrate, writing
+from service.store.expiry import Expiry
 from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.venues import Venues
@@ -79,6 +81,8 @@ ROWS = {
     ],
     "workers": [{"name": "w", "model_sha256": "f" * 64, "started_at": NOON, "seen_at": NOON}],
     "api_keys": [{"name": "cron", "hash": "0" * 64, "scope": "calibrate", "created_at": NOON, "last_used_at": NOON}],
+    "leftovers": [{"folder": "frames/lost", "due_at": NOON}],
+    "deliveries": [{"job": DONE, "url": "https://example.com/", "status": "waiting", "attempts": 1, "due_at": NOON}],
 }
 
 
@@ -129,6 +133,9 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     assert [(key.name, key.scope, key.last_used_at) for key in keys] == (
         [("cron", "calibrate", NOON)] if revision >= "0003" else []
     )
+    assert Expiry(engine).leftovers(NOON, 10) == (["frames/lost"] if revision >= "0004" else [])
+    due = Deliveries(engine).attempt(NOON, NOON, 10)
+    assert [(delivery.job_id, delivery.attempt) for delivery in due] == ([(DONE, 2)] if revision >= "0005" else [])
 
 
 @in_both_homes
@@ -142,3 +149,6 @@ def test_an_upgraded_database_takes_new_rows(old, revision):
     assert [held.cause for _, held in Venues(engine).poses(VENUE.id, None, 10)] == ["put", "calibration"]
     key = Keys(engine).add("guest", "read", NOON + timedelta(days=36500))
     assert key.startswith("esc_")
+    # What ended before files were ever deleted is past its time like any other.
+    assert Expiry(engine).expire_frames(NOON + timedelta(days=2), NOON, 10) == 1
+    assert f"frames/{DONE}" in Expiry(engine).leftovers(NOON, 10)

@@ -1,4 +1,4 @@
-"""A home on a real database and a real folder, filled with jobs that ended when a test says."""
+"""A home on a real database with real files, filled with jobs that ended when a test says."""
 
 from datetime import datetime
 from pathlib import Path
@@ -16,6 +16,7 @@ from service.store.jobs import Jobs, Submission, new_job_id, picture_folder
 from service.store.venues import Venues
 from service.store.workers import Workers
 from tests.e2e.running import venue
+from tests.homes import files
 
 
 class Stock:
@@ -52,8 +53,7 @@ class Stock:
 
     def files(self) -> set[str]:
         """The jobs whose files are there: `frames/<job>` and `pictures/<job>`."""
-        folder = self.settings.data / "blobs"
-        return {"/".join(file.relative_to(folder).parts[:2]) for file in folder.rglob("*") if file.is_file()}
+        return {"/".join(path.split("/")[:2]) for path in files(self.settings.home_blob_url)}
 
     def _venue(self, venue_id: str) -> Venue:
         stored = self.venues.get(venue_id)

@@ -4,11 +4,15 @@ import socket
 import subprocess
 import time
 from base64 import b64decode, b64encode
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
+from threading import Barrier
 
 import pytest
+import sqlalchemy as sa
 
 from service.settings import Settings
+from tests.homes import in_both_homes
 from tests.worker.receiver import Dripping, Endless, Receiver, Silent
 from tests.worker.stock import Stock
 from worker import webhook
@@ -36,12 +40,12 @@ def clock():
 
 
 @pytest.fixture
-def stock(tmp_path):
+def stock(home, tmp_path):
     """Makes homes with other settings than the usual; all of them are let go."""
     stocks = []
 
     def stock(**settings):
-        stocks.append(Stock(tmp_path, **(LOCAL | settings)))
+        stocks.append(Stock(tmp_path, **(LOCAL | home.settings(tmp_path) | settings)))
         return stocks[-1]
 
     yield stock
@@ -71,6 +75,7 @@ def ended(stock, url: str, **more) -> str:
     return stock.ended("v", datetime.now(UTC), callback_url=url, **more)
 
 
+@in_both_homes
 def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
     home, hook = stock(), receiver()
     job = ended(home, hook.url)
@@ -88,6 +93,7 @@ def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
     assert len(hook.received) == 1
 
 
+@in_both_homes
 @pytest.mark.parametrize("how", ["job.failed", "job.cancelled"])
 def test_every_end_is_told(stock, receiver, clock, how):
     home, hook = stock(), receiver()
@@ -105,6 +111,7 @@ def test_a_job_that_asked_for_nothing_is_not_told_of(stock):
     assert home.deliveries.counts() == {}
 
 
+@in_both_homes
 def test_a_cancelled_job_is_told_of_once(stock):
     home = stock()
     job = home.submitted("v", callback_url="https://example.com/")
@@ -140,6 +147,7 @@ def test_while_a_secret_is_replaced_both_sign(stock, receiver, clock):
 # Again and again
 
 
+@in_both_homes
 def test_what_fails_is_sent_again_after_ever_longer_pauses_with_the_same_id(stock, receiver, clock):
     home, hook = stock(), receiver(Receiver, 500, 302, 404, 200)
     job = ended(home, hook.url)
@@ -190,6 +198,7 @@ def test_a_receiver_may_ask_for_a_longer_pause(stock, receiver, clock):
         assert len(hook.received) == arrived
 
 
+@in_both_homes
 def test_a_sender_that_died_over_an_attempt_loses_nothing(stock, receiver, clock):
     home, hook = stock(), receiver()
     ended(home, hook.url)
@@ -202,11 +211,23 @@ def test_a_sender_that_died_over_an_attempt_loses_nothing(stock, receiver, clock
     assert home.deliveries.counts() == {"delivered": 1}
 
 
-def test_two_workers_do_not_attempt_the_same(stock, clock):
-    home = stock()
-    ended(home, "https://example.com/")
-    assert len(home.deliveries.attempt(clock.now, clock.now + ATTEMPT, 8)) == 1
-    assert home.deliveries.attempt(clock.now, clock.now + ATTEMPT, 8) == []
+@in_both_homes
+def test_workers_that_look_at_once_do_not_attempt_the_same(stock, clock):
+    home, workers = stock(), 4
+    for _ in range(3):
+        ended(home, "https://example.com/")
+    # Between looking and writing there is time for the others.
+    sa.event.listen(home.engine, "after_cursor_execute", lambda *_: time.sleep(0.05))
+    together = Barrier(workers)
+
+    def attempt(_):
+        together.wait()
+        return home.deliveries.attempt(clock.now, clock.now + ATTEMPT, 2)
+
+    with ThreadPoolExecutor(workers) as pool:
+        attempts = [delivery for found in pool.map(attempt, range(workers)) for delivery in found]
+    assert [delivery.attempt for delivery in attempts] == [1, 1, 1]
+    assert len({delivery.job_id for delivery in attempts}) == 3
 
 
 def test_a_worker_without_a_secret_sends_nothing_unsigned(stock, receiver, clock):

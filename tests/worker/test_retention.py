@@ -1,10 +1,16 @@
+import time
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
+from threading import Barrier
 
 import pytest
+import sqlalchemy as sa
 
+from tests.homes import in_both_homes
 from tests.worker.stock import Stock
-from worker.retention import Retention
+from worker.retention import TRY_AGAIN_AFTER, Retention
 
+pytestmark = in_both_homes
 NOW = datetime(2026, 11, 21, 10, tzinfo=UTC)
 
 
@@ -13,8 +19,8 @@ def ago(**time) -> datetime:
 
 
 @pytest.fixture
-def stock(tmp_path):
-    stock = Stock(tmp_path)
+def stock(home, tmp_path):
+    stock = Stock(tmp_path, **home.settings(tmp_path))
     yield stock
     stock.engine.dispose()
 
@@ -145,6 +151,26 @@ def test_of_several_workers_one_tidies(stock, retention):
     assert stock.files() == set()
 
 
+def test_two_rounds_at_once_do_no_harm(stock, retention):
+    for days in (3, 15, 401):
+        stock.ended("a", ago(days=days), accepted=False)
+    # Between looking and writing there is time for the other.
+    sa.event.listen(stock.engine, "after_cursor_execute", lambda *_: time.sleep(0.02))
+    together = Barrier(2)
+
+    def round_(_):
+        together.wait()
+        retention.round(NOW)
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(round_, range(2)))
+    # What one could not delete because the other just did is looked at again.
+    retention.round(NOW + TRY_AGAIN_AFTER)
+    assert len(stock.files()) == 1
+    assert len(stock.jobs.page("a", None, None, 10)) == 2
+    assert stock.expiry.leftovers(NOW + timedelta(days=1), 10) == []
+
+
 def test_short_of_room_frames_of_ended_jobs_go_at_once_and_nothing_else(stock, retention):
     ended, running = stock.ended("a", ago(minutes=1)), stock.submitted("b")
     stock.jobs.begin(running)
@@ -152,8 +178,10 @@ def test_short_of_room_frames_of_ended_jobs_go_at_once_and_nothing_else(stock, r
     assert stock.files() == {f"pictures/{ended}", f"frames/{running}"}
 
 
-def test_a_full_disk_does_not_wait_for_the_next_round(tmp_path, forgotten):
-    stock = Stock(tmp_path, min_free_mb=1e12, tidy_every_s=3600)
+def test_a_full_disk_does_not_wait_for_the_next_round(home, tmp_path, forgotten):
+    # A folder of files, wherever the database is.
+    here = home.settings(tmp_path) | {"blob_url": (tmp_path / "blobs").as_uri()}
+    stock = Stock(tmp_path, min_free_mb=1e12, tidy_every_s=3600, **here)
     retention = Retention(stock.settings, stock.expiry, stock.blobs, stock.workers, forgotten.extend)
     stock.workers.enter("w", None)
     retention.look()
