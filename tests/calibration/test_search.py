@@ -20,7 +20,15 @@ def searched(levels, generations):
     cameras, steps = pair(), []
     strategy = Strategy(16, 32, generations, 0.5)
     rng = np.random.default_rng(0)
-    found = search(CROWNED, cameras, [], levels, strategy, rng, lambda number, loss: steps.append((number, loss)))
+    found = search(
+        CROWNED,
+        cameras,
+        [None] * len(cameras),
+        levels,
+        strategy,
+        rng,
+        lambda number, loss: steps.append((number, loss)),
+    )
     return found, steps
 
 

@@ -18,7 +18,7 @@ from worker.calibration.quality import CameraQuality, Gate, Movement, Sigma, mar
 from worker.calibration.refinement import Refined, assess, refine
 from worker.calibration.registration import pairs_in_common, stitch_error_px
 from worker.calibration.sampling import median
-from worker.calibration.search import COARSE_TO_FINE, ON_THE_GROUND, Found, Level, Strategy, search
+from worker.calibration.search import ALONE_ON_THE_GROUND, COARSE_TO_FINE, ON_THE_GROUND, Level, Strategy, search
 from worker.calibration.segmentation import Region, reachable_regions
 from worker.calibration.visibility import SeenLines
 
@@ -56,18 +56,17 @@ class Options:
 
 @dataclass(frozen=True)
 class Method:
-    """What a preset does: levels of the search, over all cameras at once or each alone, and how it ends."""
+    """What a preset does: the levels of its search, the shape of the ground, and how it ends."""
 
     levels: Sequence[Level]
-    joint: bool
     flat: bool
     finish: Callable[..., Refined]
 
 
 METHODS: Mapping[Preset, Method] = {
-    "esc": Method(COARSE_TO_FINE, joint=True, flat=False, finish=refine),
-    "paper": Method(ON_THE_GROUND, joint=True, flat=False, finish=assess),
-    "scpr": Method(ON_THE_GROUND, joint=False, flat=True, finish=assess),
+    "esc": Method(COARSE_TO_FINE, flat=False, finish=refine),
+    "paper": Method(ON_THE_GROUND, flat=False, finish=assess),
+    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, finish=assess),
 }
 """`esc`: the default. `paper`: the paper to the letter. `scpr`: its predecessor, flat and without a stitch term."""
 
@@ -149,7 +148,9 @@ def calibrate(
     with clock.measuring("segmentation"):
         responses = _segment_all(pitch, cameras, frames, segment, journey)
     with clock.measuring("evolution"):
-        found = _evolve(pitch, cameras, responses, method, options, journey)
+        strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
+        rng = np.random.default_rng(options.seed)
+        found = search(pitch, cameras, responses, method.levels, strategy, rng, journey.evolution(options.generations))
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
         brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
@@ -208,39 +209,6 @@ def _segment_all(
     return responses
 
 
-def _evolve(
-    pitch: Field,
-    cameras: Sequence[Camera],
-    responses: Sequence[Response],
-    method: Method,
-    options: Options,
-    journey: Journey,
-) -> Found:
-    """The search of the preset: over all cameras at once, or over one camera after the other."""
-    strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
-    rng = np.random.default_rng(options.seed)
-    if method.joint:
-        return search(
-            pitch, cameras, responses, method.levels, strategy, rng, journey.evolution(0, options.generations)
-        )
-    total = options.generations * len(cameras)
-    alone = [
-        search(
-            pitch,
-            [camera],
-            [response],
-            method.levels,
-            strategy,
-            rng,
-            journey.evolution(number * options.generations, total),
-        )
-        for number, (camera, response) in enumerate(zip(cameras, responses, strict=True))
-    ]
-    return Found(
-        [found.cameras[0] for found in alone], float(np.mean([found.loss for found in alone])), options.generations
-    )
-
-
 def _qualities(
     pitch: Field, stored: Sequence[Camera], refined: Refined, responses: Sequence[Response]
 ) -> list[CameraQuality]:
@@ -287,6 +255,6 @@ class Journey:
         begin, end = SHARE_OF_JOB[stage]
         self.report(Progress(stage, begin + share * (end - begin), generation, loss))
 
-    def evolution(self, done: int, total: int) -> Callable[[int, float], None]:
-        """What a search calls after each generation, `done` out of `total` generations before it began."""
-        return lambda number, loss: self.at("evolution", (done + number) / total, done + number, loss)
+    def evolution(self, total: int) -> Callable[[int, float], None]:
+        """What a search of at most `total` generations calls after each one."""
+        return lambda number, loss: self.at("evolution", number / total, number, loss)

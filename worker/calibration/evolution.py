@@ -59,12 +59,6 @@ class EvolutionStrategy:
         survivors = np.argsort(all_losses, kind="stable")[: self.parents]
         self.population, self.losses = everyone[survivors], all_losses[survivors]
 
-    def forget_losses(self) -> Array:
-        """Empty the population and return it (parents, genes): a new objective has to judge it afresh."""
-        genomes = self.population
-        self.population, self.losses = np.empty((0, genomes.shape[1])), np.empty(0)
-        return genomes
-
     @property
     def best(self) -> Array:
         """The genome (genes,) of lowest loss so far."""

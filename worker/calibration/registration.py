@@ -188,9 +188,9 @@ def _fit(pitch: Field, sights: Sequence[Sight], middle: Array, shift: Array) -> 
     grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
     views, forms = [], []
     for (camera, response), moves in zip(sights, (start[:6], start[6:]), strict=True):
-        form = _forms(camera, pitch.lift(grid))
-        views.append(ground_view(pitch, camera, response, grid + form @ moves))
-        forms.append(form[::FINE_STRIDE, ::FINE_STRIDE])
+        surface = pitch.lift(grid)
+        views.append(ground_view(pitch, camera, response, grid + _displacement(camera, surface, moves)))
+        forms.append(_forms(camera, surface[::FINE_STRIDE, ::FINE_STRIDE]))
     fine = _fine_moves(views[0], views[1], np.concatenate(forms, axis=-1), at_middle, start, pitch.line_width)
 
     variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
@@ -253,6 +253,13 @@ def _forms(camera: Camera, points: Array) -> Array:
     change = np.concatenate([turned, moved], axis=-1)
     # The changed ray, back to where it meets the surface.
     return np.asarray(change[..., :2, :] - ray[..., :2, None] * change[..., 2:, :] / ray[..., 2, None, None])
+
+
+def _displacement(camera: Camera, points: Array, moves: Array) -> Array:
+    """How points (..., 3) move, (..., 2) metres, by given `moves` (6,): `_forms` times those, without the forms."""
+    ray = points - camera.pose.position
+    change = EXPECTED_MOVE_M * moves[3:] - EXPECTED_TURN_RAD * np.cross(ray, moves[:3])
+    return np.asarray(change[..., :2] - ray[..., :2] * (change[..., 2:] / ray[..., 2:]))
 
 
 @dataclass(frozen=True)

@@ -34,22 +34,36 @@ class Losses(Protocol):
 class Level:
     """A stretch of generations with one objective, and the strength of mutation at its start.
 
-    `patience`: generations without progress after which it ends before its time; None: it never does.
+    `patience`: generations without progress after which it ends before its time; None: it never does. `alone`: each
+    camera has a population of its own, and nothing is stitched.
     """
 
     mutation: float
     objective: Callable[[Field, Sequence[Camera], Sequence[NDArray[np.float32]], float], Losses]
     patience: int | None = None
+    alone: bool = False
 
 
-def _blurred(blur_px: float, mutation: float) -> Level:
-    return Level(mutation, partial(Objective, blur_px=blur_px), PATIENCE)
+def _blurred(blur_px: float, mutation: float, alone: bool) -> Level:
+    return Level(mutation, partial(Objective, blur_px=blur_px), PATIENCE, alone)
 
 
-COARSE_TO_FINE = (_blurred(48, 4), _blurred(16, 1.5), _blurred(6, 0.5), _blurred(2, 0.2), _blurred(0.8, 0.1))
-"""Preset `esc`: each level pulls from about one blur away, and hands over within the next one's."""
+COARSE_TO_FINE = (
+    _blurred(48, 4, alone=True),
+    _blurred(16, 1.5, alone=True),
+    _blurred(6, 0.5, alone=True),
+    _blurred(2, 0.2, alone=False),
+    _blurred(0.8, 0.1, alone=False),
+)
+"""Preset `esc`: each level pulls from about one blur away, and hands over within the next one's.
+
+Cameras are searched for one by one until they are near: six numbers are found faster than 6 N, and two cameras that are
+both far off agree best about the wrong lines.
+"""
 ON_THE_GROUND = (Level(1.0, GroundObjective),)
-"""Presets `paper` and `scpr`."""
+"""Preset `paper`."""
+ALONE_ON_THE_GROUND = (Level(1.0, GroundObjective, alone=True),)
+"""Preset `scpr`."""
 
 
 @dataclass(frozen=True)
@@ -86,27 +100,65 @@ def search(
     raise to stop.
     """
     decay = exponential_decay(DECAY)
-    mutation = np.tile([MUTATION_RAD] * 3 + [MUTATION_M] * 3, len(cameras))
-    evolution = EvolutionStrategy(strategy.parents, strategy.offspring, mutation, rng)
-    candidates = evolution.first_parents(genome_of(cameras), levels[0].mutation)
+    everyone = EvolutionStrategy(strategy.parents, strategy.offspring, _mutation(len(cameras)), rng)
+    population = everyone.first_parents(genome_of(cameras), levels[0].mutation)
     here = list(cameras)
     done = 0
     for level, generations in zip(levels, _shares(strategy.generations, len(levels)), strict=True):
-        objective = level.objective(pitch, here, responses, strategy.stitch_weight)
-        evolution.tell(candidates, objective.losses(candidates))
-        best = [evolution.best_loss]
+        groups = _groups(pitch, here, responses, level, strategy, population, rng)
+        best = [_mean_loss(groups)]
         for generation in range(generations):
-            children = evolution.ask(level.mutation * decay(generation))
-            evolution.tell(children, objective.losses(children))
+            for group in groups:
+                group.next_generation(level.mutation * decay(generation))
             done += 1
-            on_generation(done, evolution.best_loss)
-            best.append(evolution.best_loss)
+            best.append(_mean_loss(groups))
+            on_generation(done, best[-1])
             if _nothing_moves(best, level.patience):
                 break
-        here = with_genome(cameras, evolution.best)
-        loss = evolution.best_loss
-        candidates = evolution.forget_losses()
-    return Found(here, loss, done)
+        population = np.concatenate([group.evolution.population for group in groups], axis=1)
+        here = with_genome(cameras, population[0])
+    return Found(here, best[-1], done)
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Cameras that are searched for together."""
+
+    evolution: EvolutionStrategy
+    objective: Losses
+
+    def next_generation(self, strength: float) -> None:
+        children = self.evolution.ask(strength)
+        self.evolution.tell(children, self.objective.losses(children))
+
+
+def _groups(
+    pitch: Field,
+    here: Sequence[Camera],
+    responses: Sequence[NDArray[np.float32]],
+    level: Level,
+    strategy: Strategy,
+    population: Array,
+    rng: np.random.Generator,
+) -> list[_Group]:
+    """One group per camera or one of all, each with its genes of the `population` (parents, 6 N), judged."""
+    groups = []
+    for members in [[i] for i in range(len(here))] if level.alone else [list(range(len(here)))]:
+        seen = [responses[i] for i in members]
+        objective = level.objective(pitch, [here[i] for i in members], seen, strategy.stitch_weight)
+        evolution = EvolutionStrategy(strategy.parents, strategy.offspring, _mutation(len(members)), rng)
+        genomes = population[:, GENES * members[0] : GENES * (members[-1] + 1)]
+        evolution.tell(genomes, objective.losses(genomes))
+        groups.append(_Group(evolution, objective))
+    return groups
+
+
+def _mutation(cameras: int) -> Array:
+    return np.tile([MUTATION_RAD] * 3 + [MUTATION_M] * 3, cameras)
+
+
+def _mean_loss(groups: Sequence[_Group]) -> float:
+    return float(np.mean([group.evolution.best_loss for group in groups]))
 
 
 def _nothing_moves(best: Sequence[float], patience: int | None) -> bool:
