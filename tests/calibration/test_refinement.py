@@ -7,9 +7,10 @@ import pytest
 
 from tests.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame, paint_markings, pair
 from worker.calibration.camera import rotation_angles_deg
+from worker.calibration.field import Field
 from worker.calibration.linemeasurement import brightness_of, expected_profiles, measure_lines, sliding_correlation
 from worker.calibration.quality import Gate, Sigma
-from worker.calibration.refinement import assess, refine, tukey_weights
+from worker.calibration.refinement import assess, huber_weights, refine, tukey_weights
 from worker.calibration.registration import stitch_error_px
 
 SMALL_TURN = (0.0008, -0.0006, 0.0005)
@@ -147,3 +148,21 @@ def test_blue_that_the_lens_puts_elsewhere_moves_no_line():
         measure_lines(lines, one, brightness_of(f).astype(np.float32), response, 6.0) for f in (frame, fringed)
     )
     np.testing.assert_array_equal(here.pixel, there.pixel)
+
+
+def test_the_end_is_the_same_from_both_sides_where_the_model_is_wrong():
+    cameras, brightness, responses = scene()
+    wrong = Field(CROWNED.length, CROWNED.width, CROWNED.line_width, CROWNED.ridge + [0.0, 0.0, 0.3])
+    ends = [
+        refine(wrong, [moved(c, turn, shift) for c in cameras], brightness, responses, 0.5).cameras
+        for turn, shift in ((SMALL_TURN, SMALL_SHIFT), (tuple(-np.array(SMALL_TURN)), tuple(-np.array(SMALL_SHIFT))))
+    ]
+    for shift, turn in off_by(*ends):
+        assert shift < 0.002
+        assert turn < 0.001
+
+
+def test_huber_believes_what_is_near_and_doubts_the_rest_the_more_the_farther():
+    weights = huber_weights(np.array([0.0, 0.5, -0.5, 0.2, 10.0, 100.0]))
+    assert weights[0] == weights[1] == 1
+    assert weights[4] == pytest.approx(10 * weights[5])

@@ -11,7 +11,7 @@ do not (a lone touchline) it keeps the camera from running away along them, and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -25,8 +25,10 @@ from worker.calibration.linemeasurement import NOISE_PX, UNEVEN_GROUND_M, Measur
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0)
 """How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
 ASSESSING_SEARCH_PX = 8.0
-STEPS_PER_ROUND = 4
-TUKEY = 4.685
+HUBER_STEPS, TUKEY_STEPS = 6, 4
+"""Per round."""
+HUBER, TUKEY = 1.345, 4.685
+"""Residuals, in standard deviations, where each begins to doubt: 95 % of the efficiency of least squares."""
 LEAST_SINGLE_WEIGHT = 0.02
 FEWEST_MEASUREMENTS = 30
 CLUSTER_POINTS = 8
@@ -36,6 +38,10 @@ SWELL_M = 8.0
 PRIOR_RAD, PRIOR_M = 0.03, 1.0
 """Standard deviation, per axis, of where a camera is before any line is measured."""
 JACOBIAN_STEP = 1e-5
+
+
+Weigh = Callable[[Array], Array]
+"""How much each of M residuals, in units of its expected error, is believed."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +84,9 @@ def refine(
     here = list(cameras)
     for search in SEARCH_PX:
         measured = _measure_all(pitch, here, brightness, responses, search)
-        for _ in range(STEPS_PER_ROUND):
-            here = _step(here, cameras, measured, stitch_weight)
+        # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several.
+        for weigh in [huber_weights] * HUBER_STEPS + [tukey_weights] * TUKEY_STEPS:
+            here = _step(here, cameras, measured, stitch_weight, weigh)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
     return assess(pitch, here, brightness, responses, stitch_weight)
 
@@ -112,10 +119,14 @@ def _measure_all(
 
 
 def _step(
-    cameras: list[Camera], found: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float
+    cameras: list[Camera],
+    found: Sequence[Camera],
+    measured: Sequence[Measurements],
+    stitch_weight: float,
+    weigh: Weigh,
 ) -> list[Camera]:
     """One Gauss-Newton step for all cameras together; `found`: where the search left them."""
-    rows = _all_residuals(cameras, measured, stitch_weight)
+    rows = _all_residuals(cameras, measured, stitch_weight, weigh)
     weighted = rows.jacobian * rows.weight[:, None]
     # einsum rather than BLAS: the same sum to the last digit whatever the number of threads.
     normal = np.einsum("mi,mj->ij", weighted, rows.jacobian)
@@ -143,16 +154,18 @@ def _prior(count: int) -> Array:
     return np.tile([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3, count)
 
 
-def _all_residuals(cameras: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float) -> Residuals:
+def _all_residuals(
+    cameras: Sequence[Camera], measured: Sequence[Measurements], stitch_weight: float, weigh: Weigh
+) -> Residuals:
     """Single and stitch residuals of all cameras that have enough measurements, weighted robustly."""
     views = [_LineView.build(camera, found) for camera, found in zip(cameras, measured, strict=True)]
     singles = [
-        _single(view, index, len(cameras), max(2 * (1 - stitch_weight), LEAST_SINGLE_WEIGHT))
+        _single(view, index, len(cameras), max(2 * (1 - stitch_weight), LEAST_SINGLE_WEIGHT), weigh)
         for index, view in enumerate(views)
         if len(view.measured) >= FEWEST_MEASUREMENTS
     ]
     pairs = [
-        _stitch(views[i], views[j], i, j, len(cameras), 2 * stitch_weight)
+        _stitch(views[i], views[j], i, j, len(cameras), 2 * stitch_weight, weigh)
         for i, j in combinations(range(len(cameras)), 2)
         if min(len(views[i].measured), len(views[j].measured)) >= FEWEST_MEASUREMENTS
     ]
@@ -188,17 +201,17 @@ class _LineView:
         return cls(measured[known], offset[known], -slope[known])
 
 
-def _single(view: _LineView, index: int, count: int, share: float) -> Residuals:
+def _single(view: _LineView, index: int, count: int, share: float, weigh: Weigh) -> Residuals:
     """How far one camera puts the markings from where it sees them."""
     sigma = view.measured.sigma_px
     value = view.offset / sigma
     jacobian = np.zeros((len(value), 6 * count))
     jacobian[:, 6 * index : 6 * index + 6] = view.jacobian / sigma[:, None]
     rise = view.measured.px_per_metre_up / sigma
-    return Residuals(value, jacobian, share * tukey_weights(value), view.measured.index, rise)
+    return Residuals(value, jacobian, share * weigh(value), view.measured.index, rise)
 
 
-def _stitch(first: _LineView, second: _LineView, i: int, j: int, count: int, share: float) -> Residuals:
+def _stitch(first: _LineView, second: _LineView, i: int, j: int, count: int, share: float, weigh: Weigh) -> Residuals:
     """How far apart two cameras put the same pieces of line on the ground."""
     index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
     if share == 0 or len(index) == 0:
@@ -210,7 +223,7 @@ def _stitch(first: _LineView, second: _LineView, i: int, j: int, count: int, sha
     jacobian[:, 6 * i : 6 * i + 6] = first.jacobian[a] / (scale_a * sigma_m)[:, None]
     jacobian[:, 6 * j : 6 * j + 6] = -second.jacobian[b] / (scale_b * sigma_m)[:, None]
     up_a, up_b = first.measured.px_per_metre_up[a], second.measured.px_per_metre_up[b]
-    return Residuals(value, jacobian, share * tukey_weights(value), index, (up_a / scale_a - up_b / scale_b) / sigma_m)
+    return Residuals(value, jacobian, share * weigh(value), index, (up_a / scale_a - up_b / scale_b) / sigma_m)
 
 
 def _nothing(count: int) -> Residuals:
@@ -220,6 +233,12 @@ def _nothing(count: int) -> Residuals:
 def robust_scale(values: Array) -> float:
     """Standard deviation by the median absolute value, at least 1: expected errors are not doubted downwards."""
     return max(1.0, 1.4826 * float(np.median(np.abs(values)))) if len(values) else 1.0
+
+
+def huber_weights(values: Array) -> Array:
+    """Huber's weights (M,) at the scale of the values themselves: 1 near zero, falling as 1 / |value| beyond."""
+    scale = robust_scale(values)
+    return np.minimum(1.0, HUBER * scale / np.maximum(np.abs(values), 1e-12)) / scale**2
 
 
 def tukey_weights(values: Array) -> Array:
@@ -237,7 +256,7 @@ def _covariances(
     heights that are off by `UNEVEN_GROUND_M` and alike over `SWELL_M`. They move every line on a swell the same way, in
     all cameras, so many points do not average them out and the residuals do not show them.
     """
-    rows = _all_residuals(cameras, measured, stitch_weight)
+    rows = _all_residuals(cameras, measured, stitch_weight, tukey_weights)
     weighted = rows.jacobian * rows.weight[:, None]
     normal = np.einsum("mi,mj->ij", weighted, rows.jacobian)
     prior = np.diag(_prior(len(cameras)))
