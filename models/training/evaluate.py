@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,10 +74,9 @@ def _distance_px(mask: NDArray[np.bool_]) -> Plane:
     return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
 
 
-def real_cameras(folder: Path) -> tuple[Field, dict[str, Camera]]:
-    """The pitch and the cameras, with the poses of `reference.json`, of a folder of real frames."""
-    venue = json.loads((folder / "venue.json").read_text())
-    poses = json.loads((folder / "reference.json").read_text())["poses"]
+def read_venue(path: Path) -> tuple[Field, dict[str, Camera]]:
+    """The pitch and the cameras, at their stored poses, of a venue's file."""
+    venue = json.loads(path.read_text())
     shape = venue["field"]
     ridge = np.array(shape["ridge"]) if shape.get("ridge") else None
     field = Field(shape["length_m"], shape["width_m"], shape["line_width_m"], ridge)
@@ -84,11 +84,19 @@ def real_cameras(folder: Path) -> tuple[Field, dict[str, Camera]]:
     for entry in venue["cameras"]:
         lens = entry["intrinsics"]
         intrinsics = Intrinsics(np.array(lens["matrix"]), np.array(lens["distortion"]), tuple(entry["image_size"]))
-        pose = poses[entry["id"]]
-        cameras[entry["id"]] = Camera(
-            entry["id"], intrinsics, Pose(np.array(pose["rotation"]), np.array(pose["position"]))
-        )
+        cameras[entry["id"]] = Camera(entry["id"], intrinsics, _pose(entry["pose"]))
     return field, cameras
+
+
+def real_cameras(folder: Path) -> tuple[Field, dict[str, Camera]]:
+    """The pitch and the cameras, with the poses of `reference.json`, of a folder of real frames."""
+    field, cameras = read_venue(folder / "venue.json")
+    poses = json.loads((folder / "reference.json").read_text())["poses"]
+    return field, {name: camera.with_pose(_pose(poses[name])) for name, camera in cameras.items()}
+
+
+def _pose(written: dict[str, list[float]]) -> Pose:
+    return Pose(np.array(written["rotation"]), np.array(written["position"]))
 
 
 def real(segmenter: Segmenter, folder: Path, out: Path | None) -> dict[str, Figures]:
@@ -111,7 +119,7 @@ def real(segmenter: Segmenter, folder: Path, out: Path | None) -> dict[str, Figu
 def rendered(segmenter: Segmenter, crops: int, seed: int = UNSEEN) -> list[dict[str, float]]:
     """Figures per pixel over rendered crops of venues that training never draws, one row per threshold."""
     counts = sum(
-        (_count(segmenter, random_crop(np.random.default_rng([seed, index]))) for index in range(crops)),
+        (_count(segmenter, random_crop(np.random.default_rng([seed, index])), THRESHOLDS) for index in range(crops)),
         start=np.zeros((len(THRESHOLDS), 5)),
     )
     return [{"threshold": threshold, **_shares(*row)} for threshold, row in zip(THRESHOLDS, counts, strict=True)]
@@ -121,22 +129,22 @@ def by_condition(segmenter: Segmenter, views: int, seed: int = UNSEEN) -> dict[s
     """Figures per pixel at 0.5 under each of the named conditions, over the same views of the same venues."""
     figures = {}
     for name in NAMED:
-        counts = np.zeros((len(THRESHOLDS), 5))
+        counts = np.zeros((1, 5))
         for index in range(views):
             rng = np.random.default_rng([seed, 1, index])
             view = random_view(rng)
-            counts += _count(segmenter, view.rendered(Conditions.named(name, rng), rng))
-        figures[name] = _shares(*counts[THRESHOLDS.index(0.5)])
+            counts += _count(segmenter, view.rendered(Conditions.named(name, rng), rng), [0.5])
+        figures[name] = _shares(*counts[0])
     return figures
 
 
-def _count(segmenter: Segmenter, rendering: Rendering) -> NDArray[np.float64]:
+def _count(segmenter: Segmenter, rendering: Rendering, thresholds: Sequence[float]) -> NDArray[np.float64]:
     """Pixels per threshold: hits, answers, labels, answers far from any marking, pixels far from any marking."""
     picture = rendering.frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
     probability = segmenter.session.run(None, {segmenter.input_name: picture})[0][0, 0]
     label = rendering.target > 0.5
     far = _distance_px(rendering.target > 0.05) > TOLERANCE_PX
-    answers = [probability > threshold for threshold in THRESHOLDS]
+    answers = [probability > threshold for threshold in thresholds]
     return np.array(
         [((answer & label).sum(), answer.sum(), label.sum(), (answer & far).sum(), far.sum()) for answer in answers],
         dtype=float,

@@ -21,9 +21,9 @@ import numpy as np
 from tests.benchmarks import plots
 from tests.benchmarks.methods import METHODS, SLOW, THREADS, Seen, engine
 from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, VENUES, Scene, scene, started
-from tests.benchmarks.truth import errors
+from tests.benchmarks.truth import apart, errors
 from worker.calibration.calibrate import Options, Progress, calibrate
-from worker.calibration.camera import Camera, rotation_angles_deg
+from worker.calibration.camera import Camera
 
 ROWS = FOLDER / "rows.jsonl"
 CAUGHT_M, CAUGHT_DEG = 0.01, 0.01
@@ -128,22 +128,15 @@ def _caught(venue: str, number: int, size: float) -> dict:
     reference = _reference(venue)
     answer = engine()(seen, started(seen.scene.cameras, np.random.default_rng([number, 2]), size), number)
     assert answer.said is not None
-    apart = [_apart(a, b) for a, b in zip(answer.cameras, reference, strict=True)]
-    caught = all(shift <= CAUGHT_M and turn <= CAUGHT_DEG for shift, turn in apart)
+    off = [apart(a, b) for a, b in zip(answer.cameras, reference, strict=True)]
+    caught = all(shift <= CAUGHT_M and turn <= CAUGHT_DEG for shift, turn in off)
     return {
         "caught": caught,
         "accepted": answer.said.accepted,
-        "apart_m": max(shift for shift, _ in apart),
-        "apart_deg": max(turn for _, turn in apart),
+        "apart_m": max(shift for shift, _ in off),
+        "apart_deg": max(turn for _, turn in off),
         "why": answer.said.rejected_because,
     }
-
-
-def _apart(a: Camera, b: Camera) -> tuple[float, float]:
-    return (
-        float(np.linalg.norm(a.pose.position - b.pose.position)),
-        float(rotation_angles_deg(a.pose.rotation, b.pose.rotation)),
-    )
 
 
 def honesty(options: argparse.Namespace) -> Iterator[str]:
@@ -168,7 +161,7 @@ def _ratios(venue: str) -> dict[str, list[float]]:
         said = engine()(seen, seen.scene.cameras, 0).said
         assert said is not None
         for result, true in zip(said.cameras, seen.scene.cameras, strict=True):
-            shift, turn = _apart(true.with_pose(result.pose), true)
+            shift, turn = apart(true.with_pose(result.pose), true)
             if result.sigma:
                 found["position"].append(shift / result.sigma.position_m)
                 found["rotation"].append(turn / result.sigma.rotation_deg)

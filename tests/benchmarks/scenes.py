@@ -16,7 +16,8 @@ import numpy as np
 
 from models.training.conditions import Conditions
 from models.training.render import render_frame
-from worker.calibration.camera import Camera, Frame, Intrinsics, Pose, rotation_matrices, rotation_vectors
+from tests.demo.render import outdated
+from worker.calibration.camera import Camera, Frame, Intrinsics, Pose
 from worker.calibration.field import Field
 
 FOLDER = Path("runs/bench")
@@ -107,12 +108,7 @@ def scene(name: str, light: str | None = None) -> Scene:
 
 def started(cameras: Sequence[Camera], rng: np.random.Generator, size: float = 1.0) -> list[Camera]:
     """The cameras `size` times the paper's Start errors away from where they are, each in a direction of its own."""
-    moved = []
-    for camera in cameras:
-        shift, turn = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
-        rotation = rotation_matrices(np.radians(size * START_DEG) * turn) @ camera.pose.matrix
-        moved.append(camera.with_pose(Pose(rotation_vectors(rotation), camera.pose.position + size * START_M * shift)))
-    return moved
+    return [camera.with_pose(outdated(camera.pose, size * START_M, size * START_DEG, rng)) for camera in cameras]
 
 
 def _places(layout: Layout) -> list[tuple[np.ndarray, np.ndarray]]:

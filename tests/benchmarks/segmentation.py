@@ -20,10 +20,10 @@ import numpy as np
 
 from models import MODEL_PATH
 from models.training import ablation
-from models.training.evaluate import by_condition, real, rendered
+from models.training.evaluate import by_condition, read_venue, real, rendered
 from tests.real.pair import FOLDER as REAL_PAIR
 from worker.calibration.calibrate import CAPTURE_RAD
-from worker.calibration.camera import Camera, Intrinsics, Pose
+from worker.calibration.camera import Camera
 from worker.calibration.field import Field
 from worker.calibration.segmentation import Segmenter, reachable_regions
 
@@ -102,14 +102,9 @@ PASSES = {"whole frame": _whole_frame, "engine": _engine}
 
 
 def _demo_camera() -> tuple[Field, Camera, np.ndarray]:
-    venue = json.loads((DEMO / "venue.json").read_text())
-    shape, entry = venue["field"], venue["cameras"][0]
-    pitch = Field(shape["length_m"], shape["width_m"], shape["line_width_m"], np.array(shape["ridge"]))
-    lens = entry["intrinsics"]
-    intrinsics = Intrinsics(np.array(lens["matrix"]), np.array(lens["distortion"]), tuple(entry["image_size"]))
-    pose = Pose(np.array(entry["pose"]["rotation"]), np.array(entry["pose"]["position"]))
-    frame = cv2.imread(str(DEMO / f"{entry['id']}.jpg"), cv2.IMREAD_COLOR)
-    return pitch, Camera(entry["id"], intrinsics, pose), frame
+    pitch, cameras = read_venue(DEMO / "venue.json")
+    camera = cameras["left"]
+    return pitch, camera, cv2.imread(str(DEMO / f"{camera.id}.jpg"), cv2.IMREAD_COLOR)
 
 
 def tiles(_options: argparse.Namespace) -> list[str]:

@@ -29,12 +29,20 @@ def errors(scene: Scene, found: Sequence[Camera]) -> Errors:
     pairs = [
         _apart_px(scene, i, j, found) for i, j in combinations(range(len(found)), 2) if _common(scene, i, j) is not None
     ]
-    poses = [(a.pose, b.pose) for a, b in zip(found, scene.cameras, strict=True)]
+    shifts, turns = zip(*(apart(a, b) for a, b in zip(found, scene.cameras, strict=True)), strict=True)
     return Errors(
         max(pairs) if pairs else None,
-        100 * float(np.mean([np.linalg.norm(a.position - b.position) for a, b in poses])),
-        float(np.mean([rotation_angles_deg(a.rotation, b.rotation) for a, b in poses])),
+        100 * float(np.mean(shifts)),
+        float(np.mean(turns)),
         float(np.mean([_seen_iou(scene, a, b) for a, b in zip(found, scene.real, strict=True)])),
+    )
+
+
+def apart(a: Camera, b: Camera) -> tuple[float, float]:
+    """Between two poses: metres, degrees."""
+    return (
+        float(np.linalg.norm(a.pose.position - b.pose.position)),
+        float(rotation_angles_deg(a.pose.rotation, b.pose.rotation)),
     )
 
 

@@ -45,11 +45,11 @@ def conditions() -> Conditions:
     return replace(Conditions.fair(WORLD), wear=0.04)
 
 
-def outdated(pose: Pose, rng: np.random.Generator) -> Pose:
-    """The pose of before: `MOVED_M` and `MOVED_DEG` off, in random directions."""
+def outdated(pose: Pose, shift_m: float, turn_deg: float, rng: np.random.Generator) -> Pose:
+    """The pose of before: so far off, in random directions."""
     shift, turn = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
-    turned = rotation_matrices(np.radians(MOVED_DEG) * turn) @ pose.matrix
-    return Pose(rotation_vectors(turned), pose.position + MOVED_M * shift)
+    turned = rotation_matrices(np.radians(turn_deg) * turn) @ pose.matrix
+    return Pose(rotation_vectors(turned), pose.position + shift_m * shift)
 
 
 def main() -> None:
@@ -72,7 +72,7 @@ def main() -> None:
                     "matrix": camera.intrinsics.matrix.tolist(),
                     "distortion": camera.intrinsics.distortion.tolist(),
                 },
-                "pose": _written(outdated(camera.pose, rng)),
+                "pose": _written(outdated(camera.pose, MOVED_M, MOVED_DEG, rng)),
             }
         )
     shape = {"length_m": FIELD.length, "width_m": FIELD.width, "line_width_m": FIELD.line_width}

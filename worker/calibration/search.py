@@ -116,7 +116,7 @@ def search(
             if _nothing_moves(best, level.patience):
                 break
         population = np.concatenate([group.evolution.population for group in groups], axis=1)
-        here = with_genome(cameras, population[0])
+        here = with_genome(cameras, np.concatenate([group.evolution.best for group in groups]))
     return Found(here, best[-1], done)
 
 
