@@ -15,7 +15,7 @@ from worker.calibration.camera import Camera, Frame, Pose
 from worker.calibration.field import Field
 from worker.calibration.linemeasurement import brightness_of
 from worker.calibration.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
-from worker.calibration.refinement import Refined, assess, refine
+from worker.calibration.refinement import Refined, Sight, assess, refine
 from worker.calibration.registration import pairs_in_common, stitch_error_px
 from worker.calibration.sampling import median
 from worker.calibration.search import ALONE_ON_THE_GROUND, COARSE_TO_FINE, ON_THE_GROUND, Level, Strategy, search
@@ -154,7 +154,7 @@ def calibrate(
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
         brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
-        refined = method.finish(pitch, found.cameras, brightness, responses, options.stitch_weight)
+        refined = method.finish(pitch, found.cameras, Sight(brightness, responses), options.stitch_weight)
     with clock.measuring("quality"):
         journey.at("refinement", 0.6)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}

@@ -7,7 +7,7 @@ boundary line is the nominal distance and its centre lies half a line width insi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,13 @@ class Field:
     def flat(self) -> Field:
         """The same pitch on a plane."""
         return Field(self.length, self.width, self.line_width, None)
+
+    def raised(self, by: float) -> Field:
+        """The same pitch with a ridge that is higher by so many metres; a flat one gets a ridge between hips of 45°."""
+        if self.ridge is not None:
+            return replace(self, ridge=self.ridge + [0.0, 0.0, by])
+        end = max((self.length - self.width) / 2, 0.0)
+        return replace(self, ridge=np.array([[-end, 0.0, by], [end, 0.0, by]]))
 
     def height(self, xy: Array) -> Array:
         """Height (...) of the surface at (..., 2): the paper's four-plane hip roof; 0 off the pitch."""

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, Frame
 from worker.calibration.field import LinePoints
-from worker.calibration.lineprofile import blurred_line
+from worker.calibration.lineprofile import blurred_line, blurred_line_slope
 from worker.calibration.sampling import bilinear
 from worker.calibration.visibility import SeenLines
 
@@ -28,11 +27,12 @@ BESIDE_PX = 4.0
 """How much of the grass on each side belongs to the filter, beyond a third of the line's width."""
 LEAST_CORRELATION = 0.6
 LEAST_RESPONSE = 0.3
+CENTRE_STEPS = 2
 OFF_CENTRE_PENALTY = 0.15
 """Correlation that a candidate at the end of the search loses against one where the pose expects the line."""
-NOISE_PX = 0.25
+NOISE_PX = 0.15
 """Error of one measurement of a perfect line."""
-PAINT_M = 0.01
+PAINT_M = 0.006
 """Lines are painted to about a centimetre."""
 UNEVEN_GROUND_M = 0.015
 """And the ground swells by a little more, which from a low camera moves a far line by decimetres."""
@@ -75,12 +75,12 @@ class Measurements:
 
 
 def brightness_of(frame: Frame) -> NDArray[np.uint8]:
-    """Brightness (H, W) 0..255: the mean of green and red.
+    """Brightness (H, W) 0..255: green alone.
 
-    Lenses put blue elsewhere, up to some pixels towards the edges of the picture (the violet side of white lines). The
-    intrinsics are those of green, which makes most of the grey in which boards are found.
+    Lenses put blue and red elsewhere, up to some pixels towards the edges of the picture (the violet side of white
+    lines). The intrinsics are those of green, which makes most of the grey in which boards are found.
     """
-    return np.asarray(cv2.addWeighted(frame[..., 1], 0.5, frame[..., 2], 0.5, 0), dtype=np.uint8)
+    return frame[..., 1]
 
 
 def measure_lines(
@@ -95,12 +95,11 @@ def measure_lines(
     `brightness` (H, W) see `brightness_of`; `response` (H, W) the segmentation in 0..1.
     """
     seen = SeenLines.from_camera(lines, camera)
-    found = [
-        _measure_class(
-            seen[(seen.width_px >= low) & (seen.width_px < high)], brightness, response, search_px, high, sampling
-        )
-        for low, high, sampling in WIDTH_CLASSES_PX
-    ]
+    bend = _bend(seen)
+    found = []
+    for low, high, sampling in WIDTH_CLASSES_PX:
+        of_class = (seen.width_px >= low) & (seen.width_px < high)
+        found.append(_measure_class(seen[of_class], bend[of_class], brightness, response, search_px, high, sampling))
     index = np.concatenate([m.index for m in found])
     return Measurements(
         index,
@@ -114,6 +113,7 @@ def measure_lines(
 
 def _measure_class(
     seen: SeenLines,
+    bend: Array,
     brightness: NDArray[np.float32],
     response: NDArray[np.float32],
     search_px: float,
@@ -124,7 +124,7 @@ def _measure_class(
     half_filter = int(np.ceil((widest_px * 0.85 + BESIDE_PX) / sampling_px))
     half_search = int(np.ceil(search_px / sampling_px)) + 1
     offsets = sampling_px * np.arange(-half_filter - half_search, half_filter + half_search + 1, dtype=float)
-    profiles = _profiles(brightness, seen, offsets)
+    profiles = _profiles(brightness, seen, bend, offsets)
     around = sampling_px * np.arange(-half_filter, half_filter + 1, dtype=float)
     filters = expected_profiles(seen.width_px, around)
     correlation = sliding_correlation(profiles, filters)
@@ -133,8 +133,8 @@ def _measure_class(
     preference = correlation - OFF_CENTRE_PENALTY * (shifts / search_px) ** 2
     best = np.argmax(preference, axis=1)
     at_end = (best == 0) | (best == len(shifts) - 1)
-    best = np.clip(best, 1, len(shifts) - 2)
-    shift = shifts[best] + sampling_px * _parabola_peak(correlation, best)
+    windows = np.take_along_axis(profiles, best[:, None] + np.arange(filters.shape[1]), axis=1)
+    shift = shifts[best] + _centre(windows, seen.width_px, around, sampling_px)
     pixel = seen.pixel + shift[:, None] * seen.normal
     row = np.arange(len(seen))
     good = (
@@ -151,12 +151,16 @@ def expected_profiles(width_px: Array, offsets_px: Array) -> Array:
 
     A filter reaches a third of the width (and `BESIDE_PX`) beyond each edge and is zero farther out.
     """
-    half = width_px[:, None] / 2
     profile = blurred_line(width_px[:, None], LENS_BLUR_PX, offsets_px)
-    inside = np.abs(offsets_px) <= half + width_px[:, None] / 3 + BESIDE_PX
+    inside = np.abs(offsets_px) <= _reach(width_px)[:, None]
     mean = np.sum(profile * inside, axis=1, keepdims=True) / np.sum(inside, axis=1, keepdims=True)
     profile = (profile - mean) * inside
     return profile / np.linalg.norm(profile, axis=1, keepdims=True)
+
+
+def _reach(width_px: Array) -> Array:
+    """How far (N,) from the centre of a line its filter reaches, in px."""
+    return width_px / 2 + width_px / 3 + BESIDE_PX
 
 
 def sliding_correlation(profiles: Array, filters: Array) -> Array:
@@ -174,19 +178,50 @@ def sliding_correlation(profiles: Array, filters: Array) -> Array:
     return product / np.maximum(spread, np.sqrt(count))
 
 
-def _profiles(image: NDArray[np.float32], seen: SeenLines, offsets: Array) -> Array:
-    """Brightness (N, S) across the lines at `offsets` (S,) px, averaged along them; NaN outside the picture."""
+def _profiles(image: NDArray[np.float32], seen: SeenLines, bend: Array, offsets: Array) -> Array:
+    """Brightness (N, S) across the lines at `offsets` (S,) px, averaged along them; NaN outside the picture.
+
+    `bend` (N,): 1 / radius of the lines in the picture, in 1 / px, positive where they turn towards their normals.
+    """
     along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1)
     total = np.zeros((len(seen), len(offsets)))
     for shift in ALONG_PX:
-        where = (seen.pixel + shift * along)[:, None] + offsets[None, :, None] * seen.normal[:, None]
+        on_line = seen.pixel + shift * along + (bend * shift**2 / 2)[:, None] * seen.normal
+        where = on_line[:, None] + offsets[None, :, None] * seen.normal[:, None]
         total += bilinear(image, where, outside=np.nan)
     return total / len(ALONG_PX)
 
 
-def _parabola_peak(values: Array, best: NDArray[np.intp]) -> Array:
-    """Position (N,) of the peak relative to column `best` (N,) of values (N, S), in columns."""
-    row = np.arange(len(values))
-    left, middle, right = values[row, best - 1], values[row, best], values[row, best + 1]
-    curvature = left - 2 * middle + right
-    return np.where(curvature < 0, 0.5 * (left - right) / np.minimum(curvature, -1e-12), 0.0).clip(-1, 1)
+def _bend(seen: SeenLines) -> Array:
+    """1 / radius (N,) of the lines in the picture (see `_profiles`), from the neighbours on the same marking."""
+    rise, run = np.zeros(len(seen)), np.zeros(len(seen))
+    together = (np.diff(seen.index) == 1) & (np.diff(seen.points.marking) == 0)
+    step = np.diff(seen.pixel, axis=0)[together]
+    here, there = np.flatnonzero(together), np.flatnonzero(together) + 1
+    for at, sign in ((here, 1), (there, -1)):
+        across = sign * np.sum(step * seen.normal[at], axis=1)
+        rise[at] += across
+        run[at] += np.sum(step**2, axis=1) - across**2
+    return np.divide(2 * rise, run, out=np.zeros(len(seen)), where=run > 0)
+
+
+def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) -> Array:
+    """Centres (N,) of the lines in windows (N, K) of brightness at `offsets` (K,), at most `reach_px` from 0.
+
+    Least squares of the expected line, moved, on a background that has a level and a slope: what lies on one side of a
+    line is seldom as bright as what lies on the other.
+    """
+    inside = np.abs(offsets) <= _reach(width_px)[:, None]
+    centre = np.zeros(len(windows))
+    for _ in range(CENTRE_STEPS):
+        moved = offsets - centre[:, None]
+        line = blurred_line(width_px[:, None], LENS_BLUR_PX, moved)
+        slope = blurred_line_slope(width_px[:, None], LENS_BLUR_PX, moved)
+        model = np.stack([line, -slope, np.ones_like(line), np.broadcast_to(offsets, line.shape)], axis=1)
+        model = model * inside[:, None]
+        normal = np.einsum("nak,nbk->nab", model, model)
+        seen = np.einsum("nak,nk->na", model, np.nan_to_num(windows))
+        height, move, _, _ = np.linalg.solve(normal, seen[..., None])[..., 0].T
+        step = np.divide(move, height, out=np.zeros(len(windows)), where=height > 0)
+        centre = np.clip(centre + step, -reach_px, reach_px)
+    return centre

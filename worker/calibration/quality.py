@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, inside, rotation_angles_deg
 from worker.calibration.field import Field
-from worker.calibration.refinement import FEWEST_MEASUREMENTS
+from worker.calibration.residuals import FEWEST_MEASUREMENTS
 from worker.calibration.visibility import SeenLines
 
 TOLERANCE_PX = 3.0

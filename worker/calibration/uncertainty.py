@@ -1,0 +1,138 @@
+"""How sure the finish is, and what the lines say of what it takes for known: lenses and field.
+
+Poses are found for the lenses and the field as they are given, because that is how they are used. If those are a
+little off, the poses are off with them, and no residual need show it. So the lines are asked once more, with the
+numbers of every lens and of the field unknown: the poses that are then best are nearer the truth, and how far they are
+from the poses that are answered belongs to their error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from worker.calibration.camera import Array, Camera
+from worker.calibration.field import Field
+from worker.calibration.linemeasurement import Measurements
+from worker.calibration.normalequations import error_of_measurement, normal_equations
+from worker.calibration.parameters import LensParameter, Parameter, field_parameters, lens_parameters
+from worker.calibration.residuals import FEWEST_MEASUREMENTS, POSE, Unknowns, residuals, rms_px
+from worker.calibration.robust import tukey_weights
+
+TRUST, TRUST_NUMBERS = 0.05, 1.0
+"""Lens and field are thought to be off by this part of what is expected before they are seen, and how many numbers of
+evidence that is worth."""
+EVIDENCE_STEPS = 12
+LARGEST_FACTOR = 100.0
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far a number of a lens (`camera`) or of the field (None) seems to be from what it is taken for.
+
+    `sigma`: of that estimate; `expected`: how far off it is after a good calibration. In the unit that `name` ends on.
+    """
+
+    camera: str | None
+    name: str
+    value: float
+    sigma: float
+    expected: float
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Per camera, None where it had too few measurements: `covariance` (6, 6) and `residual_px`, see `Refined`."""
+
+    covariance: list[Array | None]
+    residual_px: list[float | None]
+    deviations: list[Deviation]
+
+
+def judge(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    measured: Sequence[Measurements],
+    solved: Unknowns,
+    heights: Array,
+    prior: Array,
+    away: Array,
+    stitch_weight: float,
+) -> Judged:
+    """Judge an answer that was found with `solved` unknown.
+
+    `prior` (U, U): the information on them before any line was measured; `away` (U,): how far they are from it.
+    """
+    suspects = _suspects(pitch, cameras, solved)
+    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground)
+    rows = residuals(pitch.line_points().position, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
+    equations = normal_equations(rows, unknowns)
+    kept = np.r_[: solved.dense, unknowns.dense : len(unknowns)]
+    asked = np.arange(solved.dense, unknowns.dense)
+
+    # Given the suspects, everything else follows: what is left of the equations is about the suspects alone.
+    inverse = np.linalg.inv(equations.information[np.ix_(kept, kept)] + prior)
+    left_over = equations.gradient[kept] + prior @ away
+    effect = inverse @ equations.information[np.ix_(kept, asked)]
+    information = equations.information[np.ix_(asked, asked)] - equations.information[np.ix_(asked, kept)] @ effect
+    pull = effect.T @ left_over - equations.gradient[asked]
+    certainty = _certainty(information, pull, suspects)
+    value = np.linalg.solve(information + np.diag(certainty), pull)
+    nearer = -inverse @ left_over - effect @ value
+
+    everything = np.zeros_like(equations.information)
+    everything[np.ix_(kept, kept)] = prior
+    everything[asked, asked] = certainty
+    full = np.linalg.inv(equations.information + everything)
+    covariance = full @ (error_of_measurement(rows, unknowns) + everything) @ full
+    return Judged(
+        [_of_pose(covariance, nearer, i) if len(m) >= FEWEST_MEASUREMENTS else None for i, m in enumerate(measured)],
+        [rms_px(camera, found) for camera, found in zip(cameras, measured, strict=True)],
+        [
+            Deviation(
+                cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
+                suspect.name,
+                float(value[i]),
+                float(np.sqrt(covariance[asked[i], asked[i]])),
+                suspect.expected,
+            )
+            for i, suspect in enumerate(suspects)
+        ],
+    )
+
+
+def _suspects(pitch: Field, cameras: Sequence[Camera], solved: Unknowns) -> list[Parameter]:
+    """The numbers of lenses and field that were not solved for."""
+    known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
+    everything = [*lens_parameters(cameras), *field_parameters(pitch)]
+    return [p for p in everything if (getattr(p, "camera", None), p.name) not in known]
+
+
+def _certainty(information: Array, pull: Array, suspects: Sequence[Parameter]) -> Array:
+    """Information (S,) on the suspects before the lines were measured, by what the lines say of how good each lens is.
+
+    MacKay's evidence update, as for the ground (`Ground.unevenness`): one scale for each lens, and one for each measure
+    of the field, which were not taken together as the numbers of a lens are.
+    """
+    owner = np.array([getattr(suspect, "camera", -1 - number) for number, suspect in enumerate(suspects)])
+    expected = np.array([suspect.expected for suspect in suspects])
+    factor = np.ones(len(suspects))
+    for _ in range(EVIDENCE_STEPS):
+        certainty = (expected * factor) ** -2
+        covariance = np.linalg.inv(information + np.diag(certainty))
+        determined = 1 - np.diag(covariance) * certainty
+        power = (covariance @ pull / expected) ** 2
+        for one in np.unique(owner):
+            its = owner == one
+            evidence = max(float(determined[its].sum()), 0.0) + TRUST_NUMBERS
+            scale = np.sqrt((power[its].sum() + TRUST_NUMBERS * TRUST**2) / evidence)
+            factor[its] = min(scale, LARGEST_FACTOR)
+    return np.asarray((expected * factor) ** -2)
+
+
+def _of_pose(covariance: Array, nearer: Array, camera: int) -> Array:
+    """Second moment (6, 6) of one pose's error: its variance, and how far it is from where it should be."""
+    its = slice(POSE * camera, POSE * (camera + 1))
+    return np.asarray(covariance[its, its] + np.outer(nearer[its], nearer[its]))
