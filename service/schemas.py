@@ -250,6 +250,23 @@ class Venue(_Place):
         cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
         return self.model_copy(update={"cameras": cameras})
 
+    def with_result(self, result: Result) -> Venue:
+        """The same venue as an accepted calibration found it: poses, and the lenses and the ridge they belong to."""
+        found = {camera.id: camera for camera in result.cameras}
+        cameras = [
+            camera.model_copy(
+                update={
+                    "pose": found[camera.id].pose,
+                    "intrinsics": found[camera.id].intrinsics or camera.intrinsics,
+                }
+            )
+            if camera.id in found
+            else camera
+            for camera in self.cameras
+        ]
+        field = self.field if result.ridge is None else self.field.model_copy(update={"ridge": result.ridge})
+        return self.model_copy(update={"cameras": cameras, "field": field})
+
     def calibrates_like(self, other: Venue) -> bool:
         """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
         return self.field == other.field and self.cameras == other.cameras
@@ -295,10 +312,20 @@ class Options(Wire):
     offspring: Annotated[Whole, Field(ge=2, le=8192)] = Field(128, description="λ of the paper's strategy.")
     stitch_weight: Annotated[Number, Field(ge=0, le=1)] = Field(0.5, description="The paper's trade-off λ.")
     flat: Flag = Field(False, description="Calibrate on a plane although the venue has a ridge.")
+    fit_focal_length: Flag = Field(False, description="Find each camera's focal length too: heat changes it.")
+    fit_ridge: Flag = Field(False, description="Find the height of the field's ridge too.")
     dry_run: Flag = Field(False, description="Never move the stored poses.")
     priority: Literal["live", "routine"] = "routine"
     timeout_s: Annotated[Number, Field(ge=1, le=3600)] | None = Field(None, description="Absent: the service's.")
     callback_url: CallbackUrl | None = Field(None, description="Told of the job's end, signed (Standard Webhooks).")
+
+    @model_validator(mode="after")
+    def _fits_with_the_finish(self) -> Self:
+        if (self.fit_focal_length or self.fit_ridge) and self.preset != "esc":
+            raise ValueError("fit_focal_length and fit_ridge need preset esc: the others end without a finish")
+        if self.fit_ridge and self.flat:
+            raise ValueError("fit_ridge and flat contradict each other")
+        return self
 
 
 class Progress(Wire):
@@ -330,6 +357,7 @@ class CameraResult(Wire):
 
     id: Id
     pose: Pose
+    intrinsics: Intrinsics | None = Field(None, description="With fit_focal_length: those the pose belongs to.")
     sigma: Sigma | None
     moved: Moved
     iou: float | None
@@ -345,12 +373,27 @@ class Provenance(Wire):
     options: dict[str, Any]
 
 
+class Suspicion(Wire):
+    """A number of a camera's lens, or of the field (camera null), that the lines contradict.
+
+    It seems to be larger than the venue says by `deviation` ± `sigma`, in the unit that `quantity` ends on.
+    """
+
+    camera: Id | None
+    quantity: str
+    deviation: float
+    sigma: float
+    detail: str
+
+
 class Result(Wire):
     """Poses and what they are worth. Stitch errors: 1 px is 10 cm on the pitch; one camera has none."""
 
     accepted: bool
     rejected_because: str | None
     cameras: list[CameraResult]
+    ridge: list[Row] | None = Field(None, description="With fit_ridge: as it was found.")
+    diagnosis: list[Suspicion] = Field([], description="What the lines say is wrong with what the venue says.")
     stitch_error_px: float | None
     stitch_error_before_px: float | None
     loss: float | None

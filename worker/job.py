@@ -110,7 +110,7 @@ def solve(
         raise Failure(error.kind, error.detail, error.camera) from error
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
     drawing = time.perf_counter()
-    pictures = _draw(pitch.flat() if options.flat else pitch, cameras, found, frames)
+    pictures = _draw(cameras, found, frames)
     timings = {
         "decode": decoded - begun,
         **found.timings_s,
@@ -123,7 +123,7 @@ def solve(
         # Who is told changes no number, and the address may be a secret.
         options=options.model_dump(mode="json", exclude={"callback_url"}),
     )
-    return Outcome(_result(found, timings, provenance), pictures)
+    return Outcome(_result(found, options, timings, provenance), pictures)
 
 
 def _segmenter(settings: Settings) -> Segmenter:
@@ -197,7 +197,18 @@ def _camera(camera: schemas.Camera) -> Camera:
 
 def _engine_options(options: schemas.Options) -> engine.Options:
     given = options.model_dump(
-        include={"preset", "seed", "generations", "parents", "offspring", "stitch_weight", "flat"}, exclude_none=True
+        include={
+            "preset",
+            "seed",
+            "generations",
+            "parents",
+            "offspring",
+            "stitch_weight",
+            "flat",
+            "fit_focal_length",
+            "fit_ridge",
+        },
+        exclude_none=True,
     )
     return engine.Options(**given)
 
@@ -212,21 +223,19 @@ def _progress(step: engine.Progress) -> Progress:
 
 
 def _draw(
-    pitch: Field,
     before: Sequence[Camera],
     found: engine.Calibration,
     frames: Mapping[str, Sequence[Picture]],
 ) -> dict[str, bytes]:
-    poses = {camera.id: camera.pose for camera in found.cameras}
-    after = [camera.with_pose(poses[camera.id]) for camera in before]
+    after = [Camera(camera.id, camera.intrinsics, camera.pose) for camera in found.cameras]
     first = {camera: several[0] for camera, several in frames.items()}
     drawn: dict[str, Callable[[], Picture]] = {
-        "preview": lambda: stitching.preview(pitch, after, first),
-        "birdseye": lambda: stitching.birdseye(pitch, after, first),
+        "preview": lambda: stitching.preview(found.pitch, after, first),
+        "birdseye": lambda: stitching.birdseye(found.pitch, after, first),
     }
     for old, new in zip(before, after, strict=True):
         drawn[f"overlay_{old.id}"] = lambda old=old, new=new: stitching.overlay(  # type: ignore[misc]
-            pitch, old, new, first[old.id]
+            found.pitch, old, new, first[old.id]
         )
     pictures = {}
     for name, draw in drawn.items():
@@ -242,11 +251,16 @@ def _jpeg(picture: Picture) -> bytes:
     return data.tobytes()
 
 
-def _result(found: engine.Calibration, timings_s: Mapping[str, float], provenance: Provenance) -> Result:
+def _result(
+    found: engine.Calibration, options: schemas.Options, timings_s: Mapping[str, float], provenance: Provenance
+) -> Result:
+    ridge = found.pitch.ridge
     return Result(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
-        cameras=[_camera_result(camera) for camera in found.cameras],
+        cameras=[_camera_result(camera, options) for camera in found.cameras],
+        ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
+        diagnosis=[schemas.Suspicion(**vars(suspicion)) for suspicion in found.suspicions],
         stitch_error_px=_number(found.stitch_error_px),
         stitch_error_before_px=_number(found.stitch_error_before_px),
         loss=_number(found.loss),
@@ -256,7 +270,8 @@ def _result(found: engine.Calibration, timings_s: Mapping[str, float], provenanc
     )
 
 
-def _camera_result(camera: engine.CameraResult) -> CameraResult:
+def _camera_result(camera: engine.CameraResult, options: schemas.Options) -> CameraResult:
+    lens = camera.intrinsics
     sigma = camera.sigma
     known = sigma is not None and isfinite(sigma.rotation_deg) and isfinite(sigma.position_m)
     return CameraResult(
@@ -266,6 +281,9 @@ def _camera_result(camera: engine.CameraResult) -> CameraResult:
             position=camera.pose.position.tolist(),
             translation=camera.pose.translation.tolist(),
         ),
+        intrinsics=schemas.Intrinsics(matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
+        if options.fit_focal_length
+        else None,
         sigma=Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m) if sigma and known else None,
         moved=Moved(
             rotation_deg=camera.moved.rotation_deg,

@@ -35,6 +35,7 @@ class Conditions:
     long_shadows: float = 0.0
     wear: float = 0.15  # of grass and of paint
     swell: float = 1.0  # of the ground, 1 for one to two centimetres
+    wobble: float = 1.0  # of the paint, 1 for lines that are half a centimetre beside themselves
     mowing: float = 0.5  # contrast of the stripes
     players: int = 22
     other_lines: bool = False  # of another sport, coloured

@@ -48,7 +48,7 @@ def shade_ground(pitch: Field, world: World, conditions: Conditions, centre: Pla
     coverage, target = marking_shares(pitch, patch)
     painted, lasting = coverage, np.float32(1)
     if coverage.any():
-        rough = np.float32(0.012 * (0.3 + conditions.wear)) * world.edge_noise.at(patch)
+        rough = np.float32(0.012 * (0.3 + conditions.wear) * conditions.wobble) * world.edge_noise.at(patch)
         painted, _ = marking_shares(pitch, patch, rough)
     lettering = [(letters.colour, _letter_coverage(letters, patch)) for letters in world.letters]
     lettering = [(ink, share) for ink, share in lettering if share is not None]

@@ -292,7 +292,7 @@ class Jobs:
             )
             if result.accepted and not task.options.dry_run and now_stored is not None:
                 poses = {camera.id: camera.pose for camera in result.cameras}
-                save_venue(connection, now_stored.with_poses(poses))
+                save_venue(connection, now_stored.with_result(result))
                 save_poses(connection, task.venue.id, poses, "calibration", task.job_id)
 
     def fail(self, task: Task, error: JobError) -> None:

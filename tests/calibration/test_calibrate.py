@@ -1,5 +1,6 @@
 """The whole engine on painted frames, with a segmentation that sees white on green."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 from tests.calibration.synthetic import CROWNED, moved, paint_frame, pair
 from worker.calibration.calibrate import CalibrationError, Options, Stopped, calibrate
 from worker.calibration.camera import rotation_angles_deg
+from worker.calibration.parameters import free_focal_lengths
+from worker.calibration.quality import Gate, ridge_rejection
 
 TURN = (0.006, -0.005, 0.004)
 SHIFT = (0.05, -0.06, 0.04)
@@ -122,3 +125,36 @@ def test_the_papers_presets_run_through_the_same_door(preset):
     found = run(preset=preset, generations=2, parents=4, offspring=4)
     assert found.generations == 2
     assert len(found.cameras) == 2
+
+
+def with_longer_lens(camera, by):
+    return free_focal_lengths([camera])[0].applied([camera], CROWNED, by)[0][0]
+
+
+def test_a_focal_length_that_heat_has_changed_is_found_when_asked_for():
+    left, right = outdated()
+    found = run(cameras=[with_longer_lens(left, 2.0), right], fit_focal_length=True)
+    assert found.accepted
+    assert found.cameras[0].intrinsics.matrix[0, 0] == pytest.approx(600.0, abs=0.3)
+    assert run(cameras=[with_longer_lens(left, 2.0), right]).cameras[0].intrinsics.matrix[0, 0] == 602.0
+
+
+def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers():
+    left, right = outdated()
+    other = replace(left.intrinsics, distortion=left.intrinsics.distortion + [0.02, 0, 0, 0, 0])
+    found = run(cameras=[replace(left, intrinsics=other), right])
+    told = {(s.camera, s.quantity): s for s in found.suspicions}
+    assert told["left", "k1"].deviation == pytest.approx(-0.02, abs=3 * told["left", "k1"].sigma)
+    assert "camera left fit best with a first radial coefficient" in told["left", "k1"].detail
+    assert result().suspicions == []
+
+
+def test_a_ridge_below_the_ground_is_rejected():
+    assert "ridge at -0.100 m" in ridge_rejection(CROWNED.raised(-0.45), Gate())
+    assert ridge_rejection(CROWNED, Gate()) is None
+    assert ridge_rejection(CROWNED.flat(), Gate()) is None
+
+
+def test_a_camera_that_sees_something_else_says_nothing_of_its_lens():
+    elsewhere = {**frames(), "left": (np.ascontiguousarray(frames()["left"][0][::-1, ::-1]),)}
+    assert {s.camera for s in run(pictures=elsewhere).suspicions} <= {"right"}

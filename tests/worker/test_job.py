@@ -7,6 +7,7 @@ from service.settings import Settings
 from worker import job
 from worker.calibration import calibrate as engine
 from worker.calibration.camera import Pose
+from worker.calibration.diagnosis import Suspicion
 from worker.message import Message
 
 SIZE = (320, 180)
@@ -47,6 +48,7 @@ def asked(monkeypatch):
         results = [
             engine.CameraResult(
                 camera.id,
+                camera.intrinsics,
                 Pose(camera.pose.rotation, camera.pose.position + [0.05, 0, 0]),
                 engine.Sigma(float("inf"), 0.1),
                 engine.Movement(0.0, 0.05, float("nan")),
@@ -55,7 +57,8 @@ def asked(monkeypatch):
             )
             for camera in cameras
         ]
-        return engine.Calibration(results, None, 0.2, None, 0.1, 3, {"evolution": 1.0})
+        doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
+        return engine.Calibration(pitch, results, None, 0.2, None, 0.1, 3, [doubt], {"evolution": 1.0})
 
     class Segmenter:
         sha256 = "f" * 64
@@ -97,6 +100,22 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert [step.stage for step in steps] == ["evolution", "preview"]
     assert set(outcome.pictures) == {"preview", "birdseye", "overlay_left", "overlay_right"}
     assert all(picture.startswith(b"\xff\xd8") for picture in outcome.pictures.values())
+
+
+def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, settings):
+    plain, fitted = (
+        job.solve(venue, files, Options(fit_focal_length=fit, fit_ridge=fit), settings, lambda _: None).result
+        for fit in (False, True)
+    )
+    assert (plain.cameras[0].intrinsics, plain.ridge) == (None, None)
+    assert fitted.cameras[0].intrinsics.matrix == venue.cameras[0].intrinsics.matrix
+    assert fitted.ridge == venue.field.ridge
+    assert asked["options"] == engine.Options(fit_focal_length=True, fit_ridge=True)
+
+
+def test_what_the_lines_contradict_is_told(venue, files, asked, settings):
+    (doubt,) = job.solve(venue, files, Options(), settings, lambda _: None).result.diagnosis
+    assert (doubt.camera, doubt.quantity, doubt.deviation, doubt.sigma) == ("left", "k1", 0.01, 0.001)
 
 
 def test_what_json_cannot_say_is_null(venue, files, asked, settings):

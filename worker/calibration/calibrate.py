@@ -11,10 +11,21 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Camera, Frame, Pose
+from worker.calibration.camera import Camera, Frame, Intrinsics, Pose
+from worker.calibration.diagnosis import Suspicion, suspicions
 from worker.calibration.field import Field
 from worker.calibration.linemeasurement import brightness_of
-from worker.calibration.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
+from worker.calibration.parameters import Parameter, free_focal_lengths, free_ridge
+from worker.calibration.quality import (
+    CameraQuality,
+    Gate,
+    Movement,
+    Sigma,
+    believable,
+    markings_iou,
+    rejection,
+    ridge_rejection,
+)
 from worker.calibration.refinement import Refined, Sight, assess, refine
 from worker.calibration.registration import pairs_in_common, stitch_error_px
 from worker.calibration.sampling import median
@@ -43,7 +54,10 @@ class Segment(Protocol):
 
 @dataclass(frozen=True)
 class Options:
-    """What a caller may choose; in the paper mu, lambda, G and the trade-off lambda of section III."""
+    """What a caller may choose; in the paper mu, lambda, G and the trade-off lambda of section III.
+
+    `fit_focal_length`: of each camera, as heat changes it; `fit_ridge`: its height. Both are for preset `esc`.
+    """
 
     preset: Preset = "esc"
     seed: int = 0
@@ -52,6 +66,8 @@ class Options:
     offspring: int = 128
     stitch_weight: float = 0.5
     flat: bool = False
+    fit_focal_length: bool = False
+    fit_ridge: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,9 +99,13 @@ class Progress:
 
 @dataclass(frozen=True)
 class CameraResult:
-    """One camera's answer. `sigma` and `residual_px` are None where too few lines could be measured."""
+    """One camera's answer. `sigma` and `residual_px` are None where too few lines could be measured.
+
+    `intrinsics`: those that the pose belongs to, which are the given ones unless the focal length was to be found.
+    """
 
     id: str
+    intrinsics: Intrinsics
     pose: Pose
     sigma: Sigma | None
     moved: Movement
@@ -95,14 +115,19 @@ class CameraResult:
 
 @dataclass(frozen=True)
 class Calibration:
-    """The answer of the engine. `rejected_because`: None when accepted."""
+    """The answer of the engine. `rejected_because`: None when accepted.
 
+    `pitch`: the given one unless its ridge was to be found. `suspicions`: what the lines contradict of what was given.
+    """
+
+    pitch: Field
     cameras: Sequence[CameraResult]
     rejected_because: str | None
     stitch_error_px: float | None
     stitch_error_before_px: float | None
     loss: float
     generations: int
+    suspicions: Sequence[Suspicion]
     timings_s: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -154,21 +179,25 @@ def calibrate(
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
         brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
-        refined = method.finish(pitch, found.cameras, Sight(brightness, responses), options.stitch_weight)
+        sight = Sight(brightness, responses)
+        refined = method.finish(pitch, found.cameras, sight, options.stitch_weight, _free(options, pitch, cameras))
     with clock.measuring("quality"):
         journey.at("refinement", 0.6)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
-        stitch = stitch_error_px(pitch, refined.cameras, by_id)
+        stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
         stitch_before = stitch_error_px(pitch, cameras, by_id)
         qualities = _qualities(pitch, cameras, refined, responses)
         journey.at("refinement", 1.0)
     return Calibration(
-        [CameraResult(q.camera.id, q.camera.pose, q.sigma, q.moved, q.iou, q.residual_px) for q in qualities],
-        rejection(qualities, pairs_in_common(pitch, refined.cameras), stitch, Gate()),
+        refined.pitch,
+        [_camera_result(quality) for quality in qualities],
+        rejection(qualities, pairs_in_common(refined.pitch, refined.cameras), stitch, Gate())
+        or ridge_rejection(refined.pitch, Gate()),
         stitch,
         stitch_before,
         found.loss,
         found.generations,
+        suspicions(believable(refined.deviations, qualities, Gate())),
         clock.seconds,
     )
 
@@ -209,13 +238,26 @@ def _segment_all(
     return responses
 
 
+def _free(options: Options, pitch: Field, cameras: Sequence[Camera]) -> list[Parameter]:
+    """What is to be found along with the poses."""
+    lengths = free_focal_lengths(cameras) if options.fit_focal_length else []
+    return [*lengths, *(free_ridge(pitch) if options.fit_ridge else [])]
+
+
+def _camera_result(quality: CameraQuality) -> CameraResult:
+    camera = quality.camera
+    return CameraResult(
+        camera.id, camera.intrinsics, camera.pose, quality.sigma, quality.moved, quality.iou, quality.residual_px
+    )
+
+
 def _qualities(
     pitch: Field, stored: Sequence[Camera], refined: Refined, responses: Sequence[Response]
 ) -> list[CameraQuality]:
     return [
         CameraQuality(
             after,
-            markings_iou(pitch, after, response),
+            markings_iou(refined.pitch, after, response),
             markings_iou(pitch, before, response),
             residual,
             Sigma.from_covariance(covariance) if covariance is not None else None,

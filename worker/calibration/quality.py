@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from worker.calibration.camera import Array, Camera, inside, rotation_angles_deg
 from worker.calibration.field import Field
 from worker.calibration.residuals import FEWEST_MEASUREMENTS
+from worker.calibration.uncertainty import Deviation
 from worker.calibration.visibility import SeenLines
 
 TOLERANCE_PX = 3.0
@@ -33,6 +34,7 @@ class Gate:
     largest_rotation_deg: float = 8.0
     largest_shift_m: float = 1.5
     largest_stitch_error_px: float = 1.5
+    highest_ridge_m: float = 3.0
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,23 @@ def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) ->
     area_beside = np.count_nonzero(marked & _pitch_area(pitch, camera) & ~explained)
     beside = area_beside * found / area_explained if area_explained else float(area_beside)
     return found / (expected + beside)
+
+
+def believable(deviations: Sequence[Deviation], qualities: Sequence[CameraQuality], gate: Gate) -> list[Deviation]:
+    """Those deviations that were read off cameras which see the pitch where they expect it."""
+    lost = {quality.camera.id for quality in qualities if quality.iou < gate.least_iou}
+    return [d for d in deviations if (not lost if d.camera is None else d.camera not in lost)]
+
+
+def ridge_rejection(pitch: Field, gate: Gate) -> str | None:
+    """Why a pitch whose ridge was found along with the poses cannot be one; None when it can."""
+    height = 0.0 if pitch.ridge is None else float(pitch.ridge[0, 2])
+    if 0 <= height <= gate.highest_ridge_m:
+        return None
+    return (
+        f"the lines fit best with a ridge at {height:.3f} m, and a pitch has one between 0 and "
+        f"{gate.highest_ridge_m:.0f} m; calibrate without fit_ridge"
+    )
 
 
 def rejection(

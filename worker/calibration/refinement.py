@@ -78,9 +78,11 @@ def refine(
     return _assessed(here, cameras, sight, unknowns, stitch_weight)
 
 
-def assess(pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float) -> Refined:
-    """What the lines say of poses that are left as they are."""
-    unknowns = Unknowns(len(cameras), (), Ground.under(pitch.line_points()))
+def assess(
+    pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float, free: Sequence[Parameter] = ()
+) -> Refined:
+    """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     return _assessed(_Estimate.at(pitch, cameras, unknowns), cameras, sight, unknowns, stitch_weight)
 
 
