@@ -83,7 +83,7 @@ def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
     (told,) = hook.received
     event = json.loads(told.body)
     assert event["type"] == "job.succeeded"
-    assert event["data"] == json.loads(home.jobs.get(job).model_dump_json())
+    assert event["data"] == json.loads(home.jobs.get(job).model_dump_json()) | {"callback": None}
     assert event["timestamp"] == event["data"]["finished_at"]
     assert (told.path, told.headers["content-type"]) == ("/told?by=esc", "application/json")
     assert told.headers["host"] == f"127.0.0.1:{hook.port}"

@@ -88,11 +88,12 @@ def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
 
 
 def test_frames_of_an_upload_that_became_no_job_go_after_their_grace(stock, retention):
-    stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", NOW)
+    grace = timedelta(hours=1)
+    stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", grace)
     stock.blobs.put("frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/left/0", b"frame")
-    retention.round(ago(seconds=1))
+    retention.round(stock.expiry.now())
     assert stock.files() == {"frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"}
-    retention.round(NOW)
+    retention.round(stock.expiry.now() + grace)
     assert stock.files() == set()
 
 
