@@ -21,7 +21,11 @@ def no_such_venue(venue_id: str) -> Problem:
     return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
 
 
-@router.put("/{venue_id}", openapi_extra=needs("admin"), responses={201: {"model": Venue}, **problems(412, 422)})
+@router.put(
+    "/{venue_id}",
+    openapi_extra=needs("admin"),
+    responses={201: {"model": Venue}, **problems(400, 408, 412, 413, 415, 422)},
+)
 def put_venue(
     venue_id: VenueIdPath,
     venue: VenueIn,
@@ -106,7 +110,12 @@ def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[
         if before is None:
             raise no_such_venue(venue_id)
         if active_job is not None:
-            raise Problem("venue-busy", "Wait for the job or cancel it.", job=active_job)
+            raise Problem(
+                "venue-busy",
+                "Wait for the job or cancel it.",
+                headers={"Location": f"/jobs/{active_job}"},
+                job=active_job,
+            )
         tag = _tag(before)
         if if_match is not None and not etags.names(if_match, tag):
             raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)
