@@ -8,6 +8,8 @@ a second, and who is over the limit is told so where that is still possible, and
 
 from __future__ import annotations
 
+import asyncio
+import socket
 from typing import Any, Literal
 
 import h11
@@ -30,6 +32,13 @@ class Connection(H11Protocol):
         self._owed_since = 0.0
         self._moved_at = 0.0
         self._left_to_take = 0
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """A client has connected."""
+        # asyncio sets this only where a socket names its protocol, and those of a listener do not. Without it the body
+        # of an answer waits until its head has been acknowledged, which clients put off by 40 ms.
+        transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        super().connection_made(transport)
 
     def let_go_if_overdue(self, now: float, stall_s: float, whole_s: float) -> None:
         """End the connection if nothing moved for `stall_s`, or what moves has not come to its end for `whole_s`."""
