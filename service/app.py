@@ -52,6 +52,8 @@ def create_app(settings: Settings) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         responses=documented.problems(422, 503),
+        # Generated clients call their functions by it.
+        generate_unique_id_function=lambda route: route.name,
     )
     app.state.context = context
     app.add_middleware(BodyLimit, largest=int(settings.max_body_mb * 1e6))

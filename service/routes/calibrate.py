@@ -17,7 +17,7 @@ from service import callbacks
 from service import frames as border
 from service.context import Context, InContext, VenueIdPath
 from service.problems import Problem, invalid
-from service.routes.documented import needs, problems, reference
+from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import RETRY_AFTER_S, job_answer
 from service.routes.venues import no_such_venue
@@ -51,7 +51,8 @@ UPLOAD: dict[str, Any] = {
                     "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part "
                     "to send several frames of a camera, they are fused.",
                     "properties": {OPTIONS_PART: reference(Options)},
-                    "additionalProperties": {"type": "array", "items": {"type": "string", "format": "binary"}},
+                    # Not an array: generators write code for a repeated part of any name that does not compile.
+                    "additionalProperties": {"type": "string", "format": "binary"},
                 },
                 "encoding": {OPTIONS_PART: {"contentType": "application/json"}},
             }
@@ -65,7 +66,8 @@ UPLOAD: dict[str, Any] = {
     status_code=202,
     response_model=Job,
     responses={
-        200: {"model": Job, "description": "This content is already a job"},
+        200: {"model": Job, "description": "This content is already a job", **headers("ETag")},
+        202: headers("ETag", "Location", "Retry-After"),
         **problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
     },
     openapi_extra=UPLOAD | needs("calibrate"),

@@ -14,7 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from service import etags
 from service.context import Context, InContext, JobIdPath
 from service.problems import Problem
-from service.routes.documented import needs, problems
+from service.routes.documented import headers, needs, problems
 from service.routes.guarded import Guarded
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, Job, Jobs, Status
 from service.store.engine import AWAY
@@ -75,7 +75,7 @@ def list_jobs(
     "/{job_id}",
     openapi_extra=needs("read"),
     response_model=Job,
-    responses={304: {"description": "Unchanged"}, **problems(404)},
+    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
 )
 async def get_job(
     job: Existing,

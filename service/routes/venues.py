@@ -9,7 +9,7 @@ from fastapi import APIRouter, Header, Query, Response
 from service import etags
 from service.context import InContext, VenueIdPath
 from service.problems import Problem
-from service.routes.documented import needs, problems
+from service.routes.documented import headers, needs, problems
 from service.routes.guarded import Guarded
 from service.schemas import ID_PATTERN, PoseHistory, Venue, VenueIn, Venues
 
@@ -24,7 +24,11 @@ def no_such_venue(venue_id: str) -> Problem:
 @router.put(
     "/{venue_id}",
     openapi_extra=needs("admin"),
-    responses={201: {"model": Venue}, **problems(400, 408, 412, 413, 415, 422)},
+    responses={
+        200: headers("ETag"),
+        201: {"model": Venue, **headers("ETag")},
+        **problems(400, 408, 412, 413, 415, 422),
+    },
 )
 def put_venue(
     venue_id: VenueIdPath,
@@ -68,7 +72,7 @@ def list_venues(
     "/{venue_id}",
     openapi_extra=needs("read"),
     response_model=Venue,
-    responses={304: {"description": "Unchanged"}, **problems(404)},
+    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
 )
 def get_venue(
     venue_id: VenueIdPath,

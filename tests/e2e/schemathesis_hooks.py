@@ -16,7 +16,7 @@ def map_case(context, case):
             case.body["id"] = case.path_parameters["venue_id"]
         case "POST /venues/{venue_id}/calibrate":
             options = {name: part for name, part in case.body.items() if name == "options"}
-            case.body = options | {camera: [png(shade=len(str(options)) % 256)] for camera in ("left", "right")}
+            case.body = options | {camera: png(shade=len(str(options)) % 256) for camera in ("left", "right")}
     return case
 
 
