@@ -13,6 +13,7 @@ import socket
 from typing import Any, Literal
 
 import h11
+import structlog
 import uvicorn
 from starlette.responses import Response
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -21,6 +22,7 @@ from service.problems import Problem
 
 # What the client owes: the head of a request, its body, or taking an answer.
 Owed = Literal["head", "body", "taking"]
+log = structlog.get_logger()
 
 
 class Connection(H11Protocol):
@@ -74,6 +76,7 @@ class Connection(H11Protocol):
         return "head" if begun and self.conn.their_state is h11.IDLE else None
 
     def _let_go(self, owed: Owed) -> None:
+        log.info("client let go", owed=owed, address=self.client[0] if self.client else "")
         if owed == "taking":
             self.transport.abort()
             return
