@@ -15,6 +15,7 @@ from service.metrics import Metrics
 REQUEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 # Asked every few seconds by machines: not worth a line.
 QUIET = {"/livez", "/readyz", "/metrics"}
+METHODS = {"DELETE", "GET", "OPTIONS", "PATCH", "POST", "PUT"}
 log = structlog.get_logger()
 
 
@@ -48,9 +49,9 @@ class Access:
                 self._record(scope, status, time.perf_counter() - begun)
 
     def _record(self, scope: Scope, status: int, seconds: float) -> None:
-        # The template of the route, not the path: a metric per job would grow without end.
+        # The template of the route, not the path: a metric per job would grow without end, and so would one per method.
         route = getattr(scope.get("route"), "path", "none")
-        method = scope["method"] if route != "none" else "any"
+        method = scope["method"] if route != "none" and scope["method"] in METHODS else "any"
         self._metrics.requests.labels(method, route, status).inc()
         self._metrics.seconds.labels(method, route).observe(seconds)
         say = log.debug if scope["path"] in QUIET else log.info

@@ -17,12 +17,13 @@ from service.access import Access
 from service.auth import Gate
 from service.bodylimit import BodyLimit
 from service.context import Context
+from service.conventions import Conventions
 from service.disk import Disk
 from service.metrics import Metrics
 from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
-from service.routes import calibrate, documented, health, jobs, venues
+from service.routes import calibrate, docs, documented, health, jobs, venues
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.deliveries import Deliveries
@@ -47,15 +48,21 @@ def create_app(settings: Settings) -> FastAPI:
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
         version=version("esc-calibration"),
         lifespan=_lifespan,
+        # FastAPI's own pages load their scripts from the internet.
+        docs_url=None,
+        redoc_url=None,
         responses=documented.problems(422, 503),
+        # Generated clients call their functions by it.
+        generate_unique_id_function=lambda route: route.name,
     )
     app.state.context = context
     app.add_middleware(BodyLimit, largest=int(settings.max_body_mb * 1e6))
     app.add_middleware(Access, metrics=context.metrics)
+    app.add_middleware(Conventions)
     documented.document_callback(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, calibrate, jobs, health):
+    for routes in (venues, calibrate, jobs, health, docs):
         app.include_router(routes.router)
     return app
 

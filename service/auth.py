@@ -21,6 +21,7 @@ import structlog
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection
 
+from service import neighbours
 from service.limits import Buckets
 from service.problems import Problem
 from service.schemas import Scope
@@ -47,6 +48,7 @@ class Gate:
 
     def __init__(self, keys: Keys, settings: Settings, clock: Callable[[], float] = time.monotonic) -> None:
         self._keys = keys
+        self._settings = settings
         self._clock = clock
         self._off = settings.auth == "off"
         # Once on it stays on: who exchanges the only key must not leave the door open in between.
@@ -60,6 +62,7 @@ class Gate:
     async def admit(self, request: HTTPConnection, needed: Scope) -> None:
         """Return if the caller may do what needs this scope; otherwise raise the problem that says why not."""
         if not await self._asks_for_keys():
+            neighbours.check(request, self._settings)
             return
         key = await self._key(request)
         # Every line that the request leaves in the log.

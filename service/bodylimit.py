@@ -1,4 +1,4 @@
-"""No request is larger than the setting says; the answer to one that is, is a problem like every other.
+"""No request is larger than the setting says, nor packed; the answer to one that is, is a problem like every other.
 
 FastAPI's own limit answers a too large Content-Length in plain text, around every handler.
 """
@@ -26,7 +26,13 @@ class BodyLimit:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        announced = Headers(scope=scope).get("content-length", "0")
+        headers = Headers(scope=scope)
+        if headers.get("content-encoding", "identity").lower() != "identity":
+            # A few bytes can be gigabytes, and frames do not shrink by it anyway.
+            packed = Problem("encoded-body", "Send it as it is.", headers={"Accept-Encoding": "identity"})
+            await packed.response()(scope, receive, send)
+            return
+        announced = headers.get("content-length", "0")
         if announced.isdecimal() and int(announced[:20]) > self._largest:
             refusal = Problem("body-too-large", f"{self._largest} bytes are allowed; send fewer or smaller frames.")
             await refusal.response()(scope, receive, send)

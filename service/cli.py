@@ -149,6 +149,8 @@ def run(
     from service.problems import Problem
 
     settings, chosen = _settings(), _options(options)
+    if chosen.callback_url is not None:
+        err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")
     # Before NumPy is loaded, which the next line does.
     os.environ |= settings.native_environment
     from worker import job

@@ -10,10 +10,12 @@ from typing import Any
 import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from fastapi.routing import iter_route_contexts
 from pydantic import ValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
+from starlette.routing import compile_path
 
 MEDIA_TYPE = "application/problem+json"
 log = structlog.get_logger()
@@ -35,7 +37,12 @@ KINDS: dict[str, Kind] = {
     "not-found": Kind(404, "There is nothing at this address"),
     "method-not-allowed": Kind(405, "This address does not take this method"),
     "body-too-large": Kind(413, "The request is too large"),
+    "too-slow": Kind(408, "The request did not arrive in time"),
+    "not-json": Kind(415, "The body must be JSON"),
     "not-multipart": Kind(415, "Frames come as multipart/form-data"),
+    "encoded-body": Kind(415, "The body must come without a content coding"),
+    "host-unknown": Kind(421, "The service is not called by this name"),
+    "origin-foreign": Kind(403, "A page of another origin may not do this"),
     # Who may call.
     "key-missing": Kind(401, "A key is needed"),
     "key-unknown": Kind(401, "The key is not known"),
@@ -131,13 +138,18 @@ def install(app: FastAPI) -> None:
         return error.response()
 
     @app.exception_handler(RequestValidationError)
-    async def validation(_: Request, error: RequestValidationError) -> Response:
+    async def validation(request: Request, error: RequestValidationError) -> Response:
         if any(finding["type"] == "json_invalid" for finding in error.errors()):
             return Problem("malformed-request", "The body is not JSON.").response()
+        if isinstance(error.body, bytes):
+            got = request.headers.get("content-type", "")[:200]
+            return Problem("not-json", "Send it with Content-Type: application/json.", got=got).response()
         return invalid(error).response()
 
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> Response:
+        if error.status_code < 400:
+            return Response(status_code=error.status_code, headers=error.headers)
         return _from_http(request, error).response()
 
     @app.exception_handler(ClientDisconnect)
@@ -155,8 +167,18 @@ def _from_http(request: Request, error: HTTPException) -> Problem:
         case 404:
             return Problem("not-found", f"Nothing is at {request.url.path}; /docs lists what there is.")
         case 405:
-            return Problem("method-not-allowed", f"{request.method} does not work here.", headers=error.headers)
+            allowed = ", ".join(sorted(_methods_at(request)))
+            return Problem("method-not-allowed", f"Here work {allowed}.", headers={"Allow": allowed})
         case 413:
             return Problem("body-too-large", "Send fewer or smaller frames.", headers=error.headers)
         case _:
             return Problem("malformed-request", str(error.detail), headers=error.headers)
+
+
+def _methods_at(request: Request) -> set[str]:
+    """What works at this address; the router itself names the methods of one of its routes."""
+    path = request.scope["path"]
+    routes = iter_route_contexts(request.app.routes)
+    here = [route for route in routes if route.path is not None and compile_path(route.path)[0].match(path)]
+    methods = {method for route in here for method in route.methods or ()}
+    return methods | {"HEAD"} if "GET" in methods else methods

@@ -411,6 +411,15 @@ class JobError(Wire):
     camera: str | None = None
 
 
+class CallbackState(Wire):
+    """How far the telling of a job's end has come, once it has ended; `callback_url` in the options asked for it."""
+
+    state: Literal["waiting", "delivered", "given-up"]
+    attempts: int = Field(description="Begun so far.")
+    last_error: str | None = Field(description="Why the last attempt that failed did.")
+    next_attempt_at: datetime | None = Field(description="Null unless waiting.")
+
+
 # What a key allows; each one includes those before it.
 Scope = Literal["read", "calibrate", "admin"]
 
@@ -436,6 +445,7 @@ class Job(Wire):
                     "finished_at": None,
                     "error": None,
                     "result": None,
+                    "callback": None,
                     "links": {"self": "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"},
                 }
             ]
@@ -453,6 +463,9 @@ class Job(Wire):
     finished_at: datetime | None
     error: JobError | None
     result: Result | None
+    callback: CallbackState | None = Field(
+        None, description="Null before the end, without `callback_url`, and in what a `callback_url` gets."
+    )
     links: dict[str, str]
 
     @property
@@ -471,7 +484,8 @@ class JobEvent(Wire):
     @classmethod
     def of(cls, job: Job) -> JobEvent:
         """The event of an ended job."""
-        return cls.model_validate({"type": f"job.{job.status}", "timestamp": job.finished_at, "data": job})
+        told = job.model_copy(update={"callback": None})
+        return cls.model_validate({"type": f"job.{job.status}", "timestamp": job.finished_at, "data": told})
 
 
 class Jobs(Wire):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import socket
@@ -19,6 +20,7 @@ from fastapi import FastAPI
 
 from service import lifeline
 from service.app import create_app
+from service.connection import Connection, let_go_of_the_slow
 from service.settings import Settings
 from service.store.keys import Keys
 
@@ -28,6 +30,8 @@ GRACE_S = 5
 RESTART_AFTER_S = 1.0
 RESTART_AT_LEAST_EVERY_S = 30.0
 YOUNG_S = 10.0
+# Of uvicorn's ticks, ten a second.
+TICKS_PER_LOOK = 10
 log = structlog.get_logger()
 
 
@@ -40,7 +44,7 @@ def serve(settings: Settings, *, with_worker: bool) -> None:
     listener = _listen(settings)
     app = create_app(settings)
     _see_to_keys(settings, app.state.context.keys)
-    server = _Server(app)
+    server = _Server(app, settings)
     # Uvicorn raises the signal again after its shutdown, which would end the process before the worker is stopped.
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, server.handle_exit)
@@ -75,11 +79,29 @@ def _listen(settings: Settings) -> socket.socket:
 
 
 class _Server(uvicorn.Server):
-    """Uvicorn, but long polls and event streams are let go before it waits for open requests."""
+    """Uvicorn, but clients have limits, and waiting ones are let go before it waits for open requests."""
 
-    def __init__(self, app: FastAPI) -> None:
-        super().__init__(uvicorn.Config(app, log_config=None, access_log=False, timeout_graceful_shutdown=GRACE_S))
+    def __init__(self, app: FastAPI, settings: Settings) -> None:
+        super().__init__(
+            uvicorn.Config(
+                app,
+                http=Connection,
+                ws="none",
+                log_config=None,
+                access_log=False,
+                server_header=False,
+                timeout_graceful_shutdown=GRACE_S,
+            )
+        )
         self._watch = app.state.context.watch
+        self._settings = settings
+
+    async def on_tick(self, counter: int) -> bool:
+        """What uvicorn does ten times a second."""
+        if counter % TICKS_PER_LOOK == 0:
+            limits = self._settings.stall_timeout_s, self._settings.request_timeout_s
+            let_go_of_the_slow(self, asyncio.get_running_loop().time(), *limits)
+        return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop answering."""

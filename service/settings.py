@@ -42,6 +42,11 @@ class Settings(BaseSettings):
         description="`auto`: callers need a key as soon as there is one, and anyway beyond this machine. `off`: anyone "
         "may call, from anywhere.",
     )
+    allowed_hosts: list[str] = Field(
+        [],
+        description="Names under which a service that asks for no keys may be called, beside addresses and localhost: "
+        'JSON, such as ["esc.truck.lan"].',
+    )
     rate_per_s: float = Field(250, gt=0, description="Requests of one key to one API process.")
     rate_burst: int = Field(500, ge=1, description="Requests of one key at once, after a pause.")
 
@@ -50,6 +55,12 @@ class Settings(BaseSettings):
     max_frame_mb: float = Field(48, gt=0)
     max_frame_pixels: int = Field(64_000_000, gt=0)
     max_frames_per_camera: int = Field(16, ge=1)
+    stall_timeout_s: float = Field(
+        20, gt=0, description="A client that owes bytes and moves none is let go after this."
+    )
+    request_timeout_s: float = Field(
+        600, gt=0, description="A body must have arrived, an answer be taken, within this."
+    )
     queue_limit: int = Field(100, ge=1, description="Jobs that may wait; more are answered with 429.")
 
     # The worker.

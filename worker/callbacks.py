@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 
 import httpx
 import structlog
@@ -31,15 +31,9 @@ log = structlog.get_logger()
 
 
 class Callbacks:
-    """Sends what is due; `now` is the clock."""
+    """Sends what is due by the clock `now`."""
 
-    def __init__(
-        self,
-        settings: Settings,
-        deliveries: Deliveries,
-        jobs: Jobs,
-        now: Callable[[], datetime] = lambda: datetime.now(UTC),
-    ) -> None:
+    def __init__(self, settings: Settings, deliveries: Deliveries, jobs: Jobs, now: Callable[[], datetime]) -> None:
         self._settings = settings
         self._deliveries = deliveries
         self._jobs = jobs
@@ -61,7 +55,7 @@ class Callbacks:
     def _attempt(self, delivery: Delivery) -> None:
         job = self._jobs.get(delivery.job_id)
         if job is None:
-            self._deliveries.end(delivery, "given-up")
+            self._deliveries.give_up(delivery, "the job was deleted")
             return
         with structlog.contextvars.bound_contextvars(job=job.id, attempt=delivery.attempt):
             try:
@@ -70,12 +64,12 @@ class Callbacks:
                 self._failed(delivery, str(error) or type(error).__name__)
                 return
             if 200 <= answer.status < 300:
-                self._deliveries.end(delivery, "delivered")
+                self._deliveries.succeed(delivery)
                 log.info("callback delivered")
             elif answer.status == GONE:
                 self._give_up(delivery, "its receiver is gone (410)")
             else:
-                self._failed(delivery, f"answered {answer.status}: {answer.text[:200]}", answer.retry_after_s)
+                self._failed(delivery, f"answered {answer.status}: {_printable(answer.text)}", answer.retry_after_s)
 
     def _send(self, url: str, job: Job) -> webhook.Answer:
         body = JobEvent.of(job).model_dump_json().encode()
@@ -89,9 +83,14 @@ class Callbacks:
             self._give_up(delivery, why)
             return
         pause_s = max(PAUSES_S[delivery.attempt - 1], min(asked_s, LONGEST_ASKED_S)) * random.uniform(1, 1 + JITTER)
-        self._deliveries.again(delivery, self._now() + timedelta(seconds=pause_s))
+        self._deliveries.again(delivery, self._now() + timedelta(seconds=pause_s), why)
         log.warning("callback failed", why=why, again_in_s=round(pause_s))
 
     def _give_up(self, delivery: Delivery, why: str) -> None:
-        self._deliveries.end(delivery, "given-up")
+        self._deliveries.give_up(delivery, why)
         log.error("callback given up", why=why)
+
+
+def _printable(text: str) -> str:
+    """The beginning of what a receiver said: it may have said anything, and no database keeps a NUL."""
+    return "".join(sign if sign.isprintable() else " " for sign in text[:200])

@@ -35,6 +35,7 @@ from service.store.engine import AWAY, connect, migrate
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs, Task
 from service.store.workers import Workers
+from worker import retention
 from worker.callbacks import Callbacks
 from worker.message import Message
 from worker.retention import Retention
@@ -91,10 +92,10 @@ class Worker:
         self._queue = WorkerQueue(
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt
         )
-        self._retention = Retention(
-            settings, Expiry(engine), Blobs(settings.home_blob_url), self._workers, self._queue.forget
-        )
-        self._callbacks = Callbacks(settings, Deliveries(engine), self._jobs)
+        blobs = Blobs(settings.home_blob_url, retention.PATIENCE_S)
+        self._retention = Retention(settings, Expiry(engine), blobs, self._workers, self._queue.forget)
+        deliveries = Deliveries(engine)
+        self._callbacks = Callbacks(settings, deliveries, self._jobs, deliveries.now)
 
     def start(self) -> None:
         """Show up and take jobs."""

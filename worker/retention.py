@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 
 import structlog
 
@@ -25,6 +25,9 @@ BREATH_S = 2.0
 # Between two looks at whether a round is due.
 LOOK_S = 10.0
 TRY_AGAIN_AFTER = timedelta(hours=1)
+# A store that is away is asked for so long about a folder, and about so many folders per round.
+PATIENCE_S = 10.0
+FAILURES = 3
 log = structlog.get_logger()
 
 
@@ -52,7 +55,7 @@ class Retention:
         short = self._disk.short()
         if (time.monotonic() < self._due and not short) or not self._chosen():
             return min(LOOK_S, self._settings.tidy_every_s)
-        if self.round(datetime.now(UTC), short_of_room=short):
+        if self.round(self._expiry.now(), short_of_room=short):
             return BREATH_S
         self._due = time.monotonic() + self._settings.tidy_every_s
         return min(LOOK_S, self._settings.tidy_every_s)
@@ -89,13 +92,18 @@ class Retention:
         return len(job_ids)
 
     def _sweep(self, now: datetime) -> int:
-        folders = self._expiry.leftovers(now, BATCH)
-        for folder in folders:
+        swept = failed = 0
+        for folder in self._expiry.leftovers(now, BATCH):
+            if failed == FAILURES:
+                # The store is away: those behind these keep their place.
+                break
             try:
                 self._blobs.delete_under(folder)
             except Exception:  # whatever the store says about this folder, the others need not wait for it
                 log.warning("cannot delete", folder=folder, exc_info=True)
                 self._expiry.postpone(folder, now + TRY_AGAIN_AFTER)
+                failed += 1
             else:
                 self._expiry.swept(folder)
-        return len(folders)
+                swept += 1
+        return swept

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request, Response
@@ -17,7 +17,7 @@ from service import callbacks
 from service import frames as border
 from service.context import Context, InContext, VenueIdPath
 from service.problems import Problem, invalid
-from service.routes.documented import needs, problems, reference
+from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import RETRY_AFTER_S, job_answer
 from service.routes.venues import no_such_venue
@@ -38,6 +38,7 @@ router = APIRouter(tags=["jobs"], route_class=Guarded)
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
 KEY_DESCRIPTION = "The same key and the same content are the same job, for as long as that job is kept."
 LONGEST_OPTIONS = 64 * 1024
+PARTS_TOO_MANY = 100
 # Longer than any upload takes from its first stored frame to its job.
 UPLOAD_GRACE = timedelta(hours=1)
 UPLOAD: dict[str, Any] = {
@@ -50,7 +51,8 @@ UPLOAD: dict[str, Any] = {
                     "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part "
                     "to send several frames of a camera, they are fused.",
                     "properties": {OPTIONS_PART: reference(Options)},
-                    "additionalProperties": {"type": "array", "items": {"type": "string", "format": "binary"}},
+                    # Not an array: generators write code for a repeated part of any name that does not compile.
+                    "additionalProperties": {"type": "string", "format": "binary"},
                 },
                 "encoding": {OPTIONS_PART: {"contentType": "application/json"}},
             }
@@ -64,8 +66,9 @@ UPLOAD: dict[str, Any] = {
     status_code=202,
     response_model=Job,
     responses={
-        200: {"model": Job, "description": "This content is already a job"},
-        **problems(404, 409, 413, 415, 422, 429, 507),
+        200: {"model": Job, "description": "This content is already a job", **headers("ETag")},
+        202: headers("ETag", "Location", "Retry-After"),
+        **problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
     },
     openapi_extra=UPLOAD | needs("calibrate"),
 )
@@ -79,8 +82,10 @@ async def calibrate(
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
         raise Problem("not-multipart", "Send each frame as a file part named by its camera, as curl -F does.")
     stored = await run_in_threadpool(_expecting, context, venue_id)
-    # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time.
-    async with request.form(max_files=2000, max_fields=100, max_part_size=LONGEST_OPTIONS) as form:
+    # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time. A few parts too many
+    # get the answer that names their camera.
+    most = len(stored.cameras) * context.settings.max_frames_per_camera + PARTS_TOO_MANY
+    async with request.form(max_files=most, max_fields=PARTS_TOO_MANY, max_part_size=LONGEST_OPTIONS) as form:
         return await run_in_threadpool(submit, context, stored, form, idempotency_key)
 
 
@@ -113,7 +118,7 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
             return job_answer(known)
         seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
         # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
-        context.expiry.expect_upload(job_id, datetime.now(UTC) + UPLOAD_GRACE)
+        context.expiry.expect_upload(job_id, UPLOAD_GRACE)
         paths = _store(context, job_id, files)
         submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths)
         job, new = context.jobs.submit(submission, context.settings.queue_limit, context.queue.enqueue)

@@ -21,6 +21,11 @@ SECURITY_SCHEMES = {
         "that listens on loopback and has no keys asks for none.",
     }
 }
+HEADERS: dict[str, dict[str, Any]] = {
+    "ETag": {"description": "For If-None-Match and If-Match.", "schema": {"type": "string"}},
+    "Location": {"description": "The job.", "schema": {"type": "string", "format": "uri-reference"}},
+    "Retry-After": {"description": "In seconds.", "schema": {"type": "integer", "minimum": 0}},
+}
 # Of a route that anybody may call.
 FOR_ALL: dict[str, Any] = {"security": []}
 
@@ -62,3 +67,8 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Entries for `responses=` of a route."""
     content = {MEDIA_TYPE: {"schema": reference(ProblemDetails)}}
     return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
+
+
+def headers(*names: str) -> dict[str, Any]:
+    """Of an entry for `responses=`: the headers that this answer always has."""
+    return {"headers": {name: {"required": True, **HEADERS[name]} for name in names}}

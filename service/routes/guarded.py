@@ -24,7 +24,7 @@ class Guarded(APIRoute):
             raise TypeError(f"{path} must say who may call it: openapi_extra=needs(a scope) or =FOR_ALL")
         self.needed: Scope | None = security[0][KEY_SCHEME][0] if security else None
         if self.needed:
-            rest["responses"] = {**problems(401, 403, 429), **(rest.get("responses") or {})}
+            rest["responses"] = {**problems(401, 403, 421, 429), **(rest.get("responses") or {})}
         super().__init__(path, endpoint, **rest)
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterable, Callable
+from http import HTTPStatus
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Header, Path, Query, Response
+import structlog
+from fastapi import APIRouter, Depends, Header, HTTPException, Path, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service import etags
 from service.context import Context, InContext, JobIdPath
 from service.problems import Problem
-from service.routes.documented import needs, problems
+from service.routes.documented import headers, needs, problems
 from service.routes.guarded import Guarded
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, Job, Jobs, Status
+from service.store.engine import AWAY
 from service.store.jobs import Pictures, State
 
+log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
 RETRY_AFTER_S = 2
@@ -71,7 +75,7 @@ def list_jobs(
     "/{job_id}",
     openapi_extra=needs("read"),
     response_model=Job,
-    responses={304: {"description": "Unchanged"}, **problems(404)},
+    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
 )
 async def get_job(
     job: Existing,
@@ -93,19 +97,39 @@ def cancel_job(job: Existing, context: InContext) -> Response:
     return job_answer(context.jobs.get(job.id) or job)
 
 
+async def _not_seen_to_its_end(
+    job: Existing,
+    context: InContext,
+    last_event_id: Annotated[str | None, Header(description="The id of the last event that arrived.")] = None,
+) -> None:
+    """A browser connects again after the end, and again: 204 is how it is told that there is no more."""
+    if job.open or last_event_id is None:
+        return
+    state = await _state(context, job)
+    if state is not None and last_event_id == str(state.revision):
+        raise HTTPException(HTTPStatus.NO_CONTENT)
+
+
 @router.get(
-    "/{job_id}/events", openapi_extra=needs("read"), response_class=EventSourceResponse, responses=problems(404)
+    "/{job_id}/events",
+    openapi_extra=needs("read"),
+    response_class=EventSourceResponse,
+    dependencies=[Depends(_not_seen_to_its_end)],
+    responses={204: {"description": "The event of `Last-Event-ID` was the end"}, **problems(404)},
 )
 async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerSentEvent]:
-    """The job as server-sent events: `progress` whenever it changes, `end` when it has ended."""
-    while True:
-        state = (await run_in_threadpool(context.jobs.states, [job.id])).get(job.id)
-        job = await _read_again(context, job)
-        if not job.open:
-            yield ServerSentEvent(data=job, event="end")
+    """The job as server-sent events: `progress` whenever it changes and every 10 s, `end` when it has ended."""
+    while not context.watch.closed:
+        try:
+            state = await _state(context, job)
+            job = await _read_again(context, job)
+        except AWAY:
+            # The client connects again, as after any stream that broke off.
+            log.warning("cannot tell of a job", exc_info=True)
             return
-        yield ServerSentEvent(data=job, event="progress")
-        if context.watch.closed:
+        number = None if state is None else str(state.revision)
+        yield ServerSentEvent(data=job, event="progress" if job.open else "end", id=number)
+        if not job.open:
             return
         await context.watch.until(job.id, _later_than(state), EVENT_AT_LEAST_EVERY_S)
 
@@ -162,6 +186,10 @@ def _why_deleted(pictures: Pictures, keep_days: float) -> str:
 
 def _later_than(seen: State | None) -> Callable[[State], bool]:
     return lambda state: seen is None or state.revision > seen.revision
+
+
+async def _state(context: Context, job: Job) -> State | None:
+    return (await run_in_threadpool(context.jobs.states, [job.id])).get(job.id)
 
 
 async def _read_again(context: Context, job: Job) -> Job:

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Header, Query, Response
 from service import etags
 from service.context import InContext, VenueIdPath
 from service.problems import Problem
-from service.routes.documented import needs, problems
+from service.routes.documented import headers, needs, problems
 from service.routes.guarded import Guarded
 from service.schemas import ID_PATTERN, PoseHistory, Venue, VenueIn, Venues
 
@@ -21,7 +21,15 @@ def no_such_venue(venue_id: str) -> Problem:
     return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
 
 
-@router.put("/{venue_id}", openapi_extra=needs("admin"), responses={201: {"model": Venue}, **problems(412, 422)})
+@router.put(
+    "/{venue_id}",
+    openapi_extra=needs("admin"),
+    responses={
+        200: headers("ETag"),
+        201: {"model": Venue, **headers("ETag")},
+        **problems(400, 408, 412, 413, 415, 422),
+    },
+)
 def put_venue(
     venue_id: VenueIdPath,
     venue: VenueIn,
@@ -64,7 +72,7 @@ def list_venues(
     "/{venue_id}",
     openapi_extra=needs("read"),
     response_model=Venue,
-    responses={304: {"description": "Unchanged"}, **problems(404)},
+    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
 )
 def get_venue(
     venue_id: VenueIdPath,
@@ -106,7 +114,12 @@ def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[
         if before is None:
             raise no_such_venue(venue_id)
         if active_job is not None:
-            raise Problem("venue-busy", "Wait for the job or cancel it.", job=active_job)
+            raise Problem(
+                "venue-busy",
+                "Wait for the job or cancel it.",
+                headers={"Location": f"/jobs/{active_job}"},
+                job=active_job,
+            )
         tag = _tag(before)
         if if_match is not None and not etags.names(if_match, tag):
             raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)

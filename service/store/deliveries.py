@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Literal
 
 import sqlalchemy as sa
 
+from service.schemas import CallbackState
 from service.store import tables
-from service.store.engine import reading, serialise, writing
+from service.store.engine import clock, reading, serialise, writing
 
-Outcome = Literal["delivered", "given-up"]
+LONGEST_ERROR = 500
 d = tables.deliveries.c
 
 
@@ -34,6 +34,11 @@ class Deliveries:
     def __init__(self, engine: sa.Engine) -> None:
         self._engine = engine
 
+    def now(self) -> datetime:
+        """The time that deliveries are due by."""
+        with reading(self._engine) as connection:
+            return clock(connection)
+
     def attempt(self, now: datetime, again_at: datetime, limit: int) -> list[Delivery]:
         """Up to `limit` that are due; due again at `again_at` unless their end is written down before."""
         due = sa.select(tables.deliveries).where(d.status == "waiting", d.due_at <= now).order_by(d.due_at).limit(limit)
@@ -47,13 +52,17 @@ class Deliveries:
             connection.execute(begun.values(attempts=d.attempts + 1, due_at=again_at))
             return [Delivery(row.job, row.url, row.attempts + 1) for row in rows]
 
-    def again(self, delivery: Delivery, at: datetime) -> None:
+    def again(self, delivery: Delivery, at: datetime, why: str) -> None:
         """An attempt failed; there will be another."""
-        self._write(delivery, due_at=at)
+        self._write(delivery, due_at=at, last_error=why[:LONGEST_ERROR])
 
-    def end(self, delivery: Delivery, outcome: Outcome) -> None:
+    def succeed(self, delivery: Delivery) -> None:
+        """The receiver knows."""
+        self._write(delivery, status="delivered")
+
+    def give_up(self, delivery: Delivery, why: str) -> None:
         """No attempt will follow."""
-        self._write(delivery, status=outcome)
+        self._write(delivery, status="given-up", last_error=why[:LONGEST_ERROR])
 
     def counts(self) -> dict[str, int]:
         """How many are waiting, delivered and given up."""
@@ -71,3 +80,16 @@ class Deliveries:
 def add_delivery(connection: sa.Connection, job_id: str, url: str, now: datetime) -> None:
     """Have `url` told that the job has ended, when and if the caller's transaction commits."""
     connection.execute(sa.insert(tables.deliveries).values(job=job_id, url=url, status="waiting", due_at=now))
+
+
+def delivery_of(connection: sa.Connection, job_id: str) -> CallbackState | None:
+    """How far the telling of a job's end has come; None: nobody is to be told (yet)."""
+    row = connection.execute(sa.select(tables.deliveries).where(d.job == job_id)).one_or_none()
+    if row is None:
+        return None
+    return CallbackState(
+        state=row.status,
+        attempts=row.attempts,
+        last_error=row.last_error,
+        next_attempt_at=row.due_at if row.status == "waiting" else None,
+    )

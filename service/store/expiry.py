@@ -10,12 +10,12 @@ The last accepted job of each venue, the one that brought its poses, is past no 
 from __future__ import annotations
 
 from collections.abc import Collection
-from datetime import datetime
+from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.engine import reading, serialise, writing
+from service.store.engine import clock, reading, serialise, writing
 from service.store.jobs import frame_folder, pictures_folder
 
 j = tables.jobs.c
@@ -37,6 +37,11 @@ class Expiry:
 
     def __init__(self, engine: sa.Engine) -> None:
         self._engine = engine
+
+    def now(self) -> datetime:
+        """The time by which jobs end and things are due."""
+        with reading(self._engine) as connection:
+            return clock(connection)
 
     def expire_frames(self, ended_before: datetime, now: datetime, limit: int) -> int:
         """Let up to `limit` jobs that ended before a moment, the oldest first, have no frames; says how many."""
@@ -69,10 +74,10 @@ class Expiry:
             connection.execute(sa.delete(tables.deliveries).where(tables.deliveries.c.job.in_(job_ids)))
             self._leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)
 
-    def expect_upload(self, job_id: str, until: datetime) -> None:
-        """Frames are about to be stored; unless they have become this job by then they are nobody's."""
+    def expect_upload(self, job_id: str, grace: timedelta) -> None:
+        """Frames are about to be stored; unless they become this job within the grace they are nobody's."""
         with writing(self._engine) as connection:
-            self._leave(connection, [frame_folder(job_id)], until)
+            self._leave(connection, [frame_folder(job_id)], clock(connection) + grace)
 
     def leftovers(self, now: datetime, limit: int) -> list[str]:
         """Up to `limit` folders whose files are to be deleted."""

@@ -3,6 +3,8 @@
 The row is the one truth about a job. The engine of the queue only decides when a worker looks at it; whether there is
 still something to do is decided here. Every write of a worker carries the token of its attempt (`run_token`) and
 changes nothing when the job was cancelled or given to another attempt meanwhile.
+
+Moments are the database's: the clocks of several machines differ.
 """
 
 from __future__ import annotations
@@ -12,15 +14,15 @@ import time
 import uuid
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from typing import Any
 
 import sqlalchemy as sa
 
 from service.schemas import OPEN, Job, JobError, Options, Progress, Result, Status, Venue
 from service.store import tables
-from service.store.deliveries import add_delivery
-from service.store.engine import reading, serialise, writing
+from service.store.deliveries import add_delivery, delivery_of
+from service.store.engine import clock, reading, serialise, writing
 from service.store.venues import find_venue, save_poses, save_venue
 
 PRIORITIES = {"live": 1, "routine": 100}
@@ -122,7 +124,6 @@ class Jobs:
 
         The job begins from the poses that hold now: others may have been found since the upload began.
         """
-        now = datetime.now(UTC)
         with writing(self._engine) as connection:
             serialise(connection)
             same = self._duplicate(connection, submission.venue.id, submission.idempotency_key, submission.content_hash)
@@ -136,7 +137,7 @@ class Jobs:
             waiting = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued"))
             if waiting is not None and waiting >= queue_limit:
                 raise QueueFull
-            priority = PRIORITIES[submission.options.priority]
+            priority, now = PRIORITIES[submission.options.priority], clock(connection)
             connection.execute(
                 sa.insert(tables.jobs).values(
                     id=submission.job_id,
@@ -229,20 +230,20 @@ class Jobs:
 
     def begin(self, job_id: str) -> Task | None:
         """Start an attempt; None if there is nothing to do any more."""
-        token, now = uuid.uuid4().hex, datetime.now(UTC)
-        begin = (
-            sa.update(tables.jobs)
-            .where(j.id == job_id, j.status.in_(OPEN))
-            .values(
-                status="running",
-                run_token=token,
-                attempt=j.attempt + 1,
-                started_at=sa.func.coalesce(j.started_at, now, type_=j.started_at.type),
-                progress=None,
-                **_changed(),
-            )
-        )
         with writing(self._engine) as connection:
+            now = clock(connection)
+            begin = (
+                sa.update(tables.jobs)
+                .where(j.id == job_id, j.status.in_(OPEN))
+                .values(
+                    status="running",
+                    run_token=uuid.uuid4().hex,
+                    attempt=j.attempt + 1,
+                    started_at=sa.func.coalesce(j.started_at, now, type_=j.started_at.type),
+                    progress=None,
+                    **_changed(now),
+                )
+            )
             if connection.execute(begin).rowcount == 0:
                 return None
             return self._task(connection, job_id)
@@ -255,16 +256,15 @@ class Jobs:
 
     def keep(self, task: Task) -> bool:
         """A sign of life of an attempt; False if it has lost the job, to a cancellation or to another attempt."""
-        alive = sa.update(tables.jobs).where(*_fence(task)).values(updated_at=datetime.now(UTC))
         with writing(self._engine) as connection:
+            alive = sa.update(tables.jobs).where(*_fence(task)).values(updated_at=clock(connection))
             return connection.execute(alive).rowcount == 1
 
     def report(self, task: Task, progress: Progress) -> None:
         """Show how far the job is."""
         with writing(self._engine) as connection:
-            connection.execute(
-                sa.update(tables.jobs).where(*_fence(task)).values(progress=progress.model_dump(), **_changed())
-            )
+            shown = {"progress": progress.model_dump(), **_changed(clock(connection))}
+            connection.execute(sa.update(tables.jobs).where(*_fence(task)).values(**shown))
 
     def finish(self, task: Task, result: Result, pictures: Sequence[str]) -> None:
         """End a job with a result and the names of its pictures.
@@ -309,8 +309,9 @@ class Jobs:
 
     def unchanged_for(self, seconds: float) -> list[str]:
         """Open jobs that nothing was heard of for a while."""
-        query = sa.select(j.id).where(j.status.in_(OPEN), j.updated_at < datetime.now(UTC) - timedelta(seconds=seconds))
         with reading(self._engine) as connection:
+            before = clock(connection) - timedelta(seconds=seconds)
+            query = sa.select(j.id).where(j.status.in_(OPEN), j.updated_at < before)
             return list(connection.scalars(query.order_by(j.updated_at).limit(100)))
 
     def abandon(self, job_id: str, error: JobError) -> None:
@@ -328,8 +329,8 @@ class Jobs:
         status: Status,
         **values: Any,
     ) -> None:
-        now = datetime.now(UTC)
-        end = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **_changed())
+        now = clock(connection)
+        end = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **_changed(now))
         if connection.execute(end).rowcount == 0:
             return
         options = Options.model_validate(connection.scalar(sa.select(j.options).where(j.id == job_id)))
@@ -364,6 +365,7 @@ class Jobs:
             finished_at=row.finished_at,
             error=row.error,
             result=row.result,
+            callback=delivery_of(connection, row.id) if row.finished_at and row.options["callback_url"] else None,
             links=_links(row),
         )
 
@@ -396,8 +398,8 @@ def _open(job_id: str) -> list[sa.ColumnElement[bool]]:
     return [j.id == job_id, j.status.in_(OPEN)]
 
 
-def _changed() -> dict[str, Any]:
-    return {"revision": j.revision + 1, "updated_at": datetime.now(UTC)}
+def _changed(now: datetime) -> dict[str, Any]:
+    return {"revision": j.revision + 1, "updated_at": now}
 
 
 def _links(row: Any) -> dict[str, str]:

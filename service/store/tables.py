@@ -121,6 +121,8 @@ deliveries = sa.Table(
     sa.Column("attempts", sa.Integer, nullable=False, default=0),
     # Of the next attempt.
     sa.Column("due_at", Instant, nullable=False),
+    # Why the last attempt that failed did.
+    sa.Column("last_error", sa.String(500)),
     sa.Index("deliveries_by_due", "status", "due_at"),
 )
 

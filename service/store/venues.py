@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import UTC, datetime
 
 import sqlalchemy as sa
 
 from service.schemas import HeldPose, Pose, Venue
 from service.store import tables
-from service.store.engine import reading, serialise, writing
+from service.store.engine import clock, reading, serialise, writing
 
 
 class Venues:
@@ -77,7 +76,7 @@ def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:
 
 def save_venue(connection: sa.Connection, venue: Venue) -> None:
     """Create or replace a venue, inside the caller's serialised transaction."""
-    values = {"document": venue.model_dump(mode="json"), "updated_at": datetime.now(UTC)}
+    values = {"document": venue.model_dump(mode="json"), "updated_at": clock(connection)}
     table = tables.venues
     replaced = connection.execute(sa.update(table).where(table.c.id == venue.id).values(**values))
     if replaced.rowcount == 0:
@@ -88,7 +87,7 @@ def save_poses(
     connection: sa.Connection, venue_id: str, poses: dict[str, Pose], cause: str, job: str | None = None
 ) -> None:
     """Add poses that hold from now on to the history, inside the caller's transaction."""
-    now = datetime.now(UTC)
+    now = clock(connection)
     rows = [
         {"venue": venue_id, "camera": camera, "pose": pose.model_dump(), "cause": cause, "job": job, "since": now}
         for camera, pose in poses.items()

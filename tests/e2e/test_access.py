@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import time
@@ -19,9 +21,8 @@ from service.store.keys import Keys
 from tests.e2e.running import Service, png, upload, venue, wait_for
 
 SCOPES = ("read", "calibrate", "admin")
-OPEN = {"/livez", "/readyz", "/problems/{kind}"}
-# FastAPI's own pages: what the service can do is no secret.
-DOCUMENTS = {"/openapi.json", "/docs", "/docs/oauth2-redirect", "/redoc"}
+# What the service can do is no secret.
+OPEN = {"/livez", "/readyz", "/problems/{kind}", "/docs", "/docs/rapidoc-min.js", "/docs/LICENSE.txt"}
 NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "DELETE": "admin"}
 JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"
 
@@ -81,7 +82,7 @@ def esc(folder, *arguments, **environment):
 def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
     for route in routes:
         if not isinstance(route.original_route, Guarded):
-            assert route.path in DOCUMENTS, f"{route.path} is not guarded"
+            assert route.path == "/openapi.json", f"{route.path} is not guarded"
             continue
         (method,) = route.methods
         needed = None if route.path in OPEN else NEEDED[method]
@@ -222,3 +223,87 @@ def test_the_log_names_the_key_and_does_not_hold_it(guarded, key):
     assert set(SCOPES) <= named
     for secret in (*key.values(), "esc_guessed"):
         assert secret not in log
+
+
+# Pages that the browsers of this machine show
+
+
+@pytest.fixture(scope="module")
+def open_to_all(tmp_path_factory):
+    """A service without keys, called by its address, by localhost and by one name."""
+    running = Service(tmp_path_factory.mktemp("open"), "serve", ESC_ALLOWED_HOSTS='["esc.truck.lan"]')
+    yield running
+    assert running.stop() == 0
+
+
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1:8000", "localhost", "LOCALHOST:1", "[::1]:80", "10.0.0.7", "esc.truck.lan"]
+)
+def test_a_service_without_keys_answers_to_its_own_names(open_to_all, host):
+    assert open_to_all.http.get("/jobs", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8000", "localhost.evil.example", "127.0.0.1.nip.io", "[", ""]
+)
+def test_and_to_no_other_name_that_was_made_to_point_to_it(open_to_all, host):
+    answer = open_to_all.http.get("/jobs", headers={"Host": host})
+    assert (answer.status_code, answer.json()["type"]) == (421, "/problems/host-unknown")
+    assert "ESC_ALLOWED_HOSTS" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("origin", ["https://evil.example", "http://127.0.0.1:1", "null", "http://[", ""])
+def test_pages_of_other_origins_change_nothing(open_to_all, origin):
+    for method, path in (("PUT", "/venues/v"), ("DELETE", "/venues/v"), ("POST", "/venues/v/calibrate")):
+        answer = open_to_all.http.request(method, path, headers={"Origin": origin})
+        assert (answer.status_code, answer.json()["type"]) == (403, "/problems/origin-foreign")
+
+
+def test_pages_of_the_service_may(open_to_all):
+    for origin in (open_to_all.url, "https://esc.truck.lan"):
+        answer = open_to_all.http.put("/venues/v", json=venue("v"), headers={"Origin": origin})
+        assert answer.is_success
+
+
+def test_no_answer_may_be_embedded_or_guessed_at_elsewhere(open_to_all):
+    for path in ("/jobs", "/docs", "/nowhere"):
+        headers = open_to_all.http.get(path).headers
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["cross-origin-resource-policy"] == "same-origin"
+        assert "access-control-allow-origin" not in headers
+
+
+def test_a_key_is_enough_under_any_name(guarded, key):
+    elsewhere = {"Host": "esc.example.com", "Origin": "https://planner.example.com"}
+    assert guarded.http.get("/jobs", headers=bearer(key["read"]) | elsewhere).status_code == 200
+
+
+# The documentation, in a truck without internet
+
+
+def test_the_documentation_needs_nothing_from_elsewhere(open_to_all):
+    page = open_to_all.http.get("/docs")
+    assert page.headers["content-security-policy"].startswith("default-src 'none'; script-src 'self'")
+    assert "://" not in page.text
+    (script,) = re.findall(r'src="([^"]+)"', page.text)
+    answer = open_to_all.http.get(script)
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "text/javascript; charset=utf-8")
+    assert "MIT License" in open_to_all.http.get("/docs/LICENSE.txt").text
+
+
+def test_a_browser_without_internet_draws_it(open_to_all, tmp_path, missing):
+    browser = shutil.which("chromium") or missing("browser")
+    shown = subprocess.run(
+        [
+            *(browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
+            *(f"--user-data-dir={tmp_path}", "--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1"),
+            *("--window-size=1200,4000", "--virtual-time-budget=10000", f"--print-to-pdf={tmp_path}/docs.pdf"),
+            *("--enable-logging=stderr", f"{open_to_all.url}/docs"),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert "Content Security Policy" not in shown.stderr
+    asked = [json.loads(line) for line in (open_to_all.data / "log").read_text().splitlines()]
+    assert "/openapi.json" in [one.get("path") for one in asked]

@@ -183,6 +183,13 @@ def test_a_bad_frame_without_a_server_is_told_too(esc, tmp_path):
     assert "left ends before its picture does" in answer.stderr
 
 
+def test_a_callback_without_a_server_is_said_to_be_of_no_use(esc, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue("v")))
+    (tmp_path / "left.png").write_bytes(b"no picture, so that nothing is computed")
+    answer = esc("run", "venue.json", *FRAMES, "-o", "out", "--options", '{"callback_url": "https://example.com/"}')
+    assert (answer.returncode, "callback_url is not used" in answer.stderr) == (1, True)
+
+
 def test_a_worker_alone_serves_an_api_alone(start):
     service = start("serve")
     command = [sys.executable, "-m", "service.cli", "worker", "--name", "alone"]

@@ -2,6 +2,7 @@ import json
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import httpx
 import pytest
 
 from service.store.blobs import Blobs
@@ -131,6 +132,7 @@ def test_the_same_frames_give_the_running_job_back_and_others_a_conflict(service
     for other in (service.submit(name, 1), service.submit(name, generations=9)):
         assert other.status_code == 409
         assert (other.json()["type"], other.json()["job"]) == ("/problems/venue-busy", job)
+        assert service.http.get(other.headers["location"]).json()["id"] == job
         assert "retry-after" in other.headers
     assert service.http.delete(f"/venues/{name}").json()["job"] == job
     assert service.end(job)["status"] == "succeeded"
@@ -171,6 +173,18 @@ def test_many_submissions_at_once_are_one_job(service, name):
     job = {answer.json()["id"] for answer in answers}
     assert len(job) == 1
     assert len(service.files(f"frames/{next(iter(job))}")) == 2
+
+
+@in_both_homes
+def test_a_key_that_comes_twice_at_once_is_one_job_whatever_came_with_it(service, name):
+    service.venue(name, "accept 1")
+    key = {"Idempotency-Key": "k"}
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda number: service.submit(name, number % 2, headers=key), range(8)))
+    assert sorted(answer.status_code for answer in answers) == [200] * 3 + [202] + [422] * 4
+    refused = {answer.json()["type"] for answer in answers if answer.status_code == 422}
+    assert refused == {"/problems/idempotency-key-reused"}
+    assert len({answer.json()["id"] for answer in answers if answer.status_code < 300}) == 1
 
 
 # Following a job
@@ -221,6 +235,59 @@ def test_events_tell_the_progress_and_the_end(service, name):
     assert set(events[:-1]) == {"progress"}
     assert bodies[-1]["status"] == "succeeded"
     assert any(body["progress"] and body["progress"]["stage"] == "evolution" for body in bodies)
+
+
+@in_both_homes
+def test_who_saw_the_end_and_connects_again_is_told_that_there_is_no_more(service, name):
+    job = service.end(service.submit(service.venue(name)).json()["id"])["id"]
+    lines = [line.partition(": ") for line in service.http.get(f"/jobs/{job}/events").text.splitlines()]
+    (number,) = [value for field, _, value in lines if field == "id"]
+    again = service.http.get(f"/jobs/{job}/events", headers={"Last-Event-ID": number})
+    assert (again.status_code, again.content) == (204, b"")
+    missed_it = service.http.get(f"/jobs/{job}/events", headers={"Last-Event-ID": "1"})
+    assert "event: end" in missed_it.text
+
+
+def test_everybody_who_listens_hears_the_end(service, name):
+    service.venue(name, "accept 2")
+    job = service.submit(name).json()["id"]
+    with ThreadPoolExecutor(30) as pool:
+        heard = list(pool.map(lambda _: httpx.get(f"{service.url}/jobs/{job}/events", timeout=30).text, range(30)))
+    for text in heard:
+        assert text.count("event: end") == 1
+        assert text.count("event: progress") > 1
+
+
+def test_a_stream_of_events_ends_with_the_service(start):
+    service = start().ready()
+    job = service.submit(service.venue("v", "hang")).json()["id"]
+    service.running(job)
+    with httpx.stream("GET", f"{service.url}/jobs/{job}/events") as events:
+        lines = events.iter_lines()
+        assert next(lines) == "event: progress"
+        begun = time.monotonic()
+        assert service.stop() == 0
+        assert all("end" not in line for line in lines if line.startswith("event"))
+    assert time.monotonic() - begun < 10
+
+
+def test_a_picture_can_be_asked_for_without_its_bytes(service, name):
+    job = service.end(service.submit(service.venue(name)).json()["id"])
+    for link in ("self", "preview"):
+        whole, without = service.http.get(job["links"][link]), service.http.head(job["links"][link])
+        assert (without.status_code, without.content) == (200, b"")
+        for field in ("content-type", "content-length", "etag", "cache-control"):
+            assert without.headers.get(field) == whole.headers.get(field)
+    assert service.http.head("/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D").status_code == 404
+
+
+def test_a_page_goes_on_where_the_last_one_ended_whatever_came_in_between(service, name):
+    service.venue(name)
+    ids = [service.end(service.submit(name, shade).json()["id"])["id"] for shade in range(3)]
+    first = service.http.get("/jobs", params={"venue": name, "limit": 2}).json()
+    service.end(service.submit(name, 3).json()["id"])
+    rest = service.http.get("/jobs", params={"venue": name, "limit": 2, "cursor": first["next_cursor"]}).json()
+    assert [job["id"] for job in first["jobs"] + rest["jobs"]] == ids[::-1]
 
 
 def test_jobs_are_listed_newest_first_in_pages(service, name):

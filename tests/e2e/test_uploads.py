@@ -4,6 +4,8 @@ import json
 import re
 import socket
 import struct
+import subprocess
+import sys
 import zlib
 
 import cv2
@@ -38,6 +40,25 @@ def bomb() -> bytes:
     return png_of(struct.pack(">IIBBBBB", 20000, 20000, 1, 0, 0, 0, 0), zlib.compress(b"\0" * 2_000_000, 9))
 
 
+def png_with(size: tuple[int, int], chunk: bytes) -> bytes:
+    """A PNG of a size that says more than its pixels."""
+    start = png(*size)
+    kind, data = chunk[:4], chunk[4:]
+    extra = struct.pack(">I", len(data)) + chunk + struct.pack(">I", zlib.crc32(kind + data))
+    return start[:33] + extra + start[33:]
+
+
+def jpeg_that_claims(width: int, height: int) -> bytes:
+    """A small JPEG whose header speaks of a large one."""
+    data = jpeg()
+    frame = data.index(b"\xff\xc0")
+    return data[: frame + 5] + struct.pack(">HH", height, width) + data[frame + 9 :]
+
+
+PDF = b"%PDF-1.7\n1 0 obj<</Type/Catalog>>endobj\ntrailer<</Root 1 0 R>>\n%%EOF"
+SVG = b'<svg xmlns="http://www.w3.org/2000/svg"><script>alert(1)</script></svg>'
+GIF = b"GIF89a" + struct.pack("<HH", *SIZE) + b"\0\0\0;"
+
 HOSTILE = {
     "wrong size": (png(*reversed(SIZE)), "frame-size"),
     "wrong size as jpeg": (jpeg(*reversed(SIZE)), "frame-size"),
@@ -53,6 +74,17 @@ HOSTILE = {
     "half a jpeg header": (jpeg()[:30], "broken-image"),
     "half a png header": (png()[:20], "broken-image"),
     "pixel bomb": (bomb(), "too-many-pixels"),
+    "pixel bomb as jpeg": (jpeg_that_claims(65535, 65535), "too-many-pixels"),
+    "no pixels": (png_of(struct.pack(">IIBBBBB", 0, 0, 8, 0, 0, 0, 0), zlib.compress(b"")), "broken-image"),
+    "no pixels as jpeg": (jpeg_that_claims(0, 0), "broken-image"),
+    "pdf": (PDF, "not-an-image"),
+    "svg": (SVG, "not-an-image"),
+    "gif": (GIF, "not-an-image"),
+    "gif that ends as a jpeg": (GIF + jpeg(), "not-an-image"),
+    "a page before the picture": (b"<html>" + png(), "not-an-image"),
+    "a chunk of two gigabytes": (png()[:33] + struct.pack(">I4s", 2**31 - 1, b"IDAT") + b"x", "truncated-image"),
+    "a jpeg of markers": (b"\xff\xd8" + b"\xff" * 100_000, "broken-image"),
+    "a jpeg of frames": (jpeg()[:-2] + jpeg()[2:], "broken-image"),
 }
 
 
@@ -233,3 +265,37 @@ def test_an_upload_that_breaks_off_is_no_mistake_of_the_service(service, stadium
         connection.sendall(head.encode() + b"Content-Type: multipart/form-data; boundary=x\r\n\r\n--x\r\n")
     wait_for(lambda: "calibrate" in (service.data / "log").read_text().splitlines()[-1])
     assert "Traceback" not in (service.data / "log").read_text()
+
+
+MORE_THAN_A_PICTURE = {
+    "a page behind it": png(shade=41) + SVG,
+    "a megabyte behind it": png(shade=42) + bytes(1_000_000),
+    "100 MB of text in it": png_with(SIZE, b"zTXtbomb\0\0" + zlib.compress(bytes(100_000_000), 9)),
+    "100 MB of pixels in it": png_of(
+        struct.pack(">IIBBBBB", *SIZE, 8, 0, 0, 0, 0), zlib.compress(bytes(100_000_000), 9)
+    ),
+}
+DECODE = """
+import cv2, numpy, re, sys
+frame = cv2.imdecode(numpy.frombuffer(sys.stdin.buffer.read(), numpy.uint8), cv2.IMREAD_COLOR_BGR)
+print(frame.shape[1], frame.shape[0], re.search(r"VmHWM:\\s*(\\d+)", open("/proc/self/status").read())[1])
+"""
+
+
+@pytest.mark.parametrize("kind", MORE_THAN_A_PICTURE)
+def test_a_picture_with_more_in_it_is_taken_for_the_picture(service, send, kind):
+    answer = send(MORE_THAN_A_PICTURE[kind])
+    assert answer.status_code == 202, answer.text
+    assert service.end(answer.json()["id"])["status"] == "succeeded"
+
+
+def test_decoding_it_takes_no_more_room_than_its_pixels():
+    def decoded(data: bytes) -> tuple[int, int, int]:
+        said = subprocess.run([sys.executable, "-c", DECODE], input=data, capture_output=True, check=True).stdout
+        return tuple(map(int, said.split()))
+
+    *_, usual_kb = decoded(png())
+    for data in MORE_THAN_A_PICTURE.values():
+        width, height, peak_kb = decoded(data)
+        assert (width, height) == SIZE
+        assert peak_kb < usual_kb + 20_000

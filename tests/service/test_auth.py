@@ -39,8 +39,10 @@ def gate(keys, clock):
 
 def answer(gate, key=None, needed="read", address="192.0.2.1", scheme="Bearer"):
     """`passed`, or the problem that says why not."""
-    headers = [(b"authorization", f"{scheme} {key}".encode())] if key is not None else []
-    caller = HTTPConnection({"type": "http", "headers": headers, "client": (address, 50000)})
+    headers = [(b"host", b"localhost")]
+    if key is not None:
+        headers.append((b"authorization", f"{scheme} {key}".encode()))
+    caller = HTTPConnection({"type": "http", "method": "GET", "headers": headers, "client": (address, 50000)})
     try:
         asyncio.run(gate.admit(caller, needed))
     except Problem as problem:

@@ -1,7 +1,7 @@
 """What several processes do to one home at the same moment."""
 
 from concurrent.futures import ThreadPoolExecutor
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from threading import Barrier, Thread
 
 import pytest
@@ -16,6 +16,7 @@ from service.store.venues import Venues
 from service.store.workers import Workers
 from tests.e2e.running import venue
 from tests.homes import in_both_homes
+from tests.worker.stock import Stock
 
 LIMIT = 3
 SHIFTED = [0.0, -55.0, 9.0]
@@ -118,6 +119,23 @@ def test_the_poses_move_only_with_the_job_that_ends_with_them(engine, running, m
     meddler.join()
     moved = venues.get("v").cameras[0].pose.position == SHIFTED
     assert (jobs.get(running.job_id).status, moved) == ("succeeded", True)
+
+
+def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(servers, tmp_path, monkeypatch):
+    stock = Stock(tmp_path, **servers.settings(tmp_path))
+    wrong = type("Wrong", (datetime,), {"now": lambda zone: datetime.now(zone) + timedelta(days=3)})
+    with monkeypatch.context() as patch:
+        patch.setattr("service.store.engine.datetime", wrong)
+        job = stock.jobs.get(stock.submitted("v", callback_url="https://example.com/"))
+        stock.jobs.cancel(job.id)
+        stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", timedelta(hours=1))
+        assert stock.expiry.leftovers(stock.expiry.now(), 10) == []
+        assert stock.deliveries.attempt(stock.deliveries.now(), stock.deliveries.now(), 10)
+        assert stock.expiry.expire_frames(stock.expiry.now() - timedelta(days=2), stock.expiry.now(), 10) == 0
+    now, ended = datetime.now(UTC), stock.jobs.get(job.id)
+    for moment in (job.created_at, ended.finished_at, stock.expiry.now(), stock.deliveries.now()):
+        assert abs(now - moment) < timedelta(minutes=10)
+    stock.engine.dispose()
 
 
 def test_workers_are_not_dead_because_the_clock_of_their_machine_is_wrong(servers, tmp_path, monkeypatch):

@@ -62,6 +62,14 @@ class Receiver:
         self._server.server_close()
 
 
+class NulSaying(Receiver):
+    """Says what no database keeps."""
+
+    def respond(self, request: BaseHTTPRequestHandler, status: int) -> None:
+        super().respond(request, status)
+        request.wfile.write(b"no\0use")
+
+
 class Silent(Receiver):
     """Takes what comes and says nothing."""
 

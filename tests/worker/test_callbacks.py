@@ -13,7 +13,7 @@ import sqlalchemy as sa
 
 from service.settings import Settings
 from tests.homes import in_both_homes
-from tests.worker.receiver import Dripping, Endless, Receiver, Silent
+from tests.worker.receiver import Dripping, Endless, NulSaying, Receiver, Silent
 from tests.worker.stock import Stock
 from worker import webhook
 from worker.callbacks import ATTEMPT, Callbacks
@@ -24,8 +24,8 @@ LOCAL = {"webhook_secret": SECRET, "callback_allow_http": True, "callback_allow_
 
 class Clock:
     def __init__(self) -> None:
-        # Deliveries are due from the end of their job, which the real clock told.
-        self.now = datetime.now(UTC) + timedelta(seconds=1)
+        # Deliveries are due from the end of their job, which the real clock tells, however long that takes here.
+        self.now = datetime.now(UTC) + timedelta(minutes=5)
 
     def __call__(self) -> datetime:
         return self.now
@@ -83,7 +83,7 @@ def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
     (told,) = hook.received
     event = json.loads(told.body)
     assert event["type"] == "job.succeeded"
-    assert event["data"] == json.loads(home.jobs.get(job).model_dump_json())
+    assert event["data"] == json.loads(home.jobs.get(job).model_dump_json()) | {"callback": None}
     assert event["timestamp"] == event["data"]["finished_at"]
     assert (told.path, told.headers["content-type"]) == ("/told?by=esc", "application/json")
     assert told.headers["host"] == f"127.0.0.1:{hook.port}"
@@ -161,6 +161,38 @@ def test_what_fails_is_sent_again_after_ever_longer_pauses_with_the_same_id(stoc
     assert len({told.headers["webhook-timestamp"] for told in hook.received}) == 4
     assert len({told.body for told in hook.received}) == 1
     assert home.deliveries.counts() == {"delivered": 1}
+
+
+@in_both_homes
+def test_the_job_says_how_far_the_telling_has_come(stock, receiver, clock):
+    home, hook = stock(), receiver(NulSaying, 500, 200)
+    waiting = home.submitted("a", callback_url=hook.url)
+    assert home.jobs.get(waiting).callback is None
+    home.jobs.cancel(waiting)
+    assert home.jobs.get(waiting).callback.model_dump(exclude={"next_attempt_at"}) == {
+        "state": "waiting",
+        "attempts": 0,
+        "last_error": None,
+    }
+    callbacks(home, clock).look()
+    failed = home.jobs.get(waiting).callback
+    assert (failed.state, failed.attempts) == ("waiting", 1)
+    assert failed.last_error == "answered 500: no use"
+    assert failed.next_attempt_at > clock.now
+    clock.goes_on(seconds=6)
+    callbacks(home, clock).look()
+    told = home.jobs.get(waiting).callback
+    assert (told.state, told.attempts, told.next_attempt_at) == ("delivered", 2, None)
+    assert [job.callback for job in home.jobs.page(None, None, None, 10)] == [told]
+
+
+@in_both_homes
+def test_a_receiver_that_is_gone_is_left_alone_and_the_job_says_why(stock, receiver, clock):
+    home, hook = stock(), receiver(Receiver, 410)
+    job = ended(home, hook.url)
+    callbacks(home, clock).look()
+    end = home.jobs.get(job).callback
+    assert (end.state, end.last_error, end.next_attempt_at) == ("given-up", "its receiver is gone (410)", None)
 
 
 def test_after_a_day_it_is_given_up(stock, receiver, clock):

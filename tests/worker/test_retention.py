@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock
-from worker.retention import TRY_AGAIN_AFTER, Retention
+from worker.retention import FAILURES, TRY_AGAIN_AFTER, Retention
 
 pytestmark = in_both_homes
 NOW = datetime(2026, 11, 21, 10, tzinfo=UTC)
@@ -88,11 +88,12 @@ def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
 
 
 def test_frames_of_an_upload_that_became_no_job_go_after_their_grace(stock, retention):
-    stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", NOW)
+    grace = timedelta(hours=1)
+    stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", grace)
     stock.blobs.put("frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/left/0", b"frame")
-    retention.round(ago(seconds=1))
+    retention.round(stock.expiry.now())
     assert stock.files() == {"frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"}
-    retention.round(NOW)
+    retention.round(stock.expiry.now() + grace)
     assert stock.files() == set()
 
 
@@ -137,6 +138,26 @@ def test_a_folder_that_cannot_be_deleted_holds_up_no_other(stock, retention, mon
         retention.round(NOW)
     assert stock.files() == {f"frames/{stuck}"}
     retention.round(NOW + timedelta(hours=1))
+    assert stock.files() == set()
+
+
+def test_a_store_that_is_away_holds_up_a_round_for_few_folders(stock, retention, monkeypatch):
+    for days in range(FAILURES + 3):
+        stock.ended("a", ago(days=4 + days), accepted=None)
+    asked = []
+
+    def away(folder):
+        asked.append(folder)
+        raise TimeoutError(folder)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stock.blobs, "delete_under", away)
+        assert not retention.round(NOW)
+    assert len(asked) == FAILURES
+    # Those that were not asked for kept their place, those that failed come an hour later.
+    retention.round(NOW)
+    assert len(stock.files()) == FAILURES
+    retention.round(NOW + TRY_AGAIN_AFTER)
     assert stock.files() == set()
 
 

@@ -1,0 +1,38 @@
+"""The documentation in a browser: files of the package, nothing from the internet, so it works where there is none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fastapi import APIRouter
+from starlette.responses import FileResponse
+
+from service.routes.documented import FOR_ALL
+from service.routes.guarded import Guarded
+
+router = APIRouter(prefix="/docs", route_class=Guarded, include_in_schema=False)
+
+FILES = Path(__file__).parent.parent / "apidocs"
+# RapiDoc styles its elements in place.
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self'; "
+    "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+@router.get("", openapi_extra=FOR_ALL)
+async def page() -> FileResponse:
+    """The page."""
+    return FileResponse(FILES / "index.html", headers={"Content-Security-Policy": POLICY})
+
+
+@router.get("/rapidoc-min.js", openapi_extra=FOR_ALL)
+async def script() -> FileResponse:
+    """What draws it: RapiDoc 9.3.8."""
+    return FileResponse(FILES / "rapidoc-min.js", media_type="text/javascript")
+
+
+@router.get("/LICENSE.txt", openapi_extra=FOR_ALL)
+async def licence() -> FileResponse:
+    """Of that script."""
+    return FileResponse(FILES / "LICENSE.txt", media_type="text/plain")
