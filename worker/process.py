@@ -23,7 +23,7 @@ from typing import IO, TypeVar
 import structlog
 from pydantic import ValidationError
 
-from service import lifeline
+from service import lifeline, tracing
 from service.problems import KINDS, type_of
 from service.queue import WorkerQueue
 from service.queue import migrate as migrate_queue
@@ -38,6 +38,7 @@ from service.store.workers import Workers
 from worker.callbacks import Callbacks
 from worker.message import Message
 from worker.retention import Retention
+from worker.spans import Spans
 
 BEAT_S = 2.0
 # Twice as often as a cancellation needs to reach the child.
@@ -65,6 +66,7 @@ class NoMessage(Exception):  # noqa: N818
 def run(settings: Settings) -> None:
     """Work until SIGTERM or SIGINT; never returns."""
     lock = _only_one(settings)
+    tracing.configure("esc-worker", settings.worker_name)
     worker = Worker(settings)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -74,6 +76,7 @@ def run(settings: Settings) -> None:
     worker.look_after(stop)
     log.info("worker stops", worker=settings.worker_name)
     lock.close()
+    tracing.flush()
     # Threads may be waiting for children; those end with this process and their jobs are begun again.
     os._exit(0)
 
@@ -150,10 +153,11 @@ class Worker:
         if task is None:
             return
         limit_s = task.options.timeout_s or self._settings.job_timeout_s
-        with structlog.contextvars.bound_contextvars(job=job_id):
+        with structlog.contextvars.bound_contextvars(job=job_id, **task.origin.names()), Spans(task) as spans:
             log.info("job begins", venue=task.venue.id)
             try:
-                end = self._compute(task, limit_s)
+                end = self._compute(task, limit_s, spans)
+                spans.end(end)
                 _insist(lambda: self._write_down(task, end), begun + limit_s + OUTAGE_S)
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
@@ -161,7 +165,7 @@ class Worker:
                 _insist(lambda: self._jobs.fail(task, crashed), time.monotonic() + OUTAGE_S)
             log.info("job ends", seconds=round(time.monotonic() - begun, 2))
 
-    def _compute(self, task: Task, limit_s: float) -> Message | None:
+    def _compute(self, task: Task, limit_s: float, spans: Spans) -> Message | None:
         """The last word about the job; None if it was taken away."""
         deadline = time.monotonic() + limit_s
         shown = 0.0
@@ -175,7 +179,10 @@ class Worker:
                     continue
                 if message.result is not None or message.error is not None:
                     return message
-                if message.progress is not None and time.monotonic() - shown >= PROGRESS_S:
+                if message.progress is None:
+                    continue
+                spans.at(message.progress.stage)
+                if time.monotonic() - shown >= PROGRESS_S:
                     self._show(task, message.progress)
                     shown = time.monotonic()
             return Message(error=_error("job-crashed", child.how_it_ended()))

@@ -12,10 +12,11 @@ from typing import Literal
 
 import sqlalchemy as sa
 
-from service.store import tables
+from service.store import tables, tallies
 from service.store.engine import reading, serialise, writing
 
 Outcome = Literal["delivered", "given-up"]
+CALLBACKS = "callbacks"
 d = tables.deliveries.c
 
 
@@ -49,23 +50,20 @@ class Deliveries:
 
     def again(self, delivery: Delivery, at: datetime) -> None:
         """An attempt failed; there will be another."""
-        self._write(delivery, due_at=at)
+        with writing(self._engine) as connection:
+            _write(connection, delivery, due_at=at)
 
     def end(self, delivery: Delivery, outcome: Outcome) -> None:
         """No attempt will follow."""
-        self._write(delivery, status=outcome)
-
-    def counts(self) -> dict[str, int]:
-        """How many are waiting, delivered and given up."""
-        with reading(self._engine) as connection:
-            rows = connection.execute(sa.select(d.status, sa.func.count().label("n")).group_by(d.status))
-            return {row.status: row.n for row in rows}
-
-    def _write(self, delivery: Delivery, **values: datetime | str) -> None:
-        # Of an attempt that took so long that another one was begun, nothing is written down.
-        this_attempt = (d.job == delivery.job_id, d.attempts == delivery.attempt, d.status == "waiting")
         with writing(self._engine) as connection:
-            connection.execute(sa.update(tables.deliveries).where(*this_attempt).values(**values))
+            if _write(connection, delivery, status=outcome):
+                tallies.add(connection, {(CALLBACKS, (outcome,)): 1})
+
+
+def _write(connection: sa.Connection, delivery: Delivery, **values: datetime | str) -> bool:
+    # Of an attempt that took so long that another one was begun, nothing is written down.
+    this_attempt = (d.job == delivery.job_id, d.attempts == delivery.attempt, d.status == "waiting")
+    return connection.execute(sa.update(tables.deliveries).where(*this_attempt).values(**values)).rowcount == 1
 
 
 def add_delivery(connection: sa.Connection, job_id: str, url: str, now: datetime) -> None:

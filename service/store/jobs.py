@@ -18,15 +18,30 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.schemas import OPEN, Job, JobError, Options, Progress, Result, Status, Venue
-from service.store import tables
+from service.store import tables, tallies
 from service.store.deliveries import add_delivery
 from service.store.engine import reading, serialise, writing
+from service.store.figures import note_quality
+from service.store.outcomes import End
 from service.store.venues import find_venue, save_poses, save_venue
 
 PRIORITIES = {"live": 1, "routine": 100}
 CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 DONE = Progress(stage="preview", fraction=1.0)
 j = tables.jobs.c
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The request that a job came with: how the log calls it, and its place in a trace (W3C Trace Context)."""
+
+    request_id: str | None = None
+    traceparent: str | None = None
+
+    def names(self) -> dict[str, str]:
+        """For every line of the log that comes of it."""
+        trace = self.traceparent.split("-")[1] if self.traceparent else None
+        return {name: value for name, value in (("request", self.request_id), ("trace", trace)) if value}
 
 
 @dataclass(frozen=True)
@@ -39,6 +54,7 @@ class Submission:
     content_hash: str
     idempotency_key: str | None
     frames: dict[str, list[str]]
+    origin: Origin = Origin()
 
 
 class KeyReused(Exception):  # noqa: N818
@@ -76,6 +92,8 @@ class Task:
     venue: Venue
     options: Options
     frames: dict[str, list[str]]
+    attempt: int = 1
+    origin: Origin = Origin()
 
 
 @dataclass(frozen=True)
@@ -148,6 +166,8 @@ class Jobs:
                     idempotency_key=submission.idempotency_key,
                     venue_document=venue.model_dump(mode="json"),
                     frames=submission.frames,
+                    request_id=submission.origin.request_id,
+                    traceparent=submission.origin.traceparent,
                     created_at=now,
                     updated_at=now,
                 )
@@ -212,18 +232,10 @@ class Jobs:
             return None
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
-    def counts(self) -> dict[str, int]:
-        """How many jobs are in each state."""
+    def check(self) -> None:
+        """Raise unless the database answers, and has them."""
         with reading(self._engine) as connection:
-            rows = connection.execute(sa.select(j.status, sa.func.count().label("n")).group_by(j.status))
-            return {row.status: row.n for row in rows}
-
-    def oldest_queued_at(self) -> datetime | None:
-        """When the job that waits longest was submitted."""
-        query = sa.select(j.created_at).where(j.status == "queued").order_by(j.created_at).limit(1)
-        with reading(self._engine) as connection:
-            oldest: datetime | None = connection.scalar(query)
-            return oldest
+            connection.execute(sa.select(j.id).limit(1))
 
     # Working
 
@@ -277,7 +289,8 @@ class Jobs:
             if connection.scalar(sa.select(j.id).where(*_fence(task)).with_for_update()) is None:
                 return
             now_stored = find_venue(connection, task.venue.id)
-            if result.accepted and (now_stored is None or not now_stored.calibrates_like(task.venue)):
+            unchanged = now_stored is not None and now_stored.calibrates_like(task.venue)
+            if result.accepted and not unchanged:
                 result = result.model_copy(
                     update={"accepted": False, "rejected_because": "the venue was changed while the job ran"}
                 )
@@ -286,11 +299,15 @@ class Jobs:
                 task.job_id,
                 _fence(task),
                 "succeeded",
-                result=result.model_dump(mode="json"),
+                result=result,
                 pictures=list(pictures),
                 progress=DONE.model_dump(),
             )
-            if result.accepted and not task.options.dry_run and now_stored is not None:
+            if now_stored is None or not unchanged:
+                return
+            moves = result.accepted and not task.options.dry_run
+            note_quality(connection, task.venue.id, result, datetime.now(UTC), moved=moves)
+            if moves:
                 poses = {camera.id: camera.pose for camera in result.cameras}
                 save_venue(connection, now_stored.with_result(result))
                 save_poses(connection, task.venue.id, poses, "calibration", task.job_id)
@@ -298,7 +315,7 @@ class Jobs:
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
-            self._end(connection, task.job_id, _fence(task), "failed", error=error.model_dump())
+            self._end(connection, task.job_id, _fence(task), "failed", error=error)
 
     def cancel(self, job_id: str) -> None:
         """End a job that is still open; its worker notices."""
@@ -316,7 +333,7 @@ class Jobs:
     def abandon(self, job_id: str, error: JobError) -> None:
         """End an open job that the queue has given up."""
         with writing(self._engine) as connection:
-            self._end(connection, job_id, _open(job_id), "failed", error=error.model_dump())
+            self._end(connection, job_id, _open(job_id), "failed", error=error)
 
     # Parts
 
@@ -326,15 +343,25 @@ class Jobs:
         job_id: str,
         still: list[sa.ColumnElement[bool]],
         status: Status,
+        *,
+        result: Result | None = None,
+        error: JobError | None = None,
         **values: Any,
     ) -> None:
         now = datetime.now(UTC)
+        for name, document in (("result", result), ("error", error)):
+            if document is not None:
+                values[name] = document.model_dump(mode="json")
         end = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **_changed())
         if connection.execute(end).rowcount == 0:
             return
-        options = Options.model_validate(connection.scalar(sa.select(j.options).where(j.id == job_id)))
+        query = sa.select(j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
+        row = connection.execute(query).one()
+        options = Options.model_validate(row.options)
         if options.callback_url is not None:
             add_delivery(connection, job_id, options.callback_url, now)
+        ended = End(status, result, error, row.created_at, row.started_at, now, row.attempt)
+        tallies.add(connection, ended.tallies())
 
     def _task(self, connection: sa.Connection, job_id: str) -> Task | None:
         row = connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one_or_none()
@@ -346,6 +373,8 @@ class Jobs:
             Venue.model_validate(row.venue_document),
             Options.model_validate(row.options),
             row.frames,
+            row.attempt,
+            Origin(row.request_id, row.traceparent),
         )
 
     def _read(self, connection: sa.Connection, job_id: str) -> Job:

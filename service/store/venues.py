@@ -10,6 +10,7 @@ import sqlalchemy as sa
 from service.schemas import HeldPose, Pose, Venue
 from service.store import tables
 from service.store.engine import reading, serialise, writing
+from service.store.figures import forget_quality
 
 
 class Venues:
@@ -54,6 +55,7 @@ class Venues:
             )
             allow(find_venue(connection, venue_id), active)
             connection.execute(sa.delete(tables.pose_history).where(tables.pose_history.c.venue == venue_id))
+            forget_quality(connection, venue_id)
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
 
     def poses(self, venue_id: str, before: int | None, limit: int) -> list[tuple[int, HeldPose]]:
