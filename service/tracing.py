@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import re
 from importlib.metadata import version
-from importlib.util import find_spec
 
 import structlog
 from opentelemetry import trace
@@ -29,13 +28,14 @@ def configure(service: str, instance: str) -> None:
     """Let spans of this process be sent, if somebody has said where to."""
     if not any(os.environ.get(name) for name in ENDPOINTS) or os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
         return
-    if find_spec("opentelemetry.sdk") is None or find_spec("opentelemetry.exporter") is None:
+    try:
+        from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
+        from opentelemetry.sdk.resources import Resource
+        from opentelemetry.sdk.trace import TracerProvider
+        from opentelemetry.sdk.trace.export import BatchSpanProcessor
+    except ImportError:
         log.warning("no traces: OpenTelemetry is configured but not installed, see the extra `tracing`")
         return
-    from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
-    from opentelemetry.sdk.resources import Resource
-    from opentelemetry.sdk.trace import TracerProvider
-    from opentelemetry.sdk.trace.export import BatchSpanProcessor
 
     names = {
         "service.name": os.environ.get("OTEL_SERVICE_NAME", service),
