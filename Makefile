@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check bench bench-real bench-segmentation train lock clean
+.PHONY: setup demo test check bench bench-real bench-segmentation bench-rate train lock clean
 
 setup: $(VENV)/.installed
 
@@ -40,6 +40,9 @@ $(VENV)/.bench: $(VENV)/.installed
 # One BLAS thread, as the worker sets it.
 bench: $(VENV)/.bench
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.accuracy
+
+bench-rate: setup
+	$(BIN)/python -m tests.benchmarks.rate
 
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'

@@ -167,11 +167,10 @@ class Worker:
 
     def _compute(self, task: Task, limit_s: float, spans: Spans) -> Message | None:
         """The last word about the job; None if it was taken away."""
-        deadline = time.monotonic() + limit_s
-        shown = 0.0
+        deadline, shown, hold = time.monotonic() + limit_s, 0.0, Hold(self._jobs, task)
         with Child(self._settings, task) as child:
             for message in child.messages():
-                if message is None and self._lost(task):
+                if message is None and hold.lost():
                     return None
                 if time.monotonic() > deadline:
                     return Message(error=_error("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
@@ -187,14 +186,6 @@ class Worker:
                     shown = time.monotonic()
             return Message(error=_error("job-crashed", child.how_it_ended()))
 
-    def _lost(self, task: Task) -> bool:
-        """Whether the job went to a cancellation or to another attempt; while the database is away, nobody can say."""
-        try:
-            return not self._jobs.keep(task)
-        except AWAY:
-            log.warning("cannot give a sign of life", exc_info=True)
-            return False
-
     def _show(self, task: Task, progress: Progress) -> None:
         with suppress(*AWAY):
             self._jobs.report(task, progress)
@@ -206,6 +197,26 @@ class Worker:
             self._jobs.finish(task, end.result, end.pictures)
         elif end.error is not None:
             self._jobs.fail(task, end.error)
+
+
+class Hold:
+    """An attempt's hold on its job: looked at often, and now and then renewed, which costs the database a write."""
+
+    def __init__(self, jobs: Jobs, task: Task) -> None:
+        self._jobs = jobs
+        self._task = task
+        self._renewed = time.monotonic()
+
+    def lost(self) -> bool:
+        """Whether the job went to a cancellation or to another attempt; while the database is away, nobody can say."""
+        try:
+            if time.monotonic() - self._renewed < BEAT_S:
+                return not self._jobs.holds(self._task)
+            self._renewed = time.monotonic()
+            return not self._jobs.keep(self._task)
+        except AWAY:
+            log.warning("cannot give a sign of life", exc_info=True)
+            return False
 
 
 class Child:

@@ -42,7 +42,7 @@ class Deliveries:
             if connection.execute(due).first() is None:
                 return []
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, "deliveries")
             rows = connection.execute(due).all()
             begun = sa.update(tables.deliveries).where(d.job.in_([row.job for row in rows]))
             connection.execute(begun.values(attempts=d.attempts + 1, due_at=again_at))

@@ -23,7 +23,7 @@ from service.store.deliveries import add_delivery
 from service.store.engine import reading, serialise, writing
 from service.store.figures import note_quality
 from service.store.outcomes import End
-from service.store.venues import find_venue, save_poses, save_venue
+from service.store.venues import find_venue, save_poses, save_venue, venue_lock
 
 PRIORITIES = {"live": 1, "routine": 100}
 CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
@@ -142,7 +142,7 @@ class Jobs:
         """
         now = datetime.now(UTC)
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, venue_lock(submission.venue.id))
             same = self._duplicate(connection, submission.venue.id, submission.idempotency_key, submission.content_hash)
             if same is not None:
                 return self._read(connection, same), False
@@ -151,6 +151,11 @@ class Jobs:
                 raise VenueGone
             if not venue.films_like(submission.venue):
                 raise VenueReplaced
+            # From here on the frames are the job's.
+            folder = frame_folder(submission.job_id)
+            connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
+            # Only now: all submissions wait here for each other's end, so that none overshoots the limit.
+            serialise(connection, "queue")
             waiting = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued"))
             if waiting is not None and waiting >= queue_limit:
                 raise QueueFull
@@ -172,10 +177,8 @@ class Jobs:
                     updated_at=now,
                 )
             )
-            # From here on the frames are the job's.
-            folder = frame_folder(submission.job_id)
-            connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
             enqueue(connection, submission.job_id, priority)
+        with reading(self._engine) as connection:
             return self._read(connection, submission.job_id), True
 
     def _duplicate(
@@ -265,8 +268,13 @@ class Jobs:
             task = self._task(connection, job_id)
             return task if task is not None and task.run_token == run_token else None
 
+    def holds(self, task: Task) -> bool:
+        """Whether the job is still this attempt's; False if it has lost it, to a cancellation or to another attempt."""
+        with reading(self._engine) as connection:
+            return connection.scalar(sa.select(j.id).where(*_fence(task))) is not None
+
     def keep(self, task: Task) -> bool:
-        """A sign of life of an attempt; False if it has lost the job, to a cancellation or to another attempt."""
+        """A sign of life of an attempt; False if it has lost the job."""
         alive = sa.update(tables.jobs).where(*_fence(task)).values(updated_at=datetime.now(UTC))
         with writing(self._engine) as connection:
             return connection.execute(alive).rowcount == 1
@@ -284,7 +292,7 @@ class Jobs:
         If the result is accepted the stored poses move in the same transaction.
         """
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, venue_lock(task.venue.id))
             # Locked: a cancellation must come before this end or after it, not between the row and the poses.
             if connection.scalar(sa.select(j.id).where(*_fence(task)).with_for_update()) is None:
                 return

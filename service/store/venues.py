@@ -35,7 +35,7 @@ class Venues:
     def put(self, venue: Venue, allow: Callable[[Venue | None], None]) -> bool:
         """Store a venue unless `allow` raises at the sight of what is there; says whether it is new."""
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, venue_lock(venue.id))
             before = find_venue(connection, venue.id)
             allow(before)
             known = before.poses if before else {}
@@ -47,7 +47,7 @@ class Venues:
     def delete(self, venue_id: str, allow: Callable[[Venue | None, str | None], None]) -> None:
         """Forget a venue and its poses unless `allow` raises at the sight of it or of its active job."""
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, venue_lock(venue_id))
             active = connection.scalar(
                 sa.select(tables.jobs.c.id).where(
                     tables.jobs.c.venue == venue_id, tables.jobs.c.status.in_(["queued", "running"])
@@ -69,6 +69,11 @@ class Venues:
                 (row.id, HeldPose(camera=row.camera, pose=row.pose, cause=row.cause, job=row.job, since=row.since))
                 for row in connection.execute(query)
             ]
+
+
+def venue_lock(venue_id: str) -> str:
+    """What to be serialised about by whoever changes a venue, or relies on it to stay."""
+    return f"venue {venue_id}"
 
 
 def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:
