@@ -143,8 +143,9 @@ class Worker:
         silent = self._jobs.unchanged_for(self._settings.takeover_after_s)
         given_up = self._queue.given_up(silent) if silent else {}
         for job_id, why in given_up.items():
-            log.error("job given up", job=job_id, why=why)
-            self._jobs.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log."))
+            # A slow job may have ended while the queue was asked.
+            if self._jobs.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log.")):
+                log.error("job given up", job=job_id, why=why)
 
     def _attempt(self, job_id: str) -> None:
         """One attempt of a job, from its beginning to a state that is written down."""

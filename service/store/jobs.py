@@ -338,10 +338,10 @@ class Jobs:
         with reading(self._engine) as connection:
             return list(connection.scalars(query.order_by(j.updated_at).limit(100)))
 
-    def abandon(self, job_id: str, error: JobError) -> None:
-        """End an open job that the queue has given up."""
+    def abandon(self, job_id: str, error: JobError) -> bool:
+        """End an open job that the queue has given up; False if it has ended meanwhile."""
         with writing(self._engine) as connection:
-            self._end(connection, job_id, _open(job_id), "failed", error=error)
+            return self._end(connection, job_id, _open(job_id), "failed", error=error)
 
     # Parts
 
@@ -355,14 +355,14 @@ class Jobs:
         result: Result | None = None,
         error: JobError | None = None,
         **values: Any,
-    ) -> None:
+    ) -> bool:
         now = datetime.now(UTC)
         for name, document in (("result", result), ("error", error)):
             if document is not None:
                 values[name] = document.model_dump(mode="json")
         end = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **_changed())
         if connection.execute(end).rowcount == 0:
-            return
+            return False
         query = sa.select(j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
         row = connection.execute(query).one()
         options = Options.model_validate(row.options)
@@ -370,6 +370,7 @@ class Jobs:
             add_delivery(connection, job_id, options.callback_url, now)
         ended = End(status, result, error, row.created_at, row.started_at, now, row.attempt)
         tallies.add(connection, ended.tallies())
+        return True
 
     def _task(self, connection: sa.Connection, job_id: str) -> Task | None:
         row = connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one_or_none()
