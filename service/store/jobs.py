@@ -154,11 +154,6 @@ class Jobs:
             # From here on the frames are the job's.
             folder = frame_folder(submission.job_id)
             connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
-            # Only now: all submissions wait here for each other's end, so that none overshoots the limit.
-            serialise(connection, "queue")
-            waiting = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued"))
-            if waiting is not None and waiting >= queue_limit:
-                raise QueueFull
             priority = PRIORITIES[submission.options.priority]
             connection.execute(
                 sa.insert(tables.jobs).values(
@@ -178,6 +173,11 @@ class Jobs:
                 )
             )
             enqueue(connection, submission.job_id, priority)
+            # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
+            serialise(connection, "queue")
+            waiting = connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
+            if waiting > queue_limit:
+                raise QueueFull
         with reading(self._engine) as connection:
             return self._read(connection, submission.job_id), True
 

@@ -15,7 +15,7 @@ import tempfile
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -269,8 +269,12 @@ def cpu_s_of_postgres(database_url: str) -> float:
         file = connection.execute("SELECT setting FROM pg_settings WHERE name = 'data_directory'").fetchone()[0]
     postmaster = int((Path(file) / "postmaster.pid").read_text().split()[0])
     backends = [int(child) for child in Path(f"/proc/{postmaster}/task/{postmaster}/children").read_text().split()]
-    gone = ticks(postmaster, children=True)
-    return (gone + sum(ticks(backend, children=False) for backend in backends)) / TICKS_PER_S
+    spent = 0
+    for backend in backends:
+        # One that has ended meanwhile is among those that the postmaster has waited for.
+        with suppress(FileNotFoundError):
+            spent += ticks(backend, children=False)
+    return (spent + ticks(postmaster, children=True)) / TICKS_PER_S
 
 
 def ticks(process: int, *, children: bool) -> int:
