@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check bench bench-real bench-segmentation train lock clean
+.PHONY: setup demo test check bench bench-real bench-segmentation bench-rate train lock clean
 
 setup: $(VENV)/.installed
 
@@ -41,6 +41,9 @@ $(VENV)/.bench: $(VENV)/.installed
 bench: $(VENV)/.bench
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.accuracy
 
+bench-rate: setup
+	$(BIN)/python -m tests.benchmarks.rate
+
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'
 	touch $@
@@ -50,6 +53,8 @@ train: $(VENV)/.train
 
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --group dev -o requirements.lock pyproject.toml
+	uv pip compile --universal --python-version 3.11 --generate-hashes --extra tracing --constraint requirements.lock \
+		-o docker/requirements.lock pyproject.toml
 
 clean:
 	rm -rf $(VENV) build *.egg-info

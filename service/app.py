@@ -13,7 +13,7 @@ from fastapi import FastAPI, Request
 from starlette.responses import Response
 
 from service import problems
-from service.access import Access
+from service.access import QUIET, Access
 from service.auth import Gate
 from service.bodylimit import BodyLimit
 from service.context import Context
@@ -23,12 +23,13 @@ from service.metrics import Metrics
 from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
+from service.readiness import Readiness
 from service.routes import calibrate, docs, documented, health, jobs, venues
 from service.settings import Settings
 from service.store.blobs import Blobs
-from service.store.deliveries import Deliveries
 from service.store.engine import AWAY, connect, migrate
 from service.store.expiry import Expiry
+from service.store.figures import look
 from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.venues import Venues
@@ -51,6 +52,8 @@ def create_app(settings: Settings) -> FastAPI:
         # FastAPI's own pages load their scripts from the internet.
         docs_url=None,
         redoc_url=None,
+        # Spans, if tracing.configure() found out where to send them; figures and logs have ways of their own.
+        telemetry={"metrics": False, "logs": False, "exclude": lambda scope: scope.get("path") in QUIET},
         responses=documented.problems(422, 503),
         # Generated clients call their functions by it.
         generate_unique_id_function=lambda route: route.name,
@@ -73,18 +76,20 @@ def open_context(settings: Settings) -> Context:
     migrate(engine)
     migrate_queue(settings.home_database_url)
     jobs_, workers, keys, disk = Jobs(engine), Workers(engine), Keys(engine), Disk(settings)
+    blobs = Blobs(settings.home_blob_url, BLOB_PATIENCE_S)
     return Context(
         settings=settings,
         engine=engine,
         queue=Queue(settings.home_database_url),
-        blobs=Blobs(settings.home_blob_url, BLOB_PATIENCE_S),
+        blobs=blobs,
         disk=disk,
         venues=Venues(engine),
         jobs=jobs_,
         expiry=Expiry(engine),
         workers=workers,
         watch=Watch(jobs_.states),
-        metrics=Metrics(jobs_, workers, Deliveries(engine), disk, settings.takeover_after_s),
+        metrics=Metrics(lambda: look(engine, settings.metrics_venues), disk, settings.takeover_after_s),
+        readiness=Readiness(jobs_, blobs, disk, workers, settings.takeover_after_s),
         keys=keys,
         gate=Gate(keys, settings),
     )

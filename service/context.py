@@ -12,6 +12,7 @@ from service.auth import Gate
 from service.disk import Disk
 from service.metrics import Metrics
 from service.queue import Queue
+from service.readiness import Readiness
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN
 from service.settings import Settings
 from service.store.blobs import Blobs
@@ -38,6 +39,7 @@ class Context:
     workers: Workers
     watch: Watch
     metrics: Metrics
+    readiness: Readiness
     keys: Keys
     gate: Gate
 

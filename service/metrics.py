@@ -1,42 +1,52 @@
-"""What Prometheus reads: requests as they come, jobs and workers as the database has them, and the disk."""
+"""What Prometheus reads.
+
+Requests are counted by the process that answers them. All else is read from the database at the moment it is asked for,
+so it is the same whichever API process is asked, however many workers there are and however often they were restarted.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from datetime import UTC, datetime
-from typing import get_args
+from collections.abc import Callable, Iterator, Mapping
+from importlib.metadata import version
 
-from prometheus_client import CollectorRegistry, Counter, Histogram
-from prometheus_client.core import GaugeMetricFamily
+import structlog
+from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, InfoMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
 from service.disk import Disk
-from service.schemas import Status
-from service.store.deliveries import Deliveries
-from service.store.jobs import Jobs
-from service.store.workers import Workers
+from service.store.deliveries import CALLBACKS
+from service.store.engine import AWAY
+from service.store.figures import Figures, VenueQuality, WorkerSeen
+from service.store.jobs import PRIORITIES
+from service.store.outcomes import ENDED, OUTCOMES, RESTARTS, STAGES
+from service.store.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Buckets, Key
+
+log = structlog.get_logger()
 
 
 class Metrics:
-    """The figures of one API process."""
+    """The figures of one API process and, through `look`, those of the service."""
 
-    def __init__(self, jobs: Jobs, workers: Workers, deliveries: Deliveries, disk: Disk, silence_s: float) -> None:
+    def __init__(self, look: Callable[[], Figures], disk: Disk, silence_s: float) -> None:
         self.registry = CollectorRegistry()
         self.requests = Counter(
             "esc_http_requests", "Requests answered.", ["method", "route", "status"], registry=self.registry
         )
         self.seconds = Histogram(
-            "esc_http_request_seconds", "Time to answer.", ["method", "route"], registry=self.registry
+            "esc_http_request_duration_seconds",
+            "Time to answer; a route that ends in ?wait holds its answer.",
+            ["method", "route"],
+            registry=self.registry,
         )
-        self.registry.register(_Stored(jobs, workers, deliveries, disk, silence_s))
+        ProcessCollector(registry=self.registry)
+        self.registry.register(_Stored(look, disk, silence_s))
 
 
 class _Stored(Collector):
-    def __init__(self, jobs: Jobs, workers: Workers, deliveries: Deliveries, disk: Disk, silence_s: float) -> None:
-        self._jobs = jobs
-        self._workers = workers
-        self._deliveries = deliveries
+    def __init__(self, look: Callable[[], Figures], disk: Disk, silence_s: float) -> None:
+        self._look = look
         self._disk = disk
         self._silence_s = silence_s
 
@@ -45,22 +55,115 @@ class _Stored(Collector):
         yield from ()
 
     def collect(self) -> Iterator[Metric]:
-        """Read the database, and how full the disk is."""
-        counts = self._jobs.counts()
-        jobs = GaugeMetricFamily("esc_jobs", "Jobs by state.", labels=["status"])
-        for status in get_args(Status):
-            jobs.add_metric([status], counts.get(status, 0))
-        yield jobs
-        oldest = self._jobs.oldest_queued_at()
-        age = 0.0 if oldest is None else (datetime.now(UTC) - oldest).total_seconds()
-        yield GaugeMetricFamily("esc_queue_age_seconds", "How long the oldest queued job has waited.", value=age)
-        alive = len(self._workers.alive(self._silence_s))
-        yield GaugeMetricFamily("esc_workers", "Workers that gave a sign of life.", value=alive)
-        told = self._deliveries.counts()
-        callbacks = GaugeMetricFamily("esc_callbacks", "Callbacks of ended jobs.", labels=["status"])
-        for status in ("waiting", "delivered", "given-up"):
-            callbacks.add_metric([status], told.get(status, 0))
-        yield callbacks
-        free = self._disk.free_bytes()
+        """Read the database, and how full the disk is; what cannot be read is missing, the rest is told."""
+        yield InfoMetricFamily("esc_build", "The version.", {"version": version("esc-calibration")})
+        yield from self._room()
+        try:
+            figures = self._look()
+        except AWAY:
+            log.warning("no figures for Prometheus", exc_info=True)
+            yield _gauge("esc_database_up", "Whether the database answers.", 0)
+            return
+        yield _gauge("esc_database_up", "Whether the database answers.", 1)
+        yield from _queue(figures)
+        yield from _jobs(figures.tallies)
+        yield from _venues(figures.venues)
+        yield from _workers(figures.workers, self._silence_s)
+        yield from _callbacks(figures)
+
+    def _room(self) -> Iterator[Metric]:
+        try:
+            free = self._disk.free_bytes()
+        except OSError:
+            log.warning("cannot read how full the disk is", exc_info=True)
+            return
         if free is not None:
-            yield GaugeMetricFamily("esc_disk_free_bytes", "Free where database and files grow.", value=free)
+            yield _gauge("esc_disk_free_bytes", "Free where database and files grow.", free)
+            yield _gauge("esc_disk_needed_bytes", "With less free, uploads are refused.", self._disk.least_bytes)
+
+
+def _queue(figures: Figures) -> Iterator[Metric]:
+    jobs = GaugeMetricFamily("esc_queue_jobs", "Jobs that wait.", labels=["priority"])
+    oldest = GaugeMetricFamily(
+        "esc_queue_oldest_age_seconds", "How long the oldest of them has waited.", labels=["priority"]
+    )
+    for name, number in PRIORITIES.items():
+        waiting = figures.queue.get(number)
+        jobs.add_metric([name], waiting.jobs if waiting else 0)
+        oldest.add_metric([name], waiting.oldest_s if waiting else 0)
+    yield jobs
+    yield oldest
+    yield _gauge("esc_jobs_running", "Jobs that are being computed.", figures.running)
+
+
+def _jobs(tallies: Mapping[Key, float]) -> Iterator[Metric]:
+    ended = CounterMetricFamily("esc_jobs_ended", "Jobs by their end.", labels=["status", "verdict", "error"])
+    for outcome in OUTCOMES:
+        ended.add_metric(outcome, tallies.get((ENDED, outcome), 0))
+    yield ended
+    restarts = tallies.get((RESTARTS, ()), 0)
+    yield CounterMetricFamily(
+        "esc_job_restarts", "Attempts after a job's first: its worker died or was stopped.", value=restarts
+    )
+    yield _histogram("esc_job_wait_seconds", "From submission to the first attempt.", WAIT, tallies)
+    yield _histogram("esc_job_duration_seconds", "From the first attempt to the end.", DURATION, tallies)
+    stages = HistogramMetricFamily("esc_job_stage_duration_seconds", "Of jobs with a result.", labels=["stage"])
+    for stage in STAGES:
+        stages.add_metric([stage], *STAGE.read(tallies, stage))
+    yield stages
+    yield _histogram(
+        "esc_job_stitch_error_pixels", "Of the poses that were found; 1 px is 10 cm.", STITCH_ERROR, tallies
+    )
+
+
+def _venues(venues: list[VenueQuality]) -> Iterator[Metric]:
+    """Those with the worst stitch errors: how many at most is a setting."""
+    stitch = GaugeMetricFamily(
+        "esc_venue_stitch_error_pixels", "Of the poses that hold, by the last result; 1 px is 10 cm.", labels=["venue"]
+    )
+    moved = GaugeMetricFamily(
+        "esc_venue_moved_pixels", "How far the last result found its worst camera moved.", labels=["venue"]
+    )
+    accepted = GaugeMetricFamily(
+        "esc_venue_accepted_timestamp_seconds", "When poses were last accepted.", labels=["venue"]
+    )
+    for venue in venues:
+        if venue.stitch_error_px is not None:
+            stitch.add_metric([venue.venue], venue.stitch_error_px)
+        if venue.moved_px is not None:
+            moved.add_metric([venue.venue], venue.moved_px)
+        if venue.accepted_at is not None:
+            accepted.add_metric([venue.venue], venue.accepted_at.timestamp())
+    yield from (stitch, moved, accepted)
+
+
+def _workers(workers: list[WorkerSeen], silence_s: float) -> Iterator[Metric]:
+    alive = [worker for worker in workers if worker.silent_s <= silence_s]
+    yield _gauge("esc_workers", "Workers that gave a sign of life.", len(alive))
+    up = GaugeMetricFamily(
+        "esc_worker_up", "Whether it gave one, until another takes its jobs over.", labels=["worker"]
+    )
+    age = GaugeMetricFamily("esc_worker_heartbeat_age_seconds", "Since its last one.", labels=["worker"])
+    model = InfoMetricFamily("esc_worker_model", "Its network; empty: missing.", labels=["worker"])
+    for worker in workers:
+        up.add_metric([worker.name], float(worker in alive))
+        age.add_metric([worker.name], worker.silent_s)
+        model.add_metric([worker.name], {"sha256": worker.model_sha256 or ""})
+    yield from (up, age, model)
+
+
+def _callbacks(figures: Figures) -> Iterator[Metric]:
+    yield _gauge("esc_callbacks_waiting", "Callbacks that are due or will be tried again.", figures.callbacks_waiting)
+    told = CounterMetricFamily("esc_callbacks", "Callbacks that will not be tried again.", labels=["outcome"])
+    for outcome in ("delivered", "given-up"):
+        told.add_metric([outcome], figures.tallies.get((CALLBACKS, (outcome,)), 0))
+    yield told
+
+
+def _gauge(name: str, meaning: str, value: float) -> Metric:
+    return GaugeMetricFamily(name, meaning, value=value)
+
+
+def _histogram(name: str, meaning: str, buckets: Buckets, tallies: Mapping[Key, float]) -> Metric:
+    cumulative, total = buckets.read(tallies)
+    return HistogramMetricFamily(name, meaning, buckets=cumulative, sum_value=total)

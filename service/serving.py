@@ -18,7 +18,7 @@ import structlog
 import uvicorn
 from fastapi import FastAPI
 
-from service import lifeline
+from service import lifeline, tracing
 from service.app import create_app
 from service.connection import Connection, let_go_of_the_slow
 from service.settings import Settings
@@ -42,6 +42,7 @@ class CannotListen(Exception):  # noqa: N818
 def serve(settings: Settings, *, with_worker: bool) -> None:
     """Answer requests until SIGTERM or SIGINT."""
     listener = _listen(settings)
+    tracing.configure("esc-api", socket.gethostname())
     app = create_app(settings)
     _see_to_keys(settings, app.state.context.keys)
     server = _Server(app, settings)
@@ -52,6 +53,7 @@ def serve(settings: Settings, *, with_worker: bool) -> None:
         host, port = listener.getsockname()[:2]
         print(f"ESC listens on http://{host}:{port}", flush=True)
         server.run(sockets=[listener])
+    tracing.flush()
 
 
 def _see_to_keys(settings: Settings, keys: Keys) -> None:

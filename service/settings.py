@@ -95,6 +95,9 @@ class Settings(BaseSettings):
     # Being watched.
     log_format: Literal["json", "console"] = "json"
     log_level: Literal["debug", "info", "warning", "error"] = "info"
+    metrics_venues: int = Field(
+        500, ge=0, description="Venues with figures of their own in /metrics: those with the worst stitch errors."
+    )
 
     @field_validator("database_url")
     @classmethod

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -22,6 +22,8 @@ from obstore.store import from_url
 
 STARTING_S = 60
 BUCKET = "esc-tests"
+# Nothing of a test's database must survive a power cut.
+HASTY = ("fsync=off", "synchronous_commit=off", "full_page_writes=off")
 # On a test: which home, or homes, it runs in. What it builds, it builds in the home that the fixture `home` gives.
 in_both_homes = pytest.mark.parametrize("home", ["embedded", "servers"], indirect=True, scope="session")
 on_servers = pytest.mark.parametrize("home", ["servers"], indirect=True, scope="session")
@@ -103,16 +105,15 @@ def postgres_binaries() -> Path | None:
 
 
 @contextmanager
-def postgres_server(binaries: Path) -> Iterator[str]:
+def postgres_server(binaries: Path, options: Sequence[str] = HASTY) -> Iterator[str]:
     """A server on a socket that only this user reaches; gives its URL with `{}` for the name of a database."""
     # Not below pytest's folder: PostgreSQL refuses to run as root, and nobody else may look in there.
     folder = Path(tempfile.mkdtemp(prefix="esc-postgres-"))
     somebody = _who_may_run_postgres(folder)
     log = folder / "log"
     initialise = ["initdb", "-D", folder / "data", "-U", "esc", "-E", "UTF8", "--locale=C", "-A", "trust", "--no-sync"]
-    # Nothing of it must survive a power cut.
-    hasty = ["-c", "fsync=off", "-c", "synchronous_commit=off", "-c", "full_page_writes=off"]
-    serve = ["postgres", "-D", folder / "data", "-k", folder, "-c", "listen_addresses=", *hasty]
+    set_options = [word for option in options for word in ("-c", option)]
+    serve = ["postgres", "-D", folder / "data", "-k", folder, "-c", "listen_addresses=", *set_options]
     url = f"postgresql://esc@/{{}}?host={folder}"
     try:
         with log.open("wb") as output:

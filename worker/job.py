@@ -69,6 +69,7 @@ def main(job_id: str, run_token: str) -> None:
     task = Jobs(connect(settings.home_database_url)).task(job_id, run_token)
     if task is None:
         return
+    structlog.contextvars.bind_contextvars(**task.origin.names())
     blobs = Blobs(settings.home_blob_url)
     try:
         outcome = solve(

@@ -23,7 +23,7 @@ from typing import IO, TypeVar
 import structlog
 from pydantic import ValidationError
 
-from service import lifeline
+from service import lifeline, tracing
 from service.problems import KINDS, type_of
 from service.queue import WorkerQueue
 from service.queue import migrate as migrate_queue
@@ -39,6 +39,7 @@ from worker import retention
 from worker.callbacks import Callbacks
 from worker.message import Message
 from worker.retention import Retention
+from worker.spans import Spans
 
 BEAT_S = 2.0
 # Twice as often as a cancellation needs to reach the child.
@@ -66,6 +67,7 @@ class NoMessage(Exception):  # noqa: N818
 def run(settings: Settings) -> None:
     """Work until SIGTERM or SIGINT; never returns."""
     lock = _only_one(settings)
+    tracing.configure("esc-worker", settings.worker_name)
     worker = Worker(settings)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -75,6 +77,7 @@ def run(settings: Settings) -> None:
     worker.look_after(stop)
     log.info("worker stops", worker=settings.worker_name)
     lock.close()
+    tracing.flush()
     # Threads may be waiting for children; those end with this process and their jobs are begun again.
     os._exit(0)
 
@@ -141,8 +144,9 @@ class Worker:
         silent = self._jobs.unchanged_for(self._settings.takeover_after_s)
         given_up = self._queue.given_up(silent) if silent else {}
         for job_id, why in given_up.items():
-            log.error("job given up", job=job_id, why=why)
-            self._jobs.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log."))
+            # A slow job may have ended while the queue was asked.
+            if self._jobs.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log.")):
+                log.error("job given up", job=job_id, why=why)
 
     def _attempt(self, job_id: str) -> None:
         """One attempt of a job, from its beginning to a state that is written down."""
@@ -151,10 +155,11 @@ class Worker:
         if task is None:
             return
         limit_s = task.options.timeout_s or self._settings.job_timeout_s
-        with structlog.contextvars.bound_contextvars(job=job_id):
+        with structlog.contextvars.bound_contextvars(job=job_id, **task.origin.names()), Spans(task) as spans:
             log.info("job begins", venue=task.venue.id)
             try:
-                end = self._compute(task, limit_s)
+                end = self._compute(task, limit_s, spans)
+                spans.end(end)
                 _insist(lambda: self._write_down(task, end), begun + limit_s + OUTAGE_S)
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
@@ -162,13 +167,12 @@ class Worker:
                 _insist(lambda: self._jobs.fail(task, crashed), time.monotonic() + OUTAGE_S)
             log.info("job ends", seconds=round(time.monotonic() - begun, 2))
 
-    def _compute(self, task: Task, limit_s: float) -> Message | None:
+    def _compute(self, task: Task, limit_s: float, spans: Spans) -> Message | None:
         """The last word about the job; None if it was taken away."""
-        deadline = time.monotonic() + limit_s
-        shown = 0.0
+        deadline, shown, hold = time.monotonic() + limit_s, 0.0, Hold(self._jobs, task)
         with Child(self._settings, task) as child:
             for message in child.messages():
-                if message is None and self._lost(task):
+                if message is None and hold.lost():
                     return None
                 if time.monotonic() > deadline:
                     return Message(error=_error("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
@@ -176,18 +180,13 @@ class Worker:
                     continue
                 if message.result is not None or message.error is not None:
                     return message
-                if message.progress is not None and time.monotonic() - shown >= PROGRESS_S:
+                if message.progress is None:
+                    continue
+                spans.at(message.progress.stage)
+                if time.monotonic() - shown >= PROGRESS_S:
                     self._show(task, message.progress)
                     shown = time.monotonic()
             return Message(error=_error("job-crashed", child.how_it_ended()))
-
-    def _lost(self, task: Task) -> bool:
-        """Whether the job went to a cancellation or to another attempt; while the database is away, nobody can say."""
-        try:
-            return not self._jobs.keep(task)
-        except AWAY:
-            log.warning("cannot give a sign of life", exc_info=True)
-            return False
 
     def _show(self, task: Task, progress: Progress) -> None:
         with suppress(*AWAY):
@@ -200,6 +199,26 @@ class Worker:
             self._jobs.finish(task, end.result, end.pictures)
         elif end.error is not None:
             self._jobs.fail(task, end.error)
+
+
+class Hold:
+    """An attempt's hold on its job: looked at often, and now and then renewed, which costs the database a write."""
+
+    def __init__(self, jobs: Jobs, task: Task) -> None:
+        self._jobs = jobs
+        self._task = task
+        self._renewed = time.monotonic()
+
+    def lost(self) -> bool:
+        """Whether the job went to a cancellation or to another attempt; while the database is away, nobody can say."""
+        try:
+            if time.monotonic() - self._renewed < BEAT_S:
+                return not self._jobs.holds(self._task)
+            self._renewed = time.monotonic()
+            return not self._jobs.keep(self._task)
+        except AWAY:
+            log.warning("cannot give a sign of life", exc_info=True)
+            return False
 
 
 class Child:

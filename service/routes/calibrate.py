@@ -24,6 +24,7 @@ from service.routes.venues import no_such_venue
 from service.schemas import OPTIONS_PART, Job, Options, Venue
 from service.store.jobs import (
     KeyReused,
+    Origin,
     QueueFull,
     Submission,
     VenueBusy,
@@ -86,7 +87,7 @@ async def calibrate(
     # get the answer that names their camera.
     most = len(stored.cameras) * context.settings.max_frames_per_camera + PARTS_TOO_MANY
     async with request.form(max_files=most, max_fields=PARTS_TOO_MANY, max_part_size=LONGEST_OPTIONS) as form:
-        return await run_in_threadpool(submit, context, stored, form, idempotency_key)
+        return await run_in_threadpool(submit, context, stored, form, idempotency_key, request.state.origin)
 
 
 def _expecting(context: Context, venue_id: str) -> Venue:
@@ -104,7 +105,7 @@ def _expecting(context: Context, venue_id: str) -> Venue:
     return stored
 
 
-def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None) -> Response:
+def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None, origin: Origin) -> Response:
     """Make a form a job of `venue`, which is the venue as it was before the form arrived."""
     options = _options(form)
     if options.callback_url is not None:
@@ -120,7 +121,7 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
         # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
         context.expiry.expect_upload(job_id, UPLOAD_GRACE)
         paths = _store(context, job_id, files)
-        submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths)
+        submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths, origin)
         job, new = context.jobs.submit(submission, context.settings.queue_limit, context.queue.enqueue)
     except (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull) as refusal:
         context.blobs.delete_under(frame_folder(job_id))

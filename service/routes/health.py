@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Response
 from prometheus_client import generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
-from service.context import Context, InContext
+from service.context import InContext
 from service.problems import KINDS, Problem, type_of
 from service.routes.documented import FOR_ALL, needs, problems
 from service.routes.guarded import Guarded
@@ -24,12 +24,12 @@ async def livez() -> Health:
 
 
 @router.get("/readyz", openapi_extra=FOR_ALL, responses={503: {"model": Health}})
-def readyz(context: InContext, response: Response) -> Health:
+async def readyz(context: InContext, response: Response) -> Health:
     """All that a job needs is there: database, files, room, a worker that gives signs of life, its network."""
-    parts = {"database": _database(context), "blobs": _blobs(context), "disk": _disk(context), **_worker(context)}
-    ready = all(found == "ok" for found in parts.values())
+    parts = await context.readiness.look()
+    ready = all(part.ok for part in parts.values())
     response.status_code = 200 if ready else 503
-    return Health(status="ok" if ready else "unavailable", parts=parts)
+    return Health(status="ok" if ready else "unavailable", parts={name: part.says for name, part in parts.items()})
 
 
 @router.get(
@@ -49,41 +49,3 @@ async def explain(kind: Annotated[str, Path(max_length=64)]) -> dict[str, str | 
     if kind not in KINDS:
         raise Problem("not-found", f"The kinds of problems are {', '.join(KINDS)}.")
     return {"type": type_of(kind), "title": KINDS[kind].title, "status": KINDS[kind].status}
-
-
-def _database(context: Context) -> str:
-    try:
-        context.jobs.counts()
-    except Exception as error:  # whatever the driver says
-        return f"cannot be read: {type(error).__name__}"
-    return "ok"
-
-
-def _blobs(context: Context) -> str:
-    try:
-        context.blobs.check()
-    except Exception as error:  # whatever the store says
-        return f"cannot be reached: {type(error).__name__}"
-    return "ok"
-
-
-def _disk(context: Context) -> str:
-    try:
-        free = context.disk.free_bytes()
-    except OSError as error:
-        return f"cannot be read: {type(error).__name__}"
-    if free is None or free >= context.disk.least_bytes:
-        return "ok"
-    return f"{free / 1e6:.0f} MB free, {context.disk.least_bytes / 1e6:.0f} needed: uploads are refused"
-
-
-def _worker(context: Context) -> dict[str, str]:
-    try:
-        alive = context.workers.alive(context.settings.takeover_after_s)
-    except Exception:  # the database is already named above
-        alive = []
-    if not alive:
-        return {"worker": "none gave a sign of life"}
-    missing = [worker.name for worker in alive if worker.model_sha256 is None]
-    model = f"missing at {', '.join(missing)}" if missing else "ok"
-    return {"worker": "ok", "model": model}

@@ -12,9 +12,10 @@ from datetime import datetime
 import sqlalchemy as sa
 
 from service.schemas import CallbackState
-from service.store import tables
+from service.store import tables, tallies
 from service.store.engine import clock, reading, serialise, writing
 
+CALLBACKS = "callbacks"
 LONGEST_ERROR = 500
 d = tables.deliveries.c
 
@@ -46,7 +47,7 @@ class Deliveries:
             if connection.execute(due).first() is None:
                 return []
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, "deliveries")
             rows = connection.execute(due).all()
             begun = sa.update(tables.deliveries).where(d.job.in_([row.job for row in rows]))
             connection.execute(begun.values(attempts=d.attempts + 1, due_at=again_at))
@@ -54,27 +55,27 @@ class Deliveries:
 
     def again(self, delivery: Delivery, at: datetime, why: str) -> None:
         """An attempt failed; there will be another."""
-        self._write(delivery, due_at=at, last_error=why[:LONGEST_ERROR])
+        with writing(self._engine) as connection:
+            _write(connection, delivery, due_at=at, last_error=why[:LONGEST_ERROR])
 
     def succeed(self, delivery: Delivery) -> None:
         """The receiver knows."""
-        self._write(delivery, status="delivered")
+        self._end(delivery, "delivered")
 
     def give_up(self, delivery: Delivery, why: str) -> None:
         """No attempt will follow."""
-        self._write(delivery, status="given-up", last_error=why[:LONGEST_ERROR])
+        self._end(delivery, "given-up", last_error=why[:LONGEST_ERROR])
 
-    def counts(self) -> dict[str, int]:
-        """How many are waiting, delivered and given up."""
-        with reading(self._engine) as connection:
-            rows = connection.execute(sa.select(d.status, sa.func.count().label("n")).group_by(d.status))
-            return {row.status: row.n for row in rows}
-
-    def _write(self, delivery: Delivery, **values: datetime | str) -> None:
-        # Of an attempt that took so long that another one was begun, nothing is written down.
-        this_attempt = (d.job == delivery.job_id, d.attempts == delivery.attempt, d.status == "waiting")
+    def _end(self, delivery: Delivery, outcome: str, **values: str) -> None:
         with writing(self._engine) as connection:
-            connection.execute(sa.update(tables.deliveries).where(*this_attempt).values(**values))
+            if _write(connection, delivery, status=outcome, **values):
+                tallies.add(connection, {(CALLBACKS, (outcome,)): 1})
+
+
+def _write(connection: sa.Connection, delivery: Delivery, **values: datetime | str) -> bool:
+    # Of an attempt that took so long that another one was begun, nothing is written down.
+    this_attempt = (d.job == delivery.job_id, d.attempts == delivery.attempt, d.status == "waiting")
+    return connection.execute(sa.update(tables.deliveries).where(*this_attempt).values(**values)).rowcount == 1
 
 
 def add_delivery(connection: sa.Connection, job_id: str, url: str, now: datetime) -> None:

@@ -20,7 +20,7 @@ WRITES = "esc_writes"
 SNAPSHOT: dict[str, dict[str, Any]] = {"sqlite": {}, "postgresql": {"isolation_level": "REPEATABLE READ"}}
 # What is raised while the database is away, locked or changing its machine: trying again later can help.
 AWAY = (sa.exc.OperationalError, sa.exc.InterfaceError, sa.exc.InternalError, sa.exc.TimeoutError)
-# Any number, the same everywhere: serialises writers that must see each other's rows on PostgreSQL.
+# Any number, the same everywhere: of the locks by which writers wait for each other on PostgreSQL.
 LOCK = 0x45_53_43
 # What libpq is told unless the URL says otherwise. A server that is out of reach is given up after seconds, and what a
 # machine held that vanished in the middle of a transaction is free again within a minute.
@@ -93,10 +93,13 @@ def writing(engine: sa.Engine) -> Iterator[sa.Connection]:
         yield connection
 
 
-def serialise(connection: sa.Connection) -> None:
-    """Wait until no other transaction that called this is open; on SQLite a writer is alone anyway."""
+def serialise(connection: sa.Connection, about: str) -> None:
+    """Wait until no other transaction that called this about the same is open; on SQLite a writer is alone anyway.
+
+    Each wait costs whoever comes next, so take it about as little and as late as what you read allows.
+    """
     if connection.dialect.name == "postgresql":
-        connection.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
+        connection.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK, sa.func.hashtext(about))))
 
 
 def clock(connection: sa.Connection) -> datetime:
@@ -110,7 +113,7 @@ def clock(connection: sa.Connection) -> datetime:
 def migrate(engine: sa.Engine) -> None:
     """Bring the schema up to date; of several processes that start together one does it."""
     with writing(engine) as connection:
-        serialise(connection)
+        serialise(connection, "schema")
         config = Config()
         config.set_main_option("script_location", str(MIGRATIONS))
         config.attributes["connection"] = connection

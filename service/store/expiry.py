@@ -46,7 +46,7 @@ class Expiry:
     def expire_frames(self, ended_before: datetime, now: datetime, limit: int) -> int:
         """Let up to `limit` jobs that ended before a moment, the oldest first, have no frames; says how many."""
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, "expiry")
             ids = self._ended(connection, ended_before, limit, j.frames_deleted_at.is_(None))
             self._mark(connection, ids, frames_deleted_at=now)
             self._leave(connection, [frame_folder(job_id) for job_id in ids], now)
@@ -55,7 +55,7 @@ class Expiry:
     def expire_pictures(self, ended_before: datetime, now: datetime, limit: int) -> int:
         """The same for pictures, but for those of the last accepted job of each venue."""
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, "expiry")
             ids = self._ended(connection, ended_before, limit, j.pictures_deleted_at.is_(None), NOT_THE_LAST_ACCEPTED)
             self._mark(connection, ids, pictures_deleted_at=now)
             self._leave(connection, [pictures_folder(job_id) for job_id in ids], now)
@@ -69,7 +69,7 @@ class Expiry:
     def delete_jobs(self, job_ids: Collection[str], now: datetime) -> None:
         """Forget ended jobs with everything that is theirs."""
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, "expiry")
             connection.execute(sa.delete(tables.jobs).where(j.id.in_(job_ids), j.finished_at.is_not(None)))
             connection.execute(sa.delete(tables.deliveries).where(tables.deliveries.c.job.in_(job_ids)))
             self._leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)

@@ -20,15 +20,30 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.schemas import OPEN, Job, JobError, Options, Progress, Result, Status, Venue
-from service.store import tables
+from service.store import tables, tallies
 from service.store.deliveries import add_delivery, delivery_of
 from service.store.engine import clock, reading, serialise, writing
-from service.store.venues import find_venue, save_poses, save_venue
+from service.store.figures import note_quality
+from service.store.outcomes import End
+from service.store.venues import find_venue, save_poses, save_venue, venue_lock
 
 PRIORITIES = {"live": 1, "routine": 100}
 CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 DONE = Progress(stage="preview", fraction=1.0)
 j = tables.jobs.c
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The request that a job came with: how the log calls it, and its place in a trace (W3C Trace Context)."""
+
+    request_id: str | None = None
+    traceparent: str | None = None
+
+    def names(self) -> dict[str, str]:
+        """For every line of the log that comes of it."""
+        trace = self.traceparent.split("-")[1] if self.traceparent else None
+        return {name: value for name, value in (("request", self.request_id), ("trace", trace)) if value}
 
 
 @dataclass(frozen=True)
@@ -41,6 +56,7 @@ class Submission:
     content_hash: str
     idempotency_key: str | None
     frames: dict[str, list[str]]
+    origin: Origin = Origin()
 
 
 class KeyReused(Exception):  # noqa: N818
@@ -78,6 +94,8 @@ class Task:
     venue: Venue
     options: Options
     frames: dict[str, list[str]]
+    attempt: int = 1
+    origin: Origin = Origin()
 
 
 @dataclass(frozen=True)
@@ -125,7 +143,7 @@ class Jobs:
         The job begins from the poses that hold now: others may have been found since the upload began.
         """
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, venue_lock(submission.venue.id))
             same = self._duplicate(connection, submission.venue.id, submission.idempotency_key, submission.content_hash)
             if same is not None:
                 return self._read(connection, same), False
@@ -134,9 +152,9 @@ class Jobs:
                 raise VenueGone
             if not venue.films_like(submission.venue):
                 raise VenueReplaced
-            waiting = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued"))
-            if waiting is not None and waiting >= queue_limit:
-                raise QueueFull
+            # From here on the frames are the job's.
+            folder = frame_folder(submission.job_id)
+            connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
             priority, now = PRIORITIES[submission.options.priority], clock(connection)
             connection.execute(
                 sa.insert(tables.jobs).values(
@@ -149,14 +167,19 @@ class Jobs:
                     idempotency_key=submission.idempotency_key,
                     venue_document=venue.model_dump(mode="json"),
                     frames=submission.frames,
+                    request_id=submission.origin.request_id,
+                    traceparent=submission.origin.traceparent,
                     created_at=now,
                     updated_at=now,
                 )
             )
-            # From here on the frames are the job's.
-            folder = frame_folder(submission.job_id)
-            connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
             enqueue(connection, submission.job_id, priority)
+            # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
+            serialise(connection, "queue")
+            waiting = connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
+            if waiting > queue_limit:
+                raise QueueFull
+        with reading(self._engine) as connection:
             return self._read(connection, submission.job_id), True
 
     def _duplicate(
@@ -213,18 +236,10 @@ class Jobs:
             return None
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
-    def counts(self) -> dict[str, int]:
-        """How many jobs are in each state."""
+    def check(self) -> None:
+        """Raise unless the database answers, and has them."""
         with reading(self._engine) as connection:
-            rows = connection.execute(sa.select(j.status, sa.func.count().label("n")).group_by(j.status))
-            return {row.status: row.n for row in rows}
-
-    def oldest_queued_at(self) -> datetime | None:
-        """When the job that waits longest was submitted."""
-        query = sa.select(j.created_at).where(j.status == "queued").order_by(j.created_at).limit(1)
-        with reading(self._engine) as connection:
-            oldest: datetime | None = connection.scalar(query)
-            return oldest
+            connection.execute(sa.select(j.id).limit(1))
 
     # Working
 
@@ -254,8 +269,13 @@ class Jobs:
             task = self._task(connection, job_id)
             return task if task is not None and task.run_token == run_token else None
 
+    def holds(self, task: Task) -> bool:
+        """Whether the job is still this attempt's; False if it has lost it, to a cancellation or to another attempt."""
+        with reading(self._engine) as connection:
+            return connection.scalar(sa.select(j.id).where(*_fence(task))) is not None
+
     def keep(self, task: Task) -> bool:
-        """A sign of life of an attempt; False if it has lost the job, to a cancellation or to another attempt."""
+        """A sign of life of an attempt; False if it has lost the job."""
         with writing(self._engine) as connection:
             alive = sa.update(tables.jobs).where(*_fence(task)).values(updated_at=clock(connection))
             return connection.execute(alive).rowcount == 1
@@ -272,12 +292,13 @@ class Jobs:
         If the result is accepted the stored poses move in the same transaction.
         """
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, venue_lock(task.venue.id))
             # Locked: a cancellation must come before this end or after it, not between the row and the poses.
             if connection.scalar(sa.select(j.id).where(*_fence(task)).with_for_update()) is None:
                 return
             now_stored = find_venue(connection, task.venue.id)
-            if result.accepted and (now_stored is None or not now_stored.calibrates_like(task.venue)):
+            unchanged = now_stored is not None and now_stored.calibrates_like(task.venue)
+            if result.accepted and not unchanged:
                 result = result.model_copy(
                     update={"accepted": False, "rejected_because": "the venue was changed while the job ran"}
                 )
@@ -286,11 +307,15 @@ class Jobs:
                 task.job_id,
                 _fence(task),
                 "succeeded",
-                result=result.model_dump(mode="json"),
+                result=result,
                 pictures=list(pictures),
                 progress=DONE.model_dump(),
             )
-            if result.accepted and not task.options.dry_run and now_stored is not None:
+            if now_stored is None or not unchanged:
+                return
+            moves = result.accepted and not task.options.dry_run
+            note_quality(connection, task.venue.id, result, clock(connection), moved=moves)
+            if moves:
                 poses = {camera.id: camera.pose for camera in result.cameras}
                 save_venue(connection, now_stored.with_result(result))
                 save_poses(connection, task.venue.id, poses, "calibration", task.job_id)
@@ -298,7 +323,7 @@ class Jobs:
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
-            self._end(connection, task.job_id, _fence(task), "failed", error=error.model_dump())
+            self._end(connection, task.job_id, _fence(task), "failed", error=error)
 
     def cancel(self, job_id: str) -> None:
         """End a job that is still open; its worker notices."""
@@ -314,10 +339,10 @@ class Jobs:
             query = sa.select(j.id).where(j.status.in_(OPEN), j.updated_at < before)
             return list(connection.scalars(query.order_by(j.updated_at).limit(100)))
 
-    def abandon(self, job_id: str, error: JobError) -> None:
-        """End an open job that the queue has given up."""
+    def abandon(self, job_id: str, error: JobError) -> bool:
+        """End an open job that the queue has given up; False if it has ended meanwhile."""
         with writing(self._engine) as connection:
-            self._end(connection, job_id, _open(job_id), "failed", error=error.model_dump())
+            return self._end(connection, job_id, _open(job_id), "failed", error=error)
 
     # Parts
 
@@ -327,15 +352,26 @@ class Jobs:
         job_id: str,
         still: list[sa.ColumnElement[bool]],
         status: Status,
+        *,
+        result: Result | None = None,
+        error: JobError | None = None,
         **values: Any,
-    ) -> None:
+    ) -> bool:
         now = clock(connection)
+        for name, document in (("result", result), ("error", error)):
+            if document is not None:
+                values[name] = document.model_dump(mode="json")
         end = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **_changed(now))
         if connection.execute(end).rowcount == 0:
-            return
-        options = Options.model_validate(connection.scalar(sa.select(j.options).where(j.id == job_id)))
+            return False
+        query = sa.select(j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
+        row = connection.execute(query).one()
+        options = Options.model_validate(row.options)
         if options.callback_url is not None:
             add_delivery(connection, job_id, options.callback_url, now)
+        ended = End(status, result, error, row.created_at, row.started_at, now, row.attempt)
+        tallies.add(connection, ended.tallies())
+        return True
 
     def _task(self, connection: sa.Connection, job_id: str) -> Task | None:
         row = connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one_or_none()
@@ -347,6 +383,8 @@ class Jobs:
             Venue.model_validate(row.venue_document),
             Options.model_validate(row.options),
             row.frames,
+            row.attempt,
+            Origin(row.request_id, row.traceparent),
         )
 
     def _read(self, connection: sa.Connection, job_id: str) -> Job:

@@ -64,7 +64,7 @@ class Keys:
         """Make a key and return it: the only time that it can be seen."""
         key = new_key()
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, "keys")
             if connection.scalar(sa.select(k.name).where(k.name == name)) is not None:
                 raise KeyExists
             connection.execute(

@@ -76,6 +76,9 @@ jobs = sa.Table(
     # From then on the row answers for none of its files, whether or not the store is rid of them.
     sa.Column("frames_deleted_at", Instant),
     sa.Column("pictures_deleted_at", Instant),
+    # The request that it came with, as its log and its trace call it.
+    sa.Column("request_id", sa.String(64)),
+    sa.Column("traceparent", sa.String(55)),
     sa.Index("jobs_by_venue", "venue", "id"),
     sa.Index("jobs_by_status", "status", "priority", "id"),
     sa.Index("one_job_per_key", "venue", "idempotency_key", unique=True),
@@ -124,6 +127,28 @@ deliveries = sa.Table(
     # Why the last attempt that failed did.
     sa.Column("last_error", sa.String(500)),
     sa.Index("deliveries_by_due", "status", "due_at"),
+)
+
+# Counts that outlive processes, see tallies.py.
+tallies = sa.Table(
+    "tallies",
+    metadata,
+    sa.Column("metric", sa.String(64), primary_key=True),
+    # Their values, separated by commas.
+    sa.Column("labels", sa.String(255), primary_key=True),
+    sa.Column("value", sa.Double, nullable=False),
+)
+
+# What the last result of each venue said, see figures.VenueQuality.
+venue_quality = sa.Table(
+    "venue_quality",
+    metadata,
+    sa.Column("venue", sa.String(64), primary_key=True),
+    sa.Column("stitch_error_px", sa.Double),
+    sa.Column("moved_px", sa.Double),
+    # When the poses that hold were accepted; null: they were put.
+    sa.Column("accepted_at", Instant),
+    sa.Index("venues_by_stitch_error", "stitch_error_px"),
 )
 
 # The heartbeat of the workers.

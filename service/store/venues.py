@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from service.schemas import HeldPose, Pose, Venue
 from service.store import tables
 from service.store.engine import clock, reading, serialise, writing
+from service.store.figures import forget_quality
 
 
 class Venues:
@@ -33,7 +34,7 @@ class Venues:
     def put(self, venue: Venue, allow: Callable[[Venue | None], None]) -> bool:
         """Store a venue unless `allow` raises at the sight of what is there; says whether it is new."""
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, venue_lock(venue.id))
             before = find_venue(connection, venue.id)
             allow(before)
             known = before.poses if before else {}
@@ -45,7 +46,7 @@ class Venues:
     def delete(self, venue_id: str, allow: Callable[[Venue | None, str | None], None]) -> None:
         """Forget a venue and its poses unless `allow` raises at the sight of it or of its active job."""
         with writing(self._engine) as connection:
-            serialise(connection)
+            serialise(connection, venue_lock(venue_id))
             active = connection.scalar(
                 sa.select(tables.jobs.c.id).where(
                     tables.jobs.c.venue == venue_id, tables.jobs.c.status.in_(["queued", "running"])
@@ -53,6 +54,7 @@ class Venues:
             )
             allow(find_venue(connection, venue_id), active)
             connection.execute(sa.delete(tables.pose_history).where(tables.pose_history.c.venue == venue_id))
+            forget_quality(connection, venue_id)
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
 
     def poses(self, venue_id: str, before: int | None, limit: int) -> list[tuple[int, HeldPose]]:
@@ -66,6 +68,11 @@ class Venues:
                 (row.id, HeldPose(camera=row.camera, pose=row.pose, cause=row.cause, job=row.job, since=row.since))
                 for row in connection.execute(query)
             ]
+
+
+def venue_lock(venue_id: str) -> str:
+    """What to be serialised about by whoever changes a venue, or relies on it to stay."""
+    return f"venue {venue_id}"
 
 
 def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:

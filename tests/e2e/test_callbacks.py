@@ -60,7 +60,7 @@ def test_the_worker_that_is_killed_over_a_callback_sends_it_again_when_it_is_bac
     keys = Settings(webhook_secret=SECRET).webhook_keys
     at = datetime.fromtimestamp(int(second.headers["webhook-timestamp"]), UTC)
     assert second.headers.items() >= webhook.headers(job, at, second.body, keys).items()
-    wait_for(lambda: 'esc_callbacks{status="delivered"} 1.0' in service.http.get("/metrics").text)
+    wait_for(lambda: 'esc_callbacks_total{outcome="delivered"} 1.0' in service.http.get("/metrics").text)
 
 
 def due_now(service, job: str) -> None:

@@ -369,16 +369,7 @@ def test_nothing_is_ready_without_a_worker(start):
 
 def test_a_missing_network_is_told(start):
     lost = start("up", ESC_MODEL="/nowhere/unet.onnx")
-    parts = wait_for(lambda: "model" in (found := lost.http.get("/readyz").json()["parts"]) and found)
-    assert parts["model"].startswith("missing at")
-
-
-def test_what_a_request_is_called_stays(service):
-    assert (
-        service.http.get("/livez", headers={"X-Request-ID": "camera-van-3"}).headers["x-request-id"] == "camera-van-3"
-    )
-    odd = service.http.get("/livez", headers={"X-Request-ID": 'a"b\tc'}).headers["x-request-id"]
-    assert len(odd) == 32
+    wait_for(lambda: lost.http.get("/readyz").json()["parts"]["model"].startswith("missing at"))
 
 
 @in_both_homes

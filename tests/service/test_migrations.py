@@ -12,8 +12,10 @@ from service.schemas import VENUE_EXAMPLE, Options, VenueIn
 from service.store.deliveries import Deliveries
 from service.store.engine import MIGRATIONS, connect, migrate, writing
 from service.store.expiry import Expiry
+from service.store.figures import VenueQuality, look
 from service.store.jobs import Jobs
 from service.store.keys import Keys
+from service.store.outcomes import ENDED
 from service.store.venues import Venues
 from service.store.workers import Workers
 from tests.homes import in_both_homes
@@ -22,6 +24,7 @@ REVISIONS = [script.revision for script in ScriptDirectory(str(MIGRATIONS)).walk
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 VENUE = VenueIn.model_validate(VENUE_EXAMPLE).stored()
 DONE, WAITING = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "01KAJ3Q6WZ5T3Y8R0N4M2C7B1E"
+RECEIVER = "https://example.com/"
 FRAMES = {"left": [f"frames/{WAITING}/left/0"]}
 RESULT = {
     "accepted": True,
@@ -76,13 +79,32 @@ ROWS = {
         }
     ],
     "jobs": [
-        job(DONE, status="succeeded", result=RESULT, run_token="t", idempotency_key="k", finished_at=NOON),
-        job(WAITING, status="queued"),
+        job(
+            DONE,
+            status="succeeded",
+            options=Options(seed=7, callback_url=RECEIVER).model_dump(mode="json"),
+            result=RESULT,
+            run_token="t",
+            idempotency_key="k",
+            finished_at=NOON,
+        ),
+        job(WAITING, status="queued", request_id="van-3", traceparent=None),
     ],
     "workers": [{"name": "w", "model_sha256": "f" * 64, "started_at": NOON, "seen_at": NOON}],
     "api_keys": [{"name": "cron", "hash": "0" * 64, "scope": "calibrate", "created_at": NOON, "last_used_at": NOON}],
     "leftovers": [{"folder": "frames/lost", "due_at": NOON}],
-    "deliveries": [{"job": DONE, "url": "https://example.com/", "status": "waiting", "attempts": 1, "due_at": NOON}],
+    "deliveries": [
+        {
+            "job": DONE,
+            "url": RECEIVER,
+            "status": "waiting",
+            "attempts": 1,
+            "due_at": NOON,
+            "last_error": "timed out",
+        }
+    ],
+    "tallies": [{"metric": ENDED, "labels": "succeeded,accepted,", "value": 3}],
+    "venue_quality": [{"venue": VENUE.id, "stitch_error_px": 0.2, "moved_px": 2.0, "accepted_at": NOON}],
 }
 
 
@@ -123,11 +145,12 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     assert (held.cause, held.job, held.since, held.pose) == ("calibration", DONE, NOON, VENUE.cameras[0].pose)
     done = jobs.get(DONE)
     assert (done.status, done.created_at, done.finished_at) == ("succeeded", NOON, NOON)
-    assert done.result.model_dump(mode="json") == RESULT
+    assert done.result.model_dump(mode="json", exclude_unset=True) == RESULT
     assert jobs.same_as(VENUE.id, "k", "c" * 64).id == DONE
     assert jobs.get(WAITING).queue_position == 1
     task = jobs.begin(WAITING)
     assert (task.venue, task.options.seed, task.frames) == (VENUE, 7, FRAMES)
+    assert task.origin.request_id == ("van-3" if revision >= "0007" else None)
     assert Workers(engine).silent(0) == ["w"]
     keys = Keys(engine).all()
     assert [(key.name, key.scope, key.last_used_at) for key in keys] == (
@@ -136,6 +159,11 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     assert Expiry(engine).leftovers(NOON, 10) == (["frames/lost"] if revision >= "0004" else [])
     due = Deliveries(engine).attempt(NOON, NOON, 10)
     assert [(delivery.job_id, delivery.attempt) for delivery in due] == ([(DONE, 2)] if revision >= "0005" else [])
+    error = "timed out" if revision >= "0006" else None
+    assert [state.last_error for state in [jobs.get(DONE).callback] if state] == ([error] if revision >= "0005" else [])
+    seen = look(engine, 10)
+    assert seen.tallies == ({(ENDED, ("succeeded", "accepted", "")): 3} if revision >= "0007" else {})
+    assert seen.venues == ([VenueQuality(VENUE.id, 0.2, 2.0, NOON)] if revision >= "0007" else [])
 
 
 @in_both_homes

@@ -11,6 +11,7 @@ from service.problems import Problem
 from service.routes import calibrate
 from service.schemas import VenueIn
 from service.settings import Settings
+from service.store.jobs import Origin
 from tests.e2e.running import png, venue
 from tests.homes import files, in_both_homes
 
@@ -44,7 +45,7 @@ def uploaded():
 
 def refused(context, read, form):
     with pytest.raises(Problem) as problem:
-        calibrate.submit(context, read, form, None)
+        calibrate.submit(context, read, form, None, Origin())
     assert files(context.settings.home_blob_url) == []
     return problem.value.members()
 
@@ -52,7 +53,7 @@ def refused(context, read, form):
 def test_a_job_begins_from_the_poses_that_were_found_during_the_upload(context, read, form):
     moved = read.cameras[0].pose.model_copy(update={"position": [0.0, -60.0, 9.0]})
     context.venues.put(read.with_poses({"left": moved}), lambda _: None)
-    assert calibrate.submit(context, read, form, None).status_code == 202
+    assert calibrate.submit(context, read, form, None, Origin()).status_code == 202
     (job,) = context.jobs.page("v", None, None, 10)
     assert context.jobs.begin(job.id).venue == context.venues.get("v")
 
@@ -85,9 +86,9 @@ def test_frames_are_on_the_list_of_what_goes_until_they_are_a_job(context, read,
     with monkeypatch.context() as patch:
         patch.setattr(context.jobs, "submit", killed)
         with pytest.raises(KeyboardInterrupt):
-            calibrate.submit(context, read, form, None)
+            calibrate.submit(context, read, form, None, Origin())
     (folder,) = {path.rsplit("/", 2)[0] for path in files(context.settings.home_blob_url)}
     assert context.expiry.leftovers(datetime.now(UTC), 10) == []
     assert context.expiry.leftovers(later, 10) == [folder]
-    assert calibrate.submit(context, read, uploaded(), None).status_code == 202
+    assert calibrate.submit(context, read, uploaded(), None, Origin()).status_code == 202
     assert context.expiry.leftovers(later, 10) == [folder]

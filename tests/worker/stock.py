@@ -34,7 +34,7 @@ class Stock:
         job_id = new_job_id()
         frames = {"left": [f"frames/{job_id}/left/0"]}
         self.blobs.put(frames["left"][0], b"frame")
-        submission = Submission(job_id, self._venue(venue_id), Options(seed=1, **options), job_id, None, frames)
+        submission = Submission(job_id, self.venue(venue_id), Options(seed=1, **options), job_id, None, frames)
         self.jobs.submit(submission, 100, lambda _, job_id, __: self.enqueued.append(job_id))
         return job_id
 
@@ -51,11 +51,19 @@ class Stock:
             connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job_id).values(finished_at=at))
         return job_id
 
+    def callbacks(self) -> dict[str, int]:
+        """How many are in each state."""
+        d = tables.deliveries.c
+        with self.engine.connect() as connection:
+            rows = connection.execute(sa.select(d.status, sa.func.count().label("n")).group_by(d.status))
+            return {row.status: row.n for row in rows}
+
     def files(self) -> set[str]:
         """The jobs whose files are there: `frames/<job>` and `pictures/<job>`."""
         return {"/".join(path.split("/")[:2]) for path in files(self.settings.home_blob_url)}
 
-    def _venue(self, venue_id: str) -> Venue:
+    def venue(self, venue_id: str) -> Venue:
+        """The stored venue, after it was put if need be."""
         stored = self.venues.get(venue_id)
         if stored is None:
             stored = VenueIn.model_validate(venue(venue_id)).stored()

@@ -87,7 +87,7 @@ def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
     assert event["timestamp"] == event["data"]["finished_at"]
     assert (told.path, told.headers["content-type"]) == ("/told?by=esc", "application/json")
     assert told.headers["host"] == f"127.0.0.1:{hook.port}"
-    assert home.deliveries.counts() == {"delivered": 1}
+    assert home.callbacks() == {"delivered": 1}
     clock.goes_on(days=2)
     callbacks(home, clock).look()
     assert len(hook.received) == 1
@@ -108,7 +108,7 @@ def test_every_end_is_told(stock, receiver, clock, how):
 def test_a_job_that_asked_for_nothing_is_not_told_of(stock):
     home = stock()
     home.ended("v", datetime.now(UTC))
-    assert home.deliveries.counts() == {}
+    assert home.callbacks() == {}
 
 
 @in_both_homes
@@ -117,7 +117,7 @@ def test_a_cancelled_job_is_told_of_once(stock):
     job = home.submitted("v", callback_url="https://example.com/")
     home.jobs.cancel(job)
     home.jobs.cancel(job)
-    assert home.deliveries.counts() == {"waiting": 1}
+    assert home.callbacks() == {"waiting": 1}
 
 
 def test_signatures_are_those_of_standard_webhooks():
@@ -160,7 +160,7 @@ def test_what_fails_is_sent_again_after_ever_longer_pauses_with_the_same_id(stoc
     assert [told.headers["webhook-id"] for told in hook.received] == [job] * 4
     assert len({told.headers["webhook-timestamp"] for told in hook.received}) == 4
     assert len({told.body for told in hook.received}) == 1
-    assert home.deliveries.counts() == {"delivered": 1}
+    assert home.callbacks() == {"delivered": 1}
 
 
 @in_both_homes
@@ -199,13 +199,13 @@ def test_after_a_day_it_is_given_up(stock, receiver, clock):
     home, hook = stock(), receiver(Receiver, 500)
     ended(home, hook.url)
     sender, begun, last = callbacks(home, clock), clock.now, clock.now
-    while home.deliveries.counts() == {"waiting": 1}:
+    while home.callbacks() == {"waiting": 1}:
         before = len(hook.received)
         sender.look()
         if len(hook.received) > before:
             last = clock.now
         clock.goes_on(minutes=10)
-    assert home.deliveries.counts() == {"given-up": 1}
+    assert home.callbacks() == {"given-up": 1}
     assert len(hook.received) == 11
     assert timedelta(hours=23) < last - begun < timedelta(hours=30)
 
@@ -217,7 +217,7 @@ def test_a_receiver_that_is_gone_is_left_alone(stock, receiver, clock):
     sender.look()
     clock.goes_on(days=1)
     sender.look()
-    assert (len(hook.received), home.deliveries.counts()) == (1, {"given-up": 1})
+    assert (len(hook.received), home.callbacks()) == (1, {"given-up": 1})
 
 
 def test_a_receiver_may_ask_for_a_longer_pause(stock, receiver, clock):
@@ -240,7 +240,7 @@ def test_a_sender_that_died_over_an_attempt_loses_nothing(stock, receiver, clock
     assert hook.received == []
     clock.goes_on(seconds=ATTEMPT.total_seconds())
     sender.look()
-    assert home.deliveries.counts() == {"delivered": 1}
+    assert home.callbacks() == {"delivered": 1}
 
 
 @in_both_homes
@@ -266,7 +266,7 @@ def test_a_worker_without_a_secret_sends_nothing_unsigned(stock, receiver, clock
     home, hook = stock(webhook_secret=None), receiver()
     ended(home, hook.url)
     callbacks(home, clock).look()
-    assert (hook.received, home.deliveries.counts()) == ([], {"waiting": 1})
+    assert (hook.received, home.callbacks()) == ([], {"waiting": 1})
 
 
 def test_one_address_that_cannot_be_called_holds_up_no_other(stock, receiver, clock):
@@ -274,7 +274,7 @@ def test_one_address_that_cannot_be_called_holds_up_no_other(stock, receiver, cl
     for url in ("https://a..b/", "https://" + "a" * 70 + ".example/", "http://127.0.0.1:1/", hook.url):
         ended(home, url)
     callbacks(home, clock).look()
-    assert home.deliveries.counts() == {"delivered": 1, "waiting": 3}
+    assert home.callbacks() == {"delivered": 1, "waiting": 3}
 
 
 # Receivers that mean no good
@@ -288,14 +288,14 @@ def test_no_receiver_holds_a_sender_longer_than_the_limit(stock, receiver, clock
     begun = time.monotonic()
     callbacks(home, clock).look()
     assert time.monotonic() - begun < 3
-    assert (len(hook.received), home.deliveries.counts()) == (1, {"waiting": 1})
+    assert (len(hook.received), home.callbacks()) == (1, {"waiting": 1})
 
 
 def test_of_an_endless_answer_only_the_beginning_is_read(stock, receiver, clock):
     home, hook = stock(), receiver(Endless, 200)
     ended(home, hook.url)
     callbacks(home, clock).look()
-    assert home.deliveries.counts() == {"delivered": 1}
+    assert home.callbacks() == {"delivered": 1}
     assert hook.broken_off.wait(10)
 
 
@@ -305,7 +305,7 @@ def test_redirects_are_not_followed(stock, receiver, clock):
     ended(home, hook.url)
     callbacks(home, clock).look()
     assert (len(hook.received), secret_place.received) == (1, [])
-    assert home.deliveries.counts() == {"waiting": 1}
+    assert home.callbacks() == {"waiting": 1}
 
 
 def names(monkeypatch, *answers: list[str]) -> list[str]:
@@ -326,7 +326,7 @@ def test_a_name_with_any_address_inside_is_not_called(stock, receiver, clock, mo
     ended(home, f"http://rebound.example:{hook.port}/")
     names(monkeypatch, ["93.184.216.34", "127.0.0.1"])
     callbacks(home, clock).look()
-    assert (hook.received, home.deliveries.counts()) == ([], {"waiting": 1})
+    assert (hook.received, home.callbacks()) == ([], {"waiting": 1})
 
 
 def test_the_connection_goes_to_the_address_that_was_checked(stock, receiver, clock, monkeypatch):
@@ -343,7 +343,7 @@ def test_an_address_that_does_not_answer_is_passed_over_for_the_next(stock, rece
     ended(home, f"http://two.example:{hook.port}/")
     names(monkeypatch, ["127.0.0.99", "127.0.0.1"])
     callbacks(home, clock).look()
-    assert home.deliveries.counts() == {"delivered": 1}
+    assert home.callbacks() == {"delivered": 1}
 
 
 def test_proxies_of_the_environment_are_not_used(stock, receiver, clock, monkeypatch):

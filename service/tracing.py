@@ -1,0 +1,73 @@
+"""Traces: a span per request, per job and per stage, sent where OpenTelemetry's own variables say.
+
+Without `OTEL_EXPORTER_OTLP_ENDPOINT`, or without the extra `tracing`, nothing is recorded and nothing more is loaded
+than OpenTelemetry's interface, which FastAPI brings. The context of a caller's trace (W3C Trace Context, `traceparent`)
+is handed on to the job in any case.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from importlib.metadata import version
+
+import structlog
+from opentelemetry import trace
+from opentelemetry.context import Context
+from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
+
+# Of the only version there is.
+TRACEPARENT = re.compile(r"00-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}")
+ENDPOINTS = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
+# For what is left to send when a process ends.
+FLUSH_S = 2.0
+log = structlog.get_logger()
+
+
+def configure(service: str, instance: str) -> None:
+    """Let spans of this process be sent, if somebody has said where to."""
+    if not any(os.environ.get(name) for name in ENDPOINTS) or os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
+        return
+    try:
+        from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
+        from opentelemetry.sdk.resources import Resource
+        from opentelemetry.sdk.trace import TracerProvider
+        from opentelemetry.sdk.trace.export import BatchSpanProcessor
+    except ImportError:
+        log.warning("no traces: OpenTelemetry is configured but not installed, see the extra `tracing`")
+        return
+
+    names = {
+        "service.name": os.environ.get("OTEL_SERVICE_NAME", service),
+        "service.version": version("esc-calibration"),
+        "service.instance.id": instance,
+    }
+    provider = TracerProvider(resource=Resource.create(names))
+    provider.add_span_processor(BatchSpanProcessor(OTLPSpanExporter()))
+    trace.set_tracer_provider(provider)
+
+
+def flush() -> None:
+    """Send what is left; for a process that is about to end without further ado."""
+    provider = trace.get_tracer_provider()
+    if hasattr(provider, "force_flush"):
+        provider.force_flush(int(FLUSH_S * 1000))
+
+
+def trace_id_in(traceparent: str | None) -> str | None:
+    """The trace that a `traceparent` belongs to; None if it is not one."""
+    found = TRACEPARENT.fullmatch(traceparent or "")
+    return found[1] if found else None
+
+
+def current_traceparent() -> str | None:
+    """Of the span that is being recorded, for whoever goes on with its trace."""
+    carrier: dict[str, str] = {}
+    TraceContextTextMapPropagator().inject(carrier)
+    return carrier.get("traceparent")
+
+
+def context_of(traceparent: str | None) -> Context:
+    """The place in a trace that a new span belongs under."""
+    carrier = {} if traceparent is None else {"traceparent": traceparent}
+    return TraceContextTextMapPropagator().extract(carrier, context=Context())

@@ -1,0 +1,105 @@
+"""What operators copy: the image, the compose files, the units; read, as not every machine can start them."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+DOCKER = ROOT / "docker"
+DOCKERFILE = (DOCKER / "Dockerfile").read_text()
+COMPOSE = {name: yaml.safe_load((DOCKER / name).read_text()) for name in ("compose.yaml", "compose.single.yaml")}
+OURS = [
+    (name, service) for name, file in COMPOSE.items() for service, its in file["services"].items() if "build" in its
+]
+UNITS = sorted((DOCKER / "systemd").glob("*.service"))
+PIN = re.compile(r"^([a-z0-9._-]+)==(\S+)", re.MULTILINE)
+
+
+def test_the_image_has_the_versions_that_are_tested():
+    tested = dict(PIN.findall((ROOT / "requirements.lock").read_text()))
+    shipped = dict(PIN.findall((DOCKER / "requirements.lock").read_text()))
+    assert {name: version for name, version in shipped.items() if tested.get(name) != version} == {}
+    assert {"fastapi", "opentelemetry-sdk"} <= shipped.keys()
+    assert not {"pytest", "moto", "ruff"} & shipped.keys()
+
+
+def test_the_image_is_given_all_that_it_copies():
+    given = re.findall(r"^!(\S+)", (DOCKER / "Dockerfile.dockerignore").read_text(), re.MULTILINE)
+    copied = [line.split()[1:-1] for line in DOCKERFILE.splitlines() if re.match(r"COPY (?!--from)", line)]
+    sources = {source for line in copied for source in line}
+    assert sources == set(given)
+    assert all((ROOT / source).exists() for source in sources)
+
+
+def test_the_image_installs_by_hash_and_compiles_nothing_and_runs_as_nobody_special():
+    install = "pip install --no-cache-dir --require-hashes --only-binary=:all:"
+    assert install in DOCKERFILE
+    last = DOCKERFILE[DOCKERFILE.rindex("FROM ") :]
+    assert re.search(r"^USER 10001:10001$", last, re.MULTILINE)
+    assert not re.search(r"apt-get|gcc|pip", last)
+    assert "/livez" in last
+
+
+@pytest.mark.parametrize(("file", "service"), OURS)
+def test_containers_of_ours_may_write_nowhere_but_where_they_must(file, service):
+    its = COMPOSE[file]["services"][service]
+    assert its["read_only"] is True
+    assert its["cap_drop"] == ["ALL"]
+    assert its["security_opt"] == ["no-new-privileges:true"]
+    assert its["init"] is True
+    writable = [entry.split(":")[0] for entry in its["tmpfs"]] + [v.split(":")[1] for v in its.get("volumes", [])]
+    assert sorted(writable) == ["/data", "/tmp"]
+    # The grace of API and worker fits in it.
+    assert its["stop_grace_period"] == "20s"
+
+
+def test_the_large_compose_file_has_two_workers_of_names_of_their_own():
+    services = COMPOSE["compose.yaml"]["services"]
+    workers = [its for its in services.values() if its.get("command") == ["worker"]]
+    assert len({its["environment"]["ESC_WORKER_NAME"] for its in workers}) == 2
+    api = services["api"]["environment"]
+    assert all(its["environment"].items() >= api.items() for its in workers)
+    assert {"ESC_DATABASE_URL", "ESC_BLOB_URL", "ESC_WEBHOOK_SECRET"} <= api.keys()
+
+
+def test_every_secret_is_asked_for_and_none_has_a_default():
+    text = (DOCKER / "compose.yaml").read_text()
+    used = re.findall(r"(?<!\$)\$\{(\w+)([^}]*)\}", text)
+    asked = re.findall(r"^(\w+)=(.*)$", (DOCKER / "env.example").read_text(), re.MULTILINE)
+    assert {name for name, _ in used} == {name for name, _ in asked}
+    assert {how for _, how in used} == {":?put it into docker/.env"}
+    assert {value for _, value in asked} == {""}
+
+
+def test_secrets_that_are_filled_in_stay_out_of_the_repository():
+    assert "/docker/.env" in (ROOT / ".gitignore").read_text().split()
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=lambda path: path.name)
+def test_units_are_understood_by_systemd(unit, tmp_path):
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("no systemd on this machine")
+    here = tmp_path / unit.name.replace("@", "@1")
+    # The program is not installed here, and a unit whose program is missing is refused.
+    here.write_text(unit.read_text().replace("/opt/esc/.venv/bin/esc", "/bin/true"))
+    verified = subprocess.run(["systemd-analyze", "verify", here], capture_output=True, text=True)
+    assert (verified.returncode, verified.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=lambda path: path.name)
+def test_units_may_write_only_to_their_own_folder(unit):
+    lines = unit.read_text().splitlines()
+    for line in (
+        "ProtectSystem=strict",
+        "NoNewPrivileges=true",
+        "PrivateTmp=true",
+        "CapabilityBoundingSet=",
+        "User=esc",
+    ):
+        assert line in lines
+    assert sum(line.startswith("StateDirectory=") for line in lines) == 1
+    assert not any(line.startswith("ReadWritePaths") for line in lines)
