@@ -411,6 +411,9 @@ class JobError(Wire):
     camera: str | None = None
 
 
+# Of files that poses leave in; `service.formats.table` has what is behind the names.
+FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
+
 # What a key allows; each one includes those before it.
 Scope = Literal["read", "calibrate", "admin"]
 

@@ -13,8 +13,9 @@ from service import etags
 from service.context import Context, InContext, JobIdPath
 from service.problems import Problem
 from service.routes.documented import needs, problems
+from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
-from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, Job, Jobs, Status
+from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Job, Jobs, Status
 from service.store.jobs import Pictures, State
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
@@ -108,6 +109,25 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
         if context.watch.closed:
             return
         await context.watch.until(job.id, _later_than(state), EVENT_AT_LEAST_EVERY_S)
+
+
+@router.get(
+    "/{job_id}/poses",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={**DOCUMENTS, **problems(404, 422)},
+)
+def job_poses(
+    job: Existing,
+    context: InContext,
+    wanted: Annotated[Wanted, Depends()],
+    form: Annotated[FormatName, Query(alias="format")] = "json",
+) -> Response:
+    """The poses that a job found, accepted or not, in the format of another tool."""
+    venue = context.jobs.posed(job.id)
+    if venue is None:
+        raise Problem("poses-not-found", "It has not found any yet." if job.open else "It found none.", job=job.id)
+    return exported(context, venue, f"{venue.id}-{job.id}", form, wanted)
 
 
 @router.get(
