@@ -182,7 +182,7 @@ def _decode(camera: schemas.Camera, files: Sequence[bytes]) -> list[Picture]:
 
 def _pitch(field: schemas.FieldOfPlay) -> Field:
     ridge = None if field.ridge is None else np.array(field.ridge)
-    return Field(field.length_m, field.width_m, field.line_width_m, ridge)
+    return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
 
 
 def _camera(camera: schemas.Camera) -> Camera:

@@ -148,7 +148,7 @@ def preview(job: Existing, context: InContext) -> Response:
     responses={**JPEG, **problems(404, 410)},
 )
 def birdseye(job: Existing, context: InContext) -> Response:
-    """The pitch from above, 10 px/m."""
+    """The pitch from above, 10 px/m, more of small ones."""
     return _picture(context, job, "birdseye")
 
 
