@@ -13,10 +13,11 @@ OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
 }
+FUNCTIONS: dict[str, Callable[..., float]] = {"sqrt": math.sqrt, "min": min}
 
 
 def value(expression: str | float, known: Mapping[str, float]) -> float:
-    """A number, or sums, products and `sqrt` of numbers and known measures.
+    """A number, or sums, products, `sqrt` and `min` of numbers and known measures.
 
     Raises `ValueError` on anything else, and on a name that is not known.
     """
@@ -35,7 +36,7 @@ def _value(node: ast.expr, known: Mapping[str, float]) -> float:
             return -_value(operand, known)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATIONS:
             return OPERATIONS[type(op)](_value(left, known), _value(right, known))
-        case ast.Call(func=ast.Name(id="sqrt"), args=[argument], keywords=[]):
-            return math.sqrt(_value(argument, known))
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
+            return FUNCTIONS[name](*(_value(argument, known) for argument in arguments))
         case _:
             raise ValueError(f"{ast.unparse(node)} is neither a number, a known measure ({', '.join(known)}) nor a sum")

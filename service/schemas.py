@@ -193,9 +193,7 @@ class ArcIn(Wire):
     def _round(self) -> Self:
         first, last = math.dist(self.centre, self.start), math.dist(self.centre, self.end)
         if first == 0 or abs(first - last) > 0.01:
-            raise ValueError(
-                f"start is {first:.2f} m from the centre and end {last:.2f} m: they need the same distance"
-            )
+            raise ValueError(f"start is {first:.2f} m from the centre, end {last:.2f} m: one radius is needed")
         return self
 
 
@@ -311,11 +309,7 @@ class FieldOfPlay(Wire):
 
     @model_validator(mode="after")
     def _a_field(self) -> Self:
-        try:
-            shapes = self.plan.markings(self.size)
-        except ValueError as error:
-            raise ValueError(f"its markings do not fit into {self.length_m:g} x {self.width_m:g} m: {error}") from error
-        for shape in shapes:
+        for shape in self.plan.markings(self.size):
             x, y = shape.reach
             if x > self.length_m / 2 + BESIDE_M or y > self.width_m / 2 + BESIDE_M:
                 raise ValueError(
