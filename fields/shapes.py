@@ -53,8 +53,10 @@ class Arc:
     @property
     def reach(self) -> Point:
         """How far it gets from the centre of the field along x and along y, either way."""
-        (x, y), step = self.centre, (self.end - self.start) / 90
-        angles = [self.start + n * step for n in range(91)]
+        (x, y), quarter = self.centre, math.pi / 2
+        # Its ends, and where it runs along an axis.
+        level = range(math.ceil(self.start / quarter), math.floor(self.end / quarter) + 1)
+        angles = [self.start, self.end, *(n * quarter for n in level)]
         return _reach([(x + self.radius * math.cos(a), y + self.radius * math.sin(a)) for a in angles])
 
     def mirrored(self) -> Arc:

@@ -215,7 +215,7 @@ class MarkingIn(Wire):
     """One thing painted, exactly one of `line`, `arc`, `circle` and `spot`; places are x, y from the centre, m."""
 
     name: Annotated[Name, Field(min_length=1)]
-    line: Annotated[list[Place], Field(min_length=2, max_length=1000)] | None = None
+    line: Annotated[list[Place], Field(min_length=2, max_length=200)] | None = None
     arc: ArcIn | None = None
     circle: CircleIn | None = None
     spot: SpotIn | None = None
@@ -243,7 +243,7 @@ class MarkingIn(Wire):
 class Layout(Wire):
     """Markings of one's own in place of a template's name, and names for points of them."""
 
-    markings: Annotated[list[MarkingIn], Field(min_length=1, max_length=1000)]
+    markings: Annotated[list[MarkingIn], Field(min_length=1, max_length=500)]
     points: Annotated[dict[Annotated[Name, Field(min_length=1)], Place], Field(max_length=1000)] = {}
 
 

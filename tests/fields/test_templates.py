@@ -180,6 +180,14 @@ def test_dashes_are_whole_and_one_is_in_the_middle():
     assert [(dash.start + dash.end) / 2 * 2 for dash in quarter] == pytest.approx([math.pi / 2 + n for n in (-1, 0, 1)])
 
 
+@given(st.floats(-4, 4), st.floats(0.01, 2 * math.pi))
+def test_an_arc_reaches_as_far_as_its_farthest_point(start, span):
+    arc = Arc("arc", (1.0, -2.0), 3.0, start, start + span, 0.1)
+    angles = [start + span * n / 2000 for n in range(2001)]
+    points = [(1 + 3 * math.cos(angle), -2 + 3 * math.sin(angle)) for angle in angles]
+    assert arc.reach == pytest.approx([max(map(abs, along)) for along in zip(*points, strict=True)], abs=1e-4)
+
+
 def test_measures_are_sums_and_products():
     assert value("-(length/2 - 16.5) + sqrt(2*2)", {"length": 105.0}) == pytest.approx(-34)
     for wrong in ("width", "length.real", "length[0]", "__import__('os')", "length ** 2", "'a'"):
