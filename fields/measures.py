@@ -6,6 +6,7 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping
+from functools import cache
 
 OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -23,7 +24,13 @@ def value(expression: str | float, known: Mapping[str, float]) -> float:
     """
     if not isinstance(expression, str):
         return float(expression)
-    return _value(ast.parse(expression, mode="eval").body, known)
+    return _value(_parsed(expression), known)
+
+
+@cache
+def _parsed(expression: str) -> ast.expr:
+    # Only files of templates have expressions, and few.
+    return ast.parse(expression, mode="eval").body
 
 
 def _value(node: ast.expr, known: Mapping[str, float]) -> float:
