@@ -24,7 +24,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service import lifeline, logs
 from service.client import Client, Refused
-from service.schemas import ID_PATTERN, Job, JobError, Options, Result, Scope, VenueIn
+from service.schemas import ID_PATTERN, FormatName, Job, JobError, Options, Result, Scope, VenueIn
 from service.schemas import Progress as Step
 from service.settings import Settings
 
@@ -63,6 +63,9 @@ Data = Annotated[Path | None, typer.Option("--data", help="Folder of the embedde
 Host = Annotated[str | None, typer.Option("--host", help="Address to listen on (ESC_HOST).")]
 Port = Annotated[int | None, typer.Option("--port", help="0 takes a free one (ESC_PORT).")]
 Frames = Annotated[list[str], typer.Argument(metavar="CAMERA=FILE...", help="Repeat a camera to fuse its frames.")]
+Form = Annotated[FormatName, typer.Option("--format", help="Whose.")]
+OneCamera = Annotated[str | None, typer.Option("--camera", help="One camera; otherwise all.")]
+Output = Annotated[Path | None, typer.Option("-o", "--output", help="File; otherwise standard output.")]
 OptionsText = Annotated[str, typer.Option("--options", metavar="JSON", help='For instance {"dry_run": true}.')]
 
 
@@ -211,6 +214,34 @@ def delete_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Forget a venue and the history of its poses."""
     with Client(url, api_key) as client:
         client.delete_venue(venue)
+
+
+@venue_app.command("poses")
+def venue_poses(
+    venue: str,
+    form: Form = "json",
+    camera: OneCamera = None,
+    output: Output = None,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Write the poses that hold now in the format of another tool."""
+    with Client(url, api_key) as client:
+        _hand_out(client.venue_poses(venue, form, camera), output)
+
+
+@job_app.command("poses")
+def job_poses(
+    job: str,
+    form: Form = "json",
+    camera: OneCamera = None,
+    output: Output = None,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Write the poses that a job found in the format of another tool."""
+    with Client(url, api_key) as client:
+        _hand_out(client.job_poses(job, form, camera), output)
 
 
 @job_app.command("get")
@@ -406,6 +437,13 @@ def _hint(status: int) -> str:
             return "\n  Set ESC_API_KEY to a key that may. On the machine of the service: esc key list"
         case _:
             return ""
+
+
+def _hand_out(document: bytes, output: Path | None) -> None:
+    if output is None:
+        sys.stdout.buffer.write(document)
+    else:
+        output.write_bytes(document)
 
 
 def _print(what: BaseModel | dict[str, str]) -> None:

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import httpx
 
-from service.schemas import Job, Venue, VenueIn, Venues
+from service.schemas import FormatName, Job, Venue, VenueIn, Venues
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
@@ -71,6 +71,14 @@ class Client:
         """Forget a venue."""
         self._answer("DELETE", f"/venues/{venue_id}")
 
+    def venue_poses(self, venue_id: str, form: FormatName, camera: str | None = None) -> bytes:
+        """The poses that hold now, of one camera or all, as a file of another tool's format."""
+        return self._document(f"/venues/{venue_id}/poses", form, camera)
+
+    def job_poses(self, job_id: str, form: FormatName, camera: str | None = None) -> bytes:
+        """The poses that a job found, of one camera or all, as a file of another tool's format."""
+        return self._document(f"/jobs/{job_id}/poses", form, camera)
+
     def calibrate(
         self,
         venue_id: str,
@@ -115,6 +123,9 @@ class Client:
     def url_of(self, path: str) -> str:
         """The address of something the service linked to."""
         return str(self._http.base_url.join(path))
+
+    def _document(self, path: str, form: FormatName, camera: str | None) -> bytes:
+        return self._answer("GET", path, params={"format": form} | ({"camera": camera} if camera else {})).content
 
     def _json(self, method: str, path: str, **request: Any) -> Any:
         return self._answer(method, path, **request).json()

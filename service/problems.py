@@ -68,7 +68,11 @@ KINDS: dict[str, Kind] = {
     "truncated-image": Kind(422, "The frame ends too early"),
     "too-many-pixels": Kind(422, "The frame has too many pixels"),
     "frame-size": Kind(422, "The frame does not have the size of the camera"),
+    # Formats of poses.
+    "format-cannot-hold": Kind(422, "The format cannot hold this camera"),
+    "camera-needed": Kind(422, "The format holds one camera"),
     # Jobs.
+    "poses-not-found": Kind(404, "The job has no poses"),
     "job-not-found": Kind(404, "There is no such job"),
     "picture-not-found": Kind(404, "There is no such picture"),
     "picture-deleted": Kind(410, "The picture was deleted"),

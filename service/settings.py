@@ -17,6 +17,8 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 # Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
 DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
+FREED_ANGLES = " ".join(rf"-?{angle}([+-]\d{{1,3}}(\.\d+)?)?" for angle in ("pan", "tilt", "roll"))
+FREED_AXES = re.compile(rf"(-?[xyz] ){{3}}{FREED_ANGLES}")
 BLOB_URL = re.compile(r"(file|s3)://.+")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
@@ -62,6 +64,15 @@ class Settings(BaseSettings):
         600, gt=0, description="A body must have arrived, an answer be taken, within this."
     )
     queue_limit: int = Field(100, ge=1, description="Jobs that may wait; more are answered with 429.")
+
+    # Poses in other formats.
+    freed_axes: str = Field(
+        "x y z pan tilt roll",
+        description="What FreeD packets carry as X, Y, height, pan, tilt, roll: `y -x z -pan+90 tilt roll`.",
+    )
+    map_program: list[str] = Field(
+        [sys.executable, "-P", "-m", "worker.stmap"], description="What computes ST maps; called with their origin."
+    )
 
     # The worker.
     worker_name: str = Field(default_factory=socket.gethostname, description="Unique per worker and stable.")
@@ -113,6 +124,13 @@ class Settings(BaseSettings):
         if url is not None and not BLOB_URL.fullmatch(url):
             raise ValueError("expected is s3://bucket, s3://bucket/folder or file:///folder")
         return url
+
+    @field_validator("freed_axes")
+    @classmethod
+    def _are_six_axes(cls, axes: str) -> str:
+        if not FREED_AXES.fullmatch(axes) or {*"xyz"} - {*axes[: axes.index("p")]}:
+            raise ValueError("expected is each of x y z, then pan tilt roll, with signs: y -x z -pan+90 tilt roll")
+        return axes
 
     @field_validator("webhook_secret")
     @classmethod

@@ -11,6 +11,7 @@ from tests.homes import Embedded, Servers, postgres_binaries, postgres_server, s
 PARTS = {
     "postgres": "install PostgreSQL (Debian: apt-get install postgresql)",
     "s3": "install the packages of the group dev (make setup), moto among them",
+    "colmap": "install pycolmap, which the group dev has on machines that have a wheel of it (make setup)",
     "promtool": "install Prometheus (Debian: apt-get install prometheus)",
     "browser": "install Chromium (Debian: apt-get install chromium)",
 }

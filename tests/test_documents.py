@@ -11,7 +11,11 @@ from tests.benchmarks import sizing
 ROOT = Path(__file__).parents[1]
 OPERATIONS = ROOT / "docker" / "README.md"
 SIZING = ROOT / "docs" / "sizing.md"
-DOCUMENTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "models" / "README.md", OPERATIONS, SIZING]
+DOCUMENTS = [
+    *(ROOT / name for name in ("README.md", "CHANGELOG.md", "models/README.md")),
+    OPERATIONS,
+    *sorted((ROOT / "docs").glob("*.md")),
+]
 # Those of the commands that call a service.
 OF_CLIENTS = {"ESC_URL", "ESC_API_KEY"}
 

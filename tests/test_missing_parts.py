@@ -21,5 +21,5 @@ def test_what_must_not_be_missing_fails(missing, monkeypatch):
 
 def test_a_misspelt_part_is_not_silently_optional(monkeypatch, pytestconfig):
     monkeypatch.setenv("ESC_TEST_REQUIRE", "s3, postgresql")
-    with pytest.raises(pytest.UsageError, match="names postgresql; known are postgres, s3, promtool, browser"):
+    with pytest.raises(pytest.UsageError, match="names postgresql; known are postgres, s3, colmap, promtool, browser"):
         conftest.pytest_configure(pytestconfig)

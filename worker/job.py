@@ -183,17 +183,18 @@ def _decode(camera: schemas.Camera, files: Sequence[bytes]) -> list[Picture]:
 
 def _pitch(field: schemas.FieldOfPlay) -> Field:
     ridge = None if field.ridge is None else np.array(field.ridge)
-    return Field(field.length_m, field.width_m, field.line_width_m, ridge)
+    return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
 
 
 def _camera(camera: schemas.Camera) -> Camera:
-    lens = camera.intrinsics
-    intrinsics = Intrinsics(
-        np.array(lens.matrix, dtype=float),
-        np.array(lens.distortion, dtype=float),
-        (camera.image_size[0], camera.image_size[1]),
-    )
-    return Camera(camera.id, intrinsics, Pose(np.array(camera.pose.rotation), np.array(camera.pose.position)))
+    pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
+    return Camera(camera.id, intrinsics(camera), pose)
+
+
+def intrinsics(camera: schemas.Camera) -> Intrinsics:
+    """The lens of a camera of a venue, for the engine."""
+    lens, (width, height) = camera.intrinsics, camera.image_size
+    return Intrinsics(np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float), (width, height))
 
 
 def _engine_options(options: schemas.Options) -> engine.Options:

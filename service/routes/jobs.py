@@ -15,8 +15,9 @@ from service import etags
 from service.context import Context, InContext, JobIdPath
 from service.problems import Problem
 from service.routes.documented import headers, needs, problems
+from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
-from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, Job, Jobs, Status
+from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Job, Jobs, Status
 from service.store.engine import AWAY
 from service.store.jobs import Pictures, State
 
@@ -135,6 +136,25 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
 
 
 @router.get(
+    "/{job_id}/poses",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={**DOCUMENTS, 200: DOCUMENTS[200] | headers("ETag"), **problems(404)},
+)
+def job_poses(
+    job: Existing,
+    context: InContext,
+    wanted: Annotated[Wanted, Depends()],
+    form: Annotated[FormatName, Query(alias="format")] = "json",
+) -> Response:
+    """The poses that a job found, accepted or not, in the format of another tool."""
+    venue = context.jobs.posed(job.id)
+    if venue is None:
+        raise Problem("poses-not-found", "It has not found any yet." if job.open else "It found none.", job=job.id)
+    return exported(context, venue, f"{venue.id}-{job.id}", form, wanted)
+
+
+@router.get(
     "/{job_id}/preview.jpg",
     openapi_extra=needs("read"),
     response_class=Response,
@@ -152,7 +172,7 @@ def preview(job: Existing, context: InContext) -> Response:
     responses={**JPEG, **problems(404, 410)},
 )
 def birdseye(job: Existing, context: InContext) -> Response:
-    """The pitch from above, 10 px/m."""
+    """The pitch from above, 10 px/m, more of small ones."""
     return _picture(context, job, "birdseye")
 
 

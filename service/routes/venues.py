@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Depends, Header, Query, Response
 
 from service import etags
 from service.context import InContext, VenueIdPath
 from service.problems import Problem
 from service.routes.documented import headers, needs, problems
+from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
-from service.schemas import ID_PATTERN, PoseHistory, Venue, VenueIn, Venues
+from service.schemas import ID_PATTERN, FormatName, PoseHistory, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 
@@ -91,16 +92,29 @@ def get_venue(
     return stored
 
 
-@router.get("/{venue_id}/poses", openapi_extra=needs("read"), responses=problems(404))
+@router.get(
+    "/{venue_id}/poses",
+    openapi_extra=needs("read"),
+    response_model=PoseHistory | dict[str, Any],
+    responses={**DOCUMENTS, **problems(404)},
+)
 def list_poses(
     venue_id: VenueIdPath,
     context: InContext,
+    wanted: Annotated[Wanted, Depends()],
+    form: Annotated[FormatName | None, Query(alias="format", description="The poses that hold now, as a file.")] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     cursor: Annotated[int | None, Query(ge=0, le=2**31)] = None,
-) -> PoseHistory:
-    """Every pose that held, newest first, in pages: the way back from a calibration that should not have been."""
-    if context.venues.get(venue_id) is None:
+) -> PoseHistory | Response:
+    """With `format`: the poses that hold now, for another tool. Without: every pose that held, newest first, in pages.
+
+    The history is the way back from a calibration that should not have been.
+    """
+    venue = context.venues.get(venue_id)
+    if venue is None:
         raise no_such_venue(venue_id)
+    if form is not None:
+        return exported(context, venue, venue.id, form, wanted)
     page = context.venues.poses(venue_id, cursor, limit + 1)
     more = len(page) > limit
     return PoseHistory(poses=[pose for _, pose in page[:limit]], next_cursor=page[limit - 1][0] if more else None)

@@ -236,6 +236,15 @@ class Jobs:
             return None
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
+    def posed(self, job_id: str) -> Venue | None:
+        """The venue as a job found it, the lenses and the ridge that go with its poses too; None: no result (yet)."""
+        query = sa.select(j.venue_document, j.result).where(j.id == job_id, j.result.is_not(None))
+        with reading(self._engine) as connection:
+            row = connection.execute(query).one_or_none()
+        if row is None:
+            return None
+        return Venue.model_validate(row.venue_document).with_result(Result.model_validate(row.result))
+
     def check(self) -> None:
         """Raise unless the database answers, and has them."""
         with reading(self._engine) as connection:

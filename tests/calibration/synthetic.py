@@ -95,7 +95,7 @@ def _covered(marking: Marking, points: Array) -> Array:
         half_length = np.linalg.norm(np.diff(marking.centre, axis=0), axis=1).sum() / 2
         if marking.closed:
             along = np.zeros_like(along)
-    if marking.name.endswith("mark"):
+    if marking.spot:
         across, along, half_length = np.hypot(across, along), np.zeros_like(along), 1.0
     return _box(across, marking.width / 2) * _box(along, half_length)
 

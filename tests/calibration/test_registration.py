@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fields.template import load
 from tests.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings, pair
 from worker.calibration.camera import Array, Camera, Pose, rotation_matrices, rotation_vectors
 from worker.calibration.field import Field
@@ -180,3 +181,16 @@ def test_a_halfway_line_that_has_slid_along_itself_is_no_registration(degrees: f
     pitched = RIGHT.with_pose(Pose(rotation_vectors(turn @ RIGHT.pose.matrix), RIGHT.pose.position))
     assert register_pair(PITCH, LEFT, pitched, mask_of("left"), mask_of("right")) is None
     assert pairs_in_common(PITCH, [LEFT, pitched]) == [(LEFT, pitched)]
+
+
+def test_where_nothing_holds_the_views_along_a_line_the_displacement_across_it_is_told() -> None:
+    # A side line 10 m away does not: a camera can turn and move so that only the centre line slides along itself.
+    handball = Field(40.0, 20.0, 0.05, template=load("handball"))
+    cameras = [camera(name, (x, -14.4, 4.6), (20 * x, 0.0)) for name, x in (("left", -0.4), ("right", 0.4))]
+    responses = [paint_markings(handball, each) for each in cameras]
+    found = register_pair(handball, *cameras, *responses)
+    assert found is not None
+    assert found.error_px < 0.05
+    shifted = register_pair(handball, moved(cameras[0], by=(0.2, 0.0, 0.0)), cameras[1], *responses)
+    assert shifted is not None
+    assert shifted.dx_px == pytest.approx(-2, abs=0.1)

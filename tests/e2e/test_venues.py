@@ -115,3 +115,26 @@ def test_a_body_that_is_no_venue_is_refused(service, body):
 def test_the_id_in_the_address_is_the_id_of_the_venue(service):
     answer = service.http.put("/venues/one", json=venue("other"))
     assert (answer.status_code, answer.json()["type"]) == (422, "/problems/venue-id-mismatch")
+
+
+def test_a_venue_may_be_of_another_sport(service, name):
+    document = venue(name) | {"field": {"template": "rugby-union", "measures_m": {"in_goal": 8}, "length_m": 116}}
+    stored = service.http.put(f"/venues/{name}", json=document).json()
+    assert stored["field"]["template"] == "rugby-union"
+    assert stored["field"]["width_m"] == 70
+    assert service.end(service.submit(name).json()["id"])["status"] == "succeeded"
+
+
+def test_a_venue_may_have_markings_of_its_own(service, name):
+    layout = {"markings": [{"name": "line", "line": [[-5, 0], [5, 0]]}], "points": {"start": [-5, 0]}}
+    field = {"template": layout, "length_m": 10, "width_m": 6, "line_width_m": 0.05}
+    stored = service.http.put(f"/venues/{name}", json=venue(name) | {"field": field}).json()
+    assert stored["field"]["template"]["points"] == {"start": [-5, 0]}
+    assert service.http.get(f"/venues/{name}").json() == stored
+    assert service.end(service.submit(name).json()["id"])["status"] == "succeeded"
+
+
+def test_a_sport_that_is_none_is_refused_with_those_there_are(service, name):
+    answer = service.http.put(f"/venues/{name}", json=venue(name) | {"field": {"template": "curling"}})
+    assert answer.status_code == 422
+    assert "curling is none of the templates basketball, football, futsal" in answer.json()["detail"]

@@ -30,3 +30,14 @@ def test_other_databases_are_refused_without_repeating_the_password(url):
 def test_other_stores_are_refused(url):
     with pytest.raises(ValidationError, match="expected is s3://bucket"):
         Settings(blob_url=url)
+
+
+@pytest.mark.parametrize("axes", ["x y z", "x x z pan tilt roll", "x y z tilt pan roll", "x y z pan+north tilt roll"])
+def test_axes_of_freed_that_are_none_are_refused(axes):
+    with pytest.raises(ValidationError, match="y -x z -pan\\+90 tilt roll"):
+        Settings(freed_axes=axes)
+
+
+@pytest.mark.parametrize("axes", ["x y z pan tilt roll", "y -x z -pan+90 tilt-1.5 -roll"])
+def test_axes_of_freed_may_be_turned(axes):
+    assert Settings(freed_axes=axes).freed_axes == axes

@@ -4,7 +4,7 @@ import pytest
 import sqlalchemy as sa
 from obstore.exceptions import BaseError
 
-from service.schemas import VENUE_EXAMPLE, VenueIn
+from service.schemas import VENUE_EXAMPLE, Intrinsics, VenueIn
 from service.store import tables
 from service.store.blobs import Blobs
 from service.store.engine import migrate
@@ -12,6 +12,7 @@ from service.store.jobs import Jobs, new_job_id
 from service.store.venues import Venues
 from service.store.workers import Workers
 from tests.homes import in_both_homes
+from tests.worker.stock import Stock, result
 
 
 @in_both_homes
@@ -110,3 +111,19 @@ def test_a_bucket_that_does_not_answer_is_asked_for_as_long_as_its_caller_is_pat
     with pytest.raises(BaseError):
         Blobs("s3://bucket", patience_s=1).put("frames/a/left/0", b"1")
     assert 1 < time.monotonic() - begun < 10
+
+
+def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(tmp_path):
+    stock = Stock(tmp_path)
+    job_id = stock.submitted("v")
+    assert stock.jobs.posed(job_id) is None
+    task = stock.jobs.begin(job_id)
+    left, right = task.venue.cameras
+    longer = Intrinsics(matrix=[[61, 0, 32], [0, 61, 24], [0, 0, 1]], distortion=[])
+    found = result(task.venue, False)
+    cameras = [found.cameras[0].model_copy(update={"intrinsics": longer}), *found.cameras[1:]]
+    stock.jobs.finish(task, found.model_copy(update={"cameras": cameras}), [])
+    posed = stock.jobs.posed(job_id)
+    assert [camera.intrinsics for camera in posed.cameras] == [longer, right.intrinsics]
+    assert posed.cameras[0].pose == cameras[0].pose
+    assert stock.venues.get("v").cameras[0] == left

@@ -1,29 +1,23 @@
-"""The pitch: its markings by the Laws of the Game, and the roof they lie on.
+"""The pitch: its markings by the template of its sport, and the roof they lie on.
 
-Dimensions are those of IFAB, Laws of the Game, Law 1. Lines belong to the areas they bound, so the outer edge of a
-boundary line is the nominal distance and its centre lies half a line width inside. Everything here describes the
-*centres* of lines.
+Everything here describes the *centres* of lines.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fields.shapes import Arc, Line, Shape
+from fields.template import Template, load
 from worker.calibration.camera import Array
 
-CENTRE_CIRCLE_RADIUS_M = 9.15
-PENALTY_AREA_DEPTH_M = 16.5
-PENALTY_AREA_HALF_WIDTH_M = 20.16
-GOAL_AREA_DEPTH_M = 5.5
-GOAL_AREA_HALF_WIDTH_M = 9.16
-PENALTY_MARK_DISTANCE_M = 11.0
-CORNER_ARC_RADIUS_M = 1.0
-GOAL_HALF_WIDTH_M = 3.66
-GOAL_HEIGHT_M = 2.44
-SPOT_RADIUS_M = 0.11
+FOOTBALL = load("football")
+
 ARC_STEP_M = 0.05
 
 
@@ -39,6 +33,11 @@ class Marking:
     def closed(self) -> bool:
         """Whether the line ends where it begins."""
         return bool(np.allclose(self.centre[0], self.centre[-1]))
+
+    @property
+    def spot(self) -> bool:
+        """Whether it is a disc: wider than it is long."""
+        return bool(np.linalg.norm(self.centre[-1] - self.centre[0]) < self.width and not self.closed)
 
 
 @dataclass(frozen=True)
@@ -72,16 +71,21 @@ class LinePoints:
 
 @dataclass(frozen=True)
 class Field:
-    """A football pitch. `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat."""
+    """A field of a sport, a football pitch unless said; `measures`: what else its template leaves open, in metres.
+
+    `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat.
+    """
 
     length: float
     width: float
     line_width: float = 0.12
     ridge: Array | None = None
+    template: Template = FOOTBALL
+    measures: Mapping[str, float] = field(default_factory=dict)
 
     def flat(self) -> Field:
         """The same pitch on a plane."""
-        return Field(self.length, self.width, self.line_width, None)
+        return replace(self, ridge=None)
 
     def raised(self, by: float) -> Field:
         """The same pitch with a ridge that is higher by so many metres; a flat one gets a ridge between hips of 45°."""
@@ -114,78 +118,13 @@ class Field:
         return np.concatenate([xy, self.height(xy)[..., None]], axis=-1)
 
     def markings(self) -> list[Marking]:
-        """All markings of Law 1, as centre lines."""
-        half_line = self.line_width / 2
-        x_goal = self.length / 2 - half_line
-        y_touch = self.width / 2 - half_line
-        lines = [
-            self._line("near touchline", (-x_goal, -y_touch), (x_goal, -y_touch)),
-            self._line("far touchline", (-x_goal, y_touch), (x_goal, y_touch)),
-            self._line("halfway line", (0, -y_touch), (0, y_touch)),
-            self._arc("centre circle", (0, 0), CENTRE_CIRCLE_RADIUS_M - half_line, 0, 2 * np.pi),
-            self._spot("centre mark", (0, 0)),
-        ]
-        for side, name in ((-1, "left"), (1, "right")):
-            lines += self._end(side, name)
-        return lines
+        """All markings of the template, as centre lines."""
+        return list(self._markings)
 
-    def _end(self, side: int, name: str) -> list[Marking]:
-        """The markings of one half: goal line, both areas, mark, arc and corner arcs."""
-        half_line = self.line_width / 2
-        goal = self.length / 2
-        y_touch = self.width / 2 - half_line
-
-        def area(label: str, depth: float, half_width: float) -> list[Marking]:
-            x_back, x_front = side * (goal - half_line), side * (goal - depth + half_line)
-            y = half_width - half_line
-            return [
-                self._line(f"{name} {label}, near side", (x_back, -y), (x_front, -y)),
-                self._line(f"{name} {label}, front", (x_front, -y), (x_front, y)),
-                self._line(f"{name} {label}, far side", (x_front, y), (x_back, y)),
-            ]
-
-        mark = side * (goal - PENALTY_MARK_DISTANCE_M)
-        radius = CENTRE_CIRCLE_RADIUS_M - half_line
-        # The arc begins where it leaves the penalty area, and points to the pitch centre.
-        opening = np.arccos((PENALTY_AREA_DEPTH_M - half_line - PENALTY_MARK_DISTANCE_M) / radius)
-        towards_centre = np.pi if side > 0 else 0.0
-        corner = CORNER_ARC_RADIUS_M - half_line
-        lines = [
-            self._line(
-                f"{name} goal line",
-                (side * (goal - half_line), -y_touch),
-                (side * (goal - half_line), y_touch),
-            ),
-            *area("penalty area", PENALTY_AREA_DEPTH_M, PENALTY_AREA_HALF_WIDTH_M),
-            *area("goal area", GOAL_AREA_DEPTH_M, GOAL_AREA_HALF_WIDTH_M),
-            self._spot(f"{name} penalty mark", (mark, 0)),
-            self._arc(f"{name} penalty arc", (mark, 0), radius, towards_centre - opening, towards_centre + opening),
-        ]
-        for y_side, label in ((-1, "near"), (1, "far")):
-            # A quarter circle around the corner flag, inside the pitch.
-            facing = np.arctan2(-y_side, -side)
-            centre = (side * goal, y_side * self.width / 2)
-            lines.append(
-                self._arc(f"{name} {label} corner arc", centre, corner, facing - np.pi / 4, facing + np.pi / 4)
-            )
-        return lines
-
-    def _line(self, name: str, start: tuple[float, float], end: tuple[float, float]) -> Marking:
-        return Marking(name, np.array([start, end], dtype=float), self.line_width)
-
-    def _arc(self, name: str, centre: tuple[float, float], radius: float, start: float, end: float) -> Marking:
-        count = max(8, int(np.ceil(abs(end - start) * radius / ARC_STEP_M)))
-        angle = np.linspace(start, end, count + 1)
-        return Marking(
-            name,
-            np.stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)], -1),
-            self.line_width,
-        )
-
-    def _spot(self, name: str, centre: tuple[float, float]) -> Marking:
-        # A spot is a line as wide as itself and next to nothing long.
-        offset = np.array([SPOT_RADIUS_M / 4, 0.0])
-        return Marking(name, np.array([centre - offset, centre + offset]), 2 * SPOT_RADIUS_M)
+    @cached_property
+    def _markings(self) -> list[Marking]:
+        size = {"length": self.length, "width": self.width, "line": self.line_width, **self.measures}
+        return [_marking(shape) for shape in self.template.markings(size)]
 
     def line_points(self, spacing: float = 0.25) -> LinePoints:
         """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
@@ -223,3 +162,18 @@ def resample(polyline: Array, spacing: float) -> tuple[Array, Array]:
     piece = np.clip(np.searchsorted(reached, at, side="right") - 1, 0, len(pieces) - 1)
     unit = pieces[piece] / lengths[piece, None]
     return polyline[piece] + (at - reached[piece])[:, None] * unit, unit
+
+
+def _marking(shape: Shape) -> Marking:
+    match shape:
+        case Line():
+            return Marking(shape.name, np.array(shape.points), shape.width)
+        case Arc():
+            count = max(8, int(np.ceil((shape.end - shape.start) * shape.radius / ARC_STEP_M)))
+            angle = np.linspace(shape.start, shape.end, count + 1)
+            around = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+            return Marking(shape.name, shape.centre + around, shape.width)
+        case _:
+            # A spot is a line as wide as itself and next to nothing long.
+            offset = np.array([shape.diameter / 8, 0.0])
+            return Marking(shape.name, np.array([shape.centre - offset, shape.centre + offset]), shape.diameter)

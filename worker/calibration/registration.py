@@ -63,6 +63,8 @@ LEAST_SUPPORT_M = 4.0
 LEAST_CORRELATION = 0.3
 # As much line across a direction holds the views in it.
 HOLDING_M = 8.0
+# What a metre of line is expected to say about where it is.
+EXPECTED_NOISE_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -144,14 +146,26 @@ def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | Non
 
 
 def _directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
-    """In how many directions, 0 to 2, the markings that both cameras should see around a point (2,) can hold a view."""
+    """In how many directions, 0 to 2, the markings that both cameras should see around a point (2,) can hold a view.
+
+    There must be enough line across a direction, and it must not be so far aside that a turn and a move of a camera
+    which cancel there still shift the point: a court whose centre has no circle is held along its centre line by
+    nothing but a side line 10 m away.
+    """
     lines = pitch.line_points(0.5)
     seen = np.all(
         [inside(camera.project(lines.position), camera.intrinsics.size) for camera in (first, second)], axis=0
     )
     near = np.abs(lines.position[:, :2] - centre).max(axis=1) < FINE_HALF_M
-    across = lines.normal[seen & near, :2]
-    return int(np.count_nonzero(np.linalg.eigvalsh(lines.spacing * across.T @ across) > HOLDING_M))
+    common = lines[seen & near]
+    across = common.normal[:, :2]
+    enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > HOLDING_M
+    slope = (across[:, :, None] * _forms_of_both(first, second, common.position)).sum(axis=1)
+    information = lines.spacing / EXPECTED_NOISE_M**2 * slope.T @ slope
+    at_centre = _forms_of_both(first, second, pitch.lift(centre))
+    covariance = at_centre @ np.linalg.inv(information + np.eye(len(information))) @ at_centre.T
+    held = np.linalg.eigvalsh(covariance) < LOOSE_M**2
+    return int(min(np.count_nonzero(enough), np.count_nonzero(held)))
 
 
 def _guesses(pitch: Field, sights: Sequence[Sight], centre: Array) -> list[tuple[Array, Array]]:
@@ -182,7 +196,7 @@ class _Fit:
 def _fit(pitch: Field, sights: Sequence[Sight], middle: Array, shift: Array) -> _Fit:
     """The displacement of the views in the `middle`, from a guess that is right to a metre or so."""
     on_surface = pitch.lift(middle)
-    at_middle = np.concatenate([-_forms(sights[0][0], on_surface), _forms(sights[1][0], on_surface)], axis=-1)
+    at_middle = _forms_of_both(sights[0][0], sights[1][0], on_surface)
     # The most likely turns and moves that make the shift.
     start = at_middle.T @ np.linalg.solve(at_middle @ at_middle.T, shift)
     grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
@@ -253,6 +267,11 @@ def _forms(camera: Camera, points: Array) -> Array:
     change = np.concatenate([turned, moved], axis=-1)
     # The changed ray, back to where it meets the surface.
     return np.asarray(change[..., :2, :] - ray[..., :2, None] * change[..., 2:, :] / ray[..., 2, None, None])
+
+
+def _forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
+    """How points (..., 3) of the pitch move in the second view relative to the first, (..., 2, 12)."""
+    return np.concatenate([-_forms(first, points), _forms(second, points)], axis=-1)
 
 
 def _displacement(camera: Camera, points: Array, moves: Array) -> Array:

@@ -20,6 +20,8 @@ from worker.calibration.field import Field, Marking, resample
 
 Mask = NDArray[np.bool_]
 
+# Least length of the pitch in the bird's-eye view, in pixels: courts are small.
+BIRDSEYE_LENGTH = 800
 # What no camera sees: dark grey rather than black, so that it reads as "outside" and not as "broken".
 BACKDROP = 38
 
@@ -67,13 +69,15 @@ def birdseye(
     pitch: Field,
     cameras: Sequence[Camera],
     frames: Mapping[str, Frame],
-    pixels_per_metre: float = 10,
+    pixels_per_metre: float | None = None,
     margin_m: float = 3,
 ) -> Frame:
     """The pitch from straight above, BGR: x to the right, y up, the pitch centre in the centre pixel.
 
+    `pixels_per_metre`: unless said 10, and more where the pitch would come out shorter than `BIRDSEYE_LENGTH`.
     `frames[camera.id]`: BGR (height, width, 3) of the size of the camera's intrinsics.
     """
+    pixels_per_metre = pixels_per_metre or max(10.0, BIRDSEYE_LENGTH / pitch.length)
     columns = round((pitch.length / 2 + margin_m) * pixels_per_metre)
     rows = round((pitch.width / 2 + margin_m) * pixels_per_metre)
     grid = ground_grid(columns, rows, 1 / pixels_per_metre)
@@ -360,10 +364,10 @@ def _outline(marking: Marking) -> list[Array]:
     """A marking's centre line and its edges, (n, 2) each, densely enough for distortion and roof."""
     between, _ = resample(marking.centre, 0.25)
     centre = np.concatenate([marking.centre[:1], between, marking.centre[-1:]])
-    if len(between) == 1:
-        # A spot: its edge is a circle.
+    if marking.spot:
+        # Its edge is a circle.
         angle = np.linspace(0, 2 * np.pi, 33)
-        centre = np.broadcast_to(between, (len(angle), 2))
+        centre = np.broadcast_to(between[:1], (len(angle), 2))
         return [centre, centre + marking.width / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)]
     along = np.gradient(centre, axis=0)
     along /= np.linalg.norm(along, axis=-1, keepdims=True)

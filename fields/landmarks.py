@@ -1,0 +1,47 @@
+"""Points of a field by the names that people give them: `Left penalty area, near corner`."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping
+
+from fields.shapes import Point
+from fields.template import Template
+
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+SUGGESTED = 3
+
+
+class UnknownLandmark(ValueError):  # noqa: N818
+    """No point of the field has this name; `near` are names that are like it."""
+
+    def __init__(self, name: str, near: list[str]) -> None:
+        super().__init__(f"no point is called {name!r}" + (f"; near it: {'; '.join(near)}" if near else ""))
+        self.name = name
+        self.near = near
+
+
+def find(name: str, template: Template, size: Mapping[str, float]) -> Point:
+    """Where the point of this name is, whatever its case, spaces and punctuation. Raises `UnknownLandmark`.
+
+    In a name such as `near touchline, 22 m from the left goal line` any number may stand.
+    """
+    places = {_plain(known): (known, point) for known, point in template.places(size).items()}
+    wanted = _plain(name)
+    if wanted in places:
+        return places[wanted][1]
+    number = NUMBER.search(wanted)
+    measured = {_plain(known): known for known in template.places_at(size, 0.0)}
+    if number is not None:
+        open_name = measured.get(f"{wanted[: number.start()]}distance{wanted[number.end() :]}")
+        if open_name is not None:
+            return template.places_at(size, float(number.group()))[open_name]
+    names = {plain: known for plain, (known, _) in places.items()} | measured
+    raise UnknownLandmark(name, [names[like] for like in difflib.get_close_matches(wanted, names, SUGGESTED)])
+
+
+def _plain(name: str) -> str:
+    """Small letters, digits and single spaces, as the English write centre."""
+    words = re.findall(r"\d+\.\d+|[^\W_]+", name.casefold())
+    return " ".join("centre" if word == "center" else word for word in words)

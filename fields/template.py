@@ -1,0 +1,130 @@
+"""Templates: the markings and the named points of a field, by its measures.
+
+A file gives the `[size]` (length, width, line, and what else differs between fields of the sport), the `[measures]`
+that follow from it, and then
+
+- `[[marking]]`, once, and `[[end]]`, at the left end (x < 0) and mirrored at the right one, `{end}` in its name: each a
+  `line` through points, an `arc` counter-clockwise around `centre` from the direction of `start` to that of `end`, with
+  the distance of `start` as radius, a `circle` or a `spot`; a line and an arc may have a `dash` of `paint` and `gap`;
+- `[points]` and `[end_points]`: names that people use for points, at nominal places, the outer edges of lines where the
+  law measures to them. A name with `{distance}` stands for all points at that many metres.
+
+Places are pairs of what `fields.measures` reads. Those of markings are the middle of the paint.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fields.measures import value
+from fields.shapes import Arc, Line, Point, Shape, Spot
+
+FILES = Path(__file__).parent
+NAMES = tuple(sorted(path.stem for path in FILES.glob("*.toml")))
+END = "{end}"
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What a length of a field is unless said, and between what it must lie, in metres."""
+
+    default: float
+    least: float
+    most: float
+    what: str = ""
+
+
+@dataclass(frozen=True)
+class Template:
+    """A sport's field. `size`: the lengths that a field has of its own, `length`, `width` and `line` among them."""
+
+    source: str = ""
+    size: Mapping[str, Extent] = field(default_factory=dict)
+    measures: Mapping[str, str | float] = field(default_factory=dict)
+    marking: Sequence[Mapping[str, Any]] = ()
+    end: Sequence[Mapping[str, Any]] = ()
+    points: Mapping[str, Sequence[str | float]] = field(default_factory=dict)
+    end_points: Mapping[str, Sequence[str | float]] = field(default_factory=dict)
+
+    def known(self, size: Mapping[str, float]) -> dict[str, float]:
+        """Every measure by its name: those of `size`, defaults for what is absent there, and what follows from them."""
+        known = {name: extent.default for name, extent in self.size.items()} | dict(size)
+        for name, expression in self.measures.items():
+            known[name] = value(expression, known)
+        return known
+
+    def markings(self, size: Mapping[str, float]) -> list[Shape]:
+        """All that is painted: what there is once, then the left end, then the right one."""
+        known = self.known(size)
+        once, left = ([_shape(entry, known) for entry in entries] for entries in (self.marking, self.end))
+        shapes = [shape for dashes in once for shape in dashes]
+        for end in ("left", "right"):
+            shapes += [_at(end, shape) for dashes in left for shape in dashes]
+        return shapes
+
+    def places(self, size: Mapping[str, float]) -> dict[str, Point]:
+        """Where each named point is, but for those with `{distance}`."""
+        return dict(self._places(self.known(size), measured=False))
+
+    def places_at(self, size: Mapping[str, float], distance: float) -> dict[str, Point]:
+        """Where the points with `{distance}` in their names are, by these names."""
+        return dict(self._places(self.known(size) | {"distance": distance}, measured=True))
+
+    def _places(self, known: Mapping[str, float], *, measured: bool) -> Iterator[tuple[str, Point]]:
+        for name, place in self.points.items():
+            if ("{distance}" in name) == measured:
+                yield name, _point(place, known)
+        for end, sign in (("left", 1), ("right", -1)):
+            for name, place in self.end_points.items():
+                if ("{distance}" in name) == measured:
+                    x, y = _point(place, known)
+                    yield name.replace(END, end), (sign * x, y)
+
+
+@cache
+def load(name: str) -> Template:
+    """The template of this name, one of `NAMES`."""
+    content = tomllib.loads((FILES / f"{name}.toml").read_text())
+    return Template(**content | {"size": {key: Extent(**extent) for key, extent in content["size"].items()}})
+
+
+def _at(end: str, shape: Shape) -> Shape:
+    return replace(shape if end == "left" else shape.mirrored(), name=shape.name.replace(END, end))
+
+
+def _shape(entry: Mapping[str, Any], known: Mapping[str, float]) -> list[Shape]:
+    shape = _whole(entry, known)
+    if "dash" not in entry or isinstance(shape, Spot):
+        return [shape]
+    return [*shape.dashes(*(value(entry["dash"][part], known) for part in ("paint", "gap")))]
+
+
+def _whole(entry: Mapping[str, Any], known: Mapping[str, float]) -> Shape:
+    name, width = entry["name"], value(entry.get("width", "line"), known)
+    match entry:
+        case {"line": points}:
+            return Line(name, tuple(_point(point, known) for point in points), width)
+        case {"arc": {"centre": centre, "start": start, "end": end}}:
+            return _arc(name, _point(centre, known), _point(start, known), _point(end, known), width)
+        case {"circle": {"centre": centre, "radius": radius}}:
+            return Arc(name, _point(centre, known), value(radius, known), 0.0, 2 * math.pi, width)
+        case {"spot": {"centre": centre, "diameter": diameter}}:
+            return Spot(name, _point(centre, known), value(diameter, known))
+        case _:
+            raise ValueError(f"{name} is neither a line, an arc, a circle nor a spot")
+
+
+def _arc(name: str, centre: Point, start: Point, end: Point, width: float) -> Arc:
+    first, last = (math.atan2(y - centre[1], x - centre[0]) for x, y in (start, end))
+    return Arc(name, centre, math.dist(centre, start), first, last if last > first else last + 2 * math.pi, width)
+
+
+def _point(place: Sequence[str | float], known: Mapping[str, float]) -> Point:
+    x, y = place
+    return value(x, known), value(y, known)

@@ -1,0 +1,56 @@
+"""COLMAP's text model: cameras.txt, images.txt and points3D.txt in a zip.
+
+Pixel centres are at 0.5 there and at integers here. Models: OPENCV where it is exact, else FULL_OPENCV.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from service.formats.archive import archive
+from service.formats.lens import RADIAL, TANGENTIAL, Shot
+
+# Parameters after fx, fy, cx, cy, in COLMAP's order (src/colmap/sensor/models.h).
+MODELS = {
+    "OPENCV": ("k1", "k2", "p1", "p2"),
+    "FULL_OPENCV": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+}
+
+
+def write(shots: Sequence[Shot]) -> bytes:
+    """The three files. Images are named as their cameras, with `.jpg`: the frames to put beside them."""
+    cameras = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]", *(_camera(shot) for shot in shots)]
+    images = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; then a line of POINTS2D[]"]
+    for shot in shots:
+        images += [_image(shot), ""]
+    points = ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]"]
+    files = {"cameras.txt": cameras, "images.txt": images, "points3D.txt": points}
+    return archive({name: "\n".join([*lines, ""]).encode() for name, lines in files.items()})
+
+
+def _camera(shot: Shot) -> str:
+    shot.must_fit("colmap", {*RADIAL, *TANGENTIAL})
+    coefficients = shot.coefficients
+    enough = not any(coefficients[name] for name in RADIAL if name not in MODELS["OPENCV"])
+    model = "OPENCV" if enough else "FULL_OPENCV"
+    centre = [value + 0.5 for value in shot.principal]
+    parameters = [*shot.focal, *centre, *(coefficients[name] for name in MODELS[model])]
+    return _line(shot.number, model, *shot.size, *map(float, parameters))
+
+
+def _image(shot: Shot) -> str:
+    pose = shot.camera.pose
+    return _line(shot.number, *quaternion(pose.rotation), *pose.translation, shot.number, f"{shot.id}.jpg")
+
+
+def quaternion(rotation: Sequence[float]) -> list[float]:
+    """Unit quaternion (w, x, y, z) of a Rodrigues vector (rad)."""
+    angle = math.hypot(*rotation)
+    # sin(a/2)/a -> 1/2.
+    scale = math.sin(angle / 2) / angle if angle > 1e-12 else 0.5
+    return [math.cos(angle / 2), *(scale * component for component in rotation)]
+
+
+def _line(*words: str | float) -> str:
+    return " ".join(word if isinstance(word, str) else repr(word) for word in words)

@@ -1,0 +1,65 @@
+"""FreeD, message D1: 29 bytes a camera, as camera tracking sends it over serial lines and UDP.
+
+Layout (Vinten, "Free-d"): D1, camera id, then big-endian signed 24-bit numbers: pan, tilt, roll in 1/32768 degree, X,
+Y and height in 1/64 mm, zoom and focus (none here: 0), two spare bytes, and a checksum that makes the sum 0x40 modulo
+256. There is no lens in it: whoever reads it must have the intrinsics from elsewhere.
+
+Pan is positive to the right, tilt upwards, roll clockwise from behind; a camera without any looks along y of the pitch.
+Vendors differ in that: `axes` says what goes where.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from service.formats.lens import Shot, product, transposed
+from service.formats.opentrackio import AHEAD_IS_Y, pan_tilt_roll
+from service.problems import Problem
+
+STEPS_PER_DEGREE = 32768
+STEPS_PER_METRE = 64_000
+AXIS = re.compile(r"(?P<sign>-?)(?P<name>[a-z]+)(?P<offset>[+-][0-9.]+)?")
+
+
+def write(shots: Sequence[Shot], axes: str) -> bytes:
+    """A packet per camera, in the order of the venue; its id is the camera's place there, from 1.
+
+    `axes`: what is sent as X, Y, height, pan, tilt and roll: `x y z pan tilt roll`, or `y -x z -pan+90 tilt roll`.
+    """
+    return b"".join(_packet(shot, axes) for shot in shots)
+
+
+def _packet(shot: Shot, axes: str) -> bytes:
+    x, y, height, pan, tilt, roll = _mapped(shot, axes)
+    content = bytes([0xD1, shot.number])
+    content += b"".join(_steps(shot, "degrees", value, STEPS_PER_DEGREE) for value in (pan, tilt, roll))
+    content += b"".join(_steps(shot, "m", value, STEPS_PER_METRE) for value in (x, y, height))
+    content += bytes(3 + 3 + 2)
+    return content + bytes([(0x40 - sum(content)) % 256])
+
+
+def _mapped(shot: Shot, axes: str) -> list[float]:
+    pan, tilt, roll = pan_tilt_roll(product(transposed(shot.rotation), transposed(AHEAD_IS_Y)))
+    ours = dict(zip("xyz", shot.camera.pose.position, strict=True))
+    ours |= {"pan": -math.degrees(pan), "tilt": math.degrees(tilt), "roll": math.degrees(roll)}
+    found = [_value(match, ours) for match in AXIS.finditer(axes)]
+    return found[:3] + [math.remainder(angle, 360) for angle in found[3:]]
+
+
+def _value(axis: re.Match[str], ours: dict[str, float]) -> float:
+    value = ours[axis["name"]] + 0.0
+    return (-value if axis["sign"] else value) + float(axis["offset"] or 0)
+
+
+def _steps(shot: Shot, unit: str, value: float, per_unit: int) -> bytes:
+    largest = (2**23 - 1) / per_unit
+    if abs(value) > largest:
+        raise Problem(
+            "format-cannot-hold",
+            f"freed holds up to {largest:.0f} {unit}; camera {shot.id} has {value:.1f}.",
+            camera=shot.id,
+            got=value,
+        )
+    return round(value * per_unit).to_bytes(3, "big", signed=True)

@@ -1,0 +1,86 @@
+"""What every format needs to know of a camera: its numbers by name, and what its lens has that a format cannot say."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from service.problems import Problem
+from service.schemas import Camera, rotated
+
+# OpenCV's order.
+COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
+RADIAL = ("k1", "k2", "k3", "k4", "k5", "k6")
+TANGENTIAL = ("p1", "p2")
+THIN_PRISM = ("s1", "s2", "s3", "s4")
+
+Matrix = list[list[float]]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A camera with its pose, and its place among the cameras of its venue, from 1: some formats know numbers only."""
+
+    camera: Camera
+    number: int
+
+    @property
+    def id(self) -> str:
+        """The camera's."""
+        return self.camera.id
+
+    @property
+    def focal(self) -> tuple[float, float]:
+        """fx, fy in pixels."""
+        (fx, _, _), (_, fy, _), _ = self.camera.intrinsics.matrix
+        return fx, fy
+
+    @property
+    def principal(self) -> tuple[float, float]:
+        """cx, cy in pixels, pixel centres at integers."""
+        (_, _, cx), (_, _, cy), _ = self.camera.intrinsics.matrix
+        return cx, cy
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width, height in pixels."""
+        width, height = self.camera.image_size
+        return width, height
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """All of `COEFFICIENTS`, absent ones zero."""
+        given = self.camera.intrinsics.distortion
+        return dict(zip(COEFFICIENTS, [*given, *[0.0] * (len(COEFFICIENTS) - len(given))], strict=True))
+
+    @property
+    def rotation(self) -> Matrix:
+        """The matrix (3, 3), world to camera."""
+        columns = [
+            rotated(self.camera.pose.rotation, axis) for axis in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+        ]
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    def must_fit(self, name: str, held: Collection[str]) -> None:
+        """Refuse a lens that has more than skew 0 and the coefficients `held`: what is left out is pixels wrong."""
+        beyond = [key for key, value in self.coefficients.items() if value != 0 and key not in held]
+        if self.camera.intrinsics.matrix[0][1] != 0:
+            beyond.append("skew")
+        if beyond:
+            raise Problem(
+                "format-cannot-hold",
+                f"{name} has no place for {', '.join(beyond)} of the lens of camera {self.id}; "
+                "json and st-map hold every lens.",
+                camera=self.id,
+                got=beyond,
+            )
+
+
+def product(a: Matrix, b: Matrix) -> Matrix:
+    """The product of two matrices."""
+    return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*b, strict=True)] for row in a]
+
+
+def transposed(matrix: Matrix) -> Matrix:
+    """Rows to columns."""
+    return [list(row) for row in zip(*matrix, strict=True)]

@@ -1,0 +1,103 @@
+"""OpenTrackIO 1.0.1 (SMPTE RIS OSVP): a sample of JSON per camera, for virtual production.
+
+World: metres, z up, right-handed, as here. A camera without pan, tilt and roll looks along y; rotation is intrinsic
+z-x-y, degrees: pan is positive to the left seen from above, tilt upwards, roll clockwise from behind. The pose is
+that of the pinhole, so the entrance pupil has no offset. Lengths on the sensor are those of a sensor 36 mm wide: a
+calibration knows no millimetres, and only ratios to the sensor's size reach a pixel. The middle of the picture is
+pixel (W/2, H/2), as in SMPTE's "Conversion of OpenCV to OpenTrackIO" (corrected 2025-09-02).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import uuid
+from typing import Any
+
+from service.formats.lens import RADIAL, TANGENTIAL, Shot, product, transposed
+
+SENSOR_WIDTH_MM = 36.0
+# Camera axes from OpenCV's (x right, y down, z ahead) to x right, y ahead, z up.
+AHEAD_IS_Y = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
+SOURCES = uuid.UUID("3d6b2a0e-7f3c-5c8f-9d2b-52b8f4a7c1e6")
+
+
+def write(shot: Shot) -> bytes:
+    """One sample."""
+    sample = {
+        "protocol": {"name": "OpenTrackIO", "version": [1, 0, 1]},
+        "static": {"camera": _sensor(shot)},
+        "lens": _lens(shot),
+        "transforms": [_transform(shot)],
+    }
+    sample["sourceId"] = uuid.uuid5(SOURCES, shot.id).urn
+    sample["sourceNumber"] = shot.number
+    # The same sample has the same id: it names a pose, not a moment of a stream.
+    sample["sampleId"] = uuid.uuid5(SOURCES, json.dumps(sample, sort_keys=True)).urn
+    return (json.dumps(sample, indent=2) + "\n").encode()
+
+
+def _sensor(shot: Shot) -> dict[str, Any]:
+    (width, height), (fx, fy) = shot.size, shot.focal
+    return {
+        "label": shot.id,
+        "activeSensorResolution": {"width": width, "height": height},
+        # There is one focal length: pixels that are not square are told by the height.
+        "activeSensorPhysicalDimensions": {
+            "width": SENSOR_WIDTH_MM,
+            "height": SENSOR_WIDTH_MM * fx * height / (width * fy),
+        },
+    }
+
+
+def _lens(shot: Shot) -> dict[str, Any]:
+    shot.must_fit("opentrackio", {*RADIAL, *TANGENTIAL})
+    (width, height), (fx, fy), (cx, cy) = shot.size, shot.focal, shot.principal
+    focal = fx * SENSOR_WIDTH_MM / width
+    k = shot.coefficients
+    return {
+        "pinholeFocalLength": focal,
+        "entrancePupilOffset": 0.0,
+        # mm per pixel is focal / fx across and focal / fy down.
+        "projectionOffset": {"x": (cx - width / 2) * focal / fx, "y": (cy - height / 2) * focal / fy},
+        "distortion": [
+            {
+                # Without a name it would be the other direction.
+                "model": "Brown-Conrady U-D",
+                # Numerator and denominator in turn, radii in mm. Always all six: Unreal ignores shorter lists.
+                "radial": [
+                    value / focal**power
+                    for value, power in (
+                        (k["k1"], 2),
+                        (k["k4"], 2),
+                        (k["k2"], 4),
+                        (k["k5"], 4),
+                        (k["k3"], 6),
+                        (k["k6"], 6),
+                    )
+                ],
+                # By the focal length, not by its square as in SMPTE's conversion notes, which are pixels off.
+                "tangential": [k["p1"] / focal, k["p2"] / focal],
+            }
+        ],
+    }
+
+
+def _transform(shot: Shot) -> dict[str, Any]:
+    b = product(transposed(shot.rotation), transposed(AHEAD_IS_Y))
+    pan, tilt, roll = pan_tilt_roll(b)
+    x, y, z = shot.camera.pose.position
+    return {
+        "id": "camera",
+        "translation": {"x": x, "y": y, "z": z},
+        "rotation": {"pan": math.degrees(pan), "tilt": math.degrees(tilt), "roll": math.degrees(roll)},
+    }
+
+
+def pan_tilt_roll(b: list[list[float]]) -> tuple[float, float, float]:
+    """Intrinsic z-x-y angles in radians of a matrix (3, 3), camera (x right, y ahead, z up) to world."""
+    tilt = math.asin(max(-1.0, min(1.0, b[2][1])))
+    if math.hypot(b[0][1], b[1][1]) < 1e-9:
+        # Straight up or down: pan and roll turn about the same axis; the pan takes it all.
+        return math.atan2(b[1][0], b[0][0]), tilt, 0.0
+    return math.atan2(-b[0][1], b[1][1]), tilt, math.atan2(-b[2][0], b[2][2])

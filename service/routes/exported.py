@@ -1,0 +1,63 @@
+"""Poses in the formats of other tools: what venues and jobs answer alike."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Annotated, Any
+
+from fastapi import Header, Query, Response
+
+from service import etags
+from service.context import Context
+from service.formats.lens import Shot
+from service.formats.table import formats
+from service.problems import Problem
+from service.routes.documented import headers
+from service.schemas import ID_PATTERN, FormatName, Venue
+
+BINARY = {"schema": {"type": "string", "format": "binary"}}
+# Of `responses=`: what a document can be.
+DOCUMENTS: dict[int | str, dict[str, Any]] = {
+    200: {
+        "content": {
+            **dict.fromkeys(("application/yaml", "application/zip", "application/octet-stream"), BINARY),
+            "application/json": {},
+        }
+    },
+    304: {"description": "Unchanged", **headers("ETag")},
+}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which part of a document a caller asks for, and which he has."""
+
+    camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None
+    if_none_match: Annotated[str | None, Header()] = None
+
+
+def exported(context: Context, venue: Venue, called: str, form: FormatName, wanted: Wanted) -> Response:
+    """The poses of a venue as a file whose name begins with `called`."""
+    shots = _shots(venue, wanted.camera)
+    # What the document is made of names it: one that the caller has is not computed again.
+    made_of: list[Any] = [form, context.settings.freed_axes, version("esc-calibration")]
+    made_of += [[shot.number, shot.camera.model_dump(mode="json")] for shot in shots]
+    tag = etags.of(json.dumps(made_of).encode())
+    head = {"ETag": etags.quoted(tag), "Cache-Control": "no-cache"}
+    if wanted.if_none_match is not None and etags.names(wanted.if_none_match, tag):
+        return Response(status_code=304, headers=head)
+    document = formats(context.settings)[form].document(shots)
+    name = "-".join([called, *([wanted.camera] if wanted.camera else []), form])
+    head["Content-Disposition"] = f'attachment; filename="{name}.{document.suffix}"'
+    return Response(document.content, headers=head, media_type=document.media_type)
+
+
+def _shots(venue: Venue, camera: str | None) -> list[Shot]:
+    shots = [Shot(each, number) for number, each in enumerate(venue.cameras, start=1)]
+    chosen = [shot for shot in shots if camera in (None, shot.id)]
+    if not chosen:
+        ids = [shot.id for shot in shots]
+        raise Problem("unknown-camera", f"Ask for one of {', '.join(ids)}.", camera=camera, expected=ids)
+    return chosen

@@ -1,0 +1,200 @@
+"""Templates against the measures that the laws print: outer edges, inner edges and middles of the paint."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fields.measures import value
+from fields.shapes import Arc, Line, Spot
+from fields.template import NAMES, Template, load
+
+every = pytest.mark.parametrize("name", NAMES)
+
+
+def usual(name):
+    return {measure: extent.default for measure, extent in load(name).size.items()}
+
+
+def shapes(name, **size):
+    return {shape.name: shape for shape in load(name).markings(usual(name) | size)}
+
+
+def edges(line, axis):
+    """Both edges of the paint of a straight line, along an axis that it does not run along."""
+    (place,) = {point[axis] for point in line.points}
+    return place - line.width / 2, place + line.width / 2
+
+
+def outer(arc):
+    return arc.radius + arc.width / 2
+
+
+@every
+def test_a_template_names_its_source_and_its_size(name):
+    template = load(name)
+    assert len(template.source) > 20
+    assert {"length", "width", "line"} <= set(template.size)
+    for extent in template.size.values():
+        assert extent.least <= extent.default <= extent.most
+
+
+@every
+def test_names_of_markings_and_points_are_given_once(name):
+    markings = [shape.name for shape in load(name).markings(usual(name))]
+    assert len(set(markings)) == len(markings)
+    assert not any("{" in name for name in [*markings, *load(name).places(usual(name))])
+
+
+@every
+def test_both_ends_are_mirror_images(name):
+    found = shapes(name)
+    for left in [shape for shape in found.values() if shape.name.startswith("left")]:
+        right = found["right" + left.name.removeprefix("left")]
+        assert right.reach == pytest.approx(left.reach)
+        assert centre_of(right) == pytest.approx((-centre_of(left)[0], centre_of(left)[1]))
+
+
+@every
+def test_near_and_far_sides_are_mirror_images(name):
+    def places(sign):
+        return sorted((round(x, 6), round(sign * y, 6)) for x, y in map(centre_of, shapes(name).values()))
+
+    assert places(1) == places(-1)
+
+
+def centre_of(shape):
+    """A point in the middle of a shape."""
+    match shape:
+        case Line():
+            return tuple((a + b) / 2 for a, b in zip(shape.points[0], shape.points[-1], strict=True))
+        case Arc():
+            middle = (shape.start + shape.end) / 2
+            return tuple(c + shape.radius * f(middle) for c, f in zip(shape.centre, (math.cos, math.sin), strict=True))
+        case Spot():
+            return shape.centre
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("football", 27), ("futsal", 25), ("basketball", 26), ("hockey", 69), ("rugby-union", 56), ("handball", 185)],
+)
+def test_every_marking_is_there(name, count):
+    assert len(shapes(name)) == count
+
+
+@given(st.data())
+@every
+def test_markings_of_any_size_stay_on_the_field(name, data):
+    size = {measure: data.draw(st.floats(e.least, e.most)) for measure, e in load(name).size.items()}
+    for shape in load(name).markings(size):
+        x, y = shape.reach
+        assert x < size["length"] / 2 + 1
+        assert y < size["width"] / 2 + 1
+
+
+@pytest.mark.parametrize(("length", "width"), [(105, 68), (90, 45), (120, 90)])
+def test_only_the_boundary_of_football_follows_its_size(length, width):
+    found = shapes("football", length=length, width=width)
+    assert edges(found["left goal line"], 0)[0] == pytest.approx(-length / 2)
+    assert edges(found["far touchline"], 1)[1] == pytest.approx(width / 2)
+    assert edges(found["left penalty area, front"], 0)[1] == pytest.approx(-length / 2 + 16.5)
+    assert edges(found["left penalty area, far side"], 1)[1] == pytest.approx(20.16)
+    assert edges(found["right goal area, front"], 0)[0] == pytest.approx(length / 2 - 5.5)
+    assert edges(found["right goal area, near side"], 1)[0] == pytest.approx(-9.16)
+    assert found["right penalty mark"].centre == pytest.approx((length / 2 - 11, 0))
+    assert [outer(found[name]) for name in ("centre circle", "left penalty arc")] == pytest.approx([9.15, 9.15])
+    assert outer(found["right far corner arc"]) == pytest.approx(1)
+
+
+def test_the_penalty_area_of_futsal_is_round():
+    found = shapes("futsal")
+    near = found["left penalty area, near side"]
+    assert (near.centre, outer(near)) == ((-20, -1.58), pytest.approx(6))
+    assert math.dist(*found["left penalty area, front"].points) == pytest.approx(3.16)
+    assert edges(found["left penalty area, front"], 0)[1] == pytest.approx(-14)
+    assert found["left second penalty mark"].centre == (-10, 0)
+    assert outer(found["centre circle"]) == pytest.approx(3)
+    assert found["left retreat mark, far"].centre == (-10, 5)
+
+
+def test_the_lines_of_handball_are_six_seven_and_nine_metres_from_the_goal():
+    found = shapes("handball")
+    assert edges(found["left goal-area line, front"], 0)[1] == pytest.approx(-14)
+    assert math.dist(*found["left goal-area line, front"].points) == pytest.approx(3)
+    assert edges(found["left 7-metre line"], 0)[1] == pytest.approx(-13)
+    assert math.dist(*found["left 7-metre line"].points) == pytest.approx(1)
+    assert edges(found["left goalkeeper's restraining line"], 0)[1] == pytest.approx(-16)
+    dashes = [shape for shape in found.values() if shape.name.startswith("left free-throw line, front")]
+    assert [edges(dash, 0)[1] for dash in dashes] == pytest.approx([-11] * len(dashes))
+    assert [math.dist(*dash.points) for dash in dashes] == pytest.approx([0.15] * len(dashes))
+    round_the_corner = [shape for shape in found.values() if shape.name.startswith("left free-throw line, near")]
+    assert all(outer(dash) == pytest.approx(9) for dash in round_the_corner)
+    assert max(dash.reach[1] for dash in round_the_corner) <= 10
+    assert edges(found["left goal line"], 0) == pytest.approx((-20, -19.92))
+
+
+def test_basketball_is_measured_from_the_inner_edges_of_its_boundary():
+    found = shapes("basketball")
+    assert edges(found["left endline"], 0)[1] == pytest.approx(-14)
+    assert edges(found["far sideline"], 1)[0] == pytest.approx(7.5)
+    assert edges(found["left free-throw line"], 0)[1] == pytest.approx(-14 + 5.8)
+    assert edges(found["left restricted area, far side"], 1)[1] == pytest.approx(2.45)
+    three, straight = found["left three-point line"], found["left three-point line, far end"]
+    assert (three.centre, outer(three)) == (pytest.approx((-14 + 1.575, 0)), pytest.approx(6.75))
+    assert edges(straight, 1)[1] == pytest.approx(7.5 - 0.9)
+    assert math.dist(three.centre, straight.points[0]) == pytest.approx(three.radius)
+    assert found["left no-charge line"].radius - 0.025 == pytest.approx(1.25)
+    assert [outer(found[name]) for name in ("centre circle", "left free-throw semicircle")] == pytest.approx([1.8, 1.8])
+    assert found["centre line"].reach[1] == pytest.approx(7.5 + 0.05 + 0.15)
+
+
+def test_the_circles_of_hockey_are_two_quarters_and_a_line():
+    found = shapes("hockey")
+    near = found["left circle, near side"]
+    assert (near.centre, outer(near)) == ((-45.7, -1.83), pytest.approx(14.63))
+    assert edges(found["left circle, front"], 0)[1] == pytest.approx(-45.7 + 14.63)
+    assert math.dist(*found["left circle, front"].points) == pytest.approx(3.66)
+    assert edges(found["left 23-metre line"], 0)[1] == pytest.approx(-45.7 + 22.9)
+    broken = [shape for shape in found.values() if shape.name.startswith("left broken circle, far")]
+    assert [outer(dash) for dash in broken] == pytest.approx([19.63] * len(broken))
+    assert found["right penalty spot"].centre == (pytest.approx(45.7 - 6.475), 0)
+    assert edges(found["left penalty corner mark, 10 m, far"], 1)[1] == pytest.approx(1.88 + 10)
+    assert edges(found["left 14.63-metre mark, near"], 0)[1] == pytest.approx(-45.7 + 14.63)
+
+
+def test_the_field_of_play_of_rugby_lies_between_its_in_goals():
+    found = shapes("rugby-union", length=122.0, in_goal=11.0)
+    assert edges(found["left goal line"], 0)[1] == pytest.approx(-50)
+    assert edges(found["left dead-ball line"], 0)[1] == pytest.approx(-61)
+    assert edges(found["near touchline"], 1)[1] == pytest.approx(-35)
+    assert edges(found["left 22-metre line"], 0)[1] == pytest.approx(-28)
+    assert {dash.points[0][0] for name, dash in found.items() if name.startswith("right 10-metre line")} == {10}
+
+
+def test_dashes_are_whole_and_one_is_in_the_middle():
+    dashes = Line("line", ((0.0, 0.0), (10.0, 0.0)), 0.1).dashes(1.0, 2.0)
+    assert [dash.points for dash in dashes] == [((1.5, 0), (2.5, 0)), ((4.5, 0), (5.5, 0)), ((7.5, 0), (8.5, 0))]
+    quarter = Arc("arc", (0.0, 0.0), 2.0, 0.0, math.pi / 2, 0.1).dashes(0.5, 0.5)
+    assert [(dash.start + dash.end) / 2 * 2 for dash in quarter] == pytest.approx([math.pi / 2 + n for n in (-1, 0, 1)])
+
+
+@given(st.floats(-4, 4), st.floats(0.01, 2 * math.pi))
+def test_an_arc_reaches_as_far_as_its_farthest_point(start, span):
+    arc = Arc("arc", (1.0, -2.0), 3.0, start, start + span, 0.1)
+    angles = [start + span * n / 2000 for n in range(2001)]
+    points = [(1 + 3 * math.cos(angle), -2 + 3 * math.sin(angle)) for angle in angles]
+    assert arc.reach == pytest.approx([max(map(abs, along)) for along in zip(*points, strict=True)], abs=1e-4)
+
+
+def test_measures_are_sums_and_products():
+    assert value("-(length/2 - 16.5) + sqrt(2*2)", {"length": 105.0}) == pytest.approx(-34)
+    for wrong in ("width", "length.real", "length[0]", "__import__('os')", "length ** 2", "'a'"):
+        with pytest.raises(ValueError, match="is neither a number, a known measure"):
+            value(wrong, {"length": 105.0})
+
+
+def test_a_marking_of_no_shape_is_named():
+    with pytest.raises(ValueError, match="blob is neither a line, an arc, a circle nor a spot"):
+        Template(marking=[{"name": "blob", "blob": 1}]).markings({"line": 0.1})
