@@ -28,7 +28,7 @@ from service.store.blobs import Blobs
 from service.store.engine import connect
 from service.store.jobs import Jobs, Task, picture_folder
 from worker.calibration import calibrate as engine
-from worker.calibration import stitching
+from worker.calibration import quality, stitching
 from worker.calibration.calibrate import CalibrationError, calibrate
 from worker.calibration.camera import Camera, Intrinsics, Pose
 from worker.calibration.field import Field
@@ -274,8 +274,6 @@ def _result(
 
 def _camera_result(camera: engine.CameraResult, options: schemas.Options) -> CameraResult:
     lens = camera.intrinsics
-    sigma = camera.sigma
-    known = sigma is not None and isfinite(sigma.rotation_deg) and isfinite(sigma.position_m)
     return CameraResult(
         id=camera.id,
         pose=schemas.Pose(
@@ -286,7 +284,8 @@ def _camera_result(camera: engine.CameraResult, options: schemas.Options) -> Cam
         intrinsics=schemas.Intrinsics(matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
         if options.fit_focal_length
         else None,
-        sigma=Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m) if sigma and known else None,
+        sigma=_sigma(camera.sigma),
+        repeatability=_sigma(camera.repeatability),
         moved=Moved(
             rotation_deg=camera.moved.rotation_deg,
             position_m=camera.moved.position_m,
@@ -295,6 +294,12 @@ def _camera_result(camera: engine.CameraResult, options: schemas.Options) -> Cam
         iou=_number(camera.iou),
         residual_px=_number(camera.residual_px),
     )
+
+
+def _sigma(sigma: quality.Sigma | None) -> Sigma | None:
+    if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
+        return None
+    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)
 
 
 def _number(value: Any) -> float | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from models import MODEL_PATH
 from tests.benchmarks.scenes import Scene
+from tests.benchmarks.truth import apart_by_homography_px, overlapping
 from worker.calibration.calibrate import Calibration, Options, calibrate
 from worker.calibration.camera import Camera, Frame, Pose, inside
 from worker.calibration.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD, genome_of, with_genome
@@ -19,6 +20,7 @@ from worker.calibration.segmentation import Region, Segmenter, whole_frame
 
 THREADS = 2
 CLICK_NOISE_PX = 2.0
+LOWE_RATIO, FEWEST_MATCHES = 0.75, 20
 
 
 @dataclass
@@ -45,11 +47,20 @@ class Seen:
 
 @dataclass(frozen=True)
 class Answer:
-    """Poses, seconds they took from segmentations on, and what the engine said where it was the engine."""
+    """Poses, seconds they took from segmentations on, and what the engine said where it was the engine.
+
+    `stitch_px`: of a method that lays pictures onto each other and knows no poses.
+    """
 
     cameras: list[Camera]
     seconds: float
     said: Calibration | None = None
+    stitch_px: float | None = None
+
+    @property
+    def has_poses(self) -> bool:
+        """Whether there is more to judge than a seam."""
+        return bool(self.cameras)
 
 
 Method = Callable[[Seen, list[Camera], int], Answer]
@@ -82,6 +93,42 @@ def zhang(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
         )
         found.append(camera.with_pose(Pose.from_translation(turn.ravel(), move.ravel())))
     return Answer(found, time.perf_counter() - begin)
+
+
+def homography(seen: Seen, _cameras: list[Camera], _seed: int) -> Answer:
+    """SIFT features of the undistorted pictures and a homography by RANSAC: how pictures without a pitch are stitched.
+
+    The worst pair that could be matched; nothing is said of those that could not.
+    """
+    begin = time.perf_counter()
+    errors = []
+    for i, j in overlapping(seen.scene):
+        found = _matched(*(_features(seen, k) for k in (i, j)))
+        if found is not None:
+            errors.append(apart_by_homography_px(seen.scene, i, j, found))
+    return Answer([], time.perf_counter() - begin, stitch_px=max(errors, default=None))
+
+
+def _features(seen: Seen, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the undistorted picture of a camera has features (F, 2), and what they look like."""
+    camera = seen.scene.cameras[number]
+    lens = camera.intrinsics
+    picture = cv2.undistort(seen.scene.frames[camera.id][0], lens.matrix, lens.distortion)
+    grey = cv2.resize(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    points, looks = cv2.SIFT_create(8000).detectAndCompute(grey, None)
+    return 2 * np.array([point.pt for point in points]) + 0.5, looks
+
+
+def _matched(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> np.ndarray | None:
+    """The homography (3, 3) from the second picture to the first; None where too few features agree on one."""
+    pairs = cv2.BFMatcher().knnMatch(second[1], first[1], k=2)
+    good = [best for best, other in pairs if best.distance < LOWE_RATIO * other.distance]
+    if len(good) < FEWEST_MATCHES:
+        return None
+    found, agree = cv2.findHomography(
+        second[0][[match.queryIdx for match in good]], first[0][[match.trainIdx for match in good]], cv2.RANSAC, 4.0
+    )
+    return found if found is not None and agree.sum() >= FEWEST_MATCHES else None
 
 
 def _corners(seen: Seen) -> np.ndarray:
@@ -136,6 +183,7 @@ def cma_es(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
 METHODS: dict[str, Method] = {
     "Start": start,
     "Zhang (clicked corners)": zhang,
+    "SIFT and a homography": homography,
     "CMA-ES on our objective": cma_es,
     "SCPR": engine(preset="scpr"),
     "ESC `paper`": engine(preset="paper"),

@@ -24,7 +24,8 @@ def table(rows: Sequence[dict]) -> list[Path]:
         for height, method in enumerate(methods):
             values = [row[name] for row in rows if row["method"] == method and row[name] is not None]
             axis.plot(np.maximum(values, 1e-4), np.full(len(values), height), "o", ms=4, alpha=0.4, color="tab:blue")
-            axis.plot(np.mean(values), height, "|", ms=16, mew=2, color="black")
+            if values:
+                axis.plot(np.mean(values), height, "|", ms=16, mew=2, color="black")
         axis.set_xscale("log")
         axis.set_xlabel(label)
         axis.grid(axis="x", alpha=0.3)

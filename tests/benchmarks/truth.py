@@ -9,26 +9,27 @@ from itertools import combinations
 import numpy as np
 
 from tests.benchmarks.scenes import Scene
-from worker.calibration.camera import Camera, inside, rotation_angles_deg
+from worker.calibration.camera import Camera, Intrinsics, inside, rotation_angles_deg
 
 GRID_M = 0.5
 
 
 @dataclass(frozen=True)
 class Errors:
-    """`stitch_px` (1 px = 10 cm; None for one camera), `shift_cm` (TrE), `turn_deg` (RoE), `iou` in 0..1."""
+    """`stitch_px` (1 px = 10 cm; None for one camera), `shift_cm` (TrE), `turn_deg` (RoE), `iou` in 0..1.
+
+    None, all but the first, for what stitches without finding poses.
+    """
 
     stitch_px: float | None
-    shift_cm: float
-    turn_deg: float
-    iou: float
+    shift_cm: float | None = None
+    turn_deg: float | None = None
+    iou: float | None = None
 
 
 def errors(scene: Scene, found: Sequence[Camera]) -> Errors:
     """Means over the cameras; stitch: the worst pair."""
-    pairs = [
-        _apart_px(scene, i, j, found) for i, j in combinations(range(len(found)), 2) if _common(scene, i, j) is not None
-    ]
+    pairs = [_apart_px(scene, i, j, found) for i, j in overlapping(scene)]
     shifts, turns = zip(*(apart(a, b) for a, b in zip(found, scene.cameras, strict=True)), strict=True)
     return Errors(
         max(pairs) if pairs else None,
@@ -54,6 +55,26 @@ def placed(scene: Scene, camera: Camera, pixel: np.ndarray) -> np.ndarray:
         ground = camera.pose.position + ray * (height - camera.pose.position[2]) / ray[2]
         height = scene.pitch.lift(ground[None, :2])[0, 2]
     return ground[:2]
+
+
+def overlapping(scene: Scene) -> list[tuple[int, int]]:
+    """The pairs of cameras that see the pitch centre, or some marking, together."""
+    return [(i, j) for i, j in combinations(range(len(scene.cameras)), 2) if _common(scene, i, j) is not None]
+
+
+def apart_by_homography_px(scene: Scene, i: int, j: int, homography: np.ndarray) -> float:
+    """The stitch error where the undistorted picture of camera j is laid onto that of camera i by (3, 3)."""
+    point = _common(scene, i, j)
+    first, second = (scene.real[k].project(point[None])[0] for k in (i, j))
+    laid = homography @ _pinhole(scene.cameras[j].intrinsics, second)
+    ray = np.linalg.solve(scene.cameras[i].intrinsics.matrix, laid)
+    back = scene.cameras[i].intrinsics.distort(ray[:2] / ray[2])
+    return 10 * float(np.linalg.norm(placed(scene, scene.real[i], first) - placed(scene, scene.real[i], back)))
+
+
+def _pinhole(lens: Intrinsics, pixel: np.ndarray) -> np.ndarray:
+    """Where a pixel (2,) is in the undistorted picture, (3,) homogeneous."""
+    return lens.matrix @ np.append(lens.undistort(pixel), 1.0)
 
 
 def _apart_px(scene: Scene, i: int, j: int, found: Sequence[Camera]) -> float:
