@@ -54,7 +54,7 @@ def guarded(tmp_path):
     service.kill()
 
 
-@pytest.mark.timeout(120 + EXAMPLES * 10)
+@pytest.mark.timeout(300 + EXAMPLES * 10)
 def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_path):
     venues, doomed = [f"v{n}" for n in range(9)], [f"d{n}" for n in range(9)]
     for name in venues + doomed:
