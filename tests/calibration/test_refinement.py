@@ -5,7 +5,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame, paint_markings, pair
+from tests.calibration.synthetic import (
+    BARREL,
+    CROWNED,
+    camera,
+    ground_behind,
+    moved,
+    paint_frame,
+    paint_markings,
+    pair,
+)
 from worker.calibration.camera import rotation_angles_deg
 from worker.calibration.field import Field
 from worker.calibration.linemeasurement import brightness_of, expected_profiles, measure_lines, sliding_correlation
@@ -260,3 +269,29 @@ def test_the_same_wrong_lens_makes_the_next_pose_no_less_like_this_one():
     refined = refine(CROWNED, wrong, Sight(brightness, responses), 0.5)
     sigma, repeatability = (Sigma.from_covariance(c[0]) for c in (refined.covariance, refined.repeatability))
     assert repeatability.position_m < sigma.position_m / 2
+
+
+def offsets(found, one):
+    """How far (M,) measured lines are from where they are."""
+    return np.sum((found.pixel - one.project(found.points.position)) * found.normal, axis=1)
+
+
+def test_bent_lines_are_found_where_they_are():
+    cameras, brightness, responses = scene()
+    found = measure_lines(CROWNED.line_points(), cameras[0], brightness[0], responses[0], 3.0)
+    names = np.array([marking.name for marking in CROWNED.markings()])[found.points.marking]
+    for name in ("centre circle", "left penalty arc"):
+        # Along a straight tangent the arc would be 0.3 px off.
+        assert abs(np.median(offsets(found, cameras[0])[names == name])) < 0.08
+
+
+def test_ground_that_is_brighter_on_one_side_does_not_pull_a_line():
+    cameras, brightness, responses = scene()
+    with np.errstate(invalid="ignore"):
+        outside = ground_behind(CROWNED, cameras[0])[..., 1] < -CROWNED.width / 2
+    lit = brightness[0] + 40.0 * outside.astype(np.float32)
+    found = measure_lines(CROWNED.line_points(), cameras[0], lit, responses[0], 3.0)
+    names = np.array([marking.name for marking in CROWNED.markings()])[found.points.marking]
+    beside = offsets(found, cameras[0])[names == "near touchline"]
+    assert len(beside) > 30
+    assert abs(np.median(beside)) < 0.05

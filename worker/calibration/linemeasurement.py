@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, Frame
 from worker.calibration.field import LinePoints
-from worker.calibration.lineprofile import blurred_line, blurred_line_slope
+from worker.calibration.lineprofile import blurred_line, blurred_point, blurred_step
 from worker.calibration.sampling import bilinear
 from worker.calibration.visibility import SeenLines
 
@@ -28,9 +28,10 @@ BESIDE_PX = 4.0
 LEAST_CORRELATION = 0.6
 LEAST_RESPONSE = 0.3
 CENTRE_STEPS = 2
+RIDGE = 1e-6
 OFF_CENTRE_PENALTY = 0.15
 """Correlation that a candidate at the end of the search loses against one where the pose expects the line."""
-NOISE_PX = 0.15
+NOISE_PX = 0.2
 """Error of one measurement of a perfect line."""
 PAINT_M = 0.006
 """Lines are painted to about a centimetre."""
@@ -208,20 +209,22 @@ def _bend(seen: SeenLines) -> Array:
 def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) -> Array:
     """Centres (N,) of the lines in windows (N, K) of brightness at `offsets` (K,), at most `reach_px` from 0.
 
-    Least squares of the expected line, moved, on a background that has a level and a slope: what lies on one side of a
-    line is seldom as bright as what lies on the other.
+    Least squares of what is there: ground, paint, ground. Ground on one side of a line is seldom as bright as on the
+    other, and that must not pull the line.
     """
     inside = np.abs(offsets) <= _reach(width_px)[:, None]
-    centre = np.zeros(len(windows))
-    for _ in range(CENTRE_STEPS):
-        moved = offsets - centre[:, None]
-        line = blurred_line(width_px[:, None], LENS_BLUR_PX, moved)
-        slope = blurred_line_slope(width_px[:, None], LENS_BLUR_PX, moved)
-        model = np.stack([line, -slope, np.ones_like(line), np.broadcast_to(offsets, line.shape)], axis=1)
-        model = model * inside[:, None]
-        normal = np.einsum("nak,nbk->nab", model, model)
-        seen = np.einsum("nak,nk->na", model, np.nan_to_num(windows))
-        height, move, _, _ = np.linalg.solve(normal, seen[..., None])[..., 0].T
-        step = np.divide(move, height, out=np.zeros(len(windows)), where=height > 0)
-        centre = np.clip(centre + step, -reach_px, reach_px)
+    windows = np.nan_to_num(windows) * inside
+    centre, move = np.zeros(len(windows)), np.zeros((len(windows), len(offsets)))
+    for _ in range(1 + CENTRE_STEPS):
+        begin, end = (offsets - centre[:, None] + side * width_px[:, None] / 2 for side in (1, -1))
+        first, second = blurred_step(begin, LENS_BLUR_PX), blurred_step(end, LENS_BLUR_PX)
+        model = np.stack([1 - first, first - second, second, move], axis=1) * inside[:, None]
+        normal = np.einsum("nak,nbk->nab", model, model) + RIDGE * np.eye(4)
+        before, paint, behind, by = np.linalg.solve(normal, np.einsum("nak,nk->na", model, windows)[..., None])[
+            ..., 0
+        ].T
+        centre = np.clip(centre + by, -reach_px, reach_px)
+        edges = [blurred_point(edge, LENS_BLUR_PX) for edge in (begin, end)]
+        # How the brightness changes when the line moves, which the first time round is not yet known.
+        move = (before - paint)[:, None] * edges[0] + (paint - behind)[:, None] * edges[1]
     return centre

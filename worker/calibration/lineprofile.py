@@ -17,14 +17,15 @@ def blurred_line(width_px: Array, sigma_px: float, offset_px: Array | float = 0.
 
     Arguments broadcast together.
     """
-    spread = sqrt(2) * sigma_px
-    ends = [(offset_px + side * width_px / 2) / spread for side in (1, -1)]
+    return blurred_step(offset_px + width_px / 2, sigma_px) - blurred_step(offset_px - width_px / 2, sigma_px)
+
+
+def blurred_step(offset_px: Array, sigma_px: float) -> Array:
+    """Brightness at `offset_px` from a step of height 1, blurred by `sigma_px`."""
     # Between the places of the table the error function is off by less than a millionth.
-    return 0.5 * (np.interp(ends[0], _AT, _ERF) - np.interp(ends[1], _AT, _ERF))
+    return 0.5 + 0.5 * np.interp(offset_px / (sqrt(2) * sigma_px), _AT, _ERF)
 
 
-def blurred_line_slope(width_px: Array, sigma_px: float, offset_px: Array | float = 0.0) -> Array:
-    """The derivative of `blurred_line` by the offset, per px."""
-    spread = sqrt(2) * sigma_px
-    edges = [np.exp(-(((offset_px + side * width_px / 2) / spread) ** 2)) for side in (1, -1)]
-    return (edges[0] - edges[1]) / (sqrt(2 * pi) * sigma_px)
+def blurred_point(offset_px: Array, sigma_px: float) -> Array:
+    """The derivative of `blurred_step`, per px."""
+    return np.asarray(np.exp(-0.5 * (offset_px / sigma_px) ** 2) / (sqrt(2 * pi) * sigma_px))

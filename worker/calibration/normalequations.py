@@ -13,6 +13,8 @@ from worker.calibration.residuals import Residuals, Unknowns
 CLUSTER_POINTS = 8
 """Line points (25 cm apart) whose errors of paint and measurement are taken as one."""
 
+LEAST_NOISE = 0.2
+
 
 @dataclass(frozen=True)
 class NormalEquations:
@@ -40,7 +42,7 @@ def error_of_measurement(rows: Residuals, unknowns: Unknowns) -> Array:
     """Covariance (U, U) of the gradient by the residuals themselves, those of two metres of line taken as one.
 
     Neighbours on a line share the error of its paint, so they are not as many as they seem (the sandwich of Liang and
-    Zeger, 1986). Never less than their expected errors say.
+    Zeger, 1986). Never less than a fifth of what their expected errors say: no picture is perfect.
     """
     patches, patch = np.unique(rows.point // CLUSTER_POINTS, return_inverse=True)
     weighted = rows.jacobian * rows.weight[:, None]
@@ -55,7 +57,7 @@ def error_of_measurement(rows: Residuals, unknowns: Unknowns) -> Array:
             np.diag(unknowns.ground.gathered_twice(rows.point, (rows.weight * rows.rise) ** 2)),
         ]
     )
-    growth = np.sqrt(np.maximum(expected / np.maximum(np.diag(measured), 1e-300), 1.0))
+    growth = np.sqrt(np.maximum(LEAST_NOISE * expected / np.maximum(np.diag(measured), 1e-300), 1.0))
     # What nothing was measured of has no error of measurement.
     growth[expected == 0] = 0.0
     return measured * growth[:, None] * growth[None, :]

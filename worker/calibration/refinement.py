@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera
-from worker.calibration.field import Field
+from worker.calibration.field import Field, LinePoints
 from worker.calibration.ground import UNEVEN_M, Ground
 from worker.calibration.linemeasurement import Measurements, measure_lines
 from worker.calibration.normalequations import normal_equations
@@ -23,10 +23,10 @@ from worker.calibration.residuals import POSE, Unknowns, change_between, moved, 
 from worker.calibration.robust import Weigh, huber_weights, tukey_weights
 from worker.calibration.uncertainty import Deviation, judge
 
-SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0)
+SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
 """How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
 ASSESSING_SEARCH_PX = 8.0
-HUBER_STEPS, TUKEY_STEPS = 5, 3
+HUBER_STEPS, TUKEY_STEPS = 4, 3
 """Per round."""
 PRIOR_RAD, PRIOR_M = 0.03, 1.0
 """Standard deviation, per axis, of where a camera is before any line is measured."""
@@ -71,7 +71,7 @@ def refine(
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     here = _Estimate.at(pitch, cameras, unknowns)
     for search in SEARCH_PX:
-        measured = measure_all(here.pitch, here.cameras, sight, search)
+        measured = _measure_all(here.lines(unknowns), here.cameras, sight, search)
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several.
         for weigh in [huber_weights] * HUBER_STEPS + [tukey_weights] * TUKEY_STEPS:
             here = _step(here, cameras, measured, unknowns, stitch_weight, weigh)
@@ -88,9 +88,8 @@ def assess(
     return _assessed(_Estimate.at(pitch, cameras, unknowns), cameras, sight, unknowns, stitch_weight)
 
 
-def measure_all(pitch: Field, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
+def _measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
     """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
-    lines = pitch.line_points()
     return [
         measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.relative_size)
         for camera, bright, response in zip(cameras, sight.brightness, sight.responses, strict=True)
@@ -131,6 +130,12 @@ class _Estimate:
     def at(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> _Estimate:
         points = pitch.line_points().position
         return cls(pitch, points, list(cameras), np.zeros(len(unknowns.parameters)), np.zeros(len(unknowns.ground)))
+
+    def lines(self, unknowns: Unknowns) -> LinePoints:
+        """The line points of the pitch, on its ground."""
+        lines = self.pitch.line_points()
+        up = unknowns.ground.under_points(self.heights, np.arange(len(lines)))
+        return replace(lines, position=lines.position + up[:, None] * [0.0, 0.0, 1.0])
 
     def moved(self, move: Array, unknowns: Unknowns) -> _Estimate:
         """After a step (U,)."""
@@ -187,7 +192,7 @@ def _believed(here: _Estimate, measured: Sequence[Measurements], unknowns: Unkno
 def _assessed(
     here: _Estimate, found: Sequence[Camera], sight: Sight, unknowns: Unknowns, stitch_weight: float
 ) -> Refined:
-    measured = measure_all(here.pitch, here.cameras, sight, ASSESSING_SEARCH_PX)
+    measured = _measure_all(here.lines(unknowns), here.cameras, sight, ASSESSING_SEARCH_PX)
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
     prior, away = ordinary.prior(unknowns), here.away(found)

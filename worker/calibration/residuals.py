@@ -102,11 +102,14 @@ def residuals(
     return Residuals(*(np.concatenate(column) for column in columns))
 
 
-def rms_px(camera: Camera, measured: Measurements) -> float | None:
-    """Rms of the distances of the lines of one camera that are not outliers; None where it has too few."""
+def rms_px(points: Array, camera: Camera, measured: Measurements) -> float | None:
+    """Rms of the distances of the lines of one camera from the field's `points` (N, 3), but for outliers.
+
+    None where it has too few.
+    """
     if len(measured) < FEWEST_MEASUREMENTS:
         return None
-    offset = np.sum((measured.pixel - camera.project(measured.points.position)) * measured.normal, axis=1)
+    offset = np.sum((measured.pixel - camera.project(points[measured.index])) * measured.normal, axis=1)
     known = np.isfinite(offset)
     offset, sigma = offset[known], measured.sigma_px[known]
     counted = tukey_weights(offset / sigma) > 0

@@ -70,7 +70,8 @@ def judge(
     """
     suspects = _suspects(pitch, cameras, solved)
     unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground)
-    rows = residuals(pitch.line_points().position, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
+    points = pitch.line_points().position
+    rows = residuals(points, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
     equations = normal_equations(rows, unknowns)
     kept = np.r_[: solved.dense, unknowns.dense : len(unknowns)]
     asked = np.arange(solved.dense, unknowns.dense)
@@ -96,7 +97,7 @@ def judge(
     return Judged(
         [_of_pose(covariance, nearer, i) if known else None for i, known in enumerate(enough)],
         [_of_pose(alone, np.zeros(len(alone)), i) if known else None for i, known in enumerate(enough)],
-        [rms_px(camera, found) for camera, found in zip(cameras, measured, strict=True)],
+        [rms_px(points, camera, found) for camera, found in zip(cameras, measured, strict=True)],
         [
             Deviation(
                 cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
