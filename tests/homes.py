@@ -130,7 +130,19 @@ class Postgres:
         self._as_somebody = {"cwd": self._folder, **_who_may_run_postgres(self._folder)}
         with self._log.open("ab") as log:
             subprocess.run(
-                [binaries / "initdb", "-D", "data", "-U", "esc", "-E", "UTF8", "--locale=C", "-A", "trust", "--no-sync"],
+                [
+                    binaries / "initdb",
+                    "-D",
+                    "data",
+                    "-U",
+                    "esc",
+                    "-E",
+                    "UTF8",
+                    "--locale=C",
+                    "-A",
+                    "trust",
+                    "--no-sync",
+                ],
                 check=True,
                 stdout=log,
                 stderr=log,

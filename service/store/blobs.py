@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlparse
 
 import obstore
+from obstore.exceptions import BaseError
 from obstore.store import LocalStore, ObjectStore, from_url
 
 if TYPE_CHECKING:
     from obstore.store import BackoffConfig, ClientConfig, RetryConfig
 
+# What is raised while a bucket is away, or a disk full: trying again later can help.
+AWAY = (BaseError, OSError)
 # For one answer of a bucket to one request.
 ANSWER_S = 30.0
 TRUE = ("1", "true", "on", "yes", "y")
@@ -39,7 +42,7 @@ class Blobs:
 
     def put(self, path: str, data: bytes) -> None:
         """Store an object; when this returns it survives a crash, of the machine too."""
-        # In one piece: whoever dies over a piece of several leaves those before it in the bucket, where nobody sees them.
+        # In one piece: of several, those before a crash would stay in the bucket, where no list of objects shows them.
         obstore.put(self._store, path, data, use_multipart=False)
         if self._folder:
             # A bucket promises durability; a file has it only after its pages have reached the disk, and the entry of
