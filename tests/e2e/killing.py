@@ -3,9 +3,11 @@
 import os
 import random
 import signal
+import sys
 import threading
 import time
 from contextlib import suppress
+from dataclasses import dataclass
 from subprocess import Popen
 
 import httpx
@@ -16,10 +18,20 @@ from tests.e2e.running import Service, children, wait_for
 A_LITTLE_LONGER = 1.1
 
 
+@dataclass(frozen=True)
+class Death:
+    """Of a worker, and the end of the job; seconds since the kill, until another began the job if this one had."""
+
+    worker: str
+    job: dict
+    to_end_s: float
+    to_takeover_s: float | None
+
+
 def moment(of_s: float) -> float:
     """A random one, counted from the beginning of what takes `of_s`. Printed: pytest shows it when a test fails."""
     after_s = random.uniform(0, A_LITTLE_LONGER * of_s)
-    print(f"kill after {after_s:.4f} s")
+    print(f"kill after {after_s:.4f} s", file=sys.stderr)
     return after_s
 
 
@@ -49,10 +61,8 @@ def kill_kept_worker(service: Service, venue: str, after_s: float) -> tuple[dict
     return service.end(job), time.monotonic() - killed
 
 
-def kill_worker_of_several(
-    service: Service, workers: dict[str, Popen], venue: str, after_s: float
-) -> tuple[str, float | None]:
-    """Which of the workers was killed, the one at work if there was one, and the seconds until another had its job."""
+def kill_worker_of_several(service: Service, workers: dict[str, Popen], venue: str, after_s: float) -> Death:
+    """Kill the worker that computes the job, or any, at a moment of a job; it stays dead until the job has ended."""
     job = service.submit(venue).raise_for_status().json()["id"]
     time.sleep(after_s)
     name = next((name for name, process in workers.items() if children(process.pid)), random.choice(list(workers)))
@@ -60,12 +70,11 @@ def kill_worker_of_several(
     killed = time.monotonic()
     workers[name].wait()
     before = service.job(job)
-    taken_over_s = None
+    to_takeover_s = None
     if before["status"] == "running":
         wait_for(lambda: service.job(job)["attempt"] > before["attempt"])
-        taken_over_s = time.monotonic() - killed
-    service.end(job)
-    return name, taken_over_s
+        to_takeover_s = time.monotonic() - killed
+    return Death(name, service.end(job), time.monotonic() - killed, to_takeover_s)
 
 
 def kill_api(service: Service, venue: str, key: str, after_s: float) -> str | None:
