@@ -1,5 +1,6 @@
 """What has to add up whenever nothing is open: jobs, poses, the queue and the files, read beside the service."""
 
+import os
 from collections import Counter
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -75,5 +76,6 @@ def everything_in(blob_url: str) -> list[str]:
     parsed = urlparse(blob_url)
     if parsed.scheme != "file":
         return files(blob_url)
-    folder = Path(unquote(parsed.path))
-    return [str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()]
+    root = unquote(parsed.path)
+    # Folders may be deleted meanwhile, which this walk minds less than `Path.rglob`.
+    return [os.path.relpath(Path(folder) / name, root) for folder, _, names in os.walk(root) for name in names]
