@@ -33,12 +33,12 @@ DAY_S = 86400
 
 @dataclass(frozen=True)
 class Sample:
-    """After a job: resident memory in MB, files of the database and of the store in MB, rows."""
+    """After a job: resident memory in MB, of the database too, files in kB, rows."""
 
     api: float
     worker: float
     database: float
-    files: float
+    files_kb: float
     jobs: int
     queued: int
     poses: int
@@ -62,7 +62,7 @@ def table(options: argparse.Namespace) -> list[str]:
                 "resident memory of the API, MB": "api",
                 "resident memory of the worker, MB": "worker",
                 "database with its log, MB": "database",
-                "frames and pictures, MB": "files",
+                "frames and pictures, kB": "files_kb",
                 "rows: jobs": "jobs",
                 "rows: entries of the queue": "queued",
                 "rows: poses that ever held (kept for good)": "poses",
@@ -143,7 +143,7 @@ def _sample(running: Service, worker: int) -> Sample:
         api=_resident_mb(running.process.pid),
         worker=_resident_mb(worker),
         database=sum(_size_mb(path) for path in running.data.glob("esc.sqlite*")),
-        files=sum(_size_mb(blobs / path) for path in everything_in(running.blob_url)),
+        files_kb=1000 * sum(_size_mb(blobs / path) for path in everything_in(running.blob_url)),
         jobs=jobs,
         queued=entries,
         poses=poses,
