@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check bench bench-real bench-segmentation bench-rate train lock clean
+.PHONY: setup demo test check bench bench-real bench-segmentation bench-service bench-rate train lock clean
 
 setup: $(VENV)/.installed
 
@@ -32,6 +32,9 @@ bench-real: setup
 
 bench-segmentation: $(VENV)/.train
 	$(BIN)/python -m tests.benchmarks.segmentation
+
+bench-service: setup
+	$(BIN)/python -m tests.benchmarks.service
 
 $(VENV)/.bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'

@@ -7,7 +7,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
 
-import obstore.exceptions
 import structlog
 from fastapi import FastAPI, Request
 from starlette.responses import Response
@@ -26,8 +25,10 @@ from service.queue import migrate as migrate_queue
 from service.readiness import Readiness
 from service.routes import calibrate, docs, documented, health, jobs, venues
 from service.settings import Settings
+from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.blobs import Blobs
-from service.store.engine import AWAY, connect, migrate
+from service.store.engine import AWAY as DATABASE_AWAY
+from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
 from service.store.figures import look
 from service.store.jobs import Jobs
@@ -116,5 +117,5 @@ def _answer_outages(app: FastAPI) -> None:
         log.error("storage is away", exc_info=error)
         return Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}).response()
 
-    for error in (*AWAY, obstore.exceptions.BaseError, OSError):
+    for error in (*DATABASE_AWAY, *BLOBS_AWAY):
         app.add_exception_handler(error, away)

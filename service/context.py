@@ -44,7 +44,8 @@ class Context:
     gate: Gate
 
 
-def _context(request: Request) -> Context:
+async def _context(request: Request) -> Context:
+    # FastAPI calls what is not `async` in a thread, which costs as much as reading a job does.
     return cast(Context, request.app.state.context)
 
 

@@ -45,16 +45,16 @@ def postgres(missing):
     binaries = postgres_binaries()
     if binaries is None:
         missing("postgres")
-    with postgres_server(binaries) as url:
-        yield url
+    with postgres_server(binaries) as server:
+        yield server
 
 
 @pytest.fixture(scope="session")
 def bucket(missing):
     if not importlib.util.find_spec("moto"):
         missing("s3")
-    with s3_server() as url:
-        yield url
+    with s3_server() as server:
+        yield server
 
 
 @pytest.fixture(scope="session")

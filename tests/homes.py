@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
@@ -45,14 +46,26 @@ class Embedded:
     def database_away(self, folder: Path) -> Iterator[None]:
         with closing(sqlite3.connect(folder / "esc.sqlite", timeout=30, isolation_level=None)) as database:
             database.execute("ALTER TABLE jobs RENAME TO away")
-            yield
-            database.execute("ALTER TABLE away RENAME TO jobs")
+            try:
+                yield
+            finally:
+                database.execute("ALTER TABLE away RENAME TO jobs")
+
+    @contextmanager
+    def database_locked(self, folder: Path) -> Iterator[None]:
+        """Another process writes, and goes on and on."""
+        with closing(sqlite3.connect(folder / "esc.sqlite", timeout=30, isolation_level=None)) as database:
+            database.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+            finally:
+                database.execute("ROLLBACK")
 
 
 class Servers:
     """PostgreSQL and S3: a database and a part of the bucket for each folder that would be a home."""
 
-    def __init__(self, postgres: str, bucket: str) -> None:
+    def __init__(self, postgres: "Postgres", bucket: "Bucket") -> None:
         self._postgres = postgres
         self._bucket = bucket
         self._names: dict[Path, str] = {}
@@ -60,27 +73,32 @@ class Servers:
     def database_url(self, folder: Path) -> str:
         if folder not in self._names:
             self._names[folder] = f"home_{len(self._names)}"
-            self._administer(f"CREATE DATABASE {self._names[folder]}")
-        return self._postgres.format(self._names[folder])
+            with psycopg.connect(self._postgres.url("postgres"), autocommit=True) as connection:
+                connection.execute(f"CREATE DATABASE {self._names[folder]}")
+        return self._postgres.url(self._names[folder])
 
     def blob_url(self, folder: Path) -> str:
-        return f"{self._bucket}/{folder.relative_to(folder.anchor)}"
+        return f"{self._bucket.url}/{folder.relative_to(folder.anchor)}"
 
     def settings(self, folder: Path) -> dict[str, str]:
         return {"database_url": self.database_url(folder), "blob_url": self.blob_url(folder)}
 
     @contextmanager
     def database_away(self, folder: Path) -> Iterator[None]:
-        name = self._names[folder]
-        self._administer(f"ALTER DATABASE {name} ALLOW_CONNECTIONS false")
-        self._administer(f"SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = '{name}'")
-        yield
-        self._administer(f"ALTER DATABASE {name} ALLOW_CONNECTIONS true")
+        self._postgres.stop()
+        try:
+            yield
+        finally:
+            self._postgres.start()
 
-    def _administer(self, statement: str) -> None:
-        """Do something to a database from outside of it."""
-        with psycopg.connect(self._postgres.format("postgres"), autocommit=True) as connection:
-            connection.execute(statement)
+    @contextmanager
+    def bucket_away(self) -> Iterator[None]:
+        """It takes requests and does not answer them."""
+        self._bucket.server.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self._bucket.server.send_signal(signal.SIGCONT)
 
 
 Home = Embedded | Servers
@@ -104,30 +122,72 @@ def postgres_binaries() -> Path | None:
     return next((folder for folder in reversed(folders) if (folder / "postgres").exists()), None)
 
 
+class Postgres:
+    """A server on a socket that only this user reaches."""
+
+    def __init__(self, binaries: Path, options: Sequence[str]) -> None:
+        # Not below pytest's folder: PostgreSQL refuses to run as root, and nobody else may look in there.
+        self._folder = Path(tempfile.mkdtemp(prefix="esc-postgres-"))
+        self._binaries, self._log, self._options = binaries, self._folder / "log", options
+        self._as_somebody = {"cwd": self._folder, **_who_may_run_postgres(self._folder)}
+        with self._log.open("ab") as log:
+            subprocess.run(
+                [
+                    binaries / "initdb",
+                    "-D",
+                    "data",
+                    "-U",
+                    "esc",
+                    "-E",
+                    "UTF8",
+                    "--locale=C",
+                    "-A",
+                    "trust",
+                    "--no-sync",
+                ],
+                check=True,
+                stdout=log,
+                stderr=log,
+                **self._as_somebody,
+            )
+        self.start()
+
+    def url(self, database: str) -> str:
+        return f"postgresql://esc@/{database}?host={self._folder}"
+
+    def start(self) -> None:
+        options = [word for option in ("listen_addresses=", *self._options) for word in ("-c", option)]
+        command = [self._binaries / "postgres", "-D", "data", "-k", self._folder, *options]
+        with self._log.open("ab") as log:
+            self._server = subprocess.Popen(command, stdout=log, stderr=log, **self._as_somebody)
+        end = time.monotonic() + STARTING_S
+        while True:
+            try:
+                psycopg.connect(self.url("postgres")).close()
+                return
+            except psycopg.OperationalError:
+                assert self._server.poll() is None, self._log.read_text()
+                assert time.monotonic() < end, self._log.read_text()
+                time.sleep(0.05)
+
+    def stop(self) -> None:
+        """At once: connections are closed and what was not committed is lost."""
+        self._server.send_signal(signal.SIGINT)
+        self._server.wait(STARTING_S)
+
+    def remove(self) -> None:
+        self.stop()
+        shutil.rmtree(self._folder)
+
+
 @contextmanager
-def postgres_server(binaries: Path, options: Sequence[str] = HASTY) -> Iterator[str]:
-    """A server on a socket that only this user reaches; gives its URL with `{}` for the name of a database."""
-    # Not below pytest's folder: PostgreSQL refuses to run as root, and nobody else may look in there.
-    folder = Path(tempfile.mkdtemp(prefix="esc-postgres-"))
-    somebody = _who_may_run_postgres(folder)
-    log = folder / "log"
-    initialise = ["initdb", "-D", folder / "data", "-U", "esc", "-E", "UTF8", "--locale=C", "-A", "trust", "--no-sync"]
-    set_options = [word for option in options for word in ("-c", option)]
-    serve = ["postgres", "-D", folder / "data", "-k", folder, "-c", "listen_addresses=", *set_options]
-    url = f"postgresql://esc@/{{}}?host={folder}"
+def postgres_server(binaries: Path, options: Sequence[str] = HASTY) -> Iterator[Postgres]:
+    """A server of one's own."""
+    server = Postgres(binaries, options)
     try:
-        with log.open("wb") as output:
-            started = {"cwd": folder, "stdout": output, "stderr": output, **somebody}
-            subprocess.run([binaries / initialise[0], *initialise[1:]], check=True, **started)
-            server = subprocess.Popen([binaries / serve[0], *serve[1:]], **started)
-        try:
-            _wait_until_it_answers(url.format("postgres"), server, log)
-            yield url
-        finally:
-            server.send_signal(signal.SIGQUIT)
-            server.wait(STARTING_S)
+        yield server
     finally:
-        shutil.rmtree(folder)
+        server.remove()
 
 
 def _who_may_run_postgres(folder: Path) -> dict:
@@ -139,21 +199,17 @@ def _who_may_run_postgres(folder: Path) -> dict:
     return {"user": user.pw_uid, "group": user.pw_gid, "extra_groups": []}
 
 
-def _wait_until_it_answers(url: str, server: subprocess.Popen, log: Path) -> None:
-    end = time.monotonic() + STARTING_S
-    while True:
-        try:
-            psycopg.connect(url).close()
-            return
-        except psycopg.OperationalError:
-            assert server.poll() is None, log.read_text()
-            assert time.monotonic() < end, log.read_text()
-            time.sleep(0.05)
+@dataclass(frozen=True)
+class Bucket:
+    """A bucket, and the process that serves it."""
+
+    url: str
+    server: subprocess.Popen
 
 
 @contextmanager
-def s3_server() -> Iterator[str]:
-    """A server in a process of its own; gives the URL of a bucket, and the environment says how to reach it."""
+def s3_server() -> Iterator[Bucket]:
+    """A server in a process of its own, with a bucket; the environment says how to reach it."""
     server = subprocess.Popen(
         [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", "0"],
         stdout=subprocess.DEVNULL,
@@ -173,7 +229,7 @@ def s3_server() -> Iterator[str]:
                 "AWS_SECRET_ACCESS_KEY": "secret",
             }.items():
                 patch.setenv(name, value)
-            yield f"s3://{BUCKET}"
+            yield Bucket(f"s3://{BUCKET}", server)
     finally:
         server.kill()
         server.wait()

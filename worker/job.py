@@ -21,10 +21,10 @@ import structlog
 from numpy.typing import NDArray
 
 from service import lifeline, logs, schemas
-from service.problems import KINDS, type_of
+from service.problems import KINDS, first_line, type_of
 from service.schemas import CameraResult, JobError, Moved, Progress, Provenance, Result, Sigma, Venue
 from service.settings import Settings
-from service.store.blobs import Blobs
+from service.store.blobs import AWAY, Blobs
 from service.store.engine import connect
 from service.store.jobs import Jobs, Task, picture_folder
 from worker.calibration import calibrate as engine
@@ -79,11 +79,10 @@ def main(job_id: str, run_token: str) -> None:
             settings,
             lambda progress: say(Message(progress=progress)),
         )
+        _store(task, blobs, outcome.pictures)
     except Failure as failure:
         say(Message(error=failure.error))
         return
-    for name, picture in outcome.pictures.items():
-        blobs.put(f"{picture_folder(job_id, run_token)}/{name}.jpg", picture)
     say(Message(result=outcome.result, pictures=list(outcome.pictures)))
 
 
@@ -150,11 +149,22 @@ def _load(task: Task, blobs: Blobs) -> dict[str, list[bytes]]:
     for camera, paths in task.frames.items():
         files[camera] = []
         for path in paths:
-            data = blobs.get(path)
+            try:
+                data = blobs.get(path)
+            except AWAY as error:
+                raise Failure("job-crashed", f"A stored frame cannot be read: {first_line(error)}", camera) from error
             if data is None:
                 raise Failure("job-crashed", f"The stored frame {path} is gone.", camera)
             files[camera].append(data)
     return files
+
+
+def _store(task: Task, blobs: Blobs, pictures: Mapping[str, bytes]) -> None:
+    for name, picture in pictures.items():
+        try:
+            blobs.put(f"{picture_folder(task.job_id, task.run_token)}/{name}.jpg", picture)
+        except AWAY as error:
+            raise Failure("job-crashed", f"Its pictures cannot be stored: {first_line(error)}") from error
 
 
 def _decode(camera: schemas.Camera, files: Sequence[bytes]) -> list[Picture]:

@@ -24,7 +24,7 @@ import structlog
 from pydantic import ValidationError
 
 from service import lifeline, tracing
-from service.problems import KINDS, type_of
+from service.problems import KINDS, first_line, type_of
 from service.queue import WorkerQueue
 from service.queue import migrate as migrate_queue
 from service.schemas import JobError, Progress
@@ -163,7 +163,7 @@ class Worker:
                 _insist(lambda: self._write_down(task, end), begun + limit_s + OUTAGE_S)
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
-                crashed = _error("job-crashed", f"The attempt broke off: {_in_words(error)}")
+                crashed = _error("job-crashed", f"The attempt broke off: {first_line(error)}")
                 _insist(lambda: self._jobs.fail(task, crashed), time.monotonic() + OUTAGE_S)
             log.info("job ends", seconds=round(time.monotonic() - begun, 2))
 
@@ -308,11 +308,6 @@ def _again_and_again(look: Callable[[], float], stop: threading.Event) -> None:
         except Exception:  # the database or the store is away: the next call tries again
             log.warning("put off", duty=look.__qualname__, exc_info=True)
             pause_s = PUT_OFF_S
-
-
-def _in_words(error: Exception) -> str:
-    """The first line: a database's error goes on with its statement."""
-    return (str(error).splitlines() or [""])[0][:300] or type(error).__name__
 
 
 def _error(kind: str, detail: str) -> JobError:

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import os
+import shutil
+from contextlib import suppress
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlparse
 
 import obstore
+from obstore.exceptions import BaseError
 from obstore.store import LocalStore, ObjectStore, from_url
 
 if TYPE_CHECKING:
-    from obstore.store import BackoffConfig, RetryConfig
+    from obstore.store import BackoffConfig, ClientConfig, RetryConfig
+
+# What is raised while a bucket is away, or a disk full: trying again later can help.
+AWAY = (BaseError, OSError)
+# For one answer of a bucket to one request.
+ANSWER_S = 30.0
+TRUE = ("1", "true", "on", "yes", "y")
 
 
 class Blobs:
@@ -26,14 +35,15 @@ class Blobs:
         parsed = urlparse(url)
         self._folder = Path(unquote(parsed.path)) if parsed.scheme == "file" else None
         self._store: ObjectStore = (
-            LocalStore(self._folder, mkdir=True, automatic_cleanup=True)
+            LocalStore(self._folder, mkdir=True)
             if self._folder
-            else from_url(url, retry_config=_for(patience_s))
+            else from_url(url, client_options=_within(patience_s), retry_config=_for(patience_s))
         )
 
     def put(self, path: str, data: bytes) -> None:
         """Store an object; when this returns it survives a crash, of the machine too."""
-        obstore.put(self._store, path, data)
+        # In one piece: of several, those before a crash would stay in the bucket, where no list of objects shows them.
+        obstore.put(self._store, path, data, use_multipart=False)
         if self._folder:
             # A bucket promises durability; a file has it only after its pages have reached the disk, and the entry of
             # each folder on the way to it, of which any may be new.
@@ -50,7 +60,12 @@ class Blobs:
             return None
 
     def delete_under(self, prefix: str) -> None:
-        """Remove every object whose path begins with the folder `prefix`."""
+        """Remove the folder `prefix` with every object in it."""
+        if self._folder:
+            # Whoever died over a `put` left its beginning here under another name, which no list of objects shows.
+            with suppress(FileNotFoundError):
+                shutil.rmtree(self._folder / prefix)
+            return
         for page in obstore.list(self._store, prefix):
             obstore.delete(self._store, [entry["path"] for entry in page])
 
@@ -60,6 +75,13 @@ class Blobs:
             raise PermissionError(f"{self._folder} cannot be written")
         for _ in obstore.list(self._store, "readiness", chunk_size=1):
             break
+
+
+def _within(patience_s: float) -> ClientConfig:
+    """A bucket that takes a request and then says nothing uses up no more patience than there is."""
+    # Options given here replace those of the environment, of which this is one.
+    plain = os.environ.get("AWS_ALLOW_HTTP", "").lower() in TRUE
+    return {"timeout": timedelta(seconds=min(ANSWER_S, patience_s)), "allow_http": plain}
 
 
 def _for(patience_s: float) -> RetryConfig:

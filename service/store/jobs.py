@@ -31,6 +31,8 @@ PRIORITIES = {"live": 1, "routine": 100}
 CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 DONE = Progress(stage="preview", fraction=1.0)
 j = tables.jobs.c
+# What pollers ask for, hundreds of times a second: to put the statement together takes longer than to run it.
+ONE = sa.select(tables.jobs).where(j.id == sa.bindparam("job_id"))
 
 
 @dataclass(frozen=True)
@@ -383,7 +385,7 @@ class Jobs:
         return True
 
     def _task(self, connection: sa.Connection, job_id: str) -> Task | None:
-        row = connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one_or_none()
+        row = connection.execute(ONE, {"job_id": job_id}).one_or_none()
         if row is None:
             return None
         return Task(
@@ -397,7 +399,7 @@ class Jobs:
         )
 
     def _read(self, connection: sa.Connection, job_id: str) -> Job:
-        return self._job(connection, connection.execute(sa.select(tables.jobs).where(j.id == job_id)).one())
+        return self._job(connection, connection.execute(ONE, {"job_id": job_id}).one())
 
     def _job(self, connection: sa.Connection, row: Any) -> Job:
         return Job(

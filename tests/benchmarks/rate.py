@@ -73,17 +73,17 @@ def main() -> int:
         return 2
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="esc-rate-")))
-        url = stack.enter_context(postgres_server(binaries, ("max_connections=300",)))
-        with psycopg.connect(url.format("postgres"), autocommit=True) as connection:
+        server = stack.enter_context(postgres_server(binaries, ("max_connections=300",)))
+        with psycopg.connect(server.url("postgres"), autocommit=True) as connection:
             connection.execute("CREATE DATABASE esc")
-        environment = settings(folder, url.format("esc"), chosen)
-        register_venues(url.format("esc"), chosen.venues)
+        environment = settings(folder, server.url("esc"), chosen)
+        register_venues(server.url("esc"), chosen.venues)
         api = stack.enter_context(process(environment, "serve", "--port", "0"))
         address = api.stdout.readline().decode().split()[-1]
         names = [f"worker-{number}" for number in range(chosen.workers)]
         workers = [stack.enter_context(process(environment, "worker", "--name", name)) for name in names]
         wait_for(lambda: figures(address)["esc_workers"] == chosen.workers, 60)
-        return measure(chosen, address, url.format("esc"), api, workers)
+        return measure(chosen, address, server.url("esc"), api, workers)
 
 
 def arguments() -> argparse.Namespace:

@@ -4,6 +4,8 @@ import re
 
 import pytest
 
+from tests import disks
+from tests.disks import may_mount
 from tests.e2e.running import Service
 from tests.homes import environment
 
@@ -29,6 +31,14 @@ def start(home, tmp_path):
     yield start
     for one in started:
         one.kill()
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    if not may_mount():
+        pytest.skip("a full disk needs a small one: run as root, where root may mount")
+    with disks.small_disk(tmp_path / "disk", megabytes=16) as disk:
+        yield disk
 
 
 @pytest.fixture

@@ -73,6 +73,12 @@ class Service:
         """The process id of the worker that `esc up` keeps."""
         return wait_for(lambda: next(iter(children(self.process.pid)), None))
 
+    def worker_beside(self, folder: Path, name: str) -> subprocess.Popen:
+        """A worker as on another machine, with nothing but the addresses of its home."""
+        command = [sys.executable, "-m", "service.cli", "worker", "--name", name]
+        home = {"ESC_DATA": str(folder), "ESC_DATABASE_URL": self.database_url, "ESC_BLOB_URL": self.blob_url}
+        return subprocess.Popen(command, env=self.environment | home, stderr=self.log)
+
     def venue(self, name: str, behaviour: str = "accept", cameras: tuple[str, ...] = ("left", "right")) -> str:
         self.http.put(f"/venues/{name}", json=venue(name, behaviour, cameras)).raise_for_status()
         return name

@@ -7,7 +7,10 @@ import subprocess
 import sys
 import time
 
-from tests.e2e.running import alive, children, wait_for
+from tests.disks import filled
+from tests.e2e.books import settle
+from tests.e2e.killing import kill_api, kill_kept_worker, moment, seconds_of_a_job, seconds_of_a_submission, submitted
+from tests.e2e.running import Service, alive, children, wait_for
 from tests.homes import in_both_homes, on_servers
 
 # Beyond the silence: until a worker looks, takes the job out of the queue and begins.
@@ -41,7 +44,7 @@ def test_a_worker_on_another_machine_takes_over(start, tmp_path):
     silence_s = 3
     service = start("serve", ESC_TAKEOVER_AFTER_S=str(silence_s))
     service.venue("v", "accept 3")
-    workers = [worker(service, tmp_path / f"machine-{number}", f"worker-{number}") for number in (1, 2)]
+    workers = [service.worker_beside(tmp_path / f"machine-{number}", f"worker-{number}") for number in (1, 2)]
     service.ready()
     job = service.submit("v").json()["id"]
     service.running(job)
@@ -61,11 +64,28 @@ def test_a_worker_on_another_machine_takes_over(start, tmp_path):
         process.wait()
 
 
-def worker(service, folder, name):
-    """A worker with nothing but the addresses of its home."""
-    command = [sys.executable, "-m", "service.cli", "worker", "--name", name]
-    home = {"ESC_DATA": str(folder), "ESC_DATABASE_URL": service.database_url, "ESC_BLOB_URL": service.blob_url}
-    return subprocess.Popen(command, env=service.environment | home, stderr=service.log)
+@in_both_homes
+def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothing_else(start):
+    service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
+    seconds = seconds_of_a_job(service, service.venue("alone", "accept 0.3"))
+    ended, _ = kill_kept_worker(service, service.venue("v", "accept 0.3"), moment(seconds))
+    assert ended["status"] == "succeeded"
+    assert ended["attempt"] <= 2
+    settle(service)
+
+
+@in_both_homes
+def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
+    service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
+    seconds = seconds_of_a_submission(service, service.venue("alone"))
+    promised = kill_api(service, service.venue("v"), "key", moment(seconds))
+    job = submitted(service, "v", "key")
+    assert promised in (None, job)
+    assert service.end(job)["status"] == "succeeded"
+    # This client does not come back.
+    promised = kill_api(service, service.venue("w"), "key", moment(seconds))
+    assert promised is None or service.end(promised)["status"] == "succeeded"
+    settle(service)
 
 
 def test_two_workers_of_one_name_do_not_run_on_one_machine(start):
@@ -154,7 +174,7 @@ def test_a_job_goes_on_while_the_database_is_away(start, home):
 def test_a_long_absence_of_the_database_is_no_workers_death(start, home, tmp_path):
     silence_s = 3
     service = start("up", ESC_TAKEOVER_AFTER_S=str(silence_s)).ready()
-    other = worker(service, tmp_path / "other", "other")
+    other = service.worker_beside(tmp_path / "other", "other")
     wait_for(lambda: '"other"' in (service.data / "log").read_text())
     service.venue("v", "accept 7")
     job = service.submit("v").json()["id"]
@@ -175,3 +195,37 @@ def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):
     assert "begun 3 times" in job["error"]["detail"]
     service.ready()
     assert service.end(service.submit(service.venue("w")).json()["id"])["status"] == "succeeded"
+
+
+@on_servers
+def test_a_silent_bucket_refuses_uploads_and_ends_no_job(start, home):
+    service = start().ready()
+    service.venue("v", "accept 1")
+    service.venue("w")
+    job = service.submit("v").json()["id"]
+    service.running(job)
+    with home.bucket_away():
+        answer = service.submit("w")
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/unavailable")
+    ended = service.end(job)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
+    assert service.end(service.submit("w").json()["id"])["status"] == "succeeded"
+
+
+def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk):
+    service = Service(small_disk / "esc", ESC_MIN_FREE_MB="0").ready()
+    worker = service.worker()
+    service.venue("v", "accept 1")
+    service.venue("w")
+    job = service.submit("v").json()["id"]
+    service.running(job)
+    with filled(small_disk):
+        # No room for a sign of life either.
+        wait_for(lambda: service.http.get("/readyz").json()["parts"]["worker"] != "ok")
+        answer = service.submit("w")
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/unavailable")
+    assert service.end(job)["error"]["type"] == "/problems/job-crashed"
+    service.ready()
+    assert service.end(service.submit("w").json()["id"])["status"] == "succeeded"
+    assert service.worker() == worker
+    service.kill()

@@ -1,9 +1,15 @@
+import os
+import shutil
+import subprocess
+import sys
+
 import cv2
 import numpy as np
 import pytest
 
 from service.schemas import Options, VenueIn
 from service.settings import Settings
+from tests.worker.stock import Stock
 from worker import job
 from worker.calibration import calibrate as engine
 from worker.calibration.camera import Pose
@@ -185,3 +191,16 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, set
     monkeypatch.setattr(job.stitching, "preview", preview)
     outcome = job.solve(venue, files, Options(seed=1), settings, lambda _: None)
     assert set(outcome.pictures) == {"birdseye", "overlay_left", "overlay_right"}
+
+
+def test_frames_that_the_store_does_not_hand_out_fail_the_job_in_its_words(tmp_path):
+    home = Stock(tmp_path)
+    task = home.jobs.begin(home.submitted("v"))
+    shutil.rmtree(tmp_path / "blobs/frames")
+    (tmp_path / "blobs/frames").write_bytes(b"no folder")
+    program = [sys.executable, "-m", "worker.job", task.job_id, task.run_token]
+    ended = subprocess.run(program, env=os.environ | {"ESC_DATA": str(tmp_path)}, capture_output=True, timeout=60)
+    error = Message.model_validate_json(ended.stdout).error
+    assert (error.type, error.camera) == ("/problems/job-crashed", "left")
+    assert error.detail.startswith("A stored frame cannot be read: ")
+    assert "Not a directory" in error.detail

@@ -1,0 +1,84 @@
+"""What has to add up whenever nothing is open: jobs, poses, the queue and the files, read beside the service."""
+
+import os
+from collections import Counter
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+import sqlalchemy as sa
+
+from service.schemas import OPEN
+from service.store import tables
+from service.store.jobs import picture_folder
+from tests.e2e.running import Service, wait_for
+from tests.homes import files
+
+
+def settle(service: Service) -> None:
+    """Wait until every job has ended and all that nobody will use is deleted; then everything must add up."""
+    with service.database() as connection:
+        # Uploads that never became jobs get an hour; all that could have become one here did.
+        connection.execute(sa.update(tables.leftovers).values(due_at=datetime.now(UTC)))
+    wait_for(lambda: not list(unsettled(service)), deadline_s=60)
+    found = list(mistakes(service))
+    assert not found, "\n".join(found)
+
+
+def unsettled(service: Service) -> Iterator[str]:
+    """What is still to be done."""
+    with service.database() as connection:
+        yield from connection.scalars(sa.select(tables.jobs.c.id).where(tables.jobs.c.status.in_(OPEN)))
+        yield from connection.scalars(sa.select(tables.leftovers.c.folder))
+        yield from (job for job, status in queued(connection).items() if status in ("ENQUEUED", "PENDING"))
+
+
+def mistakes(service: Service) -> Iterator[str]:
+    """What does not add up, in words."""
+    with service.database() as connection:
+        jobs = connection.execute(sa.select(tables.jobs)).all()
+        poses = connection.execute(sa.select(tables.pose_history).order_by(tables.pose_history.c.id)).all()
+        venues = connection.execute(sa.select(tables.venues)).all()
+        known_to_queue = set(queued(connection))
+    moved = Counter((pose.job, pose.camera) for pose in poses if pose.job)
+    accepted = [job for job in jobs if job.result and job.result["accepted"] and not job.options["dry_run"]]
+    due = Counter((job.id, camera["id"]) for job in accepted for camera in job.result["cameras"])
+    ids = {job.id for job in jobs}
+    # The history outlives the jobs, of which retention has deleted some.
+    due.update((job, camera) for job, camera in moved if job not in ids)
+    yield from (f"job {job} moved camera {camera} {count} times" for (job, camera), count in (moved - due).items())
+    yield from (f"job {job} did not move camera {camera}" for job, camera in due - moved)
+    last = {(pose.venue, pose.camera): pose.pose for pose in poses}
+    for venue in venues:
+        for camera in venue.document["cameras"]:
+            if camera["pose"] != last[venue.id, camera["id"]]:
+                yield f"camera {camera['id']} of {venue.id} does not stand where the last pose of the history is"
+    yield from (f"the queue knows {job}, which is no job" for job in known_to_queue - ids)
+    yield from (f"the queue does not know {job}" for job in ids - known_to_queue)
+    stored = set(files(service.blob_url))
+    for job in jobs:
+        named = {path for paths in job.frames.values() for path in paths if job.frames_deleted_at is None}
+        if job.pictures_deleted_at is None:
+            named |= {f"{picture_folder(job.id, job.run_token)}/{name}.jpg" for name in job.pictures or ()}
+        yield from (f"{path} of job {job.id} is gone" for path in named - stored)
+    for path in everything_in(service.blob_url):
+        if path.split("/")[1] not in ids:
+            yield f"{path} is nobody's"
+
+
+def queued(connection: sa.Connection) -> dict[str, str]:
+    """The jobs that the queue knows, and what it thinks of them."""
+    schema = "dbos" if connection.dialect.name == "postgresql" else None
+    table = sa.table("workflow_status", sa.column("workflow_uuid"), sa.column("status"), schema=schema)
+    return {row.workflow_uuid: row.status for row in connection.execute(sa.select(table))}
+
+
+def everything_in(blob_url: str) -> list[str]:
+    """The paths of all files, of those too that the store does not list because nobody finished them."""
+    parsed = urlparse(blob_url)
+    if parsed.scheme != "file":
+        return files(blob_url)
+    root = unquote(parsed.path)
+    # Folders may be deleted meanwhile, which this walk minds less than `Path.rglob`.
+    return [os.path.relpath(Path(folder) / name, root) for folder, _, names in os.walk(root) for name in names]
