@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, Frame
 from worker.calibration.field import LinePoints
+from worker.calibration.ground import UNEVEN_M
 from worker.calibration.lineprofile import blurred_line, blurred_point, blurred_step
 from worker.calibration.sampling import bilinear
 from worker.calibration.visibility import SeenLines
@@ -35,8 +36,6 @@ NOISE_PX = 0.2
 """Error of one measurement of a perfect line."""
 PAINT_M = 0.006
 """Lines are painted to about a centimetre."""
-UNEVEN_GROUND_M = 0.015
-"""And the ground swells by a little more, which from a low camera moves a far line by decimetres."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class Measurements:
     @property
     def sigma_px(self) -> Array:
         """Expected error (M,) along the normal: of the measurement, and of paint and ground."""
-        of_model = np.hypot(PAINT_M * self.px_per_metre, UNEVEN_GROUND_M * self.px_per_metre_up)
+        of_model = np.hypot(PAINT_M * self.px_per_metre, UNEVEN_M * self.px_per_metre_up)
         return np.hypot(NOISE_PX, of_model)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Measurements:

@@ -8,7 +8,7 @@ touchline) it keeps the camera from running away along them, and the covariance 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,7 +124,7 @@ class _Estimate:
     cameras: list[Camera]
     values: Array
     heights: Array
-    uneven_m: float = field(default=UNEVEN_M)
+    uneven_m: float = UNEVEN_M
 
     @classmethod
     def at(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> _Estimate:
