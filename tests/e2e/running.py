@@ -15,6 +15,7 @@ from pathlib import Path
 import httpx
 import sqlalchemy as sa
 
+from service import lifeline
 from service.store.engine import connect, writing
 from tests.homes import files
 
@@ -44,7 +45,8 @@ class Service:
     def start(self, port: int = 0) -> None:
         command = [sys.executable, "-m", "service.cli", *self.arguments, "--port", str(port)]
         self.log = (self.data / "log").open("ab")
-        self.process = subprocess.Popen(command, env=self.environment, stdout=subprocess.PIPE, stderr=self.log)
+        environment = self.environment | lifeline.for_child()
+        self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=self.log)
         self.url = self.process.stdout.readline().decode().strip().rpartition(" ")[2]
         assert self.url.startswith("http"), (self.data / "log").read_text()
         self.http = httpx.Client(base_url=self.url, timeout=DEADLINE_S)
@@ -77,7 +79,7 @@ class Service:
         """A worker as on another machine, with nothing but the addresses of its home."""
         command = [sys.executable, "-m", "service.cli", "worker", "--name", name]
         home = {"ESC_DATA": str(folder), "ESC_DATABASE_URL": self.database_url, "ESC_BLOB_URL": self.blob_url}
-        return subprocess.Popen(command, env=self.environment | home, stderr=self.log)
+        return subprocess.Popen(command, env=self.environment | home | lifeline.for_child(), stderr=self.log)
 
     def venue(self, name: str, behaviour: str = "accept", cameras: tuple[str, ...] = ("left", "right")) -> str:
         self.http.put(f"/venues/{name}", json=venue(name, behaviour, cameras)).raise_for_status()
