@@ -15,7 +15,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, HttpUrl, Stri
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
 OPTIONS_PART = "options"
-DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+LensModel = Literal["opencv", "fisheye"]
+DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
 LARGEST_SIDE = 16384
 
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
@@ -101,9 +102,10 @@ def rotated(rotation: list[float], vector: list[float]) -> list[float]:
 class Intrinsics(Wire):
     """The lens: OpenCV's camera matrix in pixels and its distortion coefficients in OpenCV's order."""
 
+    model: LensModel = Field("opencv", description="`fisheye`: OpenCV's fisheye module (Kannala-Brandt).")
     matrix: Annotated[list[Row], Field(min_length=3, max_length=3)]
     distortion: Annotated[list[Annotated[Number, Field(ge=-1000, le=1000)]], Field(max_length=14)] = Field(
-        description="0, 4, 5, 8, 12 or 14 numbers."
+        description="0, 4, 5, 8, 12 or 14 numbers; of a fisheye 0 or 4."
     )
 
     @model_validator(mode="after")
@@ -113,8 +115,10 @@ class Intrinsics(Wire):
             raise ValueError("matrix must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]")
         if fx <= 0 or fy <= 0:
             raise ValueError("focal lengths must be above 0 pixels")
-        if len(self.distortion) not in DISTORTION_LENGTHS:
-            raise ValueError("distortion must have 0, 4, 5, 8, 12 or 14 numbers")
+        if len(self.distortion) not in DISTORTION_LENGTHS[self.model]:
+            *most, last_length = DISTORTION_LENGTHS[self.model]
+            expected = f"{', '.join(map(str, most))} or {last_length}"
+            raise ValueError(f"distortion must have {expected} numbers with the model {self.model}")
         return self
 
 

@@ -30,7 +30,7 @@ from service.store.jobs import Jobs, Task, picture_folder
 from worker.calibration import calibrate as engine
 from worker.calibration import stitching
 from worker.calibration.calibrate import CalibrationError, calibrate
-from worker.calibration.camera import Camera, Intrinsics, Pose
+from worker.calibration.camera import LENSES, Camera, Pose
 from worker.calibration.field import Field
 from worker.calibration.segmentation import ProviderMissing, Segmenter
 from worker.message import Message
@@ -187,7 +187,7 @@ def _pitch(field: schemas.FieldOfPlay) -> Field:
 
 def _camera(camera: schemas.Camera) -> Camera:
     lens = camera.intrinsics
-    intrinsics = Intrinsics(
+    intrinsics = LENSES[lens.model](
         np.array(lens.matrix, dtype=float),
         np.array(lens.distortion, dtype=float),
         (camera.image_size[0], camera.image_size[1]),
