@@ -337,6 +337,10 @@ class Camera:
         """The same lens elsewhere."""
         return Camera(self.id, self.intrinsics, pose)
 
+    def with_lens(self, intrinsics: Intrinsics) -> Camera:
+        """Another lens in the same place."""
+        return Camera(self.id, intrinsics, self.pose)
+
 
 def project(points: Array, rotations: Array, positions: Array, intrinsics: Intrinsics) -> Array:
     """Project N points by each of P poses in one array operation.

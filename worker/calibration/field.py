@@ -7,7 +7,9 @@ boundary line is the nominal distance and its centre lies half a line width insi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,3 +225,51 @@ def resample(polyline: Array, spacing: float) -> tuple[Array, Array]:
     piece = np.clip(np.searchsorted(reached, at, side="right") - 1, 0, len(pieces) - 1)
     unit = pieces[piece] / lengths[piece, None]
     return polyline[piece] + (at - reached[piece])[:, None] * unit, unit
+
+
+class UnknownLandmark(ValueError):  # noqa: N818
+    """No landmark of the pitch has this name; says which are like it."""
+
+
+def landmarks(pitch: Field) -> Mapping[str, Array]:
+    """Points (3,) of the pitch that can be named and clicked, on its surface, where centres of lines meet.
+
+    Left, right, near and far are as seen from the usual side (y < 0).
+    """
+    half_line = pitch.line_width / 2
+    goal_line, touchline = pitch.length / 2 - half_line, pitch.width / 2 - half_line
+    circle = CENTRE_CIRCLE_RADIUS_M - half_line
+    flat: dict[str, tuple[float, float]] = {"centre mark": (0.0, 0.0)}
+    for y_side, near in ((-1, "near"), (1, "far")):
+        flat[f"halfway line, {near} end"] = (0.0, y_side * touchline)
+        flat[f"centre circle, {near} crossing"] = (0.0, y_side * circle)
+    for side, left in ((-1, "left"), (1, "right")):
+        flat[f"{left} penalty mark"] = (side * (pitch.length / 2 - PENALTY_MARK_DISTANCE_M), 0.0)
+        opening = PENALTY_AREA_DEPTH_M - half_line - PENALTY_MARK_DISTANCE_M
+        arc_end = float(np.sqrt(circle**2 - opening**2))
+        for y_side, near in ((-1, "near"), (1, "far")):
+            flat[f"{left} {near} corner"] = (side * goal_line, y_side * touchline)
+            for area, depth, half_width in (
+                ("penalty area", PENALTY_AREA_DEPTH_M, PENALTY_AREA_HALF_WIDTH_M),
+                ("goal area", GOAL_AREA_DEPTH_M, GOAL_AREA_HALF_WIDTH_M),
+            ):
+                y = y_side * (half_width - half_line)
+                flat[f"{left} {area}, {near} corner"] = (side * (pitch.length / 2 - depth + half_line), y)
+                flat[f"{left} {area}, {near} end"] = (side * goal_line, y)
+            front = side * (pitch.length / 2 - PENALTY_AREA_DEPTH_M + half_line)
+            flat[f"{left} penalty arc, {near} end"] = (front, y_side * arc_end)
+    return {name: pitch.lift(np.array(xy)) for name, xy in flat.items()}
+
+
+def resolve_landmark(pitch: Field, name: str) -> Array:
+    """The point (3,) of a landmark by its name; case, commas and spaces do not matter."""
+    known = landmarks(pitch)
+    for full, point in known.items():
+        if _plain(full) == _plain(name):
+            return point
+    like = get_close_matches(name, known, n=3, cutoff=0.4) or list(known)[:3]
+    raise UnknownLandmark(f"{name!r} is no point of the pitch; did you mean {' or '.join(map(repr, like))}?")
+
+
+def _plain(name: str) -> str:
+    return " ".join(name.replace(",", " ").lower().replace("center", "centre").split())
