@@ -288,8 +288,8 @@ def _require_not_mirrored(best: PointFit, clicks: Clicks, lens: Intrinsics, name
     fits = _candidates(flipped, lens, name)
     if fits and fits[0].cost + STRONG < best.cost and fits[0].doubted.sum() < 0.25 * len(clicks):
         raise NoPose(
-            f"the labels are those of a mirror image: with left and right (or near and far) exchanged in all of them the "
-            f"points fit to {fits[0].rms_px:.1f} px rms; as they are, to {best.rms_px:.1f} px"
+            f"the labels are those of a mirror image: with left and right (or near and far) exchanged in all of them "
+            f"the points fit to {fits[0].rms_px:.1f} px rms; as they are, to {best.rms_px:.1f} px"
         )
 
 
@@ -429,8 +429,8 @@ def _rejection(
         return f"no pose explains more than {believed} of {len(verdicts)} points: check their labels and add more"
     if best.rms_px > LARGEST_RMS_PX * relative:
         return (
-            f"the points disagree by {best.rms_px:.0f} px rms, at most {LARGEST_RMS_PX * relative:.0f} are taken: a label "
-            "or the lens is wrong; with more points it can be said which"
+            f"the points disagree by {best.rms_px:.0f} px rms, at most {LARGEST_RMS_PX * relative:.0f} are taken: a "
+            "label or the lens is wrong; with more points it can be said which"
         )
     if rivals:
         x, y, z = rivals[0].camera.pose.position
@@ -477,8 +477,8 @@ def _warnings(best: PointFit, gain: LensGain | None) -> list[str]:
         found.append(_off(gain))
     if position[1] > 0:
         found.append(
-            f"the camera stands at y = {position[1]:.1f} m, beyond the pitch as the labels have it; if it stands on the "
-            "usual side (y < 0), exchange near with far and left with right in all of them"
+            f"the camera stands at y = {position[1]:.1f} m, beyond the pitch as the labels have it; if it stands on "
+            "the usual side (y < 0), exchange near with far and left with right in all of them"
         )
     if 2 * int((~best.doubted).sum()) - 6 - len(best.free) < FEWEST_SPARE:
         found.append(
@@ -494,7 +494,8 @@ def _off(gain: LensGain) -> str:
     if "centre x" in gain.after.free:
         apart = float(np.linalg.norm(now[:2, 2] - was[:2, 2]))
         parts.append(
-            f"principal point ({was[0, 2]:.0f}, {was[1, 2]:.0f}) -> ({now[0, 2]:.0f}, {now[1, 2]:.0f}), {apart:.0f} px apart"
+            f"principal point ({was[0, 2]:.0f}, {was[1, 2]:.0f}) -> ({now[0, 2]:.0f}, {now[1, 2]:.0f}), "
+            f"{apart:.0f} px apart"
         )
     if "k1" in gain.after.free:
         parts.append("two radial terms")

@@ -205,7 +205,7 @@ class _Problem:
             normal, gradient = self._normal(camera, change, weights)
             for _ in range(8):
                 damped = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-12))
-                move = -np.linalg.solve(damped, gradient)
+                move: Array = -np.linalg.solve(damped, gradient).astype(float)
                 there, then = self._moved(camera, change, move)
                 below = self._loss(there, then, weights)
                 if below < loss:
@@ -223,7 +223,7 @@ class _Problem:
         """Of pose and free numbers, from weights (N,) that are the inverse variances of the clicks."""
         normal, _ = self._normal(camera, change, weights)
         # A pose that the clicks do not fix has an infinite variance; as good as infinite will do.
-        return np.linalg.pinv(normal + 1e-12 * np.eye(len(normal)), hermitian=True)
+        return np.linalg.pinv(normal + 1e-12 * np.eye(len(normal)), hermitian=True).astype(float)
 
     def noise(self, camera: Camera, kept: Array | None) -> float:
         """Of a click, per axis (px): by the median, or from the clicks that are `kept` (N,) 1 and the belief."""
