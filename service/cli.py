@@ -24,7 +24,24 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service import lifeline, logs
 from service.client import Client, Refused
-from service.schemas import ID_PATTERN, Job, JobError, Options, Result, Scope, VenueIn
+from service.schemas import (
+    ID_PATTERN,
+    CameraIn,
+    ClickedPoints,
+    IntrinsicsOptions,
+    IntrinsicsResult,
+    Job,
+    JobError,
+    LensFile,
+    LensModel,
+    LocateResult,
+    Options,
+    PoseIn,
+    Result,
+    Scope,
+    Site,
+    VenueIn,
+)
 from service.schemas import Progress as Step
 from service.settings import Settings
 
@@ -152,6 +169,7 @@ def run(
     # Before NumPy is loaded, which the next line does.
     os.environ |= settings.native_environment
     from worker import job
+    from worker.outcome import Failure
 
     stored = _checked(VenueIn, venue.read_text(), str(venue)).stored()
     files = {camera: [path.read_bytes() for path in paths] for camera, paths in _files(frames).items()}
@@ -166,7 +184,7 @@ def run(
             outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
     except Problem as problem:
         _fail(_in_words(problem.detail, problem.parts), FAILED)
-    except job.Failure as failure:
+    except Failure as failure:
         _fail(failure.error.detail, FAILED)
     output.mkdir(parents=True, exist_ok=True)
     (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
@@ -174,6 +192,98 @@ def run(
         (output / f"{name}.jpg").write_bytes(picture)
     _print(outcome.result)
     raise typer.Exit(_gate(outcome.result))
+
+
+# Before the first calibration
+
+
+@app.command()
+def intrinsics(
+    photos: Annotated[list[Path], typer.Argument(metavar="PHOTO...", exists=True, dir_okay=False)],
+    board: Annotated[str, typer.Option("--board", metavar="9x6", help="Inner corners, where four squares meet.")],
+    square: Annotated[float, typer.Option("--square", metavar="METRES", help="Side of a square.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the lens.")],
+    charuco: Annotated[
+        str | None, typer.Option("--charuco", metavar="4X4_50:0.022", help="Dictionary and side of a marker, m.")
+    ] = None,
+    model: Annotated[LensModel, typer.Option("--model", help="Of lens.")] = "opencv",
+    picture: Annotated[Path | None, typer.Option("--picture", help="Where the corners are: .jpg.")] = None,
+) -> None:
+    """The lens of a camera from photos of a board. Exit: 0 found (read the warnings), 1 not, 2 usage."""
+    from service import frames as border
+    from service.problems import Problem
+
+    settings = _settings()
+    options = _lens_options(board, square, charuco, model)
+    os.environ |= settings.native_environment
+    from worker import lensjob
+    from worker.outcome import Failure
+
+    files = {str(path): path.read_bytes() for path in photos}
+    try:
+        for name, data in files.items():
+            border.check_photo(name, data, settings)
+        with _bar() as show:
+            outcome = lensjob.solve(files, options, lambda step: show(step, ""))
+    except Problem as problem:
+        _fail(_in_words(problem.detail, problem.parts), FAILED)
+    except Failure as failure:
+        _fail(failure.error.detail, FAILED)
+    output.write_text(outcome.result.model_dump_json(indent=2) + "\n")
+    if picture is not None:
+        picture.write_bytes(outcome.pictures["coverage"])
+    _tell_lens(outcome.result)
+
+
+@app.command()
+def pose(
+    site: Annotated[Path, typer.Argument(metavar="SITE.json", exists=True, dir_okay=False, help="Id, name, field.")],
+    points: Annotated[
+        Path, typer.Argument(metavar="POINTS.json", exists=True, dir_okay=False, help="Clicked points by camera.")
+    ],
+    lenses: Annotated[list[str], typer.Argument(metavar="CAMERA=LENS.json...", help="As esc intrinsics writes it.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the venue, for venue put and run.")],
+    frame: Annotated[
+        list[str] | None, typer.Option("--frame", metavar="CAMERA=FILE", help="What the points were clicked in.")
+    ] = None,
+    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+) -> None:
+    """First poses of cameras from clicked points, as a venue. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
+    settings = _settings()
+    place = _checked(Site, site.read_text(), str(site))
+    clicks = _checked(ClickedPoints, points.read_text(), str(points)).root
+    given = {camera: _checked(LensFile, path.read_text(), str(path)) for camera, (path, *_) in _files(lenses).items()}
+    seen = {camera: path.read_bytes() for camera, (path, *_) in _files(frame or []).items()}
+    for camera in given.keys() - clicks.keys():
+        _fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
+    os.environ |= settings.native_environment
+    from worker import locatejob
+    from worker.outcome import Failure, lens_of
+
+    found = {camera.id: camera for camera in place.cameras}
+    results = []
+    for camera, lens in given.items():
+        engine_lens = lens_of(lens.intrinsics, lens.image_size)
+        try:
+            outcome = locatejob.locate(
+                camera, place.field, engine_lens, clicks[camera], seen.get(camera), lambda _: None
+            )
+        except Failure as failure:
+            _fail(failure.error.detail, FAILED)
+        result = outcome.result
+        results.append(result)
+        _tell_pose(result)
+        if pictures is not None:
+            pictures.mkdir(parents=True, exist_ok=True)
+            (pictures / f"points_{camera}.jpg").write_bytes(outcome.pictures["points"])
+        stands = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
+        if result.accepted:
+            found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
+    print(json.dumps([result.model_dump(mode="json") for result in results], indent=2))
+    if not all(result.accepted for result in results):
+        raise typer.Exit(REJECTED)
+    venue = VenueIn(id=place.id, name=place.name, field=place.field, cameras=list(found.values()))
+    output.write_text(venue.model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
 # Looking after venues and jobs
@@ -276,6 +386,60 @@ def remove_key(name: str, data: Data = None) -> None:
 # Parts
 
 
+def _lens_options(board: str, square: float, charuco: str | None, model: LensModel) -> IntrinsicsOptions:
+    counted = re.fullmatch(r"(\d+)[x×](\d+)", board)
+    if counted is None:
+        _fail(f"{board!r} is not COLUMNSxROWS, for instance 9x6", USAGE)
+    described: dict[str, Any] = {"columns": int(counted[1]), "rows": int(counted[2]), "square_m": square}
+    if charuco is not None:
+        dictionary, _, marker = charuco.partition(":")
+        try:
+            described["charuco"] = {"dictionary": dictionary, "marker_m": float(marker)}
+        except ValueError:
+            _fail(f"{charuco!r} is not DICTIONARY:METRES, for instance 4X4_50:0.022", USAGE)
+    return _checked(IntrinsicsOptions, json.dumps({"board": described, "model": model}), "the board")
+
+
+def _tell_lens(result: IntrinsicsResult) -> None:
+    """What a person looks at first."""
+    used = sum(photo.fate == "used" for photo in result.photos)
+    err.print(
+        f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; photos left out {result.left_out_px:.2f} px"
+    )
+    (fx, _, cx), (_, fy, cy), _ = result.intrinsics.matrix
+    err.print(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
+    for photo in result.photos:
+        told = {
+            "used": None,
+            "no-board": "shows no board",
+            "wrong-size": "has another size",
+            "hurts": f"hurts: the others foretell it to {photo.left_out_px or 0:.1f} px only; left out",
+        }[photo.fate]
+        for words in (told, "is blurred" if photo.blurred else None):
+            if words:
+                err.print(f"  {photo.name} {words}")
+    for warning in result.warnings:
+        err.print(f"Warning: {warning}")
+
+
+def _tell_pose(result: LocateResult) -> None:
+    x, y, z = result.pose.position
+    err.print(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
+    for point in result.points:
+        if point.doubted:
+            off = "out of view" if point.residual_px is None else f"{point.residual_px:.0f} px off"
+            why = ""
+            if point.exchanged_with is not None:
+                why = f"; its label and that of {point.exchanged_with} are exchanged"
+            elif point.looks_like is not None:
+                why = f"; it is on {point.looks_like}"
+            err.print(f"  {point.world} is {off}{why}")
+    for warning in result.warnings:
+        err.print(f"  {warning[0].upper()}{warning[1:]}.")
+    if result.rejected_because is not None:
+        err.print(f"  Rejected: {result.rejected_because}")
+
+
 @contextmanager
 def _keys(data: Path | None) -> Iterator[Keys]:
     """The keys of the service whose folder or database the settings name."""
@@ -351,7 +515,7 @@ def _checked(model: type[M], text: str, source: str) -> M:
 
 
 def _verdict(job: Job) -> int:
-    if job.result is not None:
+    if isinstance(job.result, Result):
         return _gate(job.result)
     if job.status == "cancelled":
         err.print(f"Job {job.id} was cancelled before it had a result.")

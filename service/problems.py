@@ -48,6 +48,7 @@ KINDS: dict[str, Kind] = {
     "venue-id-mismatch": Kind(422, "The venue's id differs from the address"),
     "venue-changed": Kind(412, "The venue is not the one the request expects"),
     "venue-replaced": Kind(409, "The venue was changed during the upload"),
+    "no-such-camera": Kind(404, "The venue has no camera of this id"),
     "venue-busy": Kind(409, "The venue has an active job"),
     # Frames.
     "unknown-camera": Kind(422, "The venue has no such camera"),
@@ -61,6 +62,12 @@ KINDS: dict[str, Kind] = {
     "truncated-image": Kind(422, "The frame ends too early"),
     "too-many-pixels": Kind(422, "The frame has too many pixels"),
     "frame-size": Kind(422, "The frame does not have the size of the camera"),
+    # Lenses and first poses.
+    "too-many-photos": Kind(422, "Too many photos"),
+    "missing-photos": Kind(422, "There are no photos"),
+    "no-lens": Kind(422, "The photos cannot fix a lens"),
+    "unknown-landmark": Kind(422, "The pitch has no such point"),
+    "no-pose": Kind(422, "The points cannot fix a pose"),
     # Jobs.
     "job-not-found": Kind(404, "There is no such job"),
     "picture-not-found": Kind(404, "There is no such picture"),

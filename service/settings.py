@@ -50,6 +50,7 @@ class Settings(BaseSettings):
     max_frame_mb: float = Field(48, gt=0)
     max_frame_pixels: int = Field(64_000_000, gt=0)
     max_frames_per_camera: int = Field(16, ge=1)
+    max_photos: int = Field(100, ge=1, description="Photos of a board in one request.")
     queue_limit: int = Field(100, ge=1, description="Jobs that may wait; more are answered with 429.")
 
     # The worker.

@@ -8,10 +8,11 @@ from typing import Any
 from fastapi import FastAPI
 
 from service.problems import MEDIA_TYPE
-from service.schemas import JobEvent, Options, ProblemDetails, Scope
+from service.schemas import IntrinsicsOptions, JobEvent, LocateOptions, Options, ProblemDetails, Scope
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
-MODELS = (Options, ProblemDetails)
+MODELS = (Options, IntrinsicsOptions, LocateOptions, ProblemDetails)
+SCHEMAS = "#/components/schemas/"
 KEY_SCHEME = "key"
 SECURITY_SCHEMES = {
     KEY_SCHEME: {
@@ -31,7 +32,9 @@ class DocumentedApp(FastAPI):
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document."""
         document = super().openapi()
-        document["components"]["schemas"] |= {model.__name__: model.model_json_schema() for model in MODELS}
+        for model in MODELS:
+            schema = model.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
+            document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
         document["components"]["securitySchemes"] = SECURITY_SCHEMES
         return document
 
@@ -48,9 +51,9 @@ def document_callback(app: FastAPI) -> None:
         """
 
 
-def reference(model: type[Options | ProblemDetails]) -> dict[str, str]:
+def reference(model: type[Options | IntrinsicsOptions | LocateOptions | ProblemDetails]) -> dict[str, str]:
     """A schema that points to one of `MODELS`."""
-    return {"$ref": f"#/components/schemas/{model.__name__}"}
+    return {"$ref": f"{SCHEMAS}{model.__name__}"}
 
 
 def needs(scope: Scope) -> dict[str, Any]:

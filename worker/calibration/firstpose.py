@@ -26,7 +26,7 @@ from worker.calibration.camera import (
     rotation_angles_deg,
 )
 from worker.calibration.pointfit import Clicks, PointFit, fit, refit
-from worker.calibration.refinement import moved
+from worker.calibration.residuals import moved
 
 FEWEST_CLICKS = 4
 TRIPLES = 400

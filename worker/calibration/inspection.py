@@ -13,11 +13,12 @@ from worker.calibration.pointfit import Clicks
 from worker.calibration.stitching import NEW_COLOUR, draw_line, legend, outline
 
 WIDTH_PX = 1600
+LEGEND_PX = 180
 ARROW_PX = 12.0
 """As long as this is the arrow of a residual of the median size."""
-PAPER, GRID, INK = (250, 250, 250), (205, 205, 205), (60, 60, 60)
+PAPER, GRID = (250, 250, 250), (205, 205, 205)
 COVERED, BARE = (205, 235, 205), (215, 215, 250)
-CORNER, ARROW = (150, 90, 30), (40, 40, 220)
+CORNER, ARROW, CENTRE = (150, 90, 30), (40, 40, 220), (200, 0, 200)
 CLICKED, MISLABELLED, EXPECTED = (60, 200, 60), (40, 40, 240), (0, 200, 255)
 
 
@@ -26,7 +27,8 @@ def coverage_picture(found: LensCalibration) -> Frame:
     width, height = found.lens.size
     scale = WIDTH_PX / width
     size = (WIDTH_PX, round(height * scale))
-    picture = np.full((size[1], size[0], 3), PAPER, np.uint8)
+    # Below the picture there is room for the legend, which would hide corners.
+    picture = np.full((size[1] + LEGEND_PX, size[0], 3), PAPER, np.uint8)
     rows, columns = found.coverage.cells.shape
     for row, column in np.ndindex(rows, columns):
         box = [round(column * size[0] / columns), round(row * size[1] / rows)]
@@ -39,14 +41,14 @@ def coverage_picture(found: LensCalibration) -> Frame:
     for corner, end in zip((found.corners + 0.5) * scale - 0.5, (ends + 0.5) * scale - 0.5, strict=True):
         cv2.circle(picture, _fixed(corner), 3 * 16, CORNER, cv2.FILLED, cv2.LINE_AA, shift=4)
         cv2.line(picture, _fixed(corner), _fixed(end), ARROW, 1, cv2.LINE_AA, shift=4)
-    _cross(picture, (found.lens.matrix[:2, 2] + 0.5) * scale - 0.5, INK, 14)
+    _cross(picture, (found.lens.matrix[:2, 2] + 0.5) * scale - 0.5, CENTRE, 16)
     legend(
         picture,
         [
             ("corner of the board", CORNER),
             (f"residual x {enlarged:.0f}", ARROW),
             (f"no corner here ({1 - found.coverage.share:.0%})", BARE),
-            ("principal point", INK),
+            ("principal point", CENTRE),
         ],
     )
     return picture

@@ -241,9 +241,7 @@ def _choose(
             # OpenCV gives up where the photos cannot carry the terms.
             continue
     if not tried:
-        raise NoLens(
-            "OpenCV finds no lens that fits these photos: take more, tilted both ways and nearer to the camera"
-        )
+        raise NoLens("OpenCV finds no lens that fits these photos: take more, nearer and tilted both ways")
     best = min(tried, key=lambda one: one.trial.left_out_px)
     return _Chosen(tried, next(one for one in tried if _as_good(one.left_out_by_photo, best.left_out_by_photo)))
 

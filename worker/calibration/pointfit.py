@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.camera import NEAREST_DEPTH_M, Array, Camera, Intrinsics, cross_matrices
-from worker.calibration.refinement import moved
+from worker.calibration.residuals import moved
 
 CLICK_PX = 2.0
 """How well people click, in pixels of a 4K frame, and after how many numbers of evidence that belief counts half."""
