@@ -404,7 +404,7 @@ def _tell_lens(result: IntrinsicsResult) -> None:
     """What a person looks at first."""
     used = sum(photo.fate == "used" for photo in result.photos)
     err.print(
-        f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; photos left out {result.left_out_px:.2f} px"
+        f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px"
     )
     (fx, _, cx), (_, fy, cy), _ = result.intrinsics.matrix
     err.print(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")

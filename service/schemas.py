@@ -557,7 +557,7 @@ class IntrinsicsResult(Wire):
 class PointResult(Wire):
     """What became of a click. `exchanged_with`: the point whose label explains it, and it theirs.
 
-    `looks_like`: the named point it is on instead of its own. `residual_px`: null where the camera cannot see the point.
+    `looks_like`: the named point it is on instead. `residual_px`: null where the camera cannot see its point.
     """
 
     world: Landmark | Coordinates

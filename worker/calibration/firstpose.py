@@ -55,6 +55,8 @@ LARGEST_SIGMA_PX = 60.0
 """Of clicks and of the pitch in view, in pixels of a 4K frame: what a calibration still catches, with room to spare."""
 HEIGHTS_M = (0.5, 200.0)
 FARTHEST_M = 500.0
+MOST_DOUBTED = 0.25
+"""Share of the clicks; where more are doubted, something is wrong with all of them."""
 COLLINEAR = 0.01
 """Width to length of a set of points below which they are a line."""
 FOLDS = 10
@@ -131,15 +133,14 @@ def first_pose(clicks: Clicks, lens: Intrinsics, landmarks: Mapping[str, Array],
     """
     require_a_plane(clicks, lens)
     fits = _candidates(clicks, lens, name)
+    if not fits or _needs_explaining(fits[0]):
+        _require_not_mirrored(fits, clicks, lens, name)
     if not fits:
         raise NoPose(
             "no pose puts these points in front of the camera and the camera above the pitch; are the pixels (x, y) "
             "of this camera's picture, in the size of its lens?"
         )
-    best = fits[0]
-    if _needs_explaining(best):
-        _require_not_mirrored(best, clicks, lens, name)
-    best = relabelled(best)
+    best = relabelled(fits[0])
     gain = freed(best)
     if gain is None:
         rivals = [other for other in fits[1:] if _elsewhere(other, best) and other.cost < best.cost + AMBIGUOUS]
@@ -279,17 +280,20 @@ def _distinct(fits: Sequence[PointFit]) -> list[PointFit]:
 
 
 def _needs_explaining(best: PointFit) -> bool:
-    return best.rms_px > LARGEST_RMS_PX * best.camera.intrinsics.relative_size or bool(best.doubted.mean() > 0.25)
+    return best.rms_px > LARGEST_RMS_PX * best.camera.intrinsics.relative_size or bool(
+        best.doubted.mean() > MOST_DOUBTED
+    )
 
 
-def _require_not_mirrored(best: PointFit, clicks: Clicks, lens: Intrinsics, name: str) -> None:
+def _require_not_mirrored(fits: Sequence[PointFit], clicks: Clicks, lens: Intrinsics, name: str) -> None:
     """Labels of a pitch seen in a mirror fit perfectly, from below the ground."""
-    flipped = Clicks(clicks.names, clicks.world * [-1.0, 1.0, 1.0], clicks.pixel)
-    fits = _candidates(flipped, lens, name)
-    if fits and fits[0].cost + STRONG < best.cost and fits[0].doubted.sum() < 0.25 * len(clicks):
+    flipped = _candidates(Clicks(clicks.names, clicks.world * [-1.0, 1.0, 1.0], clicks.pixel), lens, name)
+    if not flipped or flipped[0].doubted.mean() > MOST_DOUBTED:
+        return
+    if not fits or flipped[0].cost + STRONG < fits[0].cost:
         raise NoPose(
-            f"the labels are those of a mirror image: with left and right (or near and far) exchanged in all of them "
-            f"the points fit to {fits[0].rms_px:.1f} px rms; as they are, to {best.rms_px:.1f} px"
+            "the labels are those of a mirror image: with left and right (or near and far) exchanged in all of them "
+            f"the points fit to {flipped[0].rms_px:.1f} px rms"
         )
 
 

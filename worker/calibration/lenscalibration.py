@@ -185,7 +185,7 @@ def _common_size(photos: Sequence[Photo]) -> tuple[int, int]:
 def _require_enough(used: Mapping[str, Sighting], photos: Sequence[Photo]) -> None:
     if len(used) < FEWEST_PHOTOS:
         raise NoLens(
-            f"{len(used)} of {len(photos)} photos show the board in one size of picture, {FEWEST_PHOTOS} at least must: "
+            f"{len(used)} of {len(photos)} photos show the board in one size of picture, {FEWEST_PHOTOS} must: "
             "take 15 or more, near and far, tilted both ways, into every corner of the picture"
         )
 
@@ -469,7 +469,7 @@ def _warnings(
 ) -> list[str]:
     found = []
     if coverage.empty or coverage.share < FEW_CELLS:
-        where = f"; none of it the {', '.join(coverage.empty)}" if coverage.empty else ""
+        where = f" and nothing {', '.join(coverage.empty)}" if coverage.empty else ""
         found.append(
             f"the board reached {coverage.share:.0%} of the picture{where}: there the lens is a guess, and with it the "
             "principal point. Add photos with the board in those places"
@@ -487,7 +487,7 @@ def _warnings(
     more = [term for term in richest.terms if term.startswith(("k", "p")) and term not in best.terms]
     if more:
         found.append(
-            f"{', '.join(more)} are left at 0: with them the lens foretells photos it was not fitted to no better "
+            f"the terms {', '.join(more)} are left at 0: with them the lens foretells photos left out no better "
             f"({richest.left_out_px:.2f} px rms, without them {best.left_out_px:.2f})"
         )
     if count < FEW_PHOTOS:
