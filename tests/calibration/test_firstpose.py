@@ -150,10 +150,7 @@ def test_labels_that_fit_no_pose_are_rejected():
     right = clicks(SOME, noise_px=1.0)
     order = np.random.default_rng(3).permutation(len(right))
     shuffled = Clicks(right.names, right.world[order], right.pixel)
-    try:
-        assert first_pose(shuffled, LENS, NAMED).rejected_because is not None
-    except NoPose as refusal:
-        assert "mirror" in str(refusal) or "in front" in str(refusal)
+    assert "no pose explains more than" in first_pose(shuffled, LENS, NAMED).rejected_because
 
 
 def on_a_line(points):

@@ -46,7 +46,7 @@ def corners_seen(lens, tilt, middle, noise_px=0.0, rng=None, board=BOARD):
 
 
 @cache
-def sightings(model="opencv", noise_px=0.2, count=60, reach=0.36):
+def sightings(model="opencv", noise_px=0.2, count=24, reach=0.36):
     lens, rng = (FISHEYE if model == "fisheye" else PINHOLE), np.random.default_rng(5)
     spread = reach * (2.0 if model == "fisheye" else 1.0)
     seen = [corners_seen(lens, *place, noise_px, rng) for place in places(count, spread)]
@@ -55,6 +55,16 @@ def sightings(model="opencv", noise_px=0.2, count=60, reach=0.36):
 
 def photos(*args, **options):
     return [Photo(f"{number}.jpg", SIZE, s) for number, s in enumerate(sightings(*args, **options))]
+
+
+@cache
+def calibrated(model="opencv"):
+    return calibrate_lens(photos(model), model)
+
+
+@cache
+def from_the_left():
+    return calibrate_lens([p for p in photos(count=40) if (p.sighting.pixel[:, 0] < 750).all()], "opencv")
 
 
 def paper(board):
@@ -119,7 +129,7 @@ def test_blur_is_measured():
 
 @pytest.mark.parametrize(("model", "truth"), [("opencv", PINHOLE), ("fisheye", FISHEYE)])
 def test_the_lens_is_found_within_what_is_said_of_it(model, truth):
-    found = calibrate_lens(photos(model), model)
+    found = calibrated(model)
     assert found.lens.model == model
     assert found.rms_px == pytest.approx(0.2 * np.sqrt(2), rel=0.15)
     matrix = found.lens.matrix
@@ -137,7 +147,7 @@ def test_the_lens_is_found_within_what_is_said_of_it(model, truth):
 
 
 def test_terms_that_foretell_nothing_are_left_out_and_it_is_said():
-    found = calibrate_lens(photos(), "opencv")
+    found = calibrated()
     assert found.terms == ("f", "cx", "cy", "k1", "k2")
     assert np.count_nonzero(found.lens.distortion) == 2
     richest = found.trials[-1]
@@ -147,7 +157,7 @@ def test_terms_that_foretell_nothing_are_left_out_and_it_is_said():
 
 def test_stretched_pixels_are_noticed():
     stretched = LENSES["opencv"](PINHOLE.matrix * [[1.0], [0.75], [1.0]], PINHOLE.distortion, SIZE)
-    seen = [corners_seen(stretched, *place, 0.2, np.random.default_rng(i)) for i, place in enumerate(places(60))]
+    seen = [corners_seen(stretched, *place, 0.2, np.random.default_rng(i)) for i, place in enumerate(places(20))]
     found = calibrate_lens([Photo(str(i), SIZE, s) for i, s in enumerate(seen) if s], "opencv")
     assert found.lens.matrix[1, 1] / found.lens.matrix[0, 0] == pytest.approx(0.75, abs=0.005)
 
@@ -181,13 +191,11 @@ def test_too_few_photos_are_refused_with_what_to_do():
 
 
 def test_a_board_in_one_corner_of_the_picture_is_warned_of():
-    aside = [p for p in photos(count=200) if (p.sighting.pixel[:, 0] < 700).all()]
-    found = calibrate_lens(aside, "opencv")
+    found = from_the_left()
     assert found.coverage.share < 0.7
     assert "right" in found.coverage.empty
     assert found.warnings[0].startswith("the board reached")
-    everywhere = calibrate_lens(photos(count=200), "opencv")
-    assert not [warning for warning in everywhere.warnings if "reached" in warning]
+    assert not [warning for warning in calibrated().warnings if "reached" in warning]
 
 
 def test_cells_and_ninths_are_counted_where_corners_are():
@@ -198,7 +206,7 @@ def test_cells_and_ninths_are_counted_where_corners_are():
 
 
 def test_the_picture_shows_bare_cells_corners_and_the_principal_point():
-    found = calibrate_lens([p for p in photos(count=200) if (p.sighting.pixel[:, 0] < 700).all()], "opencv")
+    found = from_the_left()
     picture = coverage_picture(found)
     scale = WIDTH_PX / SIZE[0]
     assert picture.shape[1] == WIDTH_PX

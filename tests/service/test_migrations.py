@@ -8,11 +8,11 @@ from alembic import command
 from alembic.config import Config
 from alembic.script import ScriptDirectory
 
-from service.schemas import VENUE_EXAMPLE, Options, VenueIn
+from service.schemas import VENUE_EXAMPLE, Board, IntrinsicsOptions, LocateOptions, Options, VenueIn
 from service.store.deliveries import Deliveries
 from service.store.engine import MIGRATIONS, connect, migrate, writing
 from service.store.expiry import Expiry
-from service.store.jobs import Jobs
+from service.store.jobs import Jobs, Submission, new_job_id
 from service.store.keys import Keys
 from service.store.venues import Venues
 from service.store.workers import Workers
@@ -143,6 +143,24 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
 def test_an_upgraded_database_takes_new_rows(old, revision):
     engine = old(revision)
     migrate(engine)
+    lens = Submission(
+        new_job_id(),
+        None,
+        IntrinsicsOptions(board=Board(columns=9, rows=6, square_m=0.03)),
+        "l",
+        None,
+        {},
+        "intrinsics",
+    )
+    points = [{"world": [x, y], "pixel": [0, 0]} for x in (0, 1) for y in (0, 1)]
+    clicks = LocateOptions.model_validate({"points": points})
+    # A venue with an active calibration takes any number of first poses.
+    place = Submission(new_job_id(), VENUE, clicks, "p", None, {"left": []}, "locate")
+    for submission in (lens, place):
+        job, new = Jobs(engine).submit(submission, 100, lambda *_: None)
+        assert (new, job.kind, job.queue_position) == (True, submission.kind, 2 if submission is lens else 1)
+        task = Jobs(engine).begin(job.id)
+        assert (task.venue, task.options) == (submission.venue, submission.options)
     # Numbers go on where those of the old rows ended.
     moved = VENUE.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
     Venues(engine).put(VENUE.with_poses({"left": moved}), lambda _: None)
