@@ -136,13 +136,13 @@ def test_the_lens_is_found_within_what_is_said_of_it(model, truth):
     for name, value, true in (
         ("cx", matrix[0, 2], truth.matrix[0, 2]),
         ("cy", matrix[1, 2], truth.matrix[1, 2]),
-        ("k1", found.lens.distortion[0], truth.distortion[0]),
     ):
         assert abs(value - true) < 4 * max(found.sigma[name], found.spread[name])
     x, y = np.meshgrid(np.linspace(20, 1259, 9), np.linspace(20, 939, 7))
     pixels = np.stack([x, y], axis=-1)
-    apart = np.linalg.norm(found.lens.distort(truth.undistort(pixels)) - pixels, axis=-1)
-    assert np.median(apart) < 0.5
+    apart = found.lens.distort(truth.undistort(pixels)) - pixels
+    # A shift of the whole picture is a turn of the camera, which its pose takes up.
+    assert np.median(np.linalg.norm(apart - apart.mean(axis=(0, 1)), axis=-1)) < 0.5
     assert not [verdict for verdict in found.photos if verdict.fate != "used"]
 
 

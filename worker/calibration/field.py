@@ -242,7 +242,7 @@ def landmarks(pitch: Field) -> Mapping[str, Array]:
     flat: dict[str, tuple[float, float]] = {"centre mark": (0.0, 0.0)}
     for y_side, near in ((-1, "near"), (1, "far")):
         flat[f"halfway line, {near} end"] = (0.0, y_side * touchline)
-        flat[f"centre circle, {near} crossing"] = (0.0, y_side * circle)
+        flat[f"centre circle, {near}"] = (0.0, y_side * circle)
     for side, left in ((-1, "left"), (1, "right")):
         flat[f"{left} penalty mark"] = (side * (pitch.length / 2 - PENALTY_MARK_DISTANCE_M), 0.0)
         opening = PENALTY_AREA_DEPTH_M - half_line - PENALTY_MARK_DISTANCE_M
