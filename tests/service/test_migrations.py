@@ -8,7 +8,7 @@ from alembic import command
 from alembic.config import Config
 from alembic.script import ScriptDirectory
 
-from service.schemas import VENUE_EXAMPLE, Board, IntrinsicsOptions, LocateOptions, Options, VenueIn
+from service.schemas import VENUE_EXAMPLE, Board, IntrinsicsOptions, LocateOptions, Options, Result, VenueIn
 from service.store.deliveries import Deliveries
 from service.store.engine import MIGRATIONS, connect, migrate, writing
 from service.store.expiry import Expiry
@@ -123,7 +123,7 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     assert (held.cause, held.job, held.since, held.pose) == ("calibration", DONE, NOON, VENUE.cameras[0].pose)
     done = jobs.get(DONE)
     assert (done.status, done.created_at, done.finished_at) == ("succeeded", NOON, NOON)
-    assert done.result.model_dump(mode="json") == RESULT
+    assert done.result == Result.model_validate(RESULT)
     assert jobs.same_as(VENUE.id, "k", "c" * 64).id == DONE
     assert jobs.get(WAITING).queue_position == 1
     task = jobs.begin(WAITING)
