@@ -167,8 +167,9 @@ def test_outdated_poses_of_fisheyes_are_found_again_and_drawn():
     found = calibrate(CROWNED, outdated, frames, white_on_green, Options(seed=1))
     assert found.rejected_because is None
     for truth, camera in zip(cameras, found.cameras, strict=True):
-        assert np.linalg.norm(camera.pose.position - truth.pose.position) < 0.05
-        assert rotation_angles_deg(camera.pose.rotation, truth.pose.rotation) < 0.05
+        assert np.linalg.norm(camera.pose.position - truth.pose.position) < min(0.1, 2 * camera.sigma.position_m)
+        off_deg = rotation_angles_deg(camera.pose.rotation, truth.pose.rotation)
+        assert off_deg < min(0.25, 2 * camera.sigma.rotation_deg)
     assert found.stitch_error_px < 0.3 < found.stitch_error_before_px
 
     first = {name: several[0] for name, several in frames.items()}
