@@ -464,6 +464,9 @@ class CameraResult(Wire):
     pose: Pose
     intrinsics: Intrinsics | None = Field(None, description="With fit_focal_length: those the pose belongs to.")
     sigma: Sigma | None
+    repeatability: Sigma | None = Field(
+        None, description="The part of sigma that the lens and the field, the same the next time, have no part in."
+    )
     moved: Moved
     iou: float | None
     residual_px: float | None

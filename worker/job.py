@@ -36,7 +36,7 @@ from service.store.engine import connect
 from service.store.jobs import Jobs, Task, picture_folder
 from worker import lensjob, locatejob
 from worker.calibration import calibrate as engine
-from worker.calibration import stitching
+from worker.calibration import quality, stitching
 from worker.calibration.calibrate import CalibrationError, calibrate
 from worker.calibration.camera import Camera
 from worker.calibration.segmentation import ProviderMissing, Segmenter
@@ -240,13 +240,12 @@ def _result(
 
 def _camera_result(camera: engine.CameraResult, options: schemas.Options) -> CameraResult:
     lens = camera.intrinsics
-    sigma = camera.sigma
-    known = sigma is not None and isfinite(sigma.rotation_deg) and isfinite(sigma.position_m)
     return CameraResult(
         id=camera.id,
         pose=wire_pose(camera.pose),
         intrinsics=wire_lens(lens) if options.fit_focal_length else None,
-        sigma=Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m) if sigma and known else None,
+        sigma=_sigma(camera.sigma),
+        repeatability=_sigma(camera.repeatability),
         moved=Moved(
             rotation_deg=camera.moved.rotation_deg,
             position_m=camera.moved.position_m,
@@ -255,6 +254,12 @@ def _camera_result(camera: engine.CameraResult, options: schemas.Options) -> Cam
         iou=number(camera.iou),
         residual_px=number(camera.residual_px),
     )
+
+
+def _sigma(sigma: quality.Sigma | None) -> Sigma | None:
+    if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
+        return None
+    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ PAIR = [(scene()[0], scene()[0])]
 
 
 def good():
-    return CameraQuality(scene()[0], 0.9, 0.3, 0.2, Sigma(0.01, 0.01), Movement(0.5, 0.1, 12.0))
+    return CameraQuality(scene()[0], 0.9, 0.3, 0.2, Sigma(0.5, 0.1), Sigma(0.01, 0.01), Movement(0.5, 0.1, 12.0))
 
 
 def test_the_true_pose_explains_the_markings():
@@ -66,10 +66,10 @@ def test_a_good_result_passes_the_gate():
     [
         ({"iou": 0.1}, "do not fit this pitch"),
         ({"residual_px": None}, "fewer than 30 points"),
-        ({"sigma": None}, "fewer than 30 points"),
+        ({"repeatability": None}, "fewer than 30 points"),
         ({"residual_px": 9.0}, "px from where the pose puts them"),
-        ({"sigma": Sigma(1.0, 0.1)}, "do not determine"),
-        ({"sigma": Sigma(0.01, 2.0)}, "do not determine"),
+        ({"repeatability": Sigma(1.0, 0.1)}, "do not determine"),
+        ({"repeatability": Sigma(0.01, 2.0)}, "do not determine"),
         ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
         ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
         ({"iou_before": 0.99}, "stored pose fits the frame better"),

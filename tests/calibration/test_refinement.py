@@ -140,7 +140,7 @@ def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(disto
     )
     assert refined.residual_px[0] is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
-    assert Sigma.from_covariance(refined.covariance[0]).position_m > Gate().largest_sigma_m
+    assert Sigma.from_covariance(refined.repeatability[0]).position_m > Gate().largest_sigma_m
 
 
 @pytest.mark.parametrize("colour", [0, 2])
@@ -251,3 +251,12 @@ def test_a_camera_with_a_wrong_lens_is_less_sure_of_its_pose():
         for c in (cameras, wrong)
     )
     assert unsure.position_m > 2 * right.position_m
+
+
+def test_the_same_wrong_lens_makes_the_next_pose_no_less_like_this_one():
+    cameras, brightness, responses = scene()
+    bent = next(p for p in lens_parameters(cameras) if p.name == "k1")
+    wrong, _ = bent.applied(cameras, CROWNED, 0.01)
+    refined = refine(CROWNED, wrong, Sight(brightness, responses), 0.5)
+    sigma, repeatability = (Sigma.from_covariance(c[0]) for c in (refined.covariance, refined.repeatability))
+    assert repeatability.position_m < sigma.position_m / 2

@@ -8,6 +8,7 @@ from worker import job
 from worker.calibration import calibrate as engine
 from worker.calibration.camera import Pose
 from worker.calibration.diagnosis import Suspicion
+from worker.calibration.quality import Sigma
 from worker.message import Message
 
 SIZE = (320, 180)
@@ -50,7 +51,8 @@ def asked(monkeypatch):
                 camera.id,
                 camera.intrinsics,
                 Pose(camera.pose.rotation, camera.pose.position + [0.05, 0, 0]),
-                engine.Sigma(float("inf"), 0.1),
+                Sigma(float("inf"), 0.1),
+                Sigma(0.01, 0.02),
                 engine.Movement(0.0, 0.05, float("nan")),
                 0.9,
                 None,
@@ -122,6 +124,7 @@ def test_what_json_cannot_say_is_null(venue, files, asked, settings):
     steps = []
     camera = job.solve(venue, files, Options(seed=7), settings, steps.append).result.cameras[0]
     assert (camera.sigma, camera.moved.pixels, camera.residual_px) == (None, None, None)
+    assert camera.repeatability.position_m == 0.02
     assert (steps[0].loss, steps[0].fraction) == (None, job.PREVIEW_FRACTION)
 
 

@@ -11,7 +11,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Camera, Frame, Intrinsics, Pose
+from worker.calibration.camera import Array, Camera, Frame, Intrinsics, Pose
 from worker.calibration.diagnosis import Suspicion, suspicions
 from worker.calibration.field import Field
 from worker.calibration.linemeasurement import brightness_of
@@ -99,8 +99,9 @@ class Progress:
 
 @dataclass(frozen=True)
 class CameraResult:
-    """One camera's answer. `sigma` and `residual_px` are None where too few lines could be measured.
+    """One camera's answer. `sigma`, `repeatability` and `residual_px` are None where too few lines could be measured.
 
+    `repeatability`: the part of sigma that is not owed to lens and field, which are the same the next time.
     `intrinsics`: those that the pose belongs to, which are the given ones unless the focal length was to be found.
     """
 
@@ -108,6 +109,7 @@ class CameraResult:
     intrinsics: Intrinsics
     pose: Pose
     sigma: Sigma | None
+    repeatability: Sigma | None
     moved: Movement
     iou: float
     residual_px: float | None
@@ -245,9 +247,15 @@ def _free(options: Options, pitch: Field, cameras: Sequence[Camera]) -> list[Par
 
 
 def _camera_result(quality: CameraQuality) -> CameraResult:
-    camera = quality.camera
     return CameraResult(
-        camera.id, camera.intrinsics, camera.pose, quality.sigma, quality.moved, quality.iou, quality.residual_px
+        quality.camera.id,
+        quality.camera.intrinsics,
+        quality.camera.pose,
+        quality.sigma,
+        quality.repeatability,
+        quality.moved,
+        quality.iou,
+        quality.residual_px,
     )
 
 
@@ -260,13 +268,24 @@ def _qualities(
             markings_iou(refined.pitch, after, response),
             markings_iou(pitch, before, response),
             residual,
-            Sigma.from_covariance(covariance) if covariance is not None else None,
+            _sigma(covariance),
+            _sigma(repeatability),
             Movement.between(pitch, before, after),
         )
-        for before, after, response, residual, covariance in zip(
-            stored, refined.cameras, responses, refined.residual_px, refined.covariance, strict=True
+        for before, after, response, residual, covariance, repeatability in zip(
+            stored,
+            refined.cameras,
+            responses,
+            refined.residual_px,
+            refined.covariance,
+            refined.repeatability,
+            strict=True,
         )
     ]
+
+
+def _sigma(covariance: Array | None) -> Sigma | None:
+    return None if covariance is None else Sigma.from_covariance(covariance)
 
 
 class Clock:

@@ -20,6 +20,8 @@ NODE_M = 7.0
 CORRELATION_M = 10.0
 UNEVEN_M = 0.015
 """Standard deviation of the heights of an ordinary pitch."""
+MOST_UNEVEN_M = 0.02
+"""More than that is not taken for a swell: a ground that may do anything explains any pose."""
 EVEN_M, EVEN_NODES = 0.004, 2.0
 """How even a pitch is thought to be before it is seen, and how many nodes of evidence that is worth."""
 NUGGET = 1e-6
@@ -80,4 +82,5 @@ class Ground:
         """
         determined = len(self) - np.sum(self.precision * covariance) / believed**2
         power = heights @ self.precision @ heights
-        return float(np.sqrt((power + EVEN_NODES * EVEN_M**2) / (max(determined, 0.0) + EVEN_NODES)))
+        uneven = np.sqrt((power + EVEN_NODES * EVEN_M**2) / (max(determined, 0.0) + EVEN_NODES))
+        return min(float(uneven), MOST_UNEVEN_M)

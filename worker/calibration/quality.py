@@ -82,6 +82,7 @@ class CameraQuality:
     iou_before: float
     residual_px: float | None
     sigma: Sigma | None
+    repeatability: Sigma | None
     moved: Movement
 
 
@@ -159,17 +160,18 @@ def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
             f"the markings in the frame do not fit this pitch (IoU {quality.iou:.2f}, at least {gate.least_iou}); "
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
         )
-    if quality.residual_px is None or quality.sigma is None:
+    if quality.residual_px is None or quality.repeatability is None:
         return f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?"
     if quality.residual_px > gate.largest_residual_px * scale:
         return (
             f"lines are {quality.residual_px:.1f} px from where the pose puts them, at most "
             f"{gate.largest_residual_px * scale:.1f} allowed; check intrinsics and the field's measures"
         )
-    if quality.sigma.rotation_deg > gate.largest_sigma_deg or quality.sigma.position_m > gate.largest_sigma_m:
+    sigma = quality.repeatability
+    if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
         return (
-            f"the visible lines do not determine the pose (sigma {quality.sigma.rotation_deg:.2f} degrees, "
-            f"{quality.sigma.position_m:.2f} m)"
+            f"the visible lines do not determine the pose (sigma {sigma.rotation_deg:.2f} degrees, "
+            f"{sigma.position_m:.2f} m)"
         )
     if moved.rotation_deg > gate.largest_rotation_deg or moved.position_m > gate.largest_shift_m:
         return (

@@ -46,13 +46,15 @@ class Sight:
 class Refined:
     """The finished cameras on their pitch; per camera, None where it had too few measurements and stayed where it was:
 
-    `covariance` (6, 6) of (rotation in the camera's frame rad, position m), `residual_px` the rms of its lines.
-    `deviations`: what the lines say of lenses and field.
+    `covariance` (6, 6) of (rotation in the camera's frame rad, position m), `repeatability` (6, 6) the same for whom
+    lenses and field are what they are said to be, `residual_px` the rms of its lines. `deviations`: what the lines say
+    of lenses and field.
     """
 
     pitch: Field
     cameras: list[Camera]
     covariance: list[Array | None]
+    repeatability: list[Array | None]
     residual_px: list[float | None]
     deviations: list[Deviation]
 
@@ -105,6 +107,7 @@ def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Refine
         pitch,
         [end.cameras[0] for end in ends],
         [end.covariance[0] for end in ends],
+        [end.repeatability[0] for end in ends],
         [end.residual_px[0] for end in ends],
         [deviation for end in ends for deviation in end.deviations if deviation.camera is not None],
     )
@@ -189,4 +192,4 @@ def _assessed(
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
     prior, away = ordinary.prior(unknowns), here.away(found)
     judged = judge(here.pitch, here.cameras, measured, unknowns, here.heights, prior, away, stitch_weight)
-    return Refined(here.pitch, here.cameras, judged.covariance, judged.residual_px, judged.deviations)
+    return Refined(here.pitch, here.cameras, **vars(judged))

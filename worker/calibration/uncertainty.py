@@ -44,9 +44,12 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Judged:
-    """Per camera, None where it had too few measurements: `covariance` (6, 6) and `residual_px`, see `Refined`."""
+    """Per camera, None where it had too few measurements: `covariance` (6, 6), `repeatability` (6, 6), `residual_px`;
+    see `Refined`.
+    """
 
     covariance: list[Array | None]
+    repeatability: list[Array | None]
     residual_px: list[float | None]
     deviations: list[Deviation]
 
@@ -86,9 +89,13 @@ def judge(
     everything[np.ix_(kept, kept)] = prior
     everything[asked, asked] = certainty
     full = np.linalg.inv(equations.information + everything)
-    covariance = full @ (error_of_measurement(rows, unknowns) + everything) @ full
+    measurement = error_of_measurement(rows, unknowns)
+    covariance = full @ (measurement + everything) @ full
+    alone = inverse @ (measurement[np.ix_(kept, kept)] + prior) @ inverse
+    enough = [len(found) >= FEWEST_MEASUREMENTS for found in measured]
     return Judged(
-        [_of_pose(covariance, nearer, i) if len(m) >= FEWEST_MEASUREMENTS else None for i, m in enumerate(measured)],
+        [_of_pose(covariance, nearer, i) if known else None for i, known in enumerate(enough)],
+        [_of_pose(alone, np.zeros(len(alone)), i) if known else None for i, known in enumerate(enough)],
         [rms_px(camera, found) for camera, found in zip(cameras, measured, strict=True)],
         [
             Deviation(
