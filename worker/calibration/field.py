@@ -7,7 +7,7 @@ boundary line is the nominal distance and its centre lies half a line width insi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
@@ -27,6 +27,8 @@ GOAL_HALF_WIDTH_M = 3.66
 GOAL_HEIGHT_M = 2.44
 SPOT_RADIUS_M = 0.11
 ARC_STEP_M = 0.05
+LEAST_HIP_M = 0.5
+"""A ridge ends so far from the goal lines at least: a roof has no upright sides."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,27 @@ class Field:
             return replace(self, ridge=self.ridge + [0.0, 0.0, by])
         end = max((self.length - self.width) / 2, 0.0)
         return replace(self, ridge=np.array([[-end, 0.0, by], [end, 0.0, by]]))
+
+    @property
+    def ridge_height(self) -> float:
+        """Of the ridge above the corners; 0 of a flat pitch."""
+        return 0.0 if self.ridge is None else float(self.ridge[0, 2])
+
+    @property
+    def ridge_length(self) -> float:
+        """Between the ends of the ridge; of a flat pitch, of the ridge that `raised` would give it."""
+        ridge = self.raised(0.0).ridge
+        assert ridge is not None
+        return float(abs(ridge[1, 0] - ridge[0, 0]))
+
+    def with_ridge_length(self, length: float) -> Field:
+        """The same pitch with the ends of its ridge so far apart, as far as the pitch has room, around where it was."""
+        raised = self.raised(0.0)
+        assert raised.ridge is not None
+        (start, end) = raised.ridge[np.argsort(raised.ridge[:, 0])]
+        middle = (start[0] + end[0]) / 2
+        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle) - LEAST_HIP_M)
+        return replace(raised, ridge=np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
 
     def height(self, xy: Array) -> Array:
         """Height (...) of the surface at (..., 2): the paper's four-plane hip roof; 0 off the pitch."""
@@ -191,9 +214,17 @@ class Field:
 
     def line_points(self, spacing: float = 0.25) -> LinePoints:
         """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
+        return self._line_points([fitting(marking.centre, spacing) for marking in self.markings()], spacing)
+
+    def same_line_points(self, others: LinePoints) -> LinePoints:
+        """The points that are those of a pitch of other measures: as many on each marking, as far along it."""
+        counts: list[int] = np.bincount(others.marking).tolist()
+        return self._line_points(counts, others.spacing)
+
+    def _line_points(self, counts: Sequence[int], spacing: float) -> LinePoints:
         positions, tangents, widths, index = [], [], [], []
-        for number, marking in enumerate(self.markings()):
-            xy, along = resample(marking.centre, spacing)
+        for number, (marking, count) in enumerate(zip(self.markings(), counts, strict=True)):
+            xy, along = equal_pieces(marking.centre, count)
             positions.append(xy)
             tangents.append(along)
             widths.append(np.full(len(xy), marking.width))
@@ -217,10 +248,19 @@ class Field:
 
 def resample(polyline: Array, spacing: float) -> tuple[Array, Array]:
     """Points about every `spacing` along a polyline (n, 2), in the middle of equal pieces, and unit tangents there."""
+    return equal_pieces(polyline, fitting(polyline, spacing))
+
+
+def fitting(polyline: Array, spacing: float) -> int:
+    """How many pieces of about `spacing` a polyline (n, 2) has, at least one."""
+    return max(1, round(float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum()) / spacing))
+
+
+def equal_pieces(polyline: Array, count: int) -> tuple[Array, Array]:
+    """The middles (count, 2) of equal pieces of a polyline (n, 2), and unit tangents there."""
     pieces = np.diff(polyline, axis=0)
     lengths = np.linalg.norm(pieces, axis=1)
     reached = np.concatenate([[0.0], np.cumsum(lengths)])
-    count = max(1, round(reached[-1] / spacing))
     at = (np.arange(count) + 0.5) * reached[-1] / count
     piece = np.clip(np.searchsorted(reached, at, side="right") - 1, 0, len(pieces) - 1)
     unit = pieces[piece] / lengths[piece, None]

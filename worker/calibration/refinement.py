@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera
-from worker.calibration.field import Field
+from worker.calibration.field import Field, LinePoints
 from worker.calibration.ground import UNEVEN_M, Ground
 from worker.calibration.linemeasurement import Measurements, measure_lines
 from worker.calibration.normalequations import normal_equations
-from worker.calibration.parameters import FieldParameter, Parameter
+from worker.calibration.parameters import Parameter
 from worker.calibration.residuals import POSE, Unknowns, change_between, moved, residuals
 from worker.calibration.robust import Weigh, huber_weights, tukey_weights
-from worker.calibration.uncertainty import Deviation, judge
+from worker.calibration.uncertainty import Determined, Deviation, judge
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0)
 """How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
@@ -48,7 +48,7 @@ class Refined:
 
     `covariance` (6, 6) of (rotation in the camera's frame rad, position m), `repeatability` (6, 6) the same for whom
     lenses and field are what they are said to be, `residual_px` the rms of its lines. `deviations`: what the lines say
-    of lenses and field.
+    of lenses and field. `found`: what was left free, in that order.
     """
 
     pitch: Field
@@ -57,6 +57,7 @@ class Refined:
     repeatability: list[Array | None]
     residual_px: list[float | None]
     deviations: list[Deviation]
+    found: list[Determined]
 
 
 def refine(
@@ -71,13 +72,14 @@ def refine(
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     here = _Estimate.at(pitch, cameras, unknowns)
     for search in SEARCH_PX:
-        measured = measure_all(here.pitch, here.cameras, sight, search)
+        unknowns = unknowns.around(here.pitch, here.lines)
+        measured = measure_all(here.lines, here.cameras, sight, search)
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several.
         for weigh in [huber_weights] * HUBER_STEPS + [tukey_weights] * TUKEY_STEPS:
             here = _step(here, cameras, measured, unknowns, stitch_weight, weigh)
         here = _believed(here, measured, unknowns, stitch_weight)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _assessed(here, cameras, sight, unknowns, stitch_weight)
+    return _assessed(here, cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
 
 
 def assess(
@@ -88,9 +90,8 @@ def assess(
     return _assessed(_Estimate.at(pitch, cameras, unknowns), cameras, sight, unknowns, stitch_weight)
 
 
-def measure_all(pitch: Field, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
+def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
     """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
-    lines = pitch.line_points()
     return [
         measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.relative_size)
         for camera, bright, response in zip(cameras, sight.brightness, sight.responses, strict=True)
@@ -110,6 +111,7 @@ def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Refine
         [end.repeatability[0] for end in ends],
         [end.residual_px[0] for end in ends],
         [deviation for end in ends for deviation in end.deviations if deviation.camera is not None],
+        [],
     )
 
 
@@ -117,11 +119,11 @@ def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Refine
 class _Estimate:
     """Where the finish stands: cameras and pitch, with `values` (E,) in them, and `heights` (K,) of the ground.
 
-    `points` (N, 3): the pitch's line points.
+    `lines`: the pitch's line points, as many as it had in the beginning.
     """
 
     pitch: Field
-    points: Array
+    lines: LinePoints
     cameras: list[Camera]
     values: Array
     heights: Array
@@ -129,20 +131,18 @@ class _Estimate:
 
     @classmethod
     def at(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> _Estimate:
-        points = pitch.line_points().position
-        return cls(pitch, points, list(cameras), np.zeros(len(unknowns.parameters)), np.zeros(len(unknowns.ground)))
+        return cls(pitch, pitch.line_points(), list(cameras), np.zeros(len(unknowns.parameters)), np.zeros(len(unknowns.ground)))
 
     def moved(self, move: Array, unknowns: Unknowns) -> _Estimate:
         """After a step (U,)."""
         poses, values, heights = np.split(move, [POSE * unknowns.cameras, unknowns.dense])
-        pitch, points, cameras = self.pitch, self.points, self.cameras
+        pitch, cameras = self.pitch, self.cameras
         for parameter, by in zip(unknowns.parameters, values.tolist(), strict=True):
             cameras, pitch = parameter.applied(cameras, pitch, by)
-            if isinstance(parameter, FieldParameter):
-                points = points + by * parameter.shift
+        lines = self.lines if pitch is self.pitch else pitch.same_line_points(self.lines)
         cameras = [moved(camera, change) for camera, change in zip(cameras, poses.reshape(-1, POSE), strict=True)]
         values, heights = self.values + values, self.heights + heights
-        return replace(self, pitch=pitch, points=points, cameras=cameras, values=values, heights=heights)
+        return replace(self, pitch=pitch, lines=lines, cameras=cameras, values=values, heights=heights)
 
     def prior(self, unknowns: Unknowns) -> Array:
         """Information (U, U) on every unknown before any line is measured."""
@@ -168,7 +168,7 @@ def _step(
     weigh: Weigh,
 ) -> _Estimate:
     """One Gauss-Newton step for everything together; `found`: where the search left the cameras."""
-    rows = residuals(here.points, here.cameras, measured, unknowns, here.heights, stitch_weight, weigh)
+    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, weigh)
     equations = normal_equations(rows, unknowns)
     prior = here.prior(unknowns)
     pull = equations.gradient + prior @ here.away(found)
@@ -178,7 +178,7 @@ def _step(
 
 def _believed(here: _Estimate, measured: Sequence[Measurements], unknowns: Unknowns, stitch_weight: float) -> _Estimate:
     """With the unevenness of the ground that its heights speak for."""
-    rows = residuals(here.points, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
+    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
     information = normal_equations(rows, unknowns).information + here.prior(unknowns)
     covariance = np.asarray(np.linalg.inv(information)[unknowns.dense :, unknowns.dense :], dtype=float)
     return replace(here, uneven_m=unknowns.ground.unevenness(here.heights, covariance, here.uneven_m))
@@ -187,9 +187,9 @@ def _believed(here: _Estimate, measured: Sequence[Measurements], unknowns: Unkno
 def _assessed(
     here: _Estimate, found: Sequence[Camera], sight: Sight, unknowns: Unknowns, stitch_weight: float
 ) -> Refined:
-    measured = measure_all(here.pitch, here.cameras, sight, ASSESSING_SEARCH_PX)
+    measured = measure_all(here.lines, here.cameras, sight, ASSESSING_SEARCH_PX)
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
     prior, away = ordinary.prior(unknowns), here.away(found)
-    judged = judge(here.pitch, here.cameras, measured, unknowns, here.heights, prior, away, stitch_weight)
+    judged = judge(here.pitch, here.lines, here.cameras, measured, unknowns, here.heights, prior, away, stitch_weight)
     return Refined(here.pitch, here.cameras, **vars(judged))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from worker.calibration.camera import Array, Camera
-from worker.calibration.field import Field
+from worker.calibration.field import Field, LinePoints
 from worker.calibration.linemeasurement import Measurements
 from worker.calibration.normalequations import error_of_measurement, normal_equations
 from worker.calibration.parameters import LensParameter, Parameter, field_parameters, lens_parameters
@@ -43,19 +43,33 @@ class Deviation:
 
 
 @dataclass(frozen=True)
+class Determined:
+    """How well the lines fix a number that was left free: its `sigma`, with what lenses and field may be off, where
+    `expected` was how far off it might have been before. `entangled`: which other unknown number moves most with it,
+    and their correlation.
+    """
+
+    parameter: Parameter
+    sigma: float
+    entangled: tuple[Parameter, float] | None
+
+
+@dataclass(frozen=True)
 class Judged:
     """Per camera, None where it had too few measurements: `covariance` (6, 6), `repeatability` (6, 6), `residual_px`;
-    see `Refined`.
+    see `Refined`, also for `deviations` and `found`.
     """
 
     covariance: list[Array | None]
     repeatability: list[Array | None]
     residual_px: list[float | None]
     deviations: list[Deviation]
+    found: list[Determined]
 
 
 def judge(
     pitch: Field,
+    lines: LinePoints,
     cameras: Sequence[Camera],
     measured: Sequence[Measurements],
     solved: Unknowns,
@@ -64,13 +78,13 @@ def judge(
     away: Array,
     stitch_weight: float,
 ) -> Judged:
-    """Judge an answer that was found with `solved` unknown.
+    """Judge an answer that was found with `solved` unknown; `lines` of the pitch are those that were `measured`.
 
     `prior` (U, U): the information on them before any line was measured; `away` (U,): how far they are from it.
     """
     suspects = _suspects(pitch, cameras, solved)
-    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground)
-    rows = residuals(pitch.line_points().position, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
+    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(pitch, lines)
+    rows = residuals(lines.position, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
     equations = normal_equations(rows, unknowns)
     kept = np.r_[: solved.dense, unknowns.dense : len(unknowns)]
     asked = np.arange(solved.dense, unknowns.dense)
@@ -107,6 +121,7 @@ def judge(
             )
             for i, suspect in enumerate(suspects)
         ],
+        [_determined(number, unknowns, covariance, nearer) for number in range(len(solved.parameters))],
     )
 
 
@@ -137,6 +152,22 @@ def _certainty(information: Array, pull: Array, suspects: Sequence[Parameter]) -
             scale = np.sqrt((power[its].sum() + TRUST_NUMBERS * TRUST**2) / evidence)
             factor[its] = min(scale, LARGEST_FACTOR)
     return np.asarray((expected * factor) ** -2)
+
+
+def _determined(number: int, unknowns: Unknowns, covariance: Array, nearer: Array) -> Determined:
+    """What is known of the free parameter of this number."""
+    first = POSE * unknowns.cameras
+    at = first + number
+    variance = np.diag(covariance)[first : unknowns.dense]
+    together = np.sqrt(variance * variance[number])
+    correlation = np.divide(covariance[at, first : unknowns.dense], together, out=np.zeros_like(together), where=together > 0)
+    correlation[number] = 0.0
+    most = int(np.argmax(np.abs(correlation)))
+    return Determined(
+        unknowns.parameters[number],
+        float(np.sqrt(variance[number] + nearer[at] ** 2)),
+        None if most == number else (unknowns.parameters[most], float(correlation[most])),
+    )
 
 
 def _of_pose(covariance: Array, nearer: Array, camera: int) -> Array:
