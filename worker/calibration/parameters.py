@@ -97,8 +97,8 @@ def field_parameters(pitch: Field) -> list[Parameter]:
     """What is measured once when a venue is set up."""
     return [
         _ridge_height(pitch, 0.02),
-        FieldParameter.of(pitch, "length_m", 0.03, lambda one: one.length, _as_long),
-        FieldParameter.of(pitch, "width_m", 0.03, lambda one: one.width, lambda one, now: replace(one, width=now)),
+        _length(pitch, 0.03),
+        _width(pitch, 0.03),
     ]
 
 
@@ -117,19 +117,8 @@ def free_ridge(pitch: Field) -> list[Parameter]:
 
 
 def free_field(pitch: Field) -> list[FieldParameter]:
-    """Every measure of a field of which next to nothing is known."""
-    return [
-        FieldParameter.of(pitch, "length_m", FREE_LENGTH_M, lambda one: one.length, _as_long),
-        FieldParameter.of(pitch, "width_m", FREE_WIDTH_M, lambda one: one.width, lambda one, now: replace(one, width=now)),
-        _ridge_height(pitch, FREE_RIDGE_M),
-        FieldParameter.of(
-            pitch,
-            "ridge_length_m",
-            pitch.length / np.sqrt(12),
-            lambda one: one.ridge_length,
-            Field.with_ridge_length,
-        ),
-    ]
+    """Length, width and height of a field of which next to nothing is known."""
+    return [_length(pitch, FREE_LENGTH_M), _width(pitch, FREE_WIDTH_M), _ridge_height(pitch, FREE_RIDGE_M)]
 
 
 def _ridge_height(pitch: Field, expected: float) -> FieldParameter:
@@ -142,9 +131,17 @@ def _ridge_height(pitch: Field, expected: float) -> FieldParameter:
     )
 
 
-def _as_long(pitch: Field, length: float) -> Field:
-    """A pitch of another length; its ridge keeps its own."""
-    return replace(pitch, length=length)
+def _length(pitch: Field, expected: float) -> FieldParameter:
+    """Of the pitch; its ridge keeps its own."""
+    return FieldParameter.of(
+        pitch, "length_m", expected, lambda one: one.length, lambda one, now: replace(one, length=now)
+    )
+
+
+def _width(pitch: Field, expected: float) -> FieldParameter:
+    return FieldParameter.of(
+        pitch, "width_m", expected, lambda one: one.width, lambda one, now: replace(one, width=now)
+    )
 
 
 def _longer(lens: Intrinsics, by: float) -> Intrinsics:

@@ -49,7 +49,6 @@ class Determined:
     and their correlation.
     """
 
-    parameter: Parameter
     sigma: float
     entangled: tuple[Parameter, float] | None
 
@@ -160,11 +159,11 @@ def _determined(number: int, unknowns: Unknowns, covariance: Array, nearer: Arra
     at = first + number
     variance = np.diag(covariance)[first : unknowns.dense]
     together = np.sqrt(variance * variance[number])
-    correlation = np.divide(covariance[at, first : unknowns.dense], together, out=np.zeros_like(together), where=together > 0)
+    jointly = covariance[at, first : unknowns.dense]
+    correlation = np.divide(jointly, together, out=np.zeros_like(together), where=together > 0)
     correlation[number] = 0.0
     most = int(np.argmax(np.abs(correlation)))
     return Determined(
-        unknowns.parameters[number],
         float(np.sqrt(variance[number] + nearer[at] ** 2)),
         None if most == number else (unknowns.parameters[most], float(correlation[most])),
     )
