@@ -295,6 +295,24 @@ class Venue(_Place):
         field = self.field if result.ridge is None else self.field.model_copy(update={"ridge": result.ridge})
         return self.model_copy(update={"cameras": cameras, "field": field})
 
+    def with_field(self, result: FieldResult) -> Venue:
+        """The same venue as an accepted field fit found it: the pitch, and the poses around it."""
+        poses = {camera.id: camera.pose for camera in result.cameras}
+        return self.with_poses(poses).model_copy(update={"field": result.field})
+
+    def sent(self) -> VenueIn:
+        """The venue as one sends it."""
+        cameras = [
+            CameraIn(
+                id=c.id,
+                image_size=c.image_size,
+                intrinsics=c.intrinsics,
+                pose=PoseIn(rotation=c.pose.rotation, position=c.pose.position),
+            )
+            for c in self.cameras
+        ]
+        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras)
+
     def calibrates_like(self, other: Venue) -> bool:
         """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
         return self.field == other.field and self.cameras == other.cameras
@@ -431,6 +449,14 @@ class LocateOptions(_Handling):
     )
 
     points: Annotated[list[ClickedPoint], Field(min_length=4, max_length=500)]
+
+
+class FieldOptions(_Handling):
+    """How the measures of a pitch are to be fitted; everything is optional."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"seed": 7}]})
+
+    seed: Annotated[Whole, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
 
 
 class Progress(Wire):
@@ -612,6 +638,38 @@ class LocateResult(Wire):
     software: str
 
 
+class MeasureResult(Wire):
+    """A measure of the pitch, metres: as the venue has it (`given`) and as the lines have it (`value` ± `sigma`).
+
+    `open`: one standard deviation of what it might have been before. `known`: whether the lines tell it; if not,
+    `detail` says why, and the fitted field keeps what was given.
+    """
+
+    name: Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"]
+    given: float
+    value: float
+    sigma: float
+    open: float
+    known: bool
+    detail: str
+
+
+class FieldResult(Wire):
+    """A pitch with the measures that its lines tell, and the cameras as they stand around it.
+
+    `accepted`: it may replace the one that the venue has; nothing is replaced by itself.
+    """
+
+    accepted: bool
+    rejected_because: str | None
+    field: FieldOfPlay
+    measures: list[MeasureResult]
+    cameras: list[CameraResult]
+    stitch_error_px: float | None
+    timings_s: dict[str, float]
+    provenance: Provenance
+
+
 class JobError(Wire):
     """Why a job failed: the members of a problem (RFC 9457)."""
 
@@ -624,7 +682,7 @@ class JobError(Wire):
 # What a key allows; each one includes those before it.
 Scope = Literal["read", "calibrate", "admin"]
 
-Kind = Literal["calibration", "intrinsics", "locate"]
+Kind = Literal["calibration", "intrinsics", "locate", "field"]
 Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 OPEN: tuple[Status, ...] = ("queued", "running")
 
@@ -665,7 +723,7 @@ class Job(Wire):
     started_at: datetime | None
     finished_at: datetime | None
     error: JobError | None
-    result: Result | IntrinsicsResult | LocateResult | None
+    result: Result | IntrinsicsResult | LocateResult | FieldResult | None
     links: dict[str, str]
 
     @property

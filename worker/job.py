@@ -11,37 +11,36 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
-from math import isfinite
 
 import cv2
 import structlog
 
 from service import lifeline, logs, schemas
 from service.schemas import (
-    CameraResult,
+    FieldOptions,
+    FieldResult,
     IntrinsicsOptions,
     IntrinsicsResult,
     LocateOptions,
     LocateResult,
-    Moved,
     Progress,
     Provenance,
     Result,
-    Sigma,
     Venue,
 )
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.engine import connect
 from service.store.jobs import Jobs, Task, picture_folder
-from worker import lensjob, locatejob
+from worker import fieldjob, lensjob, locatejob
 from worker.calibration import calibrate as engine
-from worker.calibration import quality, stitching
+from worker.calibration import stitching
 from worker.calibration.calibrate import CalibrationError, calibrate
 from worker.calibration.camera import Camera
-from worker.calibration.segmentation import ProviderMissing, Segmenter
+from worker.calibration.field import Field
 from worker.message import Message
 from worker.outcome import (
+    PREVIEW_FRACTION,
     Failure,
     Outcome,
     Picture,
@@ -50,13 +49,12 @@ from worker.outcome import (
     jpeg,
     number,
     pitch_of,
+    segmenter_of,
+    wire_camera,
     wire_lens,
-    wire_pose,
+    wire_progress,
 )
 
-PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
-# The engine's report ends with the refinement; what is left is drawing.
-PREVIEW_FRACTION = 0.96
 log = structlog.get_logger()
 
 
@@ -83,7 +81,7 @@ def main(job_id: str, run_token: str) -> None:
 
 def _compute(
     task: Task, files: Mapping[str, Sequence[bytes]], settings: Settings, report: Callable[[Progress], None]
-) -> Outcome[Result | IntrinsicsResult | LocateResult]:
+) -> Outcome[Result | IntrinsicsResult | LocateResult | FieldResult]:
     """What the kind of the job asks for."""
     cv2.setNumThreads(settings.threads)
     match task.options:
@@ -93,6 +91,9 @@ def _compute(
             assert task.venue is not None
             ((camera, frames),) = files.items()
             return locatejob.solve(task.venue, camera, options, next(iter(frames), None), report)
+        case FieldOptions() as options:
+            assert task.venue is not None
+            return fieldjob.solve(task.venue, files, options, settings, report)
         case options:
             assert task.venue is not None
             return solve(task.venue, files, options, settings, report)
@@ -106,23 +107,21 @@ def solve(
     report: Callable[[Progress], None],
 ) -> Outcome[Result]:
     """Calibrate a venue from the files of its cameras, with or without a server around it."""
-    if not settings.model.is_file():
-        raise Failure("model-missing", f"{settings.model} is not there; set ESC_MODEL or train one.")
+    segmenter = segmenter_of(settings)
     cv2.setNumThreads(settings.threads)
     begun = time.perf_counter()
     frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
     decoded = time.perf_counter()
     pitch, cameras = pitch_of(venue.field), [camera_of(camera) for camera in venue.cameras]
-    segmenter = _segmenter(settings)
     try:
         found = calibrate(
-            pitch, cameras, frames, segmenter, _engine_options(options), lambda step: report(_progress(step))
+            pitch, cameras, frames, segmenter, _engine_options(options), lambda step: report(wire_progress(step))
         )
     except CalibrationError as error:
         raise Failure(error.kind, error.detail, error.camera) from error
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
     drawing = time.perf_counter()
-    pictures = _draw(cameras, found, frames)
+    pictures = _draw(pitch, cameras, found, frames)
     timings = {
         "decode": decoded - begun,
         **found.timings_s,
@@ -136,13 +135,6 @@ def solve(
         options=options.model_dump(mode="json", exclude={"callback_url"}),
     )
     return Outcome(_result(found, options, timings, provenance), pictures)
-
-
-def _segmenter(settings: Settings) -> Segmenter:
-    try:
-        return Segmenter(settings.model, settings.threads, PROVIDERS[settings.provider])
-    except ProviderMissing as missing:
-        raise Failure("provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for.") from missing
 
 
 def _line_to_parent() -> Callable[[Message], None]:
@@ -186,16 +178,8 @@ def _engine_options(options: schemas.Options) -> engine.Options:
     return engine.Options(**given)
 
 
-def _progress(step: engine.Progress) -> Progress:
-    return Progress(
-        stage=step.stage,
-        fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
-        generation=step.generation,
-        loss=number(step.loss),
-    )
-
-
 def _draw(
+    pitch: Field,
     before: Sequence[Camera],
     found: engine.Calibration,
     frames: Mapping[str, Sequence[Picture]],
@@ -208,7 +192,7 @@ def _draw(
     }
     for old, new in zip(before, after, strict=True):
         drawn[f"overlay_{old.id}"] = lambda old=old, new=new: stitching.overlay(  # type: ignore[misc]
-            found.pitch, old, new, first[old.id]
+            (pitch, old), (found.pitch, new), first[old.id]
         )
     pictures = {}
     for name, draw in drawn.items():
@@ -226,7 +210,10 @@ def _result(
     return Result(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
-        cameras=[_camera_result(camera, options) for camera in found.cameras],
+        cameras=[
+            wire_camera(camera, wire_lens(camera.intrinsics) if options.fit_focal_length else None)
+            for camera in found.cameras
+        ],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
         diagnosis=[schemas.Suspicion(**vars(suspicion)) for suspicion in found.suspicions],
         stitch_error_px=number(found.stitch_error_px),
@@ -236,30 +223,6 @@ def _result(
         timings_s={stage: round(seconds, 3) for stage, seconds in timings_s.items()},
         provenance=provenance,
     )
-
-
-def _camera_result(camera: engine.CameraResult, options: schemas.Options) -> CameraResult:
-    lens = camera.intrinsics
-    return CameraResult(
-        id=camera.id,
-        pose=wire_pose(camera.pose),
-        intrinsics=wire_lens(lens) if options.fit_focal_length else None,
-        sigma=_sigma(camera.sigma),
-        repeatability=_sigma(camera.repeatability),
-        moved=Moved(
-            rotation_deg=camera.moved.rotation_deg,
-            position_m=camera.moved.position_m,
-            pixels=number(camera.moved.pixels),
-        ),
-        iou=number(camera.iou),
-        residual_px=number(camera.residual_px),
-    )
-
-
-def _sigma(sigma: quality.Sigma | None) -> Sigma | None:
-    if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
-        return None
-    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)
 
 
 if __name__ == "__main__":

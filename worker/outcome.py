@@ -12,13 +12,30 @@ from numpy.typing import NDArray
 
 from service import schemas
 from service.problems import KINDS, type_of
-from service.schemas import IntrinsicsResult, JobError, LocateResult, Result
+from service.schemas import (
+    CameraResult,
+    FieldResult,
+    IntrinsicsResult,
+    JobError,
+    LocateResult,
+    Moved,
+    Progress,
+    Result,
+    Sigma,
+)
+from service.settings import Settings
+from worker.calibration import calibrate as engine
+from worker.calibration import quality
 from worker.calibration.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.field import Field
+from worker.calibration.segmentation import ProviderMissing, Segmenter
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
-R = TypeVar("R", bound=Result | IntrinsicsResult | LocateResult, covariant=True)
+PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
+# The engine's report ends with the refinement; what is left is drawing.
+PREVIEW_FRACTION = 0.96
+R = TypeVar("R", bound=Result | IntrinsicsResult | LocateResult | FieldResult, covariant=True)
 
 
 @dataclass(frozen=True)
@@ -101,3 +118,47 @@ def wire_pose(pose: Pose) -> schemas.Pose:
 def number(value: Any) -> float | None:
     """JSON has no NaN and no infinity."""
     return float(value) if value is not None and isfinite(value) else None
+
+
+def segmenter_of(settings: Settings) -> Segmenter:
+    """The network that the settings name."""
+    if not settings.model.is_file():
+        raise Failure("model-missing", f"{settings.model} is not there; set ESC_MODEL or train one.")
+    try:
+        return Segmenter(settings.model, settings.threads, PROVIDERS[settings.provider])
+    except ProviderMissing as missing:
+        raise Failure("provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for.") from missing
+
+
+def wire_progress(step: engine.Progress) -> Progress:
+    """How far the engine is, with room for the pictures."""
+    return Progress(
+        stage=step.stage,
+        fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
+        generation=step.generation,
+        loss=number(step.loss),
+    )
+
+
+def wire_camera(camera: engine.CameraResult, lens: schemas.Intrinsics | None = None) -> CameraResult:
+    """What a finish has to say of a camera; `lens` where it was found as well."""
+    return CameraResult(
+        id=camera.id,
+        pose=wire_pose(camera.pose),
+        intrinsics=lens,
+        sigma=_sigma(camera.sigma),
+        repeatability=_sigma(camera.repeatability),
+        moved=Moved(
+            rotation_deg=camera.moved.rotation_deg,
+            position_m=camera.moved.position_m,
+            pixels=number(camera.moved.pixels),
+        ),
+        iou=number(camera.iou),
+        residual_px=number(camera.residual_px),
+    )
+
+
+def _sigma(sigma: quality.Sigma | None) -> Sigma | None:
+    if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
+        return None
+    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)

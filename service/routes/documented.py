@@ -8,10 +8,10 @@ from typing import Any
 from fastapi import FastAPI
 
 from service.problems import MEDIA_TYPE
-from service.schemas import IntrinsicsOptions, JobEvent, LocateOptions, Options, ProblemDetails, Scope
+from service.schemas import FieldOptions, IntrinsicsOptions, JobEvent, LocateOptions, Options, ProblemDetails, Scope
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
-MODELS = (Options, IntrinsicsOptions, LocateOptions, ProblemDetails)
+MODELS = (Options, IntrinsicsOptions, LocateOptions, FieldOptions, ProblemDetails)
 SCHEMAS = "#/components/schemas/"
 KEY_SCHEME = "key"
 SECURITY_SCHEMES = {
@@ -51,7 +51,9 @@ def document_callback(app: FastAPI) -> None:
         """
 
 
-def reference(model: type[Options | IntrinsicsOptions | LocateOptions | ProblemDetails]) -> dict[str, str]:
+def reference(
+    model: type[Options | IntrinsicsOptions | LocateOptions | FieldOptions | ProblemDetails],
+) -> dict[str, str]:
     """A schema that points to one of `MODELS`."""
     return {"$ref": f"{SCHEMAS}{model.__name__}"}
 

@@ -19,6 +19,8 @@ import sqlalchemy as sa
 
 from service.schemas import (
     OPEN,
+    FieldOptions,
+    FieldResult,
     IntrinsicsOptions,
     IntrinsicsResult,
     Job,
@@ -40,12 +42,13 @@ from service.store.venues import find_venue, save_poses, save_venue
 PRIORITIES = {"live": 1, "routine": 100}
 CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 DONE = Progress(stage="preview", fraction=1.0)
-AnyOptions = Options | IntrinsicsOptions | LocateOptions
-AnyResult = Result | IntrinsicsResult | LocateResult
+AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
+AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult
 OPTIONS: dict[Kind, type[AnyOptions]] = {
     "calibration": Options,
     "intrinsics": IntrinsicsOptions,
     "locate": LocateOptions,
+    "field": FieldOptions,
 }
 j = tables.jobs.c
 

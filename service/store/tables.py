@@ -53,7 +53,7 @@ jobs = sa.Table(
     sa.Column("venue", sa.String(64)),
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("priority", sa.Integer, nullable=False),
-    # What was asked: schemas.Options (the seed filled in), IntrinsicsOptions or LocateOptions, by the kind.
+    # What was asked: schemas.Options or FieldOptions (the seed filled in), IntrinsicsOptions or LocateOptions.
     sa.Column("options", sa.JSON, nullable=False),
     # Of the frames and options as they were sent: the same content is the same job.
     sa.Column("content_hash", sa.String(64), nullable=False),

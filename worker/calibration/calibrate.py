@@ -192,7 +192,7 @@ def calibrate(
         journey.at("refinement", 1.0)
     return Calibration(
         refined.pitch,
-        [_camera_result(quality) for quality in qualities],
+        [camera_result(quality) for quality in qualities],
         rejection(qualities, pairs_in_common(refined.pitch, refined.cameras), stitch, Gate())
         or ridge_rejection(refined.pitch, Gate()),
         stitch,
@@ -246,7 +246,8 @@ def _free(options: Options, pitch: Field, cameras: Sequence[Camera]) -> list[Par
     return [*lengths, *(free_ridge(pitch) if options.fit_ridge else [])]
 
 
-def _camera_result(quality: CameraQuality) -> CameraResult:
+def camera_result(quality: CameraQuality) -> CameraResult:
+    """What is answered of what the gate looked at."""
     return CameraResult(
         quality.camera.id,
         quality.camera.intrinsics,

@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
 from worker.calibration.calibrate import (
     METHODS,
+    CameraResult,
     Clock,
     Journey,
     Options,
     Progress,
     Segment,
+    camera_result,
     qualities_of,
     require_markings_in_view,
     segment_all,
@@ -26,7 +29,7 @@ from worker.calibration.camera import Camera, Frame
 from worker.calibration.field import Field
 from worker.calibration.linemeasurement import brightness_of
 from worker.calibration.parameters import FieldParameter, LensParameter, Parameter, free_field
-from worker.calibration.quality import CameraQuality, Gate, rejection, ridge_rejection
+from worker.calibration.quality import Gate, rejection, ridge_rejection
 from worker.calibration.refinement import SEARCH_PX, Refined, Sight, refine
 from worker.calibration.registration import pairs_in_common, stitch_error_px
 from worker.calibration.ridgelength import RidgeTrials, try_ridges
@@ -54,6 +57,9 @@ WORDS = {
 }
 
 
+MeasureName = Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"]
+
+
 @dataclass(frozen=True)
 class Measure:
     """A measure of the pitch, metres: as it was `given` and as the lines have it (`value`), with `sigma`.
@@ -62,7 +68,7 @@ class Measure:
     `value` is worth nothing, the fitted pitch keeps what was given, and `detail` says why.
     """
 
-    name: str
+    name: MeasureName
     given: float
     value: float
     sigma: float
@@ -79,7 +85,7 @@ class FieldFit:
     """
 
     pitch: Field
-    cameras: Sequence[CameraQuality]
+    cameras: Sequence[CameraResult]
     measures: Sequence[Measure]
     rejected_because: str | None
     stitch_error_px: float | None
@@ -130,7 +136,7 @@ def fit_field(
         or ridge_rejection(refined.pitch, gate)
         or _implausible(refined.pitch)
     )
-    return FieldFit(refined.pitch, qualities, measures, rejected, stitch, clock.seconds)
+    return FieldFit(refined.pitch, [camera_result(q) for q in qualities], measures, rejected, stitch, clock.seconds)
 
 
 def fit_measures(
@@ -173,15 +179,14 @@ def _measure(
         if found.entangled is not None:
             other, correlation = found.entangled
             detail += f"; it cannot be told apart from {_named(other, cameras)} (correlation {correlation:+.2f})"
-    return Measure(
-        parameter.name, parameter.read(given), parameter.read(fitted), sigma, parameter.expected, known, detail
-    )
+    name = cast(MeasureName, parameter.name)
+    return Measure(name, parameter.read(given), parameter.read(fitted), sigma, parameter.expected, known, detail)
 
 
 def _ridge_length(given: Field, trials: RidgeTrials) -> Measure:
-    open_m = given.length / np.sqrt(12)
+    open_m = float(given.length / np.sqrt(12))
     shortest, longest = trials.alike
-    known = trials.sigma <= TOLD * open_m
+    known = bool(trials.sigma <= TOLD * open_m)
     detail = "" if known else f"the lines fit alike with a ridge of any length from {shortest:.0f} to {longest:.0f} m"
     return Measure("ridge_length_m", given.ridge_length, trials.best, trials.sigma, open_m, known, detail)
 

@@ -80,27 +80,31 @@ def birdseye(
     return _blend([_look(camera, frames[camera.id], _project(camera, pitch.lift(grid))) for camera in cameras])
 
 
-def overlay(pitch: Field, before: Camera, after: Camera, frame: Frame) -> Frame:
+def overlay(stored: tuple[Field, Camera], new: tuple[Field, Camera], frame: Frame, legend_for: str = "pose") -> Frame:
     """The frame with the markings on it: orange by the stored pose, blue by the new one, BGR like `frame`.
+
+    Each is drawn with the pitch it is for; `legend_for` says what is stored and new.
 
     The stored pose draws the centre of each line; the new one frames it: the painted line stays visible between two
     blue ones if the pose is right.
     """
     picture = frame.copy()
     width = frame.shape[1]
+    pitch, camera = stored
     for marking in pitch.markings():
         draw_line(
-            picture, _project(before, pitch.lift(outline(marking)[0])), STORED_COLOUR, max(1, round(width / 1600))
+            picture, _project(camera, pitch.lift(outline(marking)[0])), STORED_COLOUR, max(1, round(width / 1600))
         )
     thickness = max(1, round(width / 3000))
+    pitch, camera = new
     for marking in pitch.markings():
-        centre, *edges = (_project(after, pitch.lift(line)) for line in outline(marking))
+        centre, *edges = (_project(camera, pitch.lift(line)) for line in outline(marking))
         for edge in edges:
             # Half a stroke outwards and a little more, so that the paint stays visible between two strokes.
             outwards = edge - centre
             outwards /= np.linalg.norm(outwards, axis=-1, keepdims=True)
             draw_line(picture, edge + EDGE_GAP * thickness * outwards, NEW_COLOUR, thickness)
-    legend(picture, (("stored pose", STORED_COLOUR), ("new pose", NEW_COLOUR)))
+    legend(picture, ((f"stored {legend_for}", STORED_COLOUR), (f"new {legend_for}", NEW_COLOUR)))
     return picture
 
 
