@@ -28,6 +28,8 @@ from service.schemas import (
     ID_PATTERN,
     CameraIn,
     ClickedPoints,
+    FieldOptions,
+    FieldResult,
     IntrinsicsOptions,
     IntrinsicsResult,
     Job,
@@ -40,6 +42,7 @@ from service.schemas import (
     Result,
     Scope,
     Site,
+    Venue,
     VenueIn,
 )
 from service.schemas import Progress as Step
@@ -56,7 +59,9 @@ app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_comp
 venue_app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
 job_app = typer.Typer(no_args_is_help=True, help="Jobs of a running service.")
 key_app = typer.Typer(no_args_is_help=True, help="API keys, in the database of this machine's service.")
+field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue.")
 app.add_typer(venue_app, name="venue")
+app.add_typer(field_app, name="field")
 app.add_typer(job_app, name="job")
 app.add_typer(key_app, name="key")
 err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
@@ -162,30 +167,17 @@ def run(
     options: OptionsText = "{}",
 ) -> None:
     """The same calibration without a server. Exit codes as of `calibrate`."""
-    from service import frames as border
-    from service.problems import Problem
-
     settings, chosen = _settings(), _options(options)
     # Before NumPy is loaded, which the next line does.
     os.environ |= settings.native_environment
     from worker import job
-    from worker.outcome import Failure
 
     stored = _checked(VenueIn, venue.read_text(), str(venue)).stored()
-    files = {camera: [path.read_bytes() for path in paths] for camera, paths in _files(frames).items()}
     if chosen.seed is None:
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
-    try:
-        border.check_cameras(stored, {camera: len(several) for camera, several in files.items()}, settings)
-        for camera in stored.cameras:
-            for data in files[camera.id]:
-                border.check(camera, data, settings)
-        with _bar() as show:
-            outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
-    except Problem as problem:
-        _fail(_in_words(problem.detail, problem.parts), FAILED)
-    except Failure as failure:
-        _fail(failure.error.detail, FAILED)
+    files = _checked_files(stored, frames, settings)
+    with _failure_told(), _bar() as show:
+        outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
     output.mkdir(parents=True, exist_ok=True)
     (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
     for name, picture in outcome.pictures.items():
@@ -195,6 +187,37 @@ def run(
 
 
 # Before the first calibration
+
+
+@field_app.command("fit")
+def fit_field(
+    venue: Annotated[str, typer.Argument(metavar="VENUE", help="A venue's file, or the id of one that is stored.")],
+    frames: Frames,
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the venue with its fitted field.")],
+    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Absent: one is chosen.")] = None,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Length, width and ridge of a pitch from frames of its cameras. Exit codes as of `calibrate`.
+
+    A venue's file is fitted here, a stored venue by its service. What is stored stays as it is until `venue put`.
+    """
+    options = FieldOptions(seed=secrets.randbelow(2**31) if seed is None else seed)
+    if Path(venue).is_file():
+        stored, result, drawn = _fit_here(Path(venue), frames, options)
+    else:
+        stored, result, drawn = _fit_there(venue, frames, options, url, api_key)
+    if pictures is not None:
+        pictures.mkdir(parents=True, exist_ok=True)
+        for name, picture in drawn.items():
+            (pictures / f"{name}.jpg").write_bytes(picture)
+    _print(result)
+    _tell_field(result)
+    if not result.accepted:
+        err.print(f"Rejected: {result.rejected_because}")
+        raise typer.Exit(REJECTED)
+    output.write_text(stored.with_field(result).sent().model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
 @app.command()
@@ -386,6 +409,62 @@ def remove_key(name: str, data: Data = None) -> None:
 # Parts
 
 
+def _fit_here(file: Path, frames: list[str], options: FieldOptions) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    settings = _settings()
+    os.environ |= settings.native_environment
+    from worker import fieldjob
+
+    stored = _checked(VenueIn, file.read_text(), str(file)).stored()
+    files = _checked_files(stored, frames, settings)
+    with _failure_told(), _bar() as show:
+        outcome = fieldjob.solve(stored, files, options, settings, lambda step: show(step, ""))
+    return stored, outcome.result, outcome.pictures
+
+
+def _fit_there(
+    venue: str, frames: list[str], options: FieldOptions, url: str, api_key: str | None
+) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    files = _files(frames)
+    if not re.fullmatch(ID_PATTERN, venue):
+        _fail(f"There is no file {venue}, and it is no id of a venue", USAGE)
+    with Client(url, api_key) as client:
+        stored = client.venue(venue)
+        job = client.fit_field(venue, files, options.model_dump(mode="json", exclude_unset=True))
+        with _bar() as show:
+            job = client.follow(job, lambda job: show(job.progress, _waiting(job)))
+        if not isinstance(job.result, FieldResult):
+            raise typer.Exit(_verdict(job))
+        drawn = {f"overlay_{camera.id}": client.picture(job, f"overlay/{camera.id}") for camera in stored.cameras}
+    return stored, job.result, {name: picture for name, picture in drawn.items() if picture is not None}
+
+
+def _checked_files(stored: Venue, frames: list[str], settings: Settings) -> dict[str, list[bytes]]:
+    """Frames by camera, as the service would let them in."""
+    from service import frames as border
+    from service.problems import Problem
+
+    files = {camera: [path.read_bytes() for path in paths] for camera, paths in _files(frames).items()}
+    try:
+        border.check_cameras(stored, {camera: len(several) for camera, several in files.items()}, settings)
+        for camera in stored.cameras:
+            for data in files[camera.id]:
+                border.check(camera, data, settings)
+    except Problem as problem:
+        _fail(_in_words(problem.detail, problem.parts), FAILED)
+    return files
+
+
+@contextmanager
+def _failure_told() -> Iterator[None]:
+    """What a job without a server fails of is a line."""
+    from worker.outcome import Failure
+
+    try:
+        yield
+    except Failure as failure:
+        _fail(failure.error.detail, FAILED)
+
+
 def _lens_options(board: str, square: float, charuco: str | None, model: LensModel) -> IntrinsicsOptions:
     counted = re.fullmatch(r"(\d+)[x×](\d+)", board)
     if counted is None:
@@ -438,6 +517,15 @@ def _tell_pose(result: LocateResult) -> None:
         err.print(f"  {warning[0].upper()}{warning[1:]}.")
     if result.rejected_because is not None:
         err.print(f"  Rejected: {result.rejected_because}")
+
+
+def _tell_field(result: FieldResult) -> None:
+    for measure in result.measures:
+        what = measure.name.removesuffix("_m").replace("_", " ")
+        if measure.known:
+            err.print(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m (given {measure.given:.3f})")
+        else:
+            err.print(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
 
 
 @contextmanager

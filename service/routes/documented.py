@@ -6,6 +6,7 @@ from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI
+from pydantic import BaseModel
 
 from service.problems import MEDIA_TYPE
 from service.schemas import FieldOptions, IntrinsicsOptions, JobEvent, LocateOptions, Options, ProblemDetails, Scope
@@ -51,9 +52,7 @@ def document_callback(app: FastAPI) -> None:
         """
 
 
-def reference(
-    model: type[Options | IntrinsicsOptions | LocateOptions | FieldOptions | ProblemDetails],
-) -> dict[str, str]:
+def reference(model: type[BaseModel]) -> dict[str, str]:
     """A schema that points to one of `MODELS`."""
     return {"$ref": f"{SCHEMAS}{model.__name__}"}
 
