@@ -22,7 +22,7 @@ from service.metrics import Metrics
 from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
-from service.routes import calibrate, documented, health, intrinsics, jobs, locate, venues
+from service.routes import calibrate, documented, field, health, intrinsics, jobs, locate, venues
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.deliveries import Deliveries
@@ -55,7 +55,7 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_callback(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, calibrate, intrinsics, locate, jobs, health):
+    for routes in (venues, calibrate, intrinsics, locate, field, jobs, health):
         app.include_router(routes.router)
     return app
 

@@ -9,7 +9,16 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 
 from service.problems import MEDIA_TYPE
-from service.schemas import FieldOptions, IntrinsicsOptions, JobEvent, LocateOptions, Options, ProblemDetails, Scope
+from service.schemas import (
+    OPTIONS_PART,
+    FieldOptions,
+    IntrinsicsOptions,
+    JobEvent,
+    LocateOptions,
+    Options,
+    ProblemDetails,
+    Scope,
+)
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
 MODELS = (Options, IntrinsicsOptions, LocateOptions, FieldOptions, ProblemDetails)
@@ -55,6 +64,20 @@ def document_callback(app: FastAPI) -> None:
 def reference(model: type[BaseModel]) -> dict[str, str]:
     """A schema that points to one of `MODELS`."""
     return {"$ref": f"{SCHEMAS}{model.__name__}"}
+
+
+def frames_upload(options: type[BaseModel]) -> dict[str, Any]:
+    """The body of a route that takes frames of all cameras of a venue."""
+    schema = {
+        "type": "object",
+        "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part to send "
+        "several frames of a camera, they are fused.",
+        "properties": {OPTIONS_PART: reference(options)},
+        "additionalProperties": {"type": "array", "items": {"type": "string", "format": "binary"}},
+    }
+    encoding = {OPTIONS_PART: {"contentType": "application/json"}}
+    content = {"multipart/form-data": {"schema": schema, "encoding": encoding}}
+    return {"requestBody": {"required": True, "content": content}}
 
 
 def needs(scope: Scope) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime, timedelta
@@ -12,11 +13,12 @@ from fastapi import Request
 from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 
+from service import frames as border
 from service.context import Context
 from service.problems import Problem, invalid
 from service.routes.jobs import RETRY_AFTER_S
 from service.routes.venues import no_such_venue
-from service.schemas import OPTIONS_PART, Job
+from service.schemas import OPTIONS_PART, Job, Venue
 from service.store.jobs import (
     KeyReused,
     QueueFull,
@@ -66,6 +68,31 @@ def options_of(form: FormData, model: type[M]) -> M:
         raise invalid(error, OPTIONS_PART) from None
     except (ValueError, RecursionError):
         raise Problem("invalid-request", "The options part is not JSON.", errors=[]) from None
+
+
+def frames_of(venue: Venue, form: FormData, context: Context) -> dict[str, list[UploadFile]]:
+    """The frames of each camera of a venue, none of which may be missing."""
+    names = [name for name, _ in form.multi_items() if name != OPTIONS_PART]
+    border.check_cameras(venue, {name: names.count(name) for name in names}, context.settings)
+    files: dict[str, list[UploadFile]] = {camera.id: [] for camera in venue.cameras}
+    for name, part in form.multi_items():
+        if name == OPTIONS_PART:
+            continue
+        if not isinstance(part, UploadFile):
+            raise Problem("not-a-file", f"Send camera {name} as a file, with curl: -F {name}=@frame.jpg", camera=name)
+        files[name].append(part)
+    return files
+
+
+def checked(context: Context, venue: Venue, files: dict[str, list[UploadFile]], options: BaseModel) -> str:
+    """Let each frame pass the border; returns the hash of all that was sent."""
+    sent = hashlib.sha256(options.model_dump_json().encode())
+    for camera in venue.cameras:
+        for file in files[camera.id]:
+            data = file.file.read()
+            border.check(camera, data, context.settings)
+            sent.update(f"\n{camera.id} {hashlib.sha256(data).hexdigest()}".encode())
+    return sent.hexdigest()
 
 
 def enqueue_upload(

@@ -178,4 +178,4 @@ def test_outdated_poses_of_fisheyes_are_found_again_and_drawn():
     halfway = above[:, above.shape[1] // 2 - 2 : above.shape[1] // 2 + 3].max(axis=1)
     assert np.median(halfway[above.shape[0] // 8 : -above.shape[0] // 8].min(axis=1)) > 150
     assert preview(CROWNED, after, first).std() > 20
-    assert overlay(CROWNED, outdated[0], after[0], first["left"]).shape == first["left"].shape
+    assert overlay((CROWNED, outdated[0]), (CROWNED, after[0]), first["left"]).shape == first["left"].shape
