@@ -7,6 +7,10 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [
+    *(ROOT / folder / "README.md" for folder in (".", "models", "docker")),
+    ROOT / "CHANGELOG.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",
     ROOT / "models" / "README.md",

@@ -23,7 +23,7 @@ from worker.calibration.residuals import Unknowns, residuals
 from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 
 SPACING_M = 10.0
-SETTLING_STEPS, UNEVENNESS_STEPS = 6, 8
+SETTLING_STEPS, UNEVENNESS_STEPS = 3, 4
 """Per length: first for the poses, then with the unevenness of the ground as well."""
 ALIKE = 4.0
 """Lengths whose costs are this near to the least fit alike: two standard deviations."""
