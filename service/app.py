@@ -23,7 +23,7 @@ from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
 from service.readiness import Readiness
-from service.routes import calibrate, docs, documented, health, jobs, venues
+from service.routes import calibrate, docs, documented, field, health, intrinsics, jobs, locate, venues
 from service.settings import Settings
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.blobs import Blobs
@@ -66,7 +66,7 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_callback(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, calibrate, jobs, health, docs):
+    for routes in (venues, calibrate, intrinsics, locate, field, jobs, health, docs):
         app.include_router(routes.router)
     return app
 

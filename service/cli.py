@@ -24,7 +24,28 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service import lifeline, logs
 from service.client import Client, Refused
-from service.schemas import ID_PATTERN, FormatName, Job, JobError, Options, Result, Scope, VenueIn
+from service.schemas import (
+    ID_PATTERN,
+    CameraIn,
+    ClickedPoints,
+    FieldOptions,
+    FieldResult,
+    FormatName,
+    IntrinsicsOptions,
+    IntrinsicsResult,
+    Job,
+    JobError,
+    LensFile,
+    LensModel,
+    LocateResult,
+    Options,
+    PoseIn,
+    Result,
+    Scope,
+    Site,
+    Venue,
+    VenueIn,
+)
 from service.schemas import Progress as Step
 from service.settings import Settings
 
@@ -39,7 +60,9 @@ app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_comp
 venue_app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
 job_app = typer.Typer(no_args_is_help=True, help="Jobs of a running service.")
 key_app = typer.Typer(no_args_is_help=True, help="API keys, in the database of this machine's service.")
+field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue.")
 app.add_typer(venue_app, name="venue")
+app.add_typer(field_app, name="field")
 app.add_typer(job_app, name="job")
 app.add_typer(key_app, name="key")
 err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
@@ -148,9 +171,6 @@ def run(
     options: OptionsText = "{}",
 ) -> None:
     """The same calibration without a server. Exit codes as of `calibrate`."""
-    from service import frames as border
-    from service.problems import Problem
-
     settings, chosen = _settings(), _options(options)
     if chosen.callback_url is not None:
         err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")
@@ -159,26 +179,140 @@ def run(
     from worker import job
 
     stored = _checked(VenueIn, venue.read_text(), str(venue)).stored()
-    files = {camera: [path.read_bytes() for path in paths] for camera, paths in _files(frames).items()}
     if chosen.seed is None:
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
-    try:
-        border.check_cameras(stored, {camera: len(several) for camera, several in files.items()}, settings)
-        for camera in stored.cameras:
-            for data in files[camera.id]:
-                border.check(camera, data, settings)
-        with _bar() as show:
-            outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
-    except Problem as problem:
-        _fail(_in_words(problem.detail, problem.parts), FAILED)
-    except job.Failure as failure:
-        _fail(failure.error.detail, FAILED)
+    files = _checked_files(stored, frames, settings)
+    with _failure_told(), _bar() as show:
+        outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
     output.mkdir(parents=True, exist_ok=True)
     (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
     for name, picture in outcome.pictures.items():
         (output / f"{name}.jpg").write_bytes(picture)
     _print(outcome.result)
     raise typer.Exit(_gate(outcome.result))
+
+
+# Before the first calibration
+
+
+@field_app.command("fit")
+def fit_field(
+    venue: Annotated[str, typer.Argument(metavar="VENUE", help="A venue's file, or the id of one that is stored.")],
+    frames: Frames,
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the venue with its fitted field.")],
+    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Absent: one is chosen.")] = None,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Length, width and ridge of a pitch from frames of its cameras. Exit codes as of `calibrate`.
+
+    A venue's file is fitted here, a stored venue by its service. What is stored stays as it is until `venue put`.
+    """
+    options = FieldOptions(seed=secrets.randbelow(2**31) if seed is None else seed)
+    if Path(venue).is_file():
+        stored, result, drawn = _fit_here(Path(venue), frames, options)
+    else:
+        stored, result, drawn = _fit_there(venue, frames, options, url, api_key)
+    if pictures is not None:
+        pictures.mkdir(parents=True, exist_ok=True)
+        for name, picture in drawn.items():
+            (pictures / f"{name}.jpg").write_bytes(picture)
+    _print(result)
+    _tell_field(result)
+    if not result.accepted:
+        err.print(f"Rejected: {result.rejected_because}")
+        raise typer.Exit(REJECTED)
+    output.write_text(stored.with_field(result).sent().model_dump_json(indent=2, exclude_none=True) + "\n")
+
+
+@app.command()
+def intrinsics(
+    photos: Annotated[list[Path], typer.Argument(metavar="PHOTO...", exists=True, dir_okay=False)],
+    board: Annotated[str, typer.Option("--board", metavar="9x6", help="Inner corners, where four squares meet.")],
+    square: Annotated[float, typer.Option("--square", metavar="METRES", help="Side of a square.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the lens.")],
+    charuco: Annotated[
+        str | None, typer.Option("--charuco", metavar="4X4_50:0.022", help="Dictionary and side of a marker, m.")
+    ] = None,
+    model: Annotated[LensModel, typer.Option("--model", help="Of lens.")] = "opencv",
+    picture: Annotated[Path | None, typer.Option("--picture", help="Where the corners are: .jpg.")] = None,
+) -> None:
+    """The lens of a camera from photos of a board. Exit: 0 found (read the warnings), 1 not, 2 usage."""
+    from service import frames as border
+    from service.problems import Problem
+
+    settings = _settings()
+    options = _lens_options(board, square, charuco, model)
+    os.environ |= settings.native_environment
+    from worker import lensjob
+    from worker.outcome import Failure
+
+    files = {str(path): path.read_bytes() for path in photos}
+    try:
+        for name, data in files.items():
+            border.check_photo(name, data, settings)
+        with _bar() as show:
+            outcome = lensjob.solve(files, options, lambda step: show(step, ""))
+    except Problem as problem:
+        _fail(_in_words(problem.detail, problem.parts), FAILED)
+    except Failure as failure:
+        _fail(failure.error.detail, FAILED)
+    output.write_text(outcome.result.model_dump_json(indent=2) + "\n")
+    if picture is not None:
+        picture.write_bytes(outcome.pictures["coverage"])
+    _tell_lens(outcome.result)
+
+
+@app.command()
+def pose(
+    site: Annotated[Path, typer.Argument(metavar="SITE.json", exists=True, dir_okay=False, help="Id, name, field.")],
+    points: Annotated[
+        Path, typer.Argument(metavar="POINTS.json", exists=True, dir_okay=False, help="Clicked points by camera.")
+    ],
+    lenses: Annotated[list[str], typer.Argument(metavar="CAMERA=LENS.json...", help="As esc intrinsics writes it.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the venue, for venue put and run.")],
+    frame: Annotated[
+        list[str] | None, typer.Option("--frame", metavar="CAMERA=FILE", help="What the points were clicked in.")
+    ] = None,
+    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+) -> None:
+    """First poses of cameras from clicked points, as a venue. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
+    settings = _settings()
+    place = _checked(Site, site.read_text(), str(site))
+    clicks = _checked(ClickedPoints, points.read_text(), str(points)).root
+    given = {camera: _checked(LensFile, path.read_text(), str(path)) for camera, (path, *_) in _files(lenses).items()}
+    seen = {camera: path.read_bytes() for camera, (path, *_) in _files(frame or []).items()}
+    for camera in given.keys() - clicks.keys():
+        _fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
+    os.environ |= settings.native_environment
+    from worker import locatejob
+    from worker.outcome import Failure, lens_of
+
+    found = {camera.id: camera for camera in place.cameras}
+    results = []
+    for camera, lens in given.items():
+        engine_lens = lens_of(lens.intrinsics, lens.image_size)
+        try:
+            outcome = locatejob.locate(
+                camera, place.field, engine_lens, clicks[camera], seen.get(camera), lambda _: None
+            )
+        except Failure as failure:
+            _fail(failure.error.detail, FAILED)
+        result = outcome.result
+        results.append(result)
+        _tell_pose(result)
+        if pictures is not None:
+            pictures.mkdir(parents=True, exist_ok=True)
+            (pictures / f"points_{camera}.jpg").write_bytes(outcome.pictures["points"])
+        stands = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
+        if result.accepted:
+            found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
+    print(json.dumps([result.model_dump(mode="json") for result in results], indent=2))
+    if not all(result.accepted for result in results):
+        raise typer.Exit(REJECTED)
+    venue = VenueIn(id=place.id, name=place.name, field=place.field, cameras=list(found.values()))
+    output.write_text(venue.model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
 # Looking after venues and jobs
@@ -309,6 +443,125 @@ def remove_key(name: str, data: Data = None) -> None:
 # Parts
 
 
+def _fit_here(file: Path, frames: list[str], options: FieldOptions) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    settings = _settings()
+    os.environ |= settings.native_environment
+    from worker import fieldjob
+
+    stored = _checked(VenueIn, file.read_text(), str(file)).stored()
+    files = _checked_files(stored, frames, settings)
+    with _failure_told(), _bar() as show:
+        outcome = fieldjob.solve(stored, files, options, settings, lambda step: show(step, ""))
+    return stored, outcome.result, outcome.pictures
+
+
+def _fit_there(
+    venue: str, frames: list[str], options: FieldOptions, url: str, api_key: str | None
+) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    files = _files(frames)
+    if not re.fullmatch(ID_PATTERN, venue):
+        _fail(f"There is no file {venue}, and it is no id of a venue", USAGE)
+    with Client(url, api_key) as client:
+        stored = client.venue(venue)
+        job = client.fit_field(venue, files, options.model_dump(mode="json", exclude_unset=True))
+        with _bar() as show:
+            job = client.follow(job, lambda job: show(job.progress, _waiting(job)))
+        if not isinstance(job.result, FieldResult):
+            raise typer.Exit(_verdict(job))
+        drawn = {f"overlay_{camera.id}": client.picture(job, f"overlay/{camera.id}") for camera in stored.cameras}
+    return stored, job.result, {name: picture for name, picture in drawn.items() if picture is not None}
+
+
+def _checked_files(stored: Venue, frames: list[str], settings: Settings) -> dict[str, list[bytes]]:
+    """Frames by camera, as the service would let them in."""
+    from service import frames as border
+    from service.problems import Problem
+
+    files = {camera: [path.read_bytes() for path in paths] for camera, paths in _files(frames).items()}
+    try:
+        border.check_cameras(stored, {camera: len(several) for camera, several in files.items()}, settings)
+        for camera in stored.cameras:
+            for data in files[camera.id]:
+                border.check(camera, data, settings)
+    except Problem as problem:
+        _fail(_in_words(problem.detail, problem.parts), FAILED)
+    return files
+
+
+@contextmanager
+def _failure_told() -> Iterator[None]:
+    """What a job without a server fails of is a line."""
+    from worker.outcome import Failure
+
+    try:
+        yield
+    except Failure as failure:
+        _fail(failure.error.detail, FAILED)
+
+
+def _lens_options(board: str, square: float, charuco: str | None, model: LensModel) -> IntrinsicsOptions:
+    counted = re.fullmatch(r"(\d+)[x×](\d+)", board)
+    if counted is None:
+        _fail(f"{board!r} is not COLUMNSxROWS, for instance 9x6", USAGE)
+    described: dict[str, Any] = {"columns": int(counted[1]), "rows": int(counted[2]), "square_m": square}
+    if charuco is not None:
+        dictionary, _, marker = charuco.partition(":")
+        try:
+            described["charuco"] = {"dictionary": dictionary, "marker_m": float(marker)}
+        except ValueError:
+            _fail(f"{charuco!r} is not DICTIONARY:METRES, for instance 4X4_50:0.022", USAGE)
+    return _checked(IntrinsicsOptions, json.dumps({"board": described, "model": model}), "the board")
+
+
+def _tell_lens(result: IntrinsicsResult) -> None:
+    """What a person looks at first."""
+    used = sum(photo.fate == "used" for photo in result.photos)
+    err.print(
+        f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px"
+    )
+    (fx, _, cx), (_, fy, cy), _ = result.intrinsics.matrix
+    err.print(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
+    for photo in result.photos:
+        told = {
+            "used": None,
+            "no-board": "shows no board",
+            "wrong-size": "has another size",
+            "hurts": f"hurts: the others foretell it to {photo.left_out_px or 0:.1f} px only; left out",
+        }[photo.fate]
+        for words in (told, "is blurred" if photo.blurred else None):
+            if words:
+                err.print(f"  {photo.name} {words}")
+    for warning in result.warnings:
+        err.print(f"Warning: {warning}")
+
+
+def _tell_pose(result: LocateResult) -> None:
+    x, y, z = result.pose.position
+    err.print(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
+    for point in result.points:
+        if point.doubted:
+            off = "out of view" if point.residual_px is None else f"{point.residual_px:.0f} px off"
+            why = ""
+            if point.exchanged_with is not None:
+                why = f"; its label and that of {point.exchanged_with} are exchanged"
+            elif point.looks_like is not None:
+                why = f"; it is on {point.looks_like}"
+            err.print(f"  {point.world} is {off}{why}")
+    for warning in result.warnings:
+        err.print(f"  {warning[0].upper()}{warning[1:]}.")
+    if result.rejected_because is not None:
+        err.print(f"  Rejected: {result.rejected_because}")
+
+
+def _tell_field(result: FieldResult) -> None:
+    for measure in result.measures:
+        what = measure.name.removesuffix("_m").replace("_", " ")
+        if measure.known:
+            err.print(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m (given {measure.given:.3f})")
+        else:
+            err.print(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
+
+
 @contextmanager
 def _keys(data: Path | None) -> Iterator[Keys]:
     """The keys of the service whose folder or database the settings name."""
@@ -384,7 +637,7 @@ def _checked(model: type[M], text: str, source: str) -> M:
 
 
 def _verdict(job: Job) -> int:
-    if job.result is not None:
+    if isinstance(job.result, Result):
         return _gate(job.result)
     if job.status == "cancelled":
         err.print(f"Job {job.id} was cancelled before it had a result.")

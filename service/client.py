@@ -87,6 +87,21 @@ class Client:
         idempotency_key: str | None = None,
     ) -> Job:
         """Submit frames; the job may be an older one if the content is the same."""
+        return self._submit_frames(f"/venues/{venue_id}/calibrate", files, options, idempotency_key)
+
+    def fit_field(
+        self,
+        venue_id: str,
+        files: Mapping[str, Sequence[Path]],
+        options: Mapping[str, Any],
+        idempotency_key: str | None = None,
+    ) -> Job:
+        """Submit frames by which to fit the measures of a venue's pitch; the venue stays as it is."""
+        return self._submit_frames(f"/venues/{venue_id}/field/fit", files, options, idempotency_key)
+
+    def _submit_frames(
+        self, path: str, files: Mapping[str, Sequence[Path]], options: Mapping[str, Any], idempotency_key: str | None
+    ) -> Job:
         parts: list[tuple[str, tuple[str, bytes, str]]] = [
             (camera, (path.name, path.read_bytes(), "application/octet-stream"))
             for camera, several in files.items()
@@ -95,7 +110,7 @@ class Client:
         if options:
             parts.append(("options", ("options.json", json.dumps(options).encode(), "application/json")))
         headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
-        return Job.model_validate(self._json("POST", f"/venues/{venue_id}/calibrate", files=parts, headers=headers))
+        return Job.model_validate(self._json("POST", path, files=parts, headers=headers))
 
     def job(self, job_id: str, wait_s: float = 0) -> Job:
         """A job, at its end or after `wait_s`."""
@@ -119,6 +134,10 @@ class Client:
                     raise
                 time.sleep(every_s)
         return job
+
+    def picture(self, job: Job, name: str) -> bytes | None:
+        """A picture by the name of its link; None where the job made no such one."""
+        return self._answer("GET", job.links[name]).content if name in job.links else None
 
     def url_of(self, path: str) -> str:
         """The address of something the service linked to."""

@@ -12,6 +12,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from service.problems import Problem
 from service.schemas import Camera, Venue
@@ -52,40 +53,8 @@ def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -
 
 def check(camera: Camera, data: bytes, settings: Settings) -> None:
     """One frame: an entire JPEG or PNG of the camera's size."""
-    name = camera.id
-    if not data:
-        raise Problem("empty-frame", f"The file of camera {name} is empty; was it still being written?", camera=name)
-    if len(data) > settings.max_frame_mb * 1e6:
-        raise Problem(
-            "frame-too-large",
-            f"Send camera {name} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
-            camera=name,
-        )
-    if not data.startswith((JPEG_START, PNG_START)):
-        raise Problem("not-an-image", f"Send camera {name} as JPEG or PNG.", camera=name)
-    try:
-        outline = _jpeg(data) if data.startswith(JPEG_START) else _png(data)
-    except (struct.error, IndexError, ValueError):
-        raise Problem("broken-image", f"The file of camera {name} is damaged; grab it again.", camera=name) from None
-    _check_size(camera, outline.size, settings)
-    if not outline.whole:
-        raise Problem(
-            "truncated-image",
-            f"The file of camera {name} ends before its picture does; was it still being written?",
-            camera=name,
-        )
-
-
-def _check_size(camera: Camera, size: list[int], settings: Settings) -> None:
-    (width, height), wanted = size, camera.image_size
-    if width * height > settings.max_frame_pixels:
-        raise Problem(
-            "too-many-pixels",
-            f"The frame of camera {camera.id} has {width}x{height} pixels; {settings.max_frame_pixels} are allowed.",
-            camera=camera.id,
-            expected=wanted,
-            got=size,
-        )
+    size = _size_of_whole_picture(f"camera {camera.id}", data, settings, camera=camera.id)
+    wanted = camera.image_size
     if size != wanted:
         raise Problem(
             "frame-size",
@@ -94,6 +63,45 @@ def _check_size(camera: Camera, size: list[int], settings: Settings) -> None:
             expected=wanted,
             got=size,
         )
+
+
+def check_photo(name: str, data: bytes, settings: Settings) -> None:
+    """One photo of a board: an entire JPEG or PNG of any size."""
+    _size_of_whole_picture(f"photo {name}", data, settings, photo=name)
+
+
+def _size_of_whole_picture(subject: str, data: bytes, settings: Settings, **parts: Any) -> list[int]:
+    """Width and height of a picture that is all there; `subject` and `parts` name it in a problem."""
+    if not data:
+        raise Problem("empty-frame", f"The file of {subject} is empty; was it still being written?", **parts)
+    if len(data) > settings.max_frame_mb * 1e6:
+        raise Problem(
+            "frame-too-large",
+            f"Send {subject} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
+            **parts,
+        )
+    if not data.startswith((JPEG_START, PNG_START)):
+        raise Problem("not-an-image", f"Send {subject} as JPEG or PNG.", **parts)
+    try:
+        outline = _jpeg(data) if data.startswith(JPEG_START) else _png(data)
+    except (struct.error, IndexError, ValueError):
+        raise Problem("broken-image", f"The file of {subject} is damaged; grab it again.", **parts) from None
+    width, height = outline.size
+    if width * height > settings.max_frame_pixels:
+        raise Problem(
+            "too-many-pixels",
+            f"The picture of {subject} has {width}x{height} pixels; {settings.max_frame_pixels} are allowed.",
+            **parts,
+            expected=settings.max_frame_pixels,
+            got=outline.size,
+        )
+    if not outline.whole:
+        raise Problem(
+            "truncated-image",
+            f"The file of {subject} ends before its picture does; was it still being written?",
+            **parts,
+        )
+    return outline.size
 
 
 @dataclass(frozen=True)

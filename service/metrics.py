@@ -20,7 +20,7 @@ from service.store.deliveries import CALLBACKS
 from service.store.engine import AWAY
 from service.store.figures import Figures, VenueQuality, WorkerSeen
 from service.store.jobs import PRIORITIES
-from service.store.outcomes import ENDED, OUTCOMES, RESTARTS, STAGES
+from service.store.outcomes import ENDED, OTHER_OUTCOMES, OTHERS_ENDED, OUTCOMES, RESTARTS, STAGES
 from service.store.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Buckets, Key
 
 log = structlog.get_logger()
@@ -97,16 +97,24 @@ def _queue(figures: Figures) -> Iterator[Metric]:
 
 
 def _jobs(tallies: Mapping[Key, float]) -> Iterator[Metric]:
-    ended = CounterMetricFamily("esc_jobs_ended", "Jobs by their end.", labels=["status", "verdict", "error"])
+    ended = CounterMetricFamily("esc_jobs_ended", "Calibrations by their end.", labels=["status", "verdict", "error"])
     for outcome in OUTCOMES:
         ended.add_metric(outcome, tallies.get((ENDED, outcome), 0))
     yield ended
+    others = CounterMetricFamily(
+        "esc_other_jobs_ended", "Jobs of other kinds than calibrations by their end.", labels=["kind", "status"]
+    )
+    for other in OTHER_OUTCOMES:
+        others.add_metric(other, tallies.get((OTHERS_ENDED, other), 0))
+    yield others
     restarts = tallies.get((RESTARTS, ()), 0)
     yield CounterMetricFamily(
         "esc_job_restarts", "Attempts after a job's first: its worker died or was stopped.", value=restarts
     )
-    yield _histogram("esc_job_wait_seconds", "From submission to the first attempt.", WAIT, tallies)
-    yield _histogram("esc_job_duration_seconds", "From the first attempt to the end.", DURATION, tallies)
+    yield _histogram("esc_job_wait_seconds", "Of calibrations, from submission to the first attempt.", WAIT, tallies)
+    yield _histogram(
+        "esc_job_duration_seconds", "Of calibrations, from the first attempt to the end.", DURATION, tallies
+    )
     stages = HistogramMetricFamily("esc_job_stage_duration_seconds", "Of jobs with a result.", labels=["stage"])
     for stage in STAGES:
         stages.add_metric([stage], *STAGE.read(tallies, stage))

@@ -55,6 +55,7 @@ KINDS: dict[str, Kind] = {
     "venue-id-mismatch": Kind(422, "The venue's id differs from the address"),
     "venue-changed": Kind(412, "The venue is not the one the request expects"),
     "venue-replaced": Kind(409, "The venue was changed during the upload"),
+    "no-such-camera": Kind(404, "The venue has no camera of this id"),
     "venue-busy": Kind(409, "The venue has an active job"),
     # Frames.
     "unknown-camera": Kind(422, "The venue has no such camera"),
@@ -71,6 +72,13 @@ KINDS: dict[str, Kind] = {
     # Formats of poses.
     "format-cannot-hold": Kind(422, "The format cannot hold this camera"),
     "camera-needed": Kind(422, "The format holds one camera"),
+    # Lenses and first poses.
+    "too-many-photos": Kind(422, "Too many photos"),
+    "missing-photos": Kind(422, "There are no photos"),
+    "no-lens": Kind(422, "The photos cannot fix a lens"),
+    "unknown-landmark": Kind(422, "The pitch has no such point"),
+    "no-pose": Kind(422, "The points cannot fix a pose"),
+    "no-field-fit": Kind(422, "The field has lines that no measure can be fitted to"),
     # Jobs.
     "poses-not-found": Kind(404, "The job has no poses"),
     "job-not-found": Kind(404, "There is no such job"),

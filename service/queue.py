@@ -18,6 +18,8 @@ from service.store.engine import postgresql
 
 APPLICATION = "esc"
 QUEUE = "calibration"
+# For what takes a second and somebody waits for: it does not stand behind a calibration.
+LIGHT_QUEUE = "light"
 WORKFLOW = "calibrate"
 # The engine's default is a hash of the source; after a deployment the jobs of the old version would never be begun.
 VERSION = "1"
@@ -64,9 +66,16 @@ class Queue:
 
     def enqueue(self, connection: sa.Connection, job_id: str, priority: int) -> None:
         """Put a job in, when and if the caller's transaction commits. A smaller `priority` goes first."""
+        self._enqueue(connection, QUEUE, job_id, priority)
+
+    def enqueue_light(self, connection: sa.Connection, job_id: str, priority: int) -> None:
+        """The same for a job that takes a second: it is computed beside calibrations."""
+        self._enqueue(connection, LIGHT_QUEUE, job_id, priority)
+
+    def _enqueue(self, connection: sa.Connection, queue: str, job_id: str, priority: int) -> None:
         self._client.enqueue_in_transaction(
             connection,
-            {"workflow_name": WORKFLOW, "queue_name": QUEUE, "workflow_id": job_id, "priority": priority},
+            {"workflow_name": WORKFLOW, "queue_name": queue, "workflow_id": job_id, "priority": priority},
             job_id,
         )
 
@@ -98,12 +107,10 @@ class WorkerQueue:
     def start(self) -> None:
         """Begin with what this worker left behind, then take from the queue."""
         DBOS.launch()
-        DBOS.register_queue(
-            QUEUE,
-            worker_concurrency=self._jobs_at_once,
-            polling_interval_sec=POLL_S,
-            on_conflict="always_update",
-        )
+        for queue, at_once in ((QUEUE, self._jobs_at_once), (LIGHT_QUEUE, 1)):
+            DBOS.register_queue(
+                queue, worker_concurrency=at_once, polling_interval_sec=POLL_S, on_conflict="always_update"
+            )
 
     def take_over(self, dead_workers: Collection[str]) -> None:
         """Put the jobs of dead workers back into the queue. Private to the engine: its version is pinned exactly."""

@@ -18,6 +18,7 @@ from pydantic import (
     Discriminator,
     Field,
     HttpUrl,
+    RootModel,
     StringConstraints,
     Tag,
     ValidationInfo,
@@ -31,7 +32,10 @@ from fields.template import NAMES, Extent, Template, load
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
 OPTIONS_PART = "options"
-DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+PHOTOS_PART = "photos"
+CHARUCO_PATTERN = r"^((4X4|5X5|6X6|7X7)_(50|100|250|1000)|ARUCO_ORIGINAL|APRILTAG_(16h5|25h9|36h10|36h11))$"
+LensModel = Literal["opencv", "fisheye"]
+DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
 LARGEST_SIDE = 16384
 
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
@@ -117,9 +121,10 @@ def rotated(rotation: list[float], vector: list[float]) -> list[float]:
 class Intrinsics(Wire):
     """The lens: OpenCV's camera matrix in pixels and its distortion coefficients in OpenCV's order."""
 
+    model: LensModel = Field("opencv", description="`fisheye`: OpenCV's fisheye module (Kannala-Brandt).")
     matrix: Annotated[list[Row], Field(min_length=3, max_length=3)]
     distortion: Annotated[list[Annotated[Number, Field(ge=-1000, le=1000)]], Field(max_length=14)] = Field(
-        description="0, 4, 5, 8, 12 or 14 numbers."
+        description="0, 4, 5, 8, 12 or 14 numbers; of a fisheye 0 or 4."
     )
 
     @model_validator(mode="after")
@@ -129,8 +134,10 @@ class Intrinsics(Wire):
             raise ValueError("matrix must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]")
         if fx <= 0 or fy <= 0:
             raise ValueError("focal lengths must be above 0 pixels")
-        if len(self.distortion) not in DISTORTION_LENGTHS:
-            raise ValueError("distortion must have 0, 4, 5, 8, 12 or 14 numbers")
+        if len(self.distortion) not in DISTORTION_LENGTHS[self.model]:
+            *most, last_length = DISTORTION_LENGTHS[self.model]
+            expected = f"{', '.join(map(str, most))} or {last_length}"
+            raise ValueError(f"distortion must have {expected} numbers with the model {self.model}")
         return self
 
 
@@ -380,6 +387,19 @@ class _Place(Wire):
     field: FieldOfPlay
 
 
+class LensFile(BaseModel):
+    """The part of the file of a lens, as `esc intrinsics` writes it, that a camera needs."""
+
+    image_size: Annotated[list[Side], Field(min_length=2, max_length=2)]
+    intrinsics: Intrinsics
+
+
+class Site(_Place):
+    """The file of a venue before its cameras have poses: the pitch, and the cameras that are known."""
+
+    cameras: list[CameraIn] = []
+
+
 class VenueIn(_Place):
     """A venue as it is sent."""
 
@@ -434,6 +454,24 @@ class Venue(_Place):
         ]
         field = self.field if result.ridge is None else self.field.model_copy(update={"ridge": result.ridge})
         return self.model_copy(update={"cameras": cameras, "field": field})
+
+    def with_field(self, result: FieldResult) -> Venue:
+        """The same venue as an accepted field fit found it: the pitch, and the poses around it."""
+        poses = {camera.id: camera.pose for camera in result.cameras}
+        return self.with_poses(poses).model_copy(update={"field": result.field})
+
+    def sent(self) -> VenueIn:
+        """The venue as one sends it."""
+        cameras = [
+            CameraIn(
+                id=c.id,
+                image_size=c.image_size,
+                intrinsics=c.intrinsics,
+                pose=PoseIn(rotation=c.pose.rotation, position=c.pose.position),
+            )
+            for c in self.cameras
+        ]
+        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras)
 
     def calibrates_like(self, other: Venue) -> bool:
         """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
@@ -496,10 +534,95 @@ class Options(Wire):
         return self
 
 
+class _Handling(Wire):
+    """How a job is to be treated, whatever it computes."""
+
+    priority: Literal["live", "routine"] = "routine"
+    timeout_s: Annotated[Number, Field(ge=1, le=3600)] | None = Field(None, description="Absent: the service's.")
+    callback_url: CallbackUrl | None = Field(None, description="Told of the job's end, signed (Standard Webhooks).")
+
+
+class Charuco(Wire):
+    """What a ChArUco board has beside its squares."""
+
+    dictionary: Annotated[str, StringConstraints(pattern=CHARUCO_PATTERN)] = Field(
+        description="OpenCV's name without DICT_, for instance 4X4_50."
+    )
+    marker_m: Annotated[Number, Field(gt=0, le=10)] = Field(description="Side of a marker, m.")
+
+
+class Board(Wire):
+    """A chessboard or ChArUco board: columns and rows are its inner corners, where four squares meet."""
+
+    columns: Annotated[Whole, Field(ge=3, le=100)]
+    rows: Annotated[Whole, Field(ge=3, le=100)]
+    square_m: Annotated[Number, Field(gt=0, le=10)] = Field(description="Side of a square, m.")
+    charuco: Charuco | None = None
+
+    @model_validator(mode="after")
+    def _markers_in_squares(self) -> Self:
+        if self.charuco is not None and self.charuco.marker_m >= self.square_m:
+            raise ValueError("marker_m must be below square_m: a marker lies inside a square")
+        return self
+
+
+class IntrinsicsOptions(_Handling):
+    """What photos show, and which lens to look for."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"board": {"columns": 9, "rows": 6, "square_m": 0.03}}]})
+
+    board: Board
+    model: LensModel = "opencv"
+
+
+Coordinates = Annotated[list[Metres], Field(min_length=2, max_length=3)]
+Landmark = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+
+
+class ClickedPoint(Wire):
+    """A point of the pitch in a camera's picture: its name or [x, y] or [x, y, z] in metres, and its pixel."""
+
+    world: Landmark | Coordinates
+    pixel: Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class ClickedPoints(RootModel[dict[Id, Annotated[list[ClickedPoint], Field(min_length=4, max_length=500)]]]):
+    """A file of clicked points, by camera."""
+
+
+class LocateOptions(_Handling):
+    """Points of the pitch that somebody clicked in the picture of a camera."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "points": [
+                        {"world": "left near corner", "pixel": [128.3, 1141.1]},
+                        {"world": "left penalty area, near corner", "pixel": [939.6, 1053.9]},
+                        {"world": "left penalty area, far corner", "pixel": [1771.6, 813.2]},
+                        {"world": [0.0, 0.0], "pixel": [2796.7, 876.0]},
+                    ]
+                }
+            ]
+        }
+    )
+
+    points: Annotated[list[ClickedPoint], Field(min_length=4, max_length=500)]
+
+
+class FieldOptions(_Handling):
+    """How the measures of a pitch are to be fitted; everything is optional."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"seed": 7}]})
+
+    seed: Annotated[Whole, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
+
+
 class Progress(Wire):
     """How far a running job has come: `fraction` 0..1 of the whole."""
 
-    stage: Literal["segmentation", "evolution", "refinement", "preview"]
+    stage: Literal["segmentation", "evolution", "refinement", "preview", "detection", "fit"]
     fraction: float = Field(ge=0, le=1)
     generation: int | None = None
     loss: float | None = None
@@ -573,6 +696,140 @@ class Result(Wire):
     provenance: Provenance
 
 
+class PhotoResult(Wire):
+    """What became of a photo. `left_out_px`: how well a lens that was fitted without it foretells its corners (rms)."""
+
+    name: str
+    fate: Literal["used", "no-board", "wrong-size", "hurts"]
+    rms_px: float | None
+    left_out_px: float | None
+    blurred: bool
+
+
+class CoverageResult(Wire):
+    """How much of the picture the board reached; `empty`: the ninths of it without any corner."""
+
+    share: float
+    empty: list[str]
+
+
+class LensTrial(Wire):
+    """A lens that was tried, by its free numbers; rms of the photos it was fitted to and of those it was not."""
+
+    terms: list[str]
+    rms_px: float
+    left_out_px: float
+
+
+class IntrinsicsResult(Wire):
+    """A lens from photos of a board, and what it is worth.
+
+    `sigma`: one standard deviation of each number if every corner were an independent witness; `spread`: by leaving
+    out photos, which is nearer to the truth. `warnings` say what to photograph next.
+    """
+
+    image_size: list[int]
+    intrinsics: Intrinsics
+    terms: list[str]
+    rms_px: float
+    left_out_px: float
+    sigma: dict[str, float]
+    spread: dict[str, float]
+    coverage: CoverageResult
+    photos: list[PhotoResult]
+    trials: list[LensTrial]
+    warnings: list[str]
+    timings_s: dict[str, float]
+    software: str
+
+
+class PointResult(Wire):
+    """What became of a click. `exchanged_with`: the point whose label explains it, and it theirs.
+
+    `looks_like`: the named point it is on instead. `residual_px`: null where the camera cannot see its point.
+    """
+
+    world: Landmark | Coordinates
+    residual_px: float | None
+    doubted: bool
+    exchanged_with: Landmark | Coordinates | None
+    looks_like: str | None
+
+
+class LensGain(Wire):
+    """Numbers of the lens that were fitted to the points because the one given does not fit them.
+
+    `left_out_px`: rms of points, each where a fit to the others puts it. `evidence`: the gain in BIC; 10 is strong.
+    """
+
+    given: Intrinsics
+    free: list[str]
+    sigma: dict[str, float]
+    rms_before_px: float
+    rms_px: float
+    left_out_before_px: float
+    left_out_px: float
+    evidence: float
+
+
+class LocateSigma(Wire):
+    """One standard deviation of a first pose; `pixels`: of where it puts the clicked points."""
+
+    rotation_deg: float
+    position_m: float
+    pixels: float
+
+
+class LocateResult(Wire):
+    """A first pose. `accepted`: a calibration can begin with it; `intrinsics` are those that it holds with."""
+
+    accepted: bool
+    rejected_because: str | None
+    camera: Id
+    image_size: list[int]
+    intrinsics: Intrinsics
+    pose: Pose
+    rms_px: float
+    sigma: LocateSigma
+    points: list[PointResult]
+    lens: LensGain | None
+    warnings: list[str]
+    timings_s: dict[str, float]
+    software: str
+
+
+class MeasureResult(Wire):
+    """A measure of the pitch, metres: as the venue has it (`given`) and as the lines have it (`value` ± `sigma`).
+
+    `open`: one standard deviation of what it might have been before. `known`: whether the lines tell it; if not,
+    `detail` says why, and the fitted field keeps what was given.
+    """
+
+    name: Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"]
+    given: float
+    value: float
+    sigma: float
+    open: float
+    known: bool
+    detail: str
+
+
+class FieldResult(Wire):
+    """A pitch with the measures that its lines tell, and the cameras as they stand around it.
+
+    `accepted`: it may replace the one that the venue has; nothing is replaced by itself.
+    """
+
+    accepted: bool
+    rejected_because: str | None
+    field: FieldOfPlay
+    measures: list[MeasureResult]
+    cameras: list[CameraResult]
+    stitch_error_px: float | None
+    timings_s: dict[str, float]
+    provenance: Provenance
+
+
 class JobError(Wire):
     """Why a job failed: the members of a problem (RFC 9457)."""
 
@@ -597,18 +854,20 @@ FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccer
 # What a key allows; each one includes those before it.
 Scope = Literal["read", "calibrate", "admin"]
 
+Kind = Literal["calibration", "intrinsics", "locate", "field"]
 Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 OPEN: tuple[Status, ...] = ("queued", "running")
 
 
 class Job(Wire):
-    """A calibration: its state, how far it is, and in the end its result or its error."""
+    """What a worker computes: its state, how far it is, and in the end its result, of its kind, or its error."""
 
     model_config = ConfigDict(
         json_schema_extra={
             "examples": [
                 {
                     "id": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
+                    "kind": "calibration",
                     "venue": "tsukuba",
                     "status": "running",
                     "progress": {"stage": "evolution", "fraction": 0.42, "generation": 37, "loss": 0.31},
@@ -627,7 +886,8 @@ class Job(Wire):
     )
 
     id: str
-    venue: str
+    kind: Kind = "calibration"
+    venue: str | None = Field(description="Null for the intrinsics of a lens, which belong to no venue.")
     status: Status
     progress: Progress | None
     queue_position: int | None = Field(description="1 = next; null unless queued.")
@@ -636,7 +896,7 @@ class Job(Wire):
     started_at: datetime | None
     finished_at: datetime | None
     error: JobError | None
-    result: Result | None
+    result: Result | IntrinsicsResult | LocateResult | FieldResult | None
     callback: CallbackState | None = Field(
         None, description="Null before the end, without `callback_url`, and in what a `callback_url` gets."
     )

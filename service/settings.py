@@ -63,6 +63,7 @@ class Settings(BaseSettings):
     request_timeout_s: float = Field(
         600, gt=0, description="A body must have arrived, an answer be taken, within this."
     )
+    max_photos: int = Field(100, ge=1, description="Photos of a board in one request.")
     queue_limit: int = Field(100, ge=1, description="Jobs that may wait; more are answered with 429.")
 
     # Poses in other formats.

@@ -1,4 +1,4 @@
-"""One job, in a process of its own: load, calibrate, draw, hand back.
+"""One job, in a process of its own: load, compute what its kind asks for, draw, hand back.
 
 `python -m worker.job JOB_ID RUN_TOKEN` prints a line of JSON for each step of progress and one for the end, a
 `worker.message.Message` each. It writes no row: its parent does.
@@ -10,53 +10,53 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
-from math import isfinite
-from typing import Any
 
 import cv2
-import numpy as np
 import structlog
-from numpy.typing import NDArray
 
 from service import lifeline, logs, schemas
-from service.problems import KINDS, first_line, type_of
-from service.schemas import CameraResult, JobError, Moved, Progress, Provenance, Result, Sigma, Venue
+from service.problems import first_line
+from service.schemas import (
+    FieldOptions,
+    FieldResult,
+    IntrinsicsOptions,
+    IntrinsicsResult,
+    LocateOptions,
+    LocateResult,
+    Progress,
+    Provenance,
+    Result,
+    Venue,
+)
 from service.settings import Settings
 from service.store.blobs import AWAY, Blobs
 from service.store.engine import connect
 from service.store.jobs import Jobs, Task, picture_folder
+from worker import fieldjob, lensjob, locatejob
 from worker.calibration import calibrate as engine
-from worker.calibration import quality, stitching
+from worker.calibration import stitching
 from worker.calibration.calibrate import CalibrationError, calibrate
-from worker.calibration.camera import Camera, Intrinsics, Pose
+from worker.calibration.camera import Camera
 from worker.calibration.field import Field
-from worker.calibration.segmentation import ProviderMissing, Segmenter
 from worker.message import Message
+from worker.outcome import (
+    PREVIEW_FRACTION,
+    Failure,
+    Outcome,
+    Picture,
+    camera_of,
+    decoded_frame,
+    jpeg,
+    number,
+    pitch_of,
+    segmenter_of,
+    wire_camera,
+    wire_lens,
+    wire_progress,
+)
 
-Picture = NDArray[np.uint8]
-JPEG_QUALITY = 90
-PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
-# The engine's report ends with the refinement; what is left is drawing.
-PREVIEW_FRACTION = 0.96
 log = structlog.get_logger()
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A result and its pictures, JPEG by name: `preview`, `birdseye`, `overlay_<camera>`."""
-
-    result: Result
-    pictures: dict[str, bytes]
-
-
-class Failure(Exception):  # noqa: N818
-    """The job has no result; `error` says why."""
-
-    def __init__(self, kind: str, detail: str, camera: str | None = None) -> None:
-        super().__init__(detail)
-        self.error = JobError(type=type_of(kind), title=KINDS[kind].title, detail=detail, camera=camera)
 
 
 def main(job_id: str, run_token: str) -> None:
@@ -72,18 +72,32 @@ def main(job_id: str, run_token: str) -> None:
     structlog.contextvars.bind_contextvars(**task.origin.names())
     blobs = Blobs(settings.home_blob_url)
     try:
-        outcome = solve(
-            task.venue,
-            _load(task, blobs),
-            task.options,
-            settings,
-            lambda progress: say(Message(progress=progress)),
-        )
+        outcome = _compute(task, _load(task, blobs), settings, lambda progress: say(Message(progress=progress)))
         _store(task, blobs, outcome.pictures)
     except Failure as failure:
         say(Message(error=failure.error))
         return
     say(Message(result=outcome.result, pictures=list(outcome.pictures)))
+
+
+def _compute(
+    task: Task, files: Mapping[str, Sequence[bytes]], settings: Settings, report: Callable[[Progress], None]
+) -> Outcome[Result | IntrinsicsResult | LocateResult | FieldResult]:
+    """What the kind of the job asks for."""
+    cv2.setNumThreads(settings.threads)
+    match task.options:
+        case IntrinsicsOptions() as options:
+            return lensjob.solve({name: photo for name, (photo,) in files.items()}, options, report)
+        case LocateOptions() as options:
+            assert task.venue is not None
+            ((camera, frames),) = files.items()
+            return locatejob.solve(task.venue, camera, options, next(iter(frames), None), report)
+        case FieldOptions() as options:
+            assert task.venue is not None
+            return fieldjob.solve(task.venue, files, options, settings, report)
+        case options:
+            assert task.venue is not None
+            return solve(task.venue, files, options, settings, report)
 
 
 def solve(
@@ -92,25 +106,23 @@ def solve(
     options: schemas.Options,
     settings: Settings,
     report: Callable[[Progress], None],
-) -> Outcome:
+) -> Outcome[Result]:
     """Calibrate a venue from the files of its cameras, with or without a server around it."""
-    if not settings.model.is_file():
-        raise Failure("model-missing", f"{settings.model} is not there; set ESC_MODEL or train one.")
+    segmenter = segmenter_of(settings)
     cv2.setNumThreads(settings.threads)
     begun = time.perf_counter()
-    frames = {camera.id: _decode(camera, files[camera.id]) for camera in venue.cameras}
+    frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
     decoded = time.perf_counter()
-    pitch, cameras = _pitch(venue.field), [_camera(camera) for camera in venue.cameras]
-    segmenter = _segmenter(settings)
+    pitch, cameras = pitch_of(venue.field), [camera_of(camera) for camera in venue.cameras]
     try:
         found = calibrate(
-            pitch, cameras, frames, segmenter, _engine_options(options), lambda step: report(_progress(step))
+            pitch, cameras, frames, segmenter, _engine_options(options), lambda step: report(wire_progress(step))
         )
     except CalibrationError as error:
         raise Failure(error.kind, error.detail, error.camera) from error
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
     drawing = time.perf_counter()
-    pictures = _draw(cameras, found, frames)
+    pictures = _draw(pitch, cameras, found, frames)
     timings = {
         "decode": decoded - begun,
         **found.timings_s,
@@ -124,13 +136,6 @@ def solve(
         options=options.model_dump(mode="json", exclude={"callback_url"}),
     )
     return Outcome(_result(found, options, timings, provenance), pictures)
-
-
-def _segmenter(settings: Settings) -> Segmenter:
-    try:
-        return Segmenter(settings.model, settings.threads, PROVIDERS[settings.provider])
-    except ProviderMissing as missing:
-        raise Failure("provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for.") from missing
 
 
 def _line_to_parent() -> Callable[[Message], None]:
@@ -167,46 +172,6 @@ def _store(task: Task, blobs: Blobs, pictures: Mapping[str, bytes]) -> None:
             raise Failure("job-crashed", f"Its pictures cannot be stored: {first_line(error)}") from error
 
 
-def _decode(camera: schemas.Camera, files: Sequence[bytes]) -> list[Picture]:
-    """BGR frames (height, width, 3) of the size of the intrinsics; a camera's EXIF orientation is not obeyed."""
-    frames = []
-    for file in files:
-        try:
-            frame = cv2.imdecode(
-                np.frombuffer(file, dtype=np.uint8), cv2.IMREAD_COLOR_BGR | cv2.IMREAD_IGNORE_ORIENTATION
-            )
-        except cv2.error:
-            frame = None
-        if frame is None:
-            raise Failure("broken-image", f"A frame of camera {camera.id} cannot be decoded; grab it again.", camera.id)
-        (height, width), wanted = frame.shape[:2], camera.image_size
-        if [width, height] != wanted:
-            raise Failure(
-                "frame-size",
-                f"A frame of camera {camera.id} decodes to {width}x{height} pixels; its intrinsics are for "
-                f"{wanted[0]}x{wanted[1]}.",
-                camera.id,
-            )
-        frames.append(np.asarray(frame, dtype=np.uint8))
-    return frames
-
-
-def _pitch(field: schemas.FieldOfPlay) -> Field:
-    ridge = None if field.ridge is None else np.array(field.ridge)
-    return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
-
-
-def _camera(camera: schemas.Camera) -> Camera:
-    pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
-    return Camera(camera.id, intrinsics(camera), pose)
-
-
-def intrinsics(camera: schemas.Camera) -> Intrinsics:
-    """The lens of a camera of a venue, for the engine."""
-    lens, (width, height) = camera.intrinsics, camera.image_size
-    return Intrinsics(np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float), (width, height))
-
-
 def _engine_options(options: schemas.Options) -> engine.Options:
     given = options.model_dump(
         include={
@@ -225,16 +190,8 @@ def _engine_options(options: schemas.Options) -> engine.Options:
     return engine.Options(**given)
 
 
-def _progress(step: engine.Progress) -> Progress:
-    return Progress(
-        stage=step.stage,
-        fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
-        generation=step.generation,
-        loss=_number(step.loss),
-    )
-
-
 def _draw(
+    pitch: Field,
     before: Sequence[Camera],
     found: engine.Calibration,
     frames: Mapping[str, Sequence[Picture]],
@@ -247,20 +204,15 @@ def _draw(
     }
     for old, new in zip(before, after, strict=True):
         drawn[f"overlay_{old.id}"] = lambda old=old, new=new: stitching.overlay(  # type: ignore[misc]
-            found.pitch, old, new, first[old.id]
+            (pitch, old), (found.pitch, new), first[old.id]
         )
     pictures = {}
     for name, draw in drawn.items():
         try:
-            pictures[name] = _jpeg(draw())
+            pictures[name] = jpeg(draw())
         except Exception:  # poses that were rejected may look anywhere; a picture is not worth losing the reason
             log.warning("cannot draw", picture=name, exc_info=True)
     return pictures
-
-
-def _jpeg(picture: Picture) -> bytes:
-    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return data.tobytes()
 
 
 def _result(
@@ -270,51 +222,19 @@ def _result(
     return Result(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
-        cameras=[_camera_result(camera, options) for camera in found.cameras],
+        cameras=[
+            wire_camera(camera, wire_lens(camera.intrinsics) if options.fit_focal_length else None)
+            for camera in found.cameras
+        ],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
         diagnosis=[schemas.Suspicion(**vars(suspicion)) for suspicion in found.suspicions],
-        stitch_error_px=_number(found.stitch_error_px),
-        stitch_error_before_px=_number(found.stitch_error_before_px),
-        loss=_number(found.loss),
+        stitch_error_px=number(found.stitch_error_px),
+        stitch_error_before_px=number(found.stitch_error_before_px),
+        loss=number(found.loss),
         generations=found.generations,
         timings_s={stage: round(seconds, 3) for stage, seconds in timings_s.items()},
         provenance=provenance,
     )
-
-
-def _camera_result(camera: engine.CameraResult, options: schemas.Options) -> CameraResult:
-    lens = camera.intrinsics
-    return CameraResult(
-        id=camera.id,
-        pose=schemas.Pose(
-            rotation=camera.pose.rotation.tolist(),
-            position=camera.pose.position.tolist(),
-            translation=camera.pose.translation.tolist(),
-        ),
-        intrinsics=schemas.Intrinsics(matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
-        if options.fit_focal_length
-        else None,
-        sigma=_sigma(camera.sigma),
-        repeatability=_sigma(camera.repeatability),
-        moved=Moved(
-            rotation_deg=camera.moved.rotation_deg,
-            position_m=camera.moved.position_m,
-            pixels=_number(camera.moved.pixels),
-        ),
-        iou=_number(camera.iou),
-        residual_px=_number(camera.residual_px),
-    )
-
-
-def _sigma(sigma: quality.Sigma | None) -> Sigma | None:
-    if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
-        return None
-    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)
-
-
-def _number(value: Any) -> float | None:
-    """JSON has no NaN and no infinity."""
-    return float(value) if value is not None and isfinite(value) else None
 
 
 if __name__ == "__main__":

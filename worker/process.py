@@ -156,7 +156,7 @@ class Worker:
             return
         limit_s = task.options.timeout_s or self._settings.job_timeout_s
         with structlog.contextvars.bound_contextvars(job=job_id, **task.origin.names()), Spans(task) as spans:
-            log.info("job begins", venue=task.venue.id)
+            log.info("job begins", kind=task.kind, venue=task.venue.id if task.venue else None)
             try:
                 end = self._compute(task, limit_s, spans)
                 spans.end(end)

@@ -10,6 +10,7 @@ from opentelemetry import trace
 from opentelemetry.trace import Span, SpanKind, StatusCode
 
 from service import tracing
+from service.schemas import IntrinsicsResult
 from service.store.jobs import Task
 from worker.message import Message
 
@@ -30,9 +31,11 @@ class Spans:
     def __enter__(self) -> Self:
         of: dict[str, str | int] = {
             "esc.job": self._task.job_id,
-            "esc.venue": self._task.venue.id,
+            "esc.kind": self._task.kind,
             "esc.attempt": self._task.attempt,
         }
+        if self._task.venue is not None:
+            of["esc.venue"] = self._task.venue.id
         self._whole = self._open.enter_context(
             self._tracer.start_as_current_span(
                 "job",
@@ -61,6 +64,8 @@ class Spans:
         """What the attempt came to; None: the job was taken away."""
         if last is None:
             self._whole.set_attribute("esc.outcome", "taken away")
+        elif isinstance(last.result, IntrinsicsResult):
+            self._whole.set_attribute("esc.outcome", "succeeded")
         elif last.result is not None:
             self._whole.set_attribute("esc.outcome", "accepted" if last.result.accepted else "rejected")
         elif last.error is not None:

@@ -18,13 +18,14 @@ from service import lifeline
 from service.formats.archive import archive
 from service.schemas import Camera
 from worker.calibration.stmaps import StMap, distorting, undistorting
-from worker.job import intrinsics
+from worker.outcome import lens_of
 
 
 def main(origin: str) -> None:
     """Read the camera, write the maps."""
     lifeline.end_with_parent()
-    lens = intrinsics(Camera.model_validate_json(sys.stdin.buffer.read()))
+    camera = Camera.model_validate_json(sys.stdin.buffer.read())
+    lens = lens_of(camera.intrinsics, camera.image_size)
     maps = {"undistort": undistorting(lens), "distort": distorting(lens)}
     sys.stdout.buffer.write(archive({f"{name}.exr": _exr(_from(origin, st)) for name, st in maps.items()}))
 

@@ -24,7 +24,7 @@ from models.training.crops import random_crop, random_view
 from models.training.noise import Plane
 from models.training.render import Conditions, Rendering
 from models.training.surface import ground_patch, marking_distance, marking_shares, window_rays
-from worker.calibration.camera import Camera, Intrinsics, Pose
+from worker.calibration.camera import LENSES, Camera, Pose
 from worker.calibration.field import Field
 from worker.calibration.segmentation import Segmenter, whole_frame
 
@@ -83,7 +83,8 @@ def read_venue(path: Path) -> tuple[Field, dict[str, Camera]]:
     cameras = {}
     for entry in venue["cameras"]:
         lens = entry["intrinsics"]
-        intrinsics = Intrinsics(np.array(lens["matrix"]), np.array(lens["distortion"]), tuple(entry["image_size"]))
+        kind = LENSES[lens.get("model", "opencv")]
+        intrinsics = kind(np.array(lens["matrix"]), np.array(lens["distortion"]), tuple(entry["image_size"]))
         cameras[entry["id"]] = Camera(entry["id"], intrinsics, _pose(entry["pose"]))
     return field, cameras
 

@@ -63,6 +63,13 @@ class Shot:
 
     def must_fit(self, name: str, held: Collection[str]) -> None:
         """Refuse a lens that has more than skew 0 and the coefficients `held`: what is left out is pixels wrong."""
+        if self.camera.intrinsics.model == "fisheye":
+            raise Problem(
+                "format-cannot-hold",
+                f"{name} has no place for the fisheye lens of camera {self.id}; json and st-map hold every lens.",
+                camera=self.id,
+                got=["fisheye"],
+            )
         beyond = [key for key, value in self.coefficients.items() if value != 0 and key not in held]
         if self.camera.intrinsics.matrix[0][1] != 0:
             beyond.append("skew")

@@ -6,12 +6,23 @@ from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI
+from pydantic import BaseModel
 
 from service.problems import MEDIA_TYPE
-from service.schemas import JobEvent, Options, ProblemDetails, Scope
+from service.schemas import (
+    OPTIONS_PART,
+    FieldOptions,
+    IntrinsicsOptions,
+    JobEvent,
+    LocateOptions,
+    Options,
+    ProblemDetails,
+    Scope,
+)
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
-MODELS = (Options, ProblemDetails)
+MODELS = (Options, IntrinsicsOptions, LocateOptions, FieldOptions, ProblemDetails)
+SCHEMAS = "#/components/schemas/"
 KEY_SCHEME = "key"
 SECURITY_SCHEMES = {
     KEY_SCHEME: {
@@ -36,7 +47,9 @@ class DocumentedApp(FastAPI):
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document."""
         document = super().openapi()
-        document["components"]["schemas"] |= {model.__name__: model.model_json_schema() for model in MODELS}
+        for model in MODELS:
+            schema = model.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
+            document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
         document["components"]["securitySchemes"] = SECURITY_SCHEMES
         return document
 
@@ -53,9 +66,24 @@ def document_callback(app: FastAPI) -> None:
         """
 
 
-def reference(model: type[Options | ProblemDetails]) -> dict[str, str]:
+def reference(model: type[BaseModel]) -> dict[str, str]:
     """A schema that points to one of `MODELS`."""
-    return {"$ref": f"#/components/schemas/{model.__name__}"}
+    return {"$ref": f"{SCHEMAS}{model.__name__}"}
+
+
+def frames_upload(options: type[BaseModel]) -> dict[str, Any]:
+    """The body of a route that takes frames of all cameras of a venue."""
+    schema = {
+        "type": "object",
+        "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part to send "
+        "several frames of a camera, they are fused.",
+        "properties": {OPTIONS_PART: reference(options)},
+        # Not an array: generators write code for a repeated part of any name that does not compile.
+        "additionalProperties": {"type": "string", "format": "binary"},
+    }
+    encoding = {OPTIONS_PART: {"contentType": "application/json"}}
+    content = {"multipart/form-data": {"schema": schema, "encoding": encoding}}
+    return {"requestBody": {"required": True, "content": content}}
 
 
 def needs(scope: Scope) -> dict[str, Any]:

@@ -187,6 +187,28 @@ def overlay(job: Existing, camera: Annotated[str, Path(pattern=ID_PATTERN)], con
     return _picture(context, job, f"overlay_{camera}")
 
 
+@router.get(
+    "/{job_id}/coverage.jpg",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={**JPEG, **problems(404, 410)},
+)
+def coverage(job: Existing, context: InContext) -> Response:
+    """Of the intrinsics of a lens: where in the picture the board was seen, and residuals enlarged."""
+    return _picture(context, job, "coverage")
+
+
+@router.get(
+    "/{job_id}/points.jpg",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={**JPEG, **problems(404, 410)},
+)
+def points(job: Existing, context: InContext) -> Response:
+    """Of a first pose: the clicked points and the pitch as the pose has it, in the frame if one was sent."""
+    return _picture(context, job, "points")
+
+
 def _picture(context: Context, job: Job, name: str) -> Response:
     pictures = context.jobs.pictures(job.id)
     if pictures is None or name not in pictures.names:

@@ -19,7 +19,23 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas import OPEN, Job, JobError, Options, Progress, Result, Status, Venue
+from service.schemas import (
+    OPEN,
+    FieldOptions,
+    FieldResult,
+    IntrinsicsOptions,
+    IntrinsicsResult,
+    Job,
+    JobError,
+    Kind,
+    LocateOptions,
+    LocateResult,
+    Options,
+    Progress,
+    Result,
+    Status,
+    Venue,
+)
 from service.store import tables, tallies
 from service.store.deliveries import add_delivery, delivery_of
 from service.store.engine import clock, reading, serialise, writing
@@ -30,6 +46,14 @@ from service.store.venues import find_venue, save_poses, save_venue, venue_lock
 PRIORITIES = {"live": 1, "routine": 100}
 CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 DONE = Progress(stage="preview", fraction=1.0)
+AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
+AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult
+OPTIONS: dict[Kind, type[AnyOptions]] = {
+    "calibration": Options,
+    "intrinsics": IntrinsicsOptions,
+    "locate": LocateOptions,
+    "field": FieldOptions,
+}
 j = tables.jobs.c
 # What pollers ask for, hundreds of times a second: to put the statement together takes longer than to run it.
 ONE = sa.select(tables.jobs).where(j.id == sa.bindparam("job_id"))
@@ -53,11 +77,12 @@ class Submission:
     """What a client sent, checked and stored: ready to become a job."""
 
     job_id: str
-    venue: Venue
-    options: Options
+    venue: Venue | None
+    options: AnyOptions
     content_hash: str
     idempotency_key: str | None
     frames: dict[str, list[str]]
+    kind: Kind = "calibration"
     origin: Origin = Origin()
 
 
@@ -89,13 +114,14 @@ class QueueFull(Exception):  # noqa: N818
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker needs to compute a job."""
+    """What a worker needs to compute a job. `options` are those of its kind; only photos of a lens have no venue."""
 
     job_id: str
     run_token: str
-    venue: Venue
-    options: Options
+    venue: Venue | None
+    options: AnyOptions
     frames: dict[str, list[str]]
+    kind: Kind = "calibration"
     attempt: int = 1
     origin: Origin = Origin()
 
@@ -131,10 +157,12 @@ class Jobs:
 
     # Submission
 
-    def same_as(self, venue_id: str, idempotency_key: str | None, content_hash: str) -> Job | None:
+    def same_as(
+        self, venue_id: str | None, idempotency_key: str | None, content_hash: str, kind: Kind = "calibration"
+    ) -> Job | None:
         """The job that this content already is, so that nothing needs to be stored."""
         with reading(self._engine) as connection:
-            job_id = self._duplicate(connection, venue_id, idempotency_key, content_hash)
+            job_id = self._duplicate(connection, kind, venue_id, idempotency_key, content_hash)
             return None if job_id is None else self._read(connection, job_id)
 
     def submit(
@@ -145,15 +173,15 @@ class Jobs:
         The job begins from the poses that hold now: others may have been found since the upload began.
         """
         with writing(self._engine) as connection:
-            serialise(connection, venue_lock(submission.venue.id))
-            same = self._duplicate(connection, submission.venue.id, submission.idempotency_key, submission.content_hash)
+            venue_id = None if submission.venue is None else submission.venue.id
+            # Those of no venue wait for each other, so that the same content sent twice at once is one job.
+            serialise(connection, submission.kind if venue_id is None else venue_lock(venue_id))
+            same = self._duplicate(
+                connection, submission.kind, venue_id, submission.idempotency_key, submission.content_hash
+            )
             if same is not None:
                 return self._read(connection, same), False
-            venue = find_venue(connection, submission.venue.id)
-            if venue is None:
-                raise VenueGone
-            if not venue.films_like(submission.venue):
-                raise VenueReplaced
+            venue = self._still(connection, submission.venue)
             # From here on the frames are the job's.
             folder = frame_folder(submission.job_id)
             connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
@@ -161,13 +189,14 @@ class Jobs:
             connection.execute(
                 sa.insert(tables.jobs).values(
                     id=submission.job_id,
-                    venue=submission.venue.id,
+                    kind=submission.kind,
+                    venue=venue_id,
                     status="queued",
                     priority=priority,
                     options=submission.options.model_dump(mode="json"),
                     content_hash=submission.content_hash,
                     idempotency_key=submission.idempotency_key,
-                    venue_document=venue.model_dump(mode="json"),
+                    venue_document=venue.model_dump(mode="json") if venue else None,
                     frames=submission.frames,
                     request_id=submission.origin.request_id,
                     traceparent=submission.origin.traceparent,
@@ -184,17 +213,37 @@ class Jobs:
         with reading(self._engine) as connection:
             return self._read(connection, submission.job_id), True
 
+    def _still(self, connection: sa.Connection, read: Venue | None) -> Venue | None:
+        """The venue as it is now, if frames of the one that was read are frames of it."""
+        if read is None:
+            return None
+        venue = find_venue(connection, read.id)
+        if venue is None:
+            raise VenueGone
+        if not venue.films_like(read):
+            raise VenueReplaced
+        return venue
+
     def _duplicate(
-        self, connection: sa.Connection, venue_id: str, idempotency_key: str | None, content_hash: str
+        self,
+        connection: sa.Connection,
+        kind: Kind,
+        venue_id: str | None,
+        idempotency_key: str | None,
+        content_hash: str,
     ) -> str | None:
         if idempotency_key is not None:
-            query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.idempotency_key == idempotency_key)
+            # Of no venue is a place of its own.
+            here = j.venue.is_(None) if venue_id is None else j.venue == venue_id
+            query = sa.select(j.id, j.content_hash).where(here, j.idempotency_key == idempotency_key)
             known = connection.execute(query).one_or_none()
             if known is not None:
                 if known.content_hash != content_hash:
                     raise KeyReused(known.id)
                 return str(known.id)
-        query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.status.in_(OPEN))
+        if kind != "calibration":
+            return None
+        query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.kind == "calibration", j.status.in_(OPEN))
         active = connection.execute(query).one_or_none()
         if active is None:
             return None
@@ -239,8 +288,9 @@ class Jobs:
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
     def posed(self, job_id: str) -> Venue | None:
-        """The venue as a job found it, the lenses and the ridge that go with its poses too; None: no result (yet)."""
-        query = sa.select(j.venue_document, j.result).where(j.id == job_id, j.result.is_not(None))
+        """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
+        done = [j.id == job_id, j.kind == "calibration", j.result.is_not(None)]
+        query = sa.select(j.venue_document, j.result).where(*done)
         with reading(self._engine) as connection:
             row = connection.execute(query).one_or_none()
         if row is None:
@@ -297,22 +347,19 @@ class Jobs:
             shown = {"progress": progress.model_dump(), **_changed(clock(connection))}
             connection.execute(sa.update(tables.jobs).where(*_fence(task)).values(**shown))
 
-    def finish(self, task: Task, result: Result, pictures: Sequence[str]) -> None:
+    def finish(self, task: Task, result: AnyResult, pictures: Sequence[str]) -> None:
         """End a job with a result and the names of its pictures.
 
-        If the result is accepted the stored poses move in the same transaction.
+        If the result is that of a calibration and accepted, the stored poses move in the same transaction.
         """
         with writing(self._engine) as connection:
-            serialise(connection, venue_lock(task.venue.id))
+            if task.venue is not None:
+                serialise(connection, venue_lock(task.venue.id))
             # Locked: a cancellation must come before this end or after it, not between the row and the poses.
             if connection.scalar(sa.select(j.id).where(*_fence(task)).with_for_update()) is None:
                 return
-            now_stored = find_venue(connection, task.venue.id)
-            unchanged = now_stored is not None and now_stored.calibrates_like(task.venue)
-            if result.accepted and not unchanged:
-                result = result.model_copy(
-                    update={"accepted": False, "rejected_because": "the venue was changed while the job ran"}
-                )
+            if isinstance(result, Result):
+                result = self._move_poses(connection, task, result)
             self._end(
                 connection,
                 task.job_id,
@@ -322,14 +369,25 @@ class Jobs:
                 pictures=list(pictures),
                 progress=DONE.model_dump(),
             )
-            if now_stored is None or not unchanged:
-                return
-            moves = result.accepted and not task.options.dry_run
-            note_quality(connection, task.venue.id, result, clock(connection), moved=moves)
-            if moves:
-                poses = {camera.id: camera.pose for camera in result.cameras}
-                save_venue(connection, now_stored.with_result(result))
-                save_poses(connection, task.venue.id, poses, "calibration", task.job_id)
+
+    def _move_poses(self, connection: sa.Connection, task: Task, result: Result) -> Result:
+        """Let the new poses hold if they are accepted, and note what the result says about the venue.
+
+        Gives the result with what the venue has to say about that.
+        """
+        assert task.venue is not None
+        assert isinstance(task.options, Options)
+        now_stored = find_venue(connection, task.venue.id)
+        if now_stored is None or not now_stored.calibrates_like(task.venue):
+            changed = {"accepted": False, "rejected_because": "the venue was changed while the job ran"}
+            return result.model_copy(update=changed) if result.accepted else result
+        moves = result.accepted and not task.options.dry_run
+        note_quality(connection, task.venue.id, result, clock(connection), moved=moves)
+        if moves:
+            poses = {camera.id: camera.pose for camera in result.cameras}
+            save_venue(connection, now_stored.with_result(result))
+            save_poses(connection, task.venue.id, poses, "calibration", task.job_id)
+        return result
 
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
@@ -364,7 +422,7 @@ class Jobs:
         still: list[sa.ColumnElement[bool]],
         status: Status,
         *,
-        result: Result | None = None,
+        result: AnyResult | None = None,
         error: JobError | None = None,
         **values: Any,
     ) -> bool:
@@ -375,12 +433,12 @@ class Jobs:
         end = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **_changed(now))
         if connection.execute(end).rowcount == 0:
             return False
-        query = sa.select(j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
+        query = sa.select(j.kind, j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
         row = connection.execute(query).one()
-        options = Options.model_validate(row.options)
+        options = OPTIONS[row.kind].model_validate(row.options)
         if options.callback_url is not None:
             add_delivery(connection, job_id, options.callback_url, now)
-        ended = End(status, result, error, row.created_at, row.started_at, now, row.attempt)
+        ended = End(row.kind, status, result, error, row.created_at, row.started_at, now, row.attempt)
         tallies.add(connection, ended.tallies())
         return True
 
@@ -391,9 +449,10 @@ class Jobs:
         return Task(
             row.id,
             row.run_token,
-            Venue.model_validate(row.venue_document),
-            Options.model_validate(row.options),
+            None if row.venue_document is None else Venue.model_validate(row.venue_document),
+            OPTIONS[row.kind].model_validate(row.options),
             row.frames,
+            row.kind,
             row.attempt,
             Origin(row.request_id, row.traceparent),
         )
@@ -404,6 +463,7 @@ class Jobs:
     def _job(self, connection: sa.Connection, row: Any) -> Job:
         return Job(
             id=row.id,
+            kind=row.kind,
             venue=row.venue,
             status=row.status,
             progress=row.progress,
@@ -420,7 +480,9 @@ class Jobs:
 
     def _position(self, connection: sa.Connection, row: Any) -> int:
         ahead = sa.or_(j.priority < row.priority, sa.and_(j.priority == row.priority, j.id < row.id))
-        count = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued", ahead))
+        # First poses have a queue of their own.
+        same_queue = (j.kind == "locate") if row.kind == "locate" else (j.kind != "locate")
+        count = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued", same_queue, ahead))
         return 1 + (count or 0)
 
 
@@ -453,7 +515,9 @@ def _changed(now: datetime) -> dict[str, Any]:
 
 def _links(row: Any) -> dict[str, str]:
     base = f"/jobs/{row.id}"
-    links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel", "venue": f"/venues/{row.venue}"}
+    links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel"}
+    if row.venue is not None:
+        links["venue"] = f"/venues/{row.venue}"
     # `overlay_left` in the store is `overlay/left` in an address.
     names = [name.replace("_", "/", 1) for name in row.pictures or () if row.pictures_deleted_at is None]
     return links | {name: f"{base}/{name}.jpg" for name in names}

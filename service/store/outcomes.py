@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from typing import get_args
 
 from service.problems import KINDS, type_of
-from service.schemas import JobError, Result, Status
+from service.schemas import FieldResult, IntrinsicsResult, JobError, Kind, LocateResult, Result, Status
 from service.store.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Amounts, total
 
 # As in `timings_s` of a result.
@@ -31,6 +32,14 @@ OUTCOMES = (
     *(("failed", "", error) for error in ERRORS),
 )
 ENDED = "jobs_ended"
+# Of other kinds than calibrations: the kind and the status.
+OTHERS_ENDED = "other_jobs_ended"
+OTHER_OUTCOMES = tuple(
+    (kind, status)
+    for kind in get_args(Kind)
+    if kind != "calibration"
+    for status in ("succeeded", "failed", "cancelled")
+)
 RESTARTS = "job_restarts"
 
 
@@ -38,8 +47,9 @@ RESTARTS = "job_restarts"
 class End:
     """How a job ended, and when it was what."""
 
+    kind: Kind
     status: Status
-    result: Result | None
+    result: Result | IntrinsicsResult | LocateResult | FieldResult | None
     error: JobError | None
     created_at: datetime
     started_at: datetime | None
@@ -48,10 +58,15 @@ class End:
 
     def tallies(self) -> Amounts:
         """What it adds."""
-        return total([{(ENDED, self._outcome()): 1}, *self._course(), *self._quality()])
+        restarts: Amounts = {} if self.started_at is None else {(RESTARTS, ()): self.attempts - 1}
+        if self.kind != "calibration":
+            return total([{(OTHERS_ENDED, (self.kind, self.status)): 1}, restarts, *self._stages()])
+        return total([{(ENDED, self._outcome()): 1}, restarts, *self._course(), *self._stages(), *self._quality()])
 
     def _outcome(self) -> tuple[str, str, str]:
-        verdict = "" if self.result is None else "accepted" if self.result.accepted else "rejected"
+        verdict = ""
+        if isinstance(self.result, Result):
+            verdict = "accepted" if self.result.accepted else "rejected"
         return self.status, verdict, "" if self.error is None else _kind(self.error)
 
     def _course(self) -> list[Amounts]:
@@ -60,14 +75,18 @@ class End:
         # A clock can be set back, and another server can take over from the database's.
         waited = WAIT.of(max(0.0, (self.started_at - self.created_at).total_seconds()))
         took = DURATION.of(max(0.0, (self.finished_at - self.started_at).total_seconds()))
-        return [waited, took, {(RESTARTS, ()): self.attempts - 1}]
+        return [waited, took]
 
-    def _quality(self) -> list[Amounts]:
+    def _stages(self) -> list[Amounts]:
         if self.result is None:
             return []
-        timings, stitch = self.result.timings_s, self.result.stitch_error_px
-        stages = [STAGE.of(timings[stage], stage) for stage in STAGES if stage in timings]
-        return stages if stitch is None else [*stages, STITCH_ERROR.of(stitch)]
+        timings = self.result.timings_s
+        return [STAGE.of(timings[stage], stage) for stage in STAGES if stage in timings]
+
+    def _quality(self) -> list[Amounts]:
+        if not isinstance(self.result, Result) or self.result.stitch_error_px is None:
+            return []
+        return [STITCH_ERROR.of(self.result.stitch_error_px)]
 
 
 def _kind(error: JobError) -> str:

@@ -47,17 +47,20 @@ jobs = sa.Table(
     "jobs",
     metadata,
     sa.Column("id", sa.String(26), primary_key=True),
-    sa.Column("venue", sa.String(64), nullable=False),
+    # schemas.Kind.
+    sa.Column("kind", sa.String(16), nullable=False, server_default="calibration"),
+    # Null: the photos of a lens belong to no venue.
+    sa.Column("venue", sa.String(64)),
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("priority", sa.Integer, nullable=False),
-    # schemas.Options, the seed filled in.
+    # What was asked: schemas.Options or FieldOptions (the seed filled in), IntrinsicsOptions or LocateOptions.
     sa.Column("options", sa.JSON, nullable=False),
     # Of the frames and options as they were sent: the same content is the same job.
     sa.Column("content_hash", sa.String(64), nullable=False),
     sa.Column("idempotency_key", sa.String(255)),
-    # The venue as it was when the frames were checked against it.
+    # The venue as it was when the frames were checked against it; JSON's null where there is none.
     sa.Column("venue_document", sa.JSON, nullable=False),
-    # Camera id to the paths of its frames in the blob store.
+    # Camera id (of photos: their names) to the paths of its frames in the blob store.
     sa.Column("frames", sa.JSON, nullable=False),
     sa.Column("attempt", sa.Integer, nullable=False, default=0),
     # Of the attempt that may write: a worker that lost its job finds another token here and stops.
@@ -86,8 +89,8 @@ jobs = sa.Table(
         "one_active_job_per_venue",
         "venue",
         unique=True,
-        sqlite_where=sa.text("status IN ('queued', 'running')"),
-        postgresql_where=sa.text("status IN ('queued', 'running')"),
+        sqlite_where=sa.text("status IN ('queued', 'running') AND kind = 'calibration'"),
+        postgresql_where=sa.text("status IN ('queued', 'running') AND kind = 'calibration'"),
     ),
     sa.Index("jobs_by_end", "finished_at"),
     sa.Index(

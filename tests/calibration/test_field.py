@@ -90,3 +90,24 @@ def test_resampled_points_are_evenly_spaced(spacing, corners):
     assert np.allclose(steps, steps[0]) if len(steps) else True
     assert points[0, 0] == pytest.approx((corners - 1) * 10 - points[-1, 0])
     np.testing.assert_allclose(tangents, [[1, 0]] * len(points))
+
+
+def test_points_stay_the_same_points_on_a_pitch_of_other_measures():
+    longer = Field(109.3, 64.0, 0.12, CROWNED.ridge)
+    lines = CROWNED.line_points()
+    same = longer.same_line_points(lines)
+    assert (same.marking == lines.marking).all()
+    assert len(longer.line_points()) != len(lines)
+    touchline = lines.marking == 0
+    along = lines.position[touchline, 0] / (CROWNED.length - 0.12)
+    assert same.position[touchline, 0] / (longer.length - 0.12) == pytest.approx(along)
+
+
+def test_a_ridge_gets_another_length_around_its_middle_as_far_as_there_is_room():
+    ridge = np.array([[-10.0, 2.0, 0.3], [20.0, 2.0, 0.3]])
+    pitch = Field(105.0, 68.0, ridge=ridge)
+    assert (pitch.ridge_length, pitch.ridge_height) == (30.0, 0.3)
+    assert pitch.with_ridge_length(10.0).ridge == pytest.approx(np.array([[0.0, 2.0, 0.3], [10.0, 2.0, 0.3]]))
+    widest = pitch.with_ridge_length(500.0)
+    assert widest.ridge[:, 0] == pytest.approx([5.0 - 47.0, 5.0 + 47.0])
+    assert PITCH.with_ridge_length(8.0).height(np.array([3.0, 5.0])) == 0.0

@@ -236,7 +236,7 @@ def test_the_strokes_of_the_overlay_frame_the_painted_line() -> None:
     near = camera("near", (3.0, -48.0, 10.0), (0.0, -20.0), focal=1500.0, distortion=BARREL)
     paint = paint_markings(PITCH, near)
     elsewhere = near.with_pose(Pose.looking_at(near.pose.position, (0.0, -200.0, 0.0)))
-    drawn = overlay(PITCH, elsewhere, near, np.zeros((540, 960, 3), np.uint8))
+    drawn = overlay((PITCH, elsewhere), (PITCH, near), np.zeros((540, 960, 3), np.uint8))
     row = round(near.project(np.array([[0.0, -25.0, 0.0]]))[0, 1])
     blue = drawn[row].astype(float)[:, 0]
     middle = (np.arange(960) * paint[row]).sum() / paint[row].sum()
@@ -252,7 +252,7 @@ def test_the_strokes_of_the_overlay_frame_the_painted_line() -> None:
 def test_the_overlay_draws_both_poses_and_leaves_the_frame_alone() -> None:
     frame = frames()["left"]
     before = frame.copy()
-    drawn = overlay(CROWNED, moved(CAMERAS[0], rotation=(0.01, 0.0, 0.0)), CAMERAS[0], frame)
+    drawn = overlay((CROWNED, moved(CAMERAS[0], rotation=(0.01, 0.0, 0.0))), (CROWNED, CAMERAS[0]), frame)
     assert (frame == before).all()
     for colour in (stitching.STORED_COLOUR, stitching.NEW_COLOUR):
         assert (np.abs(drawn[:450] - np.array(colour)).max(axis=-1) < 60).sum() > 200
@@ -261,7 +261,7 @@ def test_the_overlay_draws_both_poses_and_leaves_the_frame_alone() -> None:
 def test_an_overlay_of_a_pose_that_sees_no_pitch_is_the_frame_with_a_legend() -> None:
     frame = frames()["left"]
     up = camera("left", (0.0, -48.0, 10.0), (0.0, -90.0))
-    drawn = overlay(PITCH, up, up, frame)
+    drawn = overlay((PITCH, up), (PITCH, up), frame)
     assert (drawn[:400] == frame[:400]).all()
     assert (drawn[-80:] != frame[-80:]).any()
     assert cv2.absdiff(drawn, frame)[:, 300:].max() == 0

@@ -6,7 +6,17 @@ import sys
 import time
 
 from service import lifeline
-from service.schemas import CameraResult, JobError, Moved, Pose, Progress, Provenance, Result
+from service.schemas import (
+    CameraResult,
+    FieldResult,
+    JobError,
+    MeasureResult,
+    Moved,
+    Pose,
+    Progress,
+    Provenance,
+    Result,
+)
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.engine import connect
@@ -15,6 +25,10 @@ from worker.message import Message
 
 JPEG = b"\xff\xd8\xff\xd9"
 SHIFT_M = 0.125
+MEASURES = [
+    MeasureResult(name="length_m", given=105, value=104.25, sigma=0.05, open=5, known=True, detail=""),
+    MeasureResult(name="width_m", given=68, value=67, sigma=5, open=5, known=False, detail="no line is in view"),
+]
 
 
 def say(**message):
@@ -63,22 +77,21 @@ def main(job_id: str, run_token: str) -> None:
         )
         for camera in task.venue.cameras
     ]
-    say(
-        result=Result(
-            accepted=behaviour != "reject",
-            rejected_because="the lines do not fit" if behaviour == "reject" else None,
-            cameras=cameras,
-            stitch_error_px=0.2,
-            stitch_error_before_px=10.0,
-            loss=0.1,
-            generations=10,
-            timings_s={"decode": 0.1},
-            provenance=Provenance(
-                software="0", model_sha256="0", seed=task.options.seed, options=task.options.model_dump()
-            ),
+    common = {
+        "accepted": behaviour != "reject",
+        "rejected_because": "the lines do not fit" if behaviour == "reject" else None,
+        "cameras": cameras,
+        "stitch_error_px": 0.2,
+        "timings_s": {"decode": 0.1},
+        "provenance": Provenance(
+            software="0", model_sha256="0", seed=task.options.seed, options=task.options.model_dump()
         ),
-        pictures=pictures,
-    )
+    }
+    if task.kind == "field":
+        field = task.venue.field.model_copy(update={"length_m": 104.25})
+        say(result=FieldResult(field=field, measures=MEASURES, **common), pictures=pictures[2:])
+    else:
+        say(result=Result(stitch_error_before_px=10.0, loss=0.1, generations=10, **common), pictures=pictures)
 
 
 if __name__ == "__main__":

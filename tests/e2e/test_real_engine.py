@@ -130,3 +130,23 @@ def test_a_stored_pose_that_looks_at_the_sky_fails_by_the_name_of_its_camera(ser
     assert job["error"]["camera"] == "right"
     assert "first pose" in job["error"]["detail"]
     assert service.http.get("/readyz").status_code == 200
+
+
+def test_the_measures_of_a_pitch_are_found_and_drawn(service, name):
+    document = venue(name)
+    document["field"] = {"length_m": 104, "width_m": 67.4, "line_width_m": 0.12}
+    service.http.put(f"/venues/{name}", json=document).raise_for_status()
+    parts = [(camera, (f"{camera}.jpg", data)) for camera, data in frames().items()]
+    answer = service.http.post(
+        f"/venues/{name}/field/fit", files=[*parts, ("options", (None, json.dumps({"seed": 1})))]
+    )
+    job = service.end(answer.json()["id"])
+    result = job["result"]
+    assert result["rejected_because"] is None
+    truth = {"length_m": PITCH.length, "width_m": PITCH.width, "ridge_height_m": PITCH.ridge_height}
+    for measure in result["measures"]:
+        if measure["name"] in truth:
+            assert measure["known"]
+            assert abs(measure["value"] - truth[measure["name"]]) < 3 * measure["sigma"]
+    data = service.http.get(job["links"]["overlay/left"]).raise_for_status().content
+    assert cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR).std() > 20

@@ -44,6 +44,7 @@ def test_what_an_older_release_counted_under_other_bounds_is_not_lost(counted):
 
 def end(**values):
     shown = {
+        "kind": "calibration",
         "status": "failed",
         "result": None,
         "error": None,

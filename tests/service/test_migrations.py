@@ -8,12 +8,12 @@ from alembic import command
 from alembic.config import Config
 from alembic.script import ScriptDirectory
 
-from service.schemas import VENUE_EXAMPLE, Options, VenueIn
+from service.schemas import VENUE_EXAMPLE, Board, IntrinsicsOptions, LocateOptions, Options, Result, VenueIn
 from service.store.deliveries import Deliveries
 from service.store.engine import MIGRATIONS, connect, migrate, writing
 from service.store.expiry import Expiry
 from service.store.figures import VenueQuality, look
-from service.store.jobs import Jobs
+from service.store.jobs import Jobs, Submission, new_job_id
 from service.store.keys import Keys
 from service.store.outcomes import ENDED
 from service.store.venues import Venues
@@ -145,7 +145,7 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     assert (held.cause, held.job, held.since, held.pose) == ("calibration", DONE, NOON, VENUE.cameras[0].pose)
     done = jobs.get(DONE)
     assert (done.status, done.created_at, done.finished_at) == ("succeeded", NOON, NOON)
-    assert done.result.model_dump(mode="json", exclude_unset=True) == RESULT
+    assert done.result == Result.model_validate(RESULT)
     assert jobs.same_as(VENUE.id, "k", "c" * 64).id == DONE
     assert jobs.get(WAITING).queue_position == 1
     task = jobs.begin(WAITING)
@@ -171,6 +171,24 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
 def test_an_upgraded_database_takes_new_rows(old, revision):
     engine = old(revision)
     migrate(engine)
+    lens = Submission(
+        new_job_id(),
+        None,
+        IntrinsicsOptions(board=Board(columns=9, rows=6, square_m=0.03)),
+        "l",
+        None,
+        {},
+        "intrinsics",
+    )
+    points = [{"world": [x, y], "pixel": [0, 0]} for x in (0, 1) for y in (0, 1)]
+    clicks = LocateOptions.model_validate({"points": points})
+    # A venue with an active calibration takes any number of first poses.
+    place = Submission(new_job_id(), VENUE, clicks, "p", None, {"left": []}, "locate")
+    for submission in (lens, place):
+        job, new = Jobs(engine).submit(submission, 100, lambda *_: None)
+        assert (new, job.kind, job.queue_position) == (True, submission.kind, 2 if submission is lens else 1)
+        task = Jobs(engine).begin(job.id)
+        assert (task.venue, task.options) == (submission.venue, submission.options)
     # Numbers go on where those of the old rows ended.
     moved = VENUE.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
     Venues(engine).put(VENUE.with_poses({"left": moved}), lambda _: None)

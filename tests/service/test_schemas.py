@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from fields.landmarks import find
 from fields.shapes import Line, Spot
 from fields.template import NAMES, load
-from service.schemas import VENUE_EXAMPLE, FieldOfPlay, Options, Pose, PoseIn, VenueIn
+from service.schemas import VENUE_EXAMPLE, FieldOfPlay, Intrinsics, Options, Pose, PoseIn, VenueIn
 
 
 def test_the_documented_venue_is_one():
@@ -40,6 +40,17 @@ def test_the_distortions_of_opencv_are_taken(length):
     matrix = VENUE_EXAMPLE["cameras"][0]["intrinsics"]["matrix"]
     document["cameras"][0]["intrinsics"] = {"matrix": matrix, "distortion": [0.01] * length}
     assert len(VenueIn.model_validate(document).cameras[0].intrinsics.distortion) == length
+
+
+@pytest.mark.parametrize(("length", "taken"), [(0, True), (4, True), (5, False)])
+def test_a_fisheye_has_no_distortion_or_four_numbers(length, taken):
+    matrix = VENUE_EXAMPLE["cameras"][0]["intrinsics"]["matrix"]
+    document = {"model": "fisheye", "matrix": matrix, "distortion": [0.01] * length}
+    if taken:
+        assert len(Intrinsics.model_validate(document).distortion) == length
+    else:
+        with pytest.raises(ValidationError, match="must have 0 or 4 numbers with the model fisheye"):
+            Intrinsics.model_validate(document)
 
 
 def test_a_matrix_of_another_resolution_is_noticed():

@@ -173,7 +173,7 @@ def calibrate(
     journey = Journey(report, stop)
     require_markings_in_view(pitch, cameras)
     with clock.measuring("segmentation"):
-        responses = _segment_all(pitch, cameras, frames, segment, journey)
+        responses = segment_all(pitch, cameras, frames, segment, journey)
     with clock.measuring("evolution"):
         strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
         rng = np.random.default_rng(options.seed)
@@ -188,11 +188,11 @@ def calibrate(
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
         stitch_before = stitch_error_px(pitch, cameras, by_id)
-        qualities = _qualities(pitch, cameras, refined, responses)
+        qualities = qualities_of(pitch, cameras, refined, responses)
         journey.at("refinement", 1.0)
     return Calibration(
         refined.pitch,
-        [_camera_result(quality) for quality in qualities],
+        [camera_result(quality) for quality in qualities],
         rejection(qualities, pairs_in_common(refined.pitch, refined.cameras), stitch, Gate())
         or ridge_rejection(refined.pitch, Gate()),
         stitch,
@@ -218,7 +218,7 @@ def require_markings_in_view(pitch: Field, cameras: Sequence[Camera]) -> None:
             )
 
 
-def _segment_all(
+def segment_all(
     pitch: Field,
     cameras: Sequence[Camera],
     frames: Mapping[str, Sequence[Frame]],
@@ -246,7 +246,8 @@ def _free(options: Options, pitch: Field, cameras: Sequence[Camera]) -> list[Par
     return [*lengths, *(free_ridge(pitch) if options.fit_ridge else [])]
 
 
-def _camera_result(quality: CameraQuality) -> CameraResult:
+def camera_result(quality: CameraQuality) -> CameraResult:
+    """What is answered of what the gate looked at."""
     return CameraResult(
         quality.camera.id,
         quality.camera.intrinsics,
@@ -259,9 +260,10 @@ def _camera_result(quality: CameraQuality) -> CameraResult:
     )
 
 
-def _qualities(
+def qualities_of(
     pitch: Field, stored: Sequence[Camera], refined: Refined, responses: Sequence[Response]
 ) -> list[CameraQuality]:
+    """What the gate looks at: the finished cameras beside the `stored` ones on the pitch they were stored for."""
     return [
         CameraQuality(
             after,

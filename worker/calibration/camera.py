@@ -1,4 +1,4 @@
-"""Cameras: intrinsics with OpenCV's distortion, poses, and the projection of many points by many poses at once.
+"""Cameras: OpenCV's two lens models, poses, and the projection of many points by many poses at once.
 
 World: right-handed, metres, z up. Camera: OpenCV (x right, y down, z forward; pixel centres at integers).
 A pose is the rotation vector world to camera and the camera's centre in the world, so that a change of rotation turns
@@ -7,9 +7,10 @@ the view and does not swing the camera around the pitch: P = K R [I | -C].
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,11 @@ Plane = NDArray[np.floating[Any]]
 Frame = NDArray[np.uint8]
 """A picture as a camera took it: (height, width, 3), blue, green, red."""
 
+LensModel = Literal["opencv", "fisheye"]
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+FISHEYE_DISTORTION_LENGTHS = (0, 4)
+WIDEST_FISHEYE_RAD = np.radians(89.0)
+"""How far off its axis a fisheye is used: beyond a right angle there are no image coordinates at depth 1."""
 NEAREST_DEPTH_M = 0.1
 
 
@@ -111,11 +116,15 @@ class Pose:
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """`matrix` (3, 3) in pixels, `distortion` in OpenCV's order (`DISTORTION_LENGTHS`), `size` (width, height)."""
+    """A lens of OpenCV's calib3d: pinhole with radial, tangential, thin prism and tilt terms.
+
+    `matrix` (3, 3) in pixels, `distortion` in OpenCV's order (`DISTORTION_LENGTHS`), `size` (width, height).
+    """
 
     matrix: Array
     distortion: Array
     size: tuple[int, int]
+    model: ClassVar[LensModel] = "opencv"
 
     @property
     def relative_size(self) -> float:
@@ -237,7 +246,74 @@ class Intrinsics:
         for axis, ratio in ((0, width / self.size[0]), (1, height / self.size[1])):
             matrix[axis] *= ratio
             matrix[axis, 2] = (self.matrix[axis, 2] + 0.5) * ratio - 0.5
-        return Intrinsics(matrix, self.distortion, (width, height))
+        return replace(self, matrix=matrix, size=(width, height))
+
+
+class Fisheye(Intrinsics):
+    """A lens of OpenCV's fisheye module: Kannala and Brandt, "A generic camera model", PAMI 2006, with four terms.
+
+    A ray at the angle t off the axis ends at the distance t (1 + k1 t² + k2 t⁴ + k3 t⁶ + k4 t⁸) from the centre, for
+    `matrix` = 1. `distortion` (`FISHEYE_DISTORTION_LENGTHS`) are k1 to k4.
+    """
+
+    model: ClassVar[LensModel] = "fisheye"
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """The 4 coefficients k1 k2 k3 k4, absent ones zero."""
+        padded = np.zeros(4)
+        padded[: len(self.distortion)] = self.distortion
+        return padded
+
+    @cached_property
+    def _largest_angle(self) -> float:
+        """Up to which angle (rad) the model grows; `WIDEST_FISHEYE_RAD` at most."""
+        angles = np.linspace(0.0, WIDEST_FISHEYE_RAD, 8901)
+        growing = np.diff(self._distorted_angle(angles)) > 0
+        return float(angles[-1] if growing.all() else angles[np.argmin(growing)])
+
+    @cached_property
+    def largest_radius(self) -> float:
+        """Undistorted radius (at depth 1) up to which the model grows."""
+        return float(np.tan(self._largest_angle))
+
+    def _distorted_angle(self, angle: Plane) -> Plane:
+        k1, k2, k3, k4 = self.coefficients.tolist()
+        t2 = angle * angle
+        return angle * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
+
+    def distort_planes(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
+        """`distort` for columns and rows (...) apart, in their own precision."""
+        radius = np.sqrt(x * x + y * y)
+        # On the axis the ratio of the two radii is 1, and this far off it still is.
+        scale = np.where(radius > 1e-6, self._distorted_angle(np.arctan(radius)) / np.maximum(radius, 1e-6), 1)
+        scale = np.where(radius > self.largest_radius, np.nan, scale).astype(radius.dtype, copy=False)
+        (fx, skew, cx), (_, fy, cy) = self.matrix[:2].tolist()
+        return fx * x * scale + skew * y * scale + cx, fy * y * scale + cy
+
+    def undistort(self, pixels: ArrayLike, iterations: int = 6) -> Array:
+        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
+
+        NaN where no ray of the model ends at the pixel.
+        """
+        linear = self.matrix[:2, :2]
+        rays = (np.asarray(pixels, dtype=float) - self.matrix[:2, 2]) @ np.linalg.inv(linear).T
+        distorted = np.linalg.norm(rays, axis=-1)
+        table = np.linspace(0.0, self._largest_angle, 4000)
+        angle = np.interp(distorted, self._distorted_angle(table), table)
+        k1, k2, k3, k4 = self.coefficients.tolist()
+        for _ in range(iterations):
+            t2 = angle * angle
+            slope = 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
+            # At its very end the model may stand still.
+            step = (distorted - self._distorted_angle(angle)) / np.maximum(slope, 1e-6)
+            angle = np.clip(angle + step, 0.0, self._largest_angle)
+        known = np.abs(distorted - self._distorted_angle(angle)) * linear[0, 0] < 1e-3
+        scale = np.where(distorted > 1e-9, np.tan(angle) / np.maximum(distorted, 1e-9), 1.0)
+        return np.where(known, scale, np.nan)[..., None] * rays
+
+
+LENSES: Mapping[LensModel, type[Intrinsics]] = {"opencv": Intrinsics, "fisheye": Fisheye}
 
 
 @dataclass(frozen=True)
@@ -260,6 +336,10 @@ class Camera:
     def with_pose(self, pose: Pose) -> Camera:
         """The same lens elsewhere."""
         return Camera(self.id, self.intrinsics, pose)
+
+    def with_lens(self, intrinsics: Intrinsics) -> Camera:
+        """Another lens in the same place."""
+        return Camera(self.id, intrinsics, self.pose)
 
 
 def project(points: Array, rotations: Array, positions: Array, intrinsics: Intrinsics) -> Array:

@@ -5,13 +5,14 @@ Everything here describes the *centres* of lines.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fields.landmarks import find
 from fields.shapes import Arc, Line, Shape
 from fields.template import Template, load
 from worker.calibration.camera import Array
@@ -19,6 +20,8 @@ from worker.calibration.camera import Array
 FOOTBALL = load("football")
 
 ARC_STEP_M = 0.05
+LEAST_HIP_M = 0.5
+"""A ridge ends so far from the goal lines at least: a roof has no upright sides."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,27 @@ class Field:
         end = max((self.length - self.width) / 2, 0.0)
         return replace(self, ridge=np.array([[-end, 0.0, by], [end, 0.0, by]]))
 
+    @property
+    def ridge_height(self) -> float:
+        """Of the ridge above the corners; 0 of a flat pitch."""
+        return 0.0 if self.ridge is None else float(self.ridge[0, 2])
+
+    @property
+    def ridge_length(self) -> float:
+        """Between the ends of the ridge; of a flat pitch, of the ridge that `raised` would give it."""
+        ridge = self.raised(0.0).ridge
+        assert ridge is not None
+        return float(abs(ridge[1, 0] - ridge[0, 0]))
+
+    def with_ridge_length(self, length: float) -> Field:
+        """The same pitch with the ends of its ridge so far apart, as far as the pitch has room, around where it was."""
+        raised = self.raised(0.0)
+        assert raised.ridge is not None
+        (start, end) = raised.ridge[np.argsort(raised.ridge[:, 0])]
+        middle = (start[0] + end[0]) / 2
+        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle) - LEAST_HIP_M)
+        return replace(raised, ridge=np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
+
     def height(self, xy: Array) -> Array:
         """Height (...) of the surface at (..., 2): the paper's four-plane hip roof; 0 off the pitch."""
         if self.ridge is None:
@@ -123,14 +147,37 @@ class Field:
 
     @cached_property
     def _markings(self) -> list[Marking]:
-        size = {"length": self.length, "width": self.width, "line": self.line_width, **self.measures}
-        return [_marking(shape) for shape in self.template.markings(size)]
+        return [_marking(shape) for shape in self.template.markings(self._size)]
+
+    @property
+    def _size(self) -> dict[str, float]:
+        return {"length": self.length, "width": self.width, "line": self.line_width, **self.measures}
+
+    def places(self) -> dict[str, Array]:
+        """Where the named points of the template are, (3,) each, on the surface."""
+        return {name: self.lift(np.array(point)) for name, point in self.template.places(self._size).items()}
+
+    def place(self, name: str) -> Array:
+        """The point (3,) that somebody calls so, on the surface. Raises `fields.landmarks.UnknownLandmark`."""
+        return self.lift(np.array(find(name, self.template, self._size)))
 
     def line_points(self, spacing: float = 0.25) -> LinePoints:
         """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
+        return self._line_points([fitting(marking.centre, spacing) for marking in self.markings()], spacing)
+
+    def painted_like(self, others: LinePoints) -> bool:
+        """Whether it has the markings of the pitch of these points: a longer broken line may have more dashes."""
+        return len(self.markings()) == others.marking[-1] + 1
+
+    def same_line_points(self, others: LinePoints) -> LinePoints:
+        """The points that are those of a pitch of other measures: as many on each marking, as far along it."""
+        counts: list[int] = np.bincount(others.marking).tolist()
+        return self._line_points(counts, others.spacing)
+
+    def _line_points(self, counts: Sequence[int], spacing: float) -> LinePoints:
         positions, tangents, widths, index = [], [], [], []
-        for number, marking in enumerate(self.markings()):
-            xy, along = resample(marking.centre, spacing)
+        for number, (marking, count) in enumerate(zip(self.markings(), counts, strict=True)):
+            xy, along = equal_pieces(marking.centre, count)
             positions.append(xy)
             tangents.append(along)
             widths.append(np.full(len(xy), marking.width))
@@ -154,10 +201,19 @@ class Field:
 
 def resample(polyline: Array, spacing: float) -> tuple[Array, Array]:
     """Points about every `spacing` along a polyline (n, 2), in the middle of equal pieces, and unit tangents there."""
+    return equal_pieces(polyline, fitting(polyline, spacing))
+
+
+def fitting(polyline: Array, spacing: float) -> int:
+    """How many pieces of about `spacing` a polyline (n, 2) has, at least one."""
+    return max(1, round(float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum()) / spacing))
+
+
+def equal_pieces(polyline: Array, count: int) -> tuple[Array, Array]:
+    """The middles (count, 2) of equal pieces of a polyline (n, 2), and unit tangents there."""
     pieces = np.diff(polyline, axis=0)
     lengths = np.linalg.norm(pieces, axis=1)
     reached = np.concatenate([[0.0], np.cumsum(lengths)])
-    count = max(1, round(reached[-1] / spacing))
     at = (np.arange(count) + 0.5) * reached[-1] / count
     piece = np.clip(np.searchsorted(reached, at, side="right") - 1, 0, len(pieces) - 1)
     unit = pieces[piece] / lengths[piece, None]

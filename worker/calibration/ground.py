@@ -83,4 +83,4 @@ class Ground:
         determined = len(self) - np.sum(self.precision * covariance) / believed**2
         power = heights @ self.precision @ heights
         uneven = np.sqrt((power + EVEN_NODES * EVEN_M**2) / (max(determined, 0.0) + EVEN_NODES))
-        return min(float(uneven), MOST_UNEVEN_M)
+        return float(uneven)

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from worker.calibration.camera import Array, Camera, Intrinsics
-from worker.calibration.field import Field
+from worker.calibration.field import Field, LinePoints
 
 FIELD_STEP_M = 1e-3
 FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
 """How far off what is left free may be: heat changes a focal length by a thousandth, a crown is up to half a metre."""
+FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
+"""Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
 
 
 @dataclass(frozen=True)
@@ -38,29 +40,39 @@ class LensParameter:
 
 @dataclass(frozen=True)
 class FieldParameter:
-    """A measure of the field, metres. `expected`: how far off one that was taken with care is; `shift` (N, 3): how the
-    field's line points move, metres per metre.
+    """A measure of the field, metres. `expected`: how far off one that was taken with care is; `read` and `write`: of a
+    pitch, and one with another; `shift` (N, 3): how a pitch's line points move, metres per metre.
     """
 
     name: str
     expected: float
-    change: Callable[[Field, float], Field]
+    read: Callable[[Field], float]
+    write: Callable[[Field, float], Field]
     shift: Array
 
     @classmethod
-    def of(cls, pitch: Field, name: str, expected: float, change: Callable[[Field, float], Field]) -> FieldParameter:
-        """The measure of this pitch that `change` makes larger."""
-        here = pitch.line_points().position
-        for step in (FIELD_STEP_M, -FIELD_STEP_M):
-            there = change(pitch, step).line_points().position
-            # Lines have as many points as fit on them: on the brink of one more, the other side has as many.
-            if len(there) == len(here):
-                return cls(name, expected, change, (there - here) / step)
-        raise AssertionError(name)
+    def of(
+        cls,
+        pitch: Field,
+        name: str,
+        expected: float,
+        read: Callable[[Field], float],
+        write: Callable[[Field, float], Field],
+    ) -> FieldParameter:
+        """A measure of this pitch."""
+        return cls(name, expected, read, write, np.empty((0, 3))).around(pitch, pitch.line_points())
+
+    def around(self, pitch: Field, lines: LinePoints) -> FieldParameter:
+        """The same measure as it moves `lines` of a pitch that has been changed since."""
+        changed = {step: self.write(pitch, self.read(pitch) + step) for step in (FIELD_STEP_M, 0.0, -FIELD_STEP_M)}
+        # On the brink of one more dash, the other side has as many.
+        ahead, *_, behind = (step for step, one in changed.items() if one.painted_like(lines))
+        moved = changed[ahead].same_line_points(lines).position - changed[behind].same_line_points(lines).position
+        return replace(self, shift=moved / (ahead - behind))
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
-        """Cameras and pitch with this measure changed."""
-        return list(cameras), self.change(pitch, by)
+        """Cameras and pitch with this measure changed, as far as it can be."""
+        return list(cameras), self.write(pitch, self.read(pitch) + by)
 
 
 Parameter = LensParameter | FieldParameter
@@ -84,9 +96,9 @@ def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
 def field_parameters(pitch: Field) -> list[Parameter]:
     """What is measured once when a venue is set up."""
     return [
-        FieldParameter.of(pitch, "ridge_height_m", 0.02, Field.raised),
-        FieldParameter.of(pitch, "length_m", 0.03, lambda one, by: replace(one, length=one.length + by)),
-        FieldParameter.of(pitch, "width_m", 0.03, lambda one, by: replace(one, width=one.width + by)),
+        _ridge_height(pitch, 0.02),
+        _length(pitch, 0.03),
+        _width(pitch, 0.03),
     ]
 
 
@@ -101,7 +113,35 @@ def free_focal_lengths(cameras: Sequence[Camera]) -> list[Parameter]:
 
 def free_ridge(pitch: Field) -> list[Parameter]:
     """The height of the ridge, to be found along with the poses."""
-    return [FieldParameter.of(pitch, "ridge_height_m", FREE_RIDGE_M, Field.raised)]
+    return [_ridge_height(pitch, FREE_RIDGE_M)]
+
+
+def free_field(pitch: Field) -> list[FieldParameter]:
+    """Length, width and height of a field of which next to nothing is known."""
+    return [_length(pitch, FREE_LENGTH_M), _width(pitch, FREE_WIDTH_M), _ridge_height(pitch, FREE_RIDGE_M)]
+
+
+def _ridge_height(pitch: Field, expected: float) -> FieldParameter:
+    return FieldParameter.of(
+        pitch,
+        "ridge_height_m",
+        expected,
+        lambda one: one.ridge_height,
+        lambda one, now: one.raised(now - one.ridge_height),
+    )
+
+
+def _length(pitch: Field, expected: float) -> FieldParameter:
+    """Of the pitch; its ridge keeps its own."""
+    return FieldParameter.of(
+        pitch, "length_m", expected, lambda one: one.length, lambda one, now: replace(one, length=now)
+    )
+
+
+def _width(pitch: Field, expected: float) -> FieldParameter:
+    return FieldParameter.of(
+        pitch, "width_m", expected, lambda one: one.width, lambda one, now: replace(one, width=now)
+    )
 
 
 def _longer(lens: Intrinsics, by: float) -> Intrinsics:

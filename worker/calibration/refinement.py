@@ -1,8 +1,6 @@
 """The finish: all cameras at once onto the measured lines, by a robust Gauss-Newton, and how sure that is.
 
-Found with the poses: how the ground swells, and whatever number of lens or field is left free. A weak prior holds each
-camera near where the search left it. Where lines tell something it changes nothing. Where they do not (a lone
-touchline) it keeps the camera from running away along them, and the covariance says how little is known.
+Found with the poses: how the ground swells, and whatever number of lens or field is left free.
 """
 
 from __future__ import annotations
@@ -14,22 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera
+from worker.calibration.estimate import Estimate, step, unevenness
 from worker.calibration.field import Field, LinePoints
-from worker.calibration.ground import UNEVEN_M, Ground
+from worker.calibration.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
 from worker.calibration.linemeasurement import Measurements, measure_lines
-from worker.calibration.normalequations import normal_equations
-from worker.calibration.parameters import FieldParameter, Parameter
-from worker.calibration.residuals import POSE, Unknowns, change_between, moved, residuals
-from worker.calibration.robust import Weigh, huber_weights, tukey_weights
-from worker.calibration.uncertainty import Deviation, judge
+from worker.calibration.parameters import Parameter
+from worker.calibration.residuals import Unknowns
+from worker.calibration.robust import huber_weights, tukey_weights
+from worker.calibration.uncertainty import Determined, Deviation, judge
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
 """How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
 ASSESSING_SEARCH_PX = 8.0
 HUBER_STEPS, TUKEY_STEPS = 4, 3
 """Per round."""
-PRIOR_RAD, PRIOR_M = 0.03, 1.0
-"""Standard deviation, per axis, of where a camera is before any line is measured."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +44,7 @@ class Refined:
 
     `covariance` (6, 6) of (rotation in the camera's frame rad, position m), `repeatability` (6, 6) the same for whom
     lenses and field are what they are said to be, `residual_px` the rms of its lines. `deviations`: what the lines say
-    of lenses and field.
+    of lenses and field. `found`: what was left free, in that order.
     """
 
     pitch: Field
@@ -57,10 +53,16 @@ class Refined:
     repeatability: list[Array | None]
     residual_px: list[float | None]
     deviations: list[Deviation]
+    found: list[Determined]
 
 
 def refine(
-    pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float, free: Sequence[Parameter] = ()
+    pitch: Field,
+    cameras: Sequence[Camera],
+    sight: Sight,
+    stitch_weight: float,
+    free: Sequence[Parameter] = (),
+    searches_px: Sequence[float] = SEARCH_PX,
 ) -> Refined:
     """Measure the lines and move the cameras onto them, round by round with a narrower search.
 
@@ -69,15 +71,17 @@ def refine(
     if stitch_weight == 0 and len(cameras) > 1 and not free:
         return _each_alone(pitch, cameras, sight)
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    here = _Estimate.at(pitch, cameras, unknowns)
-    for search in SEARCH_PX:
-        measured = _measure_all(here.lines(unknowns), here.cameras, sight, search)
+    here = Estimate.at(pitch, cameras, unknowns)
+    for search in searches_px:
+        unknowns = unknowns.around(here.pitch, here.lines)
+        measured = measure_all(here.on_ground(unknowns), here.cameras, sight, search)
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several.
         for weigh in [huber_weights] * HUBER_STEPS + [tukey_weights] * TUKEY_STEPS:
-            here = _step(here, cameras, measured, unknowns, stitch_weight, weigh)
-        here = _believed(here, measured, unknowns, stitch_weight)
+            here = step(here, cameras, measured, unknowns, stitch_weight, weigh)
+        uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
+        here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _assessed(here, cameras, sight, unknowns, stitch_weight)
+    return _assessed(here, cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
 
 
 def assess(
@@ -85,10 +89,10 @@ def assess(
 ) -> Refined:
     """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    return _assessed(_Estimate.at(pitch, cameras, unknowns), cameras, sight, unknowns, stitch_weight)
+    return _assessed(Estimate.at(pitch, cameras, unknowns), cameras, sight, unknowns, stitch_weight)
 
 
-def _measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
+def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
     """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
     return [
         measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.relative_size)
@@ -109,92 +113,16 @@ def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Refine
         [end.repeatability[0] for end in ends],
         [end.residual_px[0] for end in ends],
         [deviation for end in ends for deviation in end.deviations if deviation.camera is not None],
+        [],
     )
 
 
-@dataclass(frozen=True)
-class _Estimate:
-    """Where the finish stands: cameras and pitch, with `values` (E,) in them, and `heights` (K,) of the ground.
-
-    `points` (N, 3): the pitch's line points.
-    """
-
-    pitch: Field
-    points: Array
-    cameras: list[Camera]
-    values: Array
-    heights: Array
-    uneven_m: float = UNEVEN_M
-
-    @classmethod
-    def at(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> _Estimate:
-        points = pitch.line_points().position
-        return cls(pitch, points, list(cameras), np.zeros(len(unknowns.parameters)), np.zeros(len(unknowns.ground)))
-
-    def lines(self, unknowns: Unknowns) -> LinePoints:
-        """The line points of the pitch, on its ground."""
-        lines = self.pitch.line_points()
-        up = unknowns.ground.under_points(self.heights, np.arange(len(lines)))
-        return replace(lines, position=lines.position + up[:, None] * [0.0, 0.0, 1.0])
-
-    def moved(self, move: Array, unknowns: Unknowns) -> _Estimate:
-        """After a step (U,)."""
-        poses, values, heights = np.split(move, [POSE * unknowns.cameras, unknowns.dense])
-        pitch, points, cameras = self.pitch, self.points, self.cameras
-        for parameter, by in zip(unknowns.parameters, values.tolist(), strict=True):
-            cameras, pitch = parameter.applied(cameras, pitch, by)
-            if isinstance(parameter, FieldParameter):
-                points = points + by * parameter.shift
-        cameras = [moved(camera, change) for camera, change in zip(cameras, poses.reshape(-1, POSE), strict=True)]
-        values, heights = self.values + values, self.heights + heights
-        return replace(self, pitch=pitch, points=points, cameras=cameras, values=values, heights=heights)
-
-    def prior(self, unknowns: Unknowns) -> Array:
-        """Information (U, U) on every unknown before any line is measured."""
-        known = np.zeros((len(unknowns), len(unknowns)))
-        poses = [PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3
-        expected = [parameter.expected**-2 for parameter in unknowns.parameters]
-        known[: unknowns.dense, : unknowns.dense] = np.diag([*(poses * unknowns.cameras), *expected])
-        known[unknowns.dense :, unknowns.dense :] = unknowns.ground.precision / self.uneven_m**2
-        return known
-
-    def away(self, found: Sequence[Camera]) -> Array:
-        """How far (U,) every unknown is from where it was `found` by the search or given."""
-        changes = [change_between(before, now) for before, now in zip(found, self.cameras, strict=True)]
-        return np.concatenate([*changes, self.values, self.heights])
-
-
-def _step(
-    here: _Estimate,
-    found: Sequence[Camera],
-    measured: Sequence[Measurements],
-    unknowns: Unknowns,
-    stitch_weight: float,
-    weigh: Weigh,
-) -> _Estimate:
-    """One Gauss-Newton step for everything together; `found`: where the search left the cameras."""
-    rows = residuals(here.points, here.cameras, measured, unknowns, here.heights, stitch_weight, weigh)
-    equations = normal_equations(rows, unknowns)
-    prior = here.prior(unknowns)
-    pull = equations.gradient + prior @ here.away(found)
-    move = np.asarray(np.linalg.solve(equations.information + prior, -pull), dtype=float)
-    return here.moved(move, unknowns)
-
-
-def _believed(here: _Estimate, measured: Sequence[Measurements], unknowns: Unknowns, stitch_weight: float) -> _Estimate:
-    """With the unevenness of the ground that its heights speak for."""
-    rows = residuals(here.points, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
-    information = normal_equations(rows, unknowns).information + here.prior(unknowns)
-    covariance = np.asarray(np.linalg.inv(information)[unknowns.dense :, unknowns.dense :], dtype=float)
-    return replace(here, uneven_m=unknowns.ground.unevenness(here.heights, covariance, here.uneven_m))
-
-
 def _assessed(
-    here: _Estimate, found: Sequence[Camera], sight: Sight, unknowns: Unknowns, stitch_weight: float
+    here: Estimate, found: Sequence[Camera], sight: Sight, unknowns: Unknowns, stitch_weight: float
 ) -> Refined:
-    measured = _measure_all(here.lines(unknowns), here.cameras, sight, ASSESSING_SEARCH_PX)
+    measured = measure_all(here.on_ground(unknowns), here.cameras, sight, ASSESSING_SEARCH_PX)
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
     prior, away = ordinary.prior(unknowns), here.away(found)
-    judged = judge(here.pitch, here.cameras, measured, unknowns, here.heights, prior, away, stitch_weight)
+    judged = judge(here.pitch, here.lines, here.cameras, measured, unknowns, here.heights, prior, away, stitch_weight)
     return Refined(here.pitch, here.cameras, **vars(judged))

@@ -8,13 +8,14 @@ has it moves both cameras' views of a line alike, so the stitch residual has onl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.camera import Array, Camera, Pose, project, rotation_matrices, rotation_vectors
+from worker.calibration.field import Field, LinePoints
 from worker.calibration.ground import Ground
 from worker.calibration.linemeasurement import NOISE_PX, Measurements
 from worker.calibration.parameters import FIELD_STEP_M, FieldParameter, Parameter
@@ -42,6 +43,11 @@ class Unknowns:
     def dense(self) -> int:
         """6 N + E."""
         return POSE * self.cameras + len(self.parameters)
+
+    def around(self, pitch: Field, lines: LinePoints) -> Unknowns:
+        """The same unknowns on a pitch that has been changed since."""
+        parameters = [p.around(pitch, lines) if isinstance(p, FieldParameter) else p for p in self.parameters]
+        return replace(self, parameters=parameters)
 
     def __len__(self) -> int:
         return self.dense + len(self.ground)

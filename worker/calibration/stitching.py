@@ -84,25 +84,31 @@ def birdseye(
     return _blend([_look(camera, frames[camera.id], _project(camera, pitch.lift(grid))) for camera in cameras])
 
 
-def overlay(pitch: Field, before: Camera, after: Camera, frame: Frame) -> Frame:
+def overlay(stored: tuple[Field, Camera], new: tuple[Field, Camera], frame: Frame, legend_for: str = "pose") -> Frame:
     """The frame with the markings on it: orange by the stored pose, blue by the new one, BGR like `frame`.
+
+    Each is drawn with the pitch it is for; `legend_for` says what is stored and new.
 
     The stored pose draws the centre of each line; the new one frames it: the painted line stays visible between two
     blue ones if the pose is right.
     """
     picture = frame.copy()
     width = frame.shape[1]
+    pitch, camera = stored
     for marking in pitch.markings():
-        _draw(picture, _project(before, pitch.lift(_outline(marking)[0])), STORED_COLOUR, max(1, round(width / 1600)))
+        draw_line(
+            picture, _project(camera, pitch.lift(outline(marking)[0])), STORED_COLOUR, max(1, round(width / 1600))
+        )
     thickness = max(1, round(width / 3000))
+    pitch, camera = new
     for marking in pitch.markings():
-        centre, *edges = (_project(after, pitch.lift(line)) for line in _outline(marking))
+        centre, *edges = (_project(camera, pitch.lift(line)) for line in outline(marking))
         for edge in edges:
             # Half a stroke outwards and a little more, so that the paint stays visible between two strokes.
             outwards = edge - centre
             outwards /= np.linalg.norm(outwards, axis=-1, keepdims=True)
-            _draw(picture, edge + EDGE_GAP * thickness * outwards, NEW_COLOUR, thickness)
-    _legend(picture, (("stored pose", STORED_COLOUR), ("new pose", NEW_COLOUR)))
+            draw_line(picture, edge + EDGE_GAP * thickness * outwards, NEW_COLOUR, thickness)
+    legend(picture, ((f"stored {legend_for}", STORED_COLOUR), (f"new {legend_for}", NEW_COLOUR)))
     return picture
 
 
@@ -360,7 +366,7 @@ def exposure_gains(looks: Sequence[_Look]) -> NDArray[np.float32]:
     return np.clip(gains, 1 / LARGEST_GAIN, LARGEST_GAIN).astype(np.float32)
 
 
-def _outline(marking: Marking) -> list[Array]:
+def outline(marking: Marking) -> list[Array]:
     """A marking's centre line and its edges, (n, 2) each, densely enough for distortion and roof."""
     between, _ = resample(marking.centre, 0.25)
     centre = np.concatenate([marking.centre[:1], between, marking.centre[-1:]])
@@ -375,7 +381,7 @@ def _outline(marking: Marking) -> list[Array]:
     return [centre, centre + across, centre - across]
 
 
-def _draw(picture: Frame, line: Array, colour: tuple[int, int, int], thickness: int) -> None:
+def draw_line(picture: Frame, line: Array, colour: tuple[int, int, int], thickness: int) -> None:
     """Draw a polyline (n, 2) of sub-pixel positions, interrupted where it is NaN or far outside."""
     near = inside(line, (picture.shape[1], picture.shape[0]), margin=-1000.0)
     breaks = np.flatnonzero(~near)
@@ -384,10 +390,12 @@ def _draw(picture: Frame, line: Array, colour: tuple[int, int, int], thickness: 
     cv2.polylines(picture, fixed_point, False, colour, thickness, cv2.LINE_AA, shift=4)
 
 
-def _legend(picture: Frame, entries: Sequence[tuple[str, tuple[int, int, int]]]) -> None:
+def legend(picture: Frame, entries: Sequence[tuple[str, tuple[int, int, int]]]) -> None:
     """Name the colours in the lower left corner."""
     unit = max(12, picture.shape[1] // 100)
-    width, height = 13 * unit, (2 * len(entries) + 1) * unit
+    scale, thick = unit / 20, max(1, unit // 14)
+    longest = max(cv2.getTextSize(name, cv2.FONT_HERSHEY_SIMPLEX, scale, thick)[0][0] for name, _ in entries)
+    width, height = 5 * unit + longest, (2 * len(entries) + 1) * unit
     left, top = unit, picture.shape[0] - unit - height
     box = picture[max(top, 0) : top + height, left : left + width]
     box[:] = box // 4
@@ -395,6 +403,4 @@ def _legend(picture: Frame, entries: Sequence[tuple[str, tuple[int, int, int]]])
         y = top + (2 * row + 1) * unit + unit // 2
         cv2.line(picture, (left + unit, y), (left + 3 * unit, y), colour, max(2, unit // 6), cv2.LINE_AA)
         place = (left + 4 * unit, y + unit // 2)
-        cv2.putText(
-            picture, name, place, cv2.FONT_HERSHEY_SIMPLEX, unit / 20, (255, 255, 255), max(1, unit // 14), cv2.LINE_AA
-        )
+        cv2.putText(picture, name, place, cv2.FONT_HERSHEY_SIMPLEX, scale, (255, 255, 255), thick, cv2.LINE_AA)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from worker.calibration.camera import Array, Camera
-from worker.calibration.field import Field
+from worker.calibration.field import Field, LinePoints
 from worker.calibration.linemeasurement import Measurements
 from worker.calibration.normalequations import error_of_measurement, normal_equations
 from worker.calibration.parameters import LensParameter, Parameter, field_parameters, lens_parameters
@@ -43,19 +43,32 @@ class Deviation:
 
 
 @dataclass(frozen=True)
+class Determined:
+    """How well the lines fix a number that was left free: its `sigma`, with what lenses and field may be off, where
+    `expected` was how far off it might have been before. `entangled`: which other unknown number moves most with it,
+    and their correlation.
+    """
+
+    sigma: float
+    entangled: tuple[Parameter, float] | None
+
+
+@dataclass(frozen=True)
 class Judged:
     """Per camera, None where it had too few measurements: `covariance` (6, 6), `repeatability` (6, 6), `residual_px`;
-    see `Refined`.
+    see `Refined`, also for `deviations` and `found`.
     """
 
     covariance: list[Array | None]
     repeatability: list[Array | None]
     residual_px: list[float | None]
     deviations: list[Deviation]
+    found: list[Determined]
 
 
 def judge(
     pitch: Field,
+    lines: LinePoints,
     cameras: Sequence[Camera],
     measured: Sequence[Measurements],
     solved: Unknowns,
@@ -64,14 +77,13 @@ def judge(
     away: Array,
     stitch_weight: float,
 ) -> Judged:
-    """Judge an answer that was found with `solved` unknown.
+    """Judge an answer that was found with `solved` unknown; `lines` of the pitch are those that were `measured`.
 
     `prior` (U, U): the information on them before any line was measured; `away` (U,): how far they are from it.
     """
     suspects = _suspects(pitch, cameras, solved)
-    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground)
-    points = pitch.line_points().position
-    rows = residuals(points, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
+    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(pitch, lines)
+    rows = residuals(lines.position, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
     equations = normal_equations(rows, unknowns)
     kept = np.r_[: solved.dense, unknowns.dense : len(unknowns)]
     asked = np.arange(solved.dense, unknowns.dense)
@@ -97,7 +109,7 @@ def judge(
     return Judged(
         [_of_pose(covariance, nearer, i) if known else None for i, known in enumerate(enough)],
         [_of_pose(alone, np.zeros(len(alone)), i) if known else None for i, known in enumerate(enough)],
-        [rms_px(points, camera, found) for camera, found in zip(cameras, measured, strict=True)],
+        [rms_px(lines.position, camera, found) for camera, found in zip(cameras, measured, strict=True)],
         [
             Deviation(
                 cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
@@ -108,6 +120,7 @@ def judge(
             )
             for i, suspect in enumerate(suspects)
         ],
+        [_determined(number, unknowns, covariance, nearer) for number in range(len(solved.parameters))],
     )
 
 
@@ -138,6 +151,22 @@ def _certainty(information: Array, pull: Array, suspects: Sequence[Parameter]) -
             scale = np.sqrt((power[its].sum() + TRUST_NUMBERS * TRUST**2) / evidence)
             factor[its] = min(scale, LARGEST_FACTOR)
     return np.asarray((expected * factor) ** -2)
+
+
+def _determined(number: int, unknowns: Unknowns, covariance: Array, nearer: Array) -> Determined:
+    """What is known of the free parameter of this number."""
+    first = POSE * unknowns.cameras
+    at = first + number
+    variance = np.diag(covariance)[first : unknowns.dense]
+    together = np.sqrt(variance * variance[number])
+    jointly = covariance[at, first : unknowns.dense]
+    correlation = np.divide(jointly, together, out=np.zeros_like(together), where=together > 0)
+    correlation[number] = 0.0
+    most = int(np.argmax(np.abs(correlation)))
+    return Determined(
+        float(np.sqrt(variance[number] + nearer[at] ** 2)),
+        None if most == number else (unknowns.parameters[most], float(correlation[most])),
+    )
 
 
 def _of_pose(covariance: Array, nearer: Array, camera: int) -> Array:

@@ -1,0 +1,111 @@
+"""The commands of docs/first-calibration.md as they stand there, on real cameras: from photos and clicks to poses."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.real.pair import FOLDER
+from worker.calibration.camera import Camera, Intrinsics, Pose
+from worker.calibration.field import Field
+
+pytestmark = [pytest.mark.real, pytest.mark.timeout(1200)]
+DOCUMENT = Path(__file__).parents[2] / "docs" / "first-calibration.md"
+EXCHANGED = (3, 10)
+
+
+def commands() -> list[str]:
+    """What the page tells to type, step by step."""
+    return re.findall(r"^```sh\n(.*?)^```$", DOCUMENT.read_text(), re.MULTILINE | re.DOTALL)
+
+
+def typed(step: str, folder: Path) -> str:
+    """What a step says on standard error."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        ["bash", "-e", "-c", step], cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stderr
+
+
+@pytest.fixture(scope="module")
+def lenses(real_pair, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("lenses")
+    (folder / "checkerboard").symlink_to(FOLDER / "checkerboard")
+    assert typed(commands()[0], folder).count("the principal point") >= 2
+    return folder
+
+
+@pytest.fixture(scope="module", params=["plain", "with two labels exchanged"])
+def walked(request, lenses, real_pair, tmp_path_factory) -> tuple[Path, str, str]:
+    """The folder at the end of the walk, what was said of the points, and which labels were exchanged."""
+    folder = tmp_path_factory.mktemp("walk")
+    for path in [*FOLDER.glob("*_000.jpg"), *lenses.glob("*.json")]:
+        shutil.copy(path, folder)
+    clicks = json.loads((FOLDER / "keypoints.json").read_text())
+    if request.param != "plain":
+        for points in clicks.values():
+            one, other = (points[number] for number in EXCHANGED)
+            one["world"], other["world"] = other["world"], one["world"]
+    (folder / "keypoints.json").write_text(json.dumps(clicks))
+    _, *steps = commands()
+    said = [typed(step, folder) for step in steps]
+    return folder, said[0], request.param
+
+
+def test_exchanged_labels_are_named_and_no_others(real_pair, walked):
+    _, said, labels = walked
+    expected = set()
+    for points in real_pair.clicks.values():
+        one, other = (points[number]["world"] for number in EXCHANGED)
+        expected |= {(str(one), str(other)), (str(other), str(one))}
+    found = set(re.findall(r"(\[[^]]+\]) is .*? that of (\[[^]]+\]) are exchanged", said))
+    assert found == (expected if labels != "plain" else set())
+
+
+def test_the_wrong_principal_point_of_the_right_camera_is_found(walked):
+    folder, _, _ = walked
+    before = json.loads((folder / "right.json").read_text())["intrinsics"]["matrix"]
+    after = json.loads((folder / "venue.json").read_text())["cameras"][1]["intrinsics"]["matrix"]
+    off, left = (np.hypot(m[0][2] - 1515.9, m[1][2] - 876.6) for m in (before, after))
+    assert off > 150
+    assert left < 40
+
+
+def test_the_height_of_the_ridge_is_found_and_its_length_declared_unknowable(walked):
+    folder, _, _ = walked
+    measures = {m["name"]: m for m in json.loads((folder / "field.json").read_text())["measures"]}
+    height, length = measures["ridge_height_m"], measures["ridge_length_m"]
+    assert height["known"]
+    assert abs(height["value"] - 0.237) < 2 * height["sigma"] < 0.15
+    assert not length["known"]
+    assert "the lines fit alike with a ridge of any length from" in length["detail"]
+    for name, about, within in (("length_m", 105.0, 0.3), ("width_m", 68.0, 0.5)):
+        assert measures[name]["known"]
+        assert measures[name]["value"] == pytest.approx(about, abs=within)
+
+
+def test_the_calibration_is_accepted_and_ends_at_the_clicked_points(real_pair, walked):
+    folder, _, _ = walked
+    venue, result = (json.loads((folder / name).read_text()) for name in ("venue.json", "result/result.json"))
+    assert result["accepted"]
+    place = venue["field"]
+    pitch = Field(place["length_m"], place["width_m"], place["line_width_m"], np.array(place["ridge"]))
+    for stored, found in zip(venue["cameras"], result["cameras"], strict=True):
+        lens = Intrinsics(
+            np.array(stored["intrinsics"]["matrix"]),
+            np.array(stored["intrinsics"]["distortion"]),
+            tuple(stored["image_size"]),
+        )
+        pose = Pose(np.array(found["pose"]["rotation"]), np.array(found["pose"]["position"]))
+        clicks = real_pair.clicks[found["id"]]
+        world = pitch.lift(np.array([click["world"] for click in clicks], dtype=float))
+        off = Camera(found["id"], lens, pose).project(world) - np.array([click["pixel"] for click in clicks])
+        assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 4

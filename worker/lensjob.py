@@ -1,0 +1,105 @@
+"""A job of the kind `intrinsics`: from the files of photos to a lens and the picture of what it rests on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+
+import cv2
+
+from service import schemas
+from service.schemas import CoverageResult, IntrinsicsOptions, IntrinsicsResult, LensTrial, PhotoResult, Progress
+from worker.calibration.boards import Board, Charuco, find_board, other_size
+from worker.calibration.inspection import coverage_picture
+from worker.calibration.lenscalibration import LensCalibration, NoLens, Photo, calibrate_lens
+from worker.outcome import Failure, Outcome, Picture, decoded, jpeg, number, wire_lens
+
+DETECTION_FRACTION = 0.8
+
+
+def solve(
+    files: Mapping[str, bytes], options: IntrinsicsOptions, report: Callable[[Progress], None]
+) -> Outcome[IntrinsicsResult]:
+    """The lens of the camera that took the photos, `files` by their names."""
+    begun = time.perf_counter()
+    board = _board(options.board)
+    photos = []
+    for count, (name, file) in enumerate(files.items()):
+        report(Progress(stage="detection", fraction=DETECTION_FRACTION * count / len(files)))
+        # One at a time: what is kept of a photo is where the corners are.
+        photos.append(_look(name, file, board))
+    detected = time.perf_counter()
+    if all(photo.sighting is None for photo in photos):
+        _require_the_right_board(files, board)
+    rest = 1 - DETECTION_FRACTION
+    try:
+        found = calibrate_lens(
+            photos,
+            options.model,
+            lambda share: report(Progress(stage="fit", fraction=DETECTION_FRACTION + rest * share)),
+        )
+    except NoLens as error:
+        raise Failure("no-lens", _sentence(error)) from error
+    fitted = time.perf_counter()
+    picture = jpeg(coverage_picture(found))
+    timings = {"detection": detected - begun, "fit": fitted - detected, "picture": time.perf_counter() - fitted}
+    return Outcome(_result(found, timings), {"coverage": picture})
+
+
+def _board(board: schemas.Board) -> Board:
+    charuco = board.charuco
+    extra = None if charuco is None else Charuco(charuco.dictionary, charuco.marker_m)
+    return Board(board.columns, board.rows, board.square_m, extra)
+
+
+def _look(name: str, file: bytes, board: Board) -> Photo:
+    grey = _grey(name, file)
+    return Photo(name, (grey.shape[1], grey.shape[0]), find_board(grey, board))
+
+
+def _grey(name: str, file: bytes) -> Picture:
+    grey = decoded(file, cv2.IMREAD_GRAYSCALE)
+    if grey is None:
+        raise Failure("broken-image", f"Photo {name} cannot be decoded; leave it out or take it again.")
+    return grey
+
+
+def _require_the_right_board(files: Mapping[str, bytes], board: Board) -> None:
+    """Say so where it is the board that was described wrongly."""
+    for name, file in list(files.items())[:3]:
+        size = other_size(_grey(name, file), board)
+        if size is not None:
+            raise Failure(
+                "no-lens",
+                f"No photo shows a board of {board.columns}x{board.rows} inner corners, but {name} one of "
+                f"{size[0]}x{size[1]}: count where four squares meet, not squares.",
+            )
+
+
+def _result(found: LensCalibration, timings_s: Mapping[str, float]) -> IntrinsicsResult:
+    return IntrinsicsResult(
+        image_size=list(found.lens.size),
+        intrinsics=wire_lens(found.lens),
+        terms=list(found.terms),
+        rms_px=found.rms_px,
+        left_out_px=found.left_out_px,
+        sigma=dict(found.sigma),
+        spread=dict(found.spread),
+        coverage=CoverageResult(share=found.coverage.share, empty=list(found.coverage.empty)),
+        photos=[
+            PhotoResult(
+                name=p.name, fate=p.fate, rms_px=number(p.rms_px), left_out_px=number(p.left_out_px), blurred=p.blurred
+            )
+            for p in found.photos
+        ],
+        trials=[LensTrial(terms=list(t.terms), rms_px=t.rms_px, left_out_px=t.left_out_px) for t in found.trials],
+        warnings=[_sentence(warning) for warning in found.warnings],
+        timings_s={stage: round(seconds, 3) for stage, seconds in timings_s.items()},
+        software=version("esc-calibration"),
+    )
+
+
+def _sentence(words: object) -> str:
+    text = str(words)
+    return f"{text[0].upper()}{text[1:]}."

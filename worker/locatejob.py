@@ -1,0 +1,120 @@
+"""A job of the kind `locate`: from clicked points to a first pose and the picture that shows it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+
+import numpy as np
+
+from fields.landmarks import UnknownLandmark
+from service import schemas
+from service.schemas import ClickedPoint, LocateOptions, LocateResult, LocateSigma, PointResult, Progress, Venue
+from worker.calibration.camera import Array, Intrinsics
+from worker.calibration.field import Field
+from worker.calibration.firstpose import FirstPose, LensGain, NoPose, first_pose
+from worker.calibration.inspection import clicks_picture
+from worker.calibration.pointfit import Clicks
+from worker.outcome import Failure, Outcome, decoded_frame, jpeg, lens_of, number, pitch_of, wire_lens, wire_pose
+
+
+def solve(
+    venue: Venue,
+    camera: str,
+    options: LocateOptions,
+    frame: bytes | None,
+    report: Callable[[Progress], None],
+) -> Outcome[LocateResult]:
+    """The first pose of a camera of a venue. `frame`: the file that the points were clicked in, for the picture."""
+    (stored,) = (one for one in venue.cameras if one.id == camera)
+    lens = lens_of(stored.intrinsics, stored.image_size)
+    return locate(camera, venue.field, lens, options.points, frame, report)
+
+
+def locate(
+    camera: str,
+    field: schemas.FieldOfPlay,
+    lens: Intrinsics,
+    points: list[ClickedPoint],
+    frame: bytes | None,
+    report: Callable[[Progress], None],
+) -> Outcome[LocateResult]:
+    """The first pose of a camera that may belong to no venue yet."""
+    begun = time.perf_counter()
+    pitch = pitch_of(field)
+    picture = None if frame is None else decoded_frame(camera, list(lens.size), frame)
+    clicks = _clicks(camera, pitch, points)
+    report(Progress(stage="fit", fraction=0.0))
+    try:
+        found = first_pose(clicks, lens, pitch.places(), camera)
+    except NoPose as error:
+        raise Failure("no-pose", f"Camera {camera}: {error}.", camera) from error
+    fitted = time.perf_counter()
+    drawn = jpeg(clicks_picture(pitch, clicks, found, picture))
+    timings = {"fit": fitted - begun, "picture": time.perf_counter() - fitted}
+    return Outcome(_result(found, points, timings), {"points": drawn})
+
+
+def _clicks(camera: str, pitch: Field, points: list[ClickedPoint]) -> Clicks:
+    try:
+        world = np.stack([_world(pitch, point) for point in points])
+    except UnknownLandmark as error:
+        raise Failure("unknown-landmark", f"Camera {camera}: {error}.", camera) from error
+    # The number makes names of equal points differ.
+    names = tuple(f"{number}: {_label(point)}" for number, point in enumerate(points, start=1))
+    return Clicks(names, world, np.array([point.pixel for point in points], dtype=float))
+
+
+def _world(pitch: Field, point: ClickedPoint) -> Array:
+    if isinstance(point.world, str):
+        return pitch.place(point.world)
+    place = np.array(point.world, dtype=float)
+    return pitch.lift(place) if len(place) == 2 else place
+
+
+def _label(point: ClickedPoint) -> str:
+    return point.world if isinstance(point.world, str) else f"({', '.join(f'{value:g}' for value in point.world)})"
+
+
+def _result(found: FirstPose, points: list[ClickedPoint], timings_s: dict[str, float]) -> LocateResult:
+    given = {click.name: point.world for click, point in zip(found.clicks, points, strict=True)}
+    return LocateResult(
+        accepted=found.rejected_because is None,
+        rejected_because=found.rejected_because,
+        camera=found.camera.id,
+        image_size=list(found.camera.intrinsics.size),
+        intrinsics=wire_lens(found.camera.intrinsics),
+        pose=wire_pose(found.camera.pose),
+        rms_px=found.rms_px,
+        sigma=LocateSigma(
+            rotation_deg=found.sigma_rotation_deg, position_m=found.sigma_position_m, pixels=found.sigma_px
+        ),
+        points=[
+            PointResult(
+                world=point.world,
+                residual_px=number(click.residual_px),
+                doubted=click.doubted,
+                exchanged_with=None if click.exchanged_with is None else given[click.exchanged_with],
+                looks_like=click.looks_like,
+            )
+            for click, point in zip(found.clicks, points, strict=True)
+        ],
+        lens=None if found.lens is None else _gain(found.lens),
+        warnings=list(found.warnings),
+        timings_s={stage: round(seconds, 3) for stage, seconds in timings_s.items()},
+        software=version("esc-calibration"),
+    )
+
+
+def _gain(gain: LensGain) -> schemas.LensGain:
+    return schemas.LensGain(
+        given=wire_lens(gain.before.camera.intrinsics),
+        free=list(gain.after.free),
+        sigma=dict(gain.sigma),
+        rms_before_px=gain.before.rms_px,
+        rms_px=gain.after.rms_px,
+        left_out_before_px=gain.left_out_before_px,
+        left_out_px=gain.left_out_px,
+        evidence=gain.evidence,
+    )

@@ -1,0 +1,164 @@
+"""What the kinds of jobs share: how they end, how files become pictures, how the wire becomes the engine's types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Generic, TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from service import schemas
+from service.problems import KINDS, type_of
+from service.schemas import (
+    CameraResult,
+    FieldResult,
+    IntrinsicsResult,
+    JobError,
+    LocateResult,
+    Moved,
+    Progress,
+    Result,
+    Sigma,
+)
+from service.settings import Settings
+from worker.calibration import calibrate as engine
+from worker.calibration import quality
+from worker.calibration.camera import LENSES, Camera, Intrinsics, Pose
+from worker.calibration.field import Field
+from worker.calibration.segmentation import ProviderMissing, Segmenter
+
+Picture = NDArray[np.uint8]
+JPEG_QUALITY = 90
+PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
+# The engine's report ends with the refinement; what is left is drawing.
+PREVIEW_FRACTION = 0.96
+R = TypeVar("R", bound=Result | IntrinsicsResult | LocateResult | FieldResult, covariant=True)
+
+
+@dataclass(frozen=True)
+class Outcome(Generic[R]):
+    """A result and its pictures, JPEG by name: `preview`, `birdseye`, `overlay_<camera>`, `coverage`, `points`."""
+
+    result: R
+    pictures: dict[str, bytes]
+
+
+class Failure(Exception):  # noqa: N818
+    """The job has no result; `error` says why."""
+
+    def __init__(self, kind: str, detail: str, camera: str | None = None) -> None:
+        super().__init__(detail)
+        self.error = JobError(type=type_of(kind), title=KINDS[kind].title, detail=detail, camera=camera)
+
+
+def decoded(file: bytes, flags: int) -> Picture | None:
+    """A picture from a file's bytes, None where it has none; a camera's EXIF orientation is not obeyed."""
+    try:
+        picture = cv2.imdecode(np.frombuffer(file, dtype=np.uint8), flags | cv2.IMREAD_IGNORE_ORIENTATION)
+    except cv2.error:
+        return None
+    return None if picture is None else np.asarray(picture, dtype=np.uint8)
+
+
+def decoded_frame(camera: str, image_size: list[int], file: bytes) -> Picture:
+    """A BGR frame (height, width, 3) of the size of the intrinsics."""
+    frame = decoded(file, cv2.IMREAD_COLOR_BGR)
+    if frame is None:
+        raise Failure("broken-image", f"A frame of camera {camera} cannot be decoded; grab it again.", camera)
+    height, width = frame.shape[:2]
+    if [width, height] != image_size:
+        raise Failure(
+            "frame-size",
+            f"A frame of camera {camera} decodes to {width}x{height} pixels; its intrinsics are for "
+            f"{image_size[0]}x{image_size[1]}.",
+            camera,
+        )
+    return frame
+
+
+def jpeg(picture: Picture) -> bytes:
+    """The file of a picture."""
+    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return data.tobytes()
+
+
+def pitch_of(field: schemas.FieldOfPlay) -> Field:
+    """The engine's pitch."""
+    ridge = None if field.ridge is None else np.array(field.ridge)
+    return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
+
+
+def lens_of(lens: schemas.Intrinsics, image_size: list[int]) -> Intrinsics:
+    """The engine's lens."""
+    matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
+    return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]))
+
+
+def camera_of(camera: schemas.Camera) -> Camera:
+    """The engine's camera at its stored pose."""
+    pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
+    return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
+
+
+def wire_lens(lens: Intrinsics) -> schemas.Intrinsics:
+    """A lens of the engine for the wire."""
+    return schemas.Intrinsics(model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
+
+
+def wire_pose(pose: Pose) -> schemas.Pose:
+    """A pose of the engine for the wire."""
+    return schemas.Pose(
+        rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
+    )
+
+
+def number(value: Any) -> float | None:
+    """JSON has no NaN and no infinity."""
+    return float(value) if value is not None and isfinite(value) else None
+
+
+def segmenter_of(settings: Settings) -> Segmenter:
+    """The network that the settings name."""
+    if not settings.model.is_file():
+        raise Failure("model-missing", f"{settings.model} is not there; set ESC_MODEL or train one.")
+    try:
+        return Segmenter(settings.model, settings.threads, PROVIDERS[settings.provider])
+    except ProviderMissing as missing:
+        raise Failure("provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for.") from missing
+
+
+def wire_progress(step: engine.Progress) -> Progress:
+    """How far the engine is, with room for the pictures."""
+    return Progress(
+        stage=step.stage,
+        fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
+        generation=step.generation,
+        loss=number(step.loss),
+    )
+
+
+def wire_camera(camera: engine.CameraResult, lens: schemas.Intrinsics | None = None) -> CameraResult:
+    """What a finish has to say of a camera; `lens` where it was found as well."""
+    return CameraResult(
+        id=camera.id,
+        pose=wire_pose(camera.pose),
+        intrinsics=lens,
+        sigma=_sigma(camera.sigma),
+        repeatability=_sigma(camera.repeatability),
+        moved=Moved(
+            rotation_deg=camera.moved.rotation_deg,
+            position_m=camera.moved.position_m,
+            pixels=number(camera.moved.pixels),
+        ),
+        iou=number(camera.iou),
+        residual_px=number(camera.residual_px),
+    )
+
+
+def _sigma(sigma: quality.Sigma | None) -> Sigma | None:
+    if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
+        return None
+    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)
