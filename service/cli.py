@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
@@ -38,6 +39,7 @@ from service.schemas import (
     LensFile,
     LensModel,
     LocateResult,
+    Moved,
     Options,
     PoseIn,
     Result,
@@ -378,6 +380,44 @@ def job_poses(
         _hand_out(client.job_poses(job, form, camera), output)
 
 
+@venue_app.command("history")
+def venue_history(
+    venue: str,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="So many, the newest.")] = 20,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Print a line per change of the poses, newest first: revision, time, cause, job, pixels moved and drifted."""
+    with Client(url, api_key) as client:
+        for revision in islice(client.history(venue), limit):
+            cause = revision.cause if revision.restored_from is None else f"restored {revision.restored_from}"
+            cameras = " ".join(f"{c.id}:{_pixels(c.moved)}/{_pixels(c.drift)}" for c in revision.cameras)
+            print(f"{revision.revision}\t{revision.at:%Y-%m-%dT%H:%M:%SZ}\t{cause}\t{revision.job or '-'}\t{cameras}")
+
+
+@venue_app.command("restore")
+def restore_venue(
+    venue: str, revision: Annotated[int, typer.Argument(min=1)], url: Url = LOCAL, api_key: ApiKey = None
+) -> None:
+    """Let the poses of a revision hold again, see `esc venue history`."""
+    with Client(url, api_key) as client:
+        _print(client.restore(venue, revision))
+
+
+@job_app.command("accept")
+def accept_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Let the poses of a job hold that the gate rejected, or that was a dry run."""
+    with Client(url, api_key) as client:
+        _print(client.accept(job))
+
+
+@job_app.command("reject")
+def reject_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Put back the poses that held before those of a job."""
+    with Client(url, api_key) as client:
+        _print(client.reject(job))
+
+
 @job_app.command("get")
 def get_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print a job."""
@@ -697,6 +737,10 @@ def _hand_out(document: bytes, output: Path | None) -> None:
         sys.stdout.buffer.write(document)
     else:
         output.write_bytes(document)
+
+
+def _pixels(moved: Moved | None) -> str:
+    return "-" if moved is None or moved.pixels is None else f"{moved.pixels:.1f}"
 
 
 def _print(what: BaseModel | dict[str, str]) -> None:

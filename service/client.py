@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import httpx
 
-from service.schemas import FormatName, Job, Venue, VenueIn, Venues
+from service.schemas import FormatName, History, Job, Revision, Venue, VenueIn, Venues
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
@@ -71,6 +71,21 @@ class Client:
         """Forget a venue."""
         self._answer("DELETE", f"/venues/{venue_id}")
 
+    def history(self, venue_id: str) -> Iterator[Revision]:
+        """Every change of a venue's poses, newest first, page by page."""
+        cursor = None
+        while True:
+            params: dict[str, Any] = {"cursor": cursor} if cursor else {}
+            page = History.model_validate(self._json("GET", f"/venues/{venue_id}/history", params=params))
+            yield from page.revisions
+            cursor = page.next_cursor
+            if cursor is None:
+                return
+
+    def restore(self, venue_id: str, revision: int) -> Venue:
+        """Let the poses of a revision hold again."""
+        return Venue.model_validate(self._json("POST", f"/venues/{venue_id}/restore", json={"revision": revision}))
+
     def venue_poses(self, venue_id: str, form: FormatName, camera: str | None = None) -> bytes:
         """The poses that hold now, of one camera or all, as a file of another tool's format."""
         return self._document(f"/venues/{venue_id}/poses", form, camera)
@@ -119,6 +134,14 @@ class Client:
     def cancel(self, job_id: str) -> Job:
         """End a job."""
         return Job.model_validate(self._json("POST", f"/jobs/{job_id}/cancel"))
+
+    def accept(self, job_id: str) -> Job:
+        """Let the poses that a calibration found hold, whatever the gate said."""
+        return Job.model_validate(self._json("POST", f"/jobs/{job_id}/accept"))
+
+    def reject(self, job_id: str) -> Job:
+        """Put back what was before the poses of a calibration."""
+        return Job.model_validate(self._json("POST", f"/jobs/{job_id}/reject"))
 
     def follow(self, job: Job, show: Callable[[Job], None], every_s: float = 0.5) -> Job:
         """Wait for the end of a job, showing what it does meanwhile. The service may be away for a minute."""

@@ -57,6 +57,9 @@ KINDS: dict[str, Kind] = {
     "venue-replaced": Kind(409, "The venue was changed during the upload"),
     "no-such-camera": Kind(404, "The venue has no camera of this id"),
     "venue-busy": Kind(409, "The venue has an active job"),
+    "venue-moved-on": Kind(409, "The venue is not as the job left or found it"),
+    "revision-not-found": Kind(404, "The venue has no such revision"),
+    "revision-unfit": Kind(409, "The revision does not fit the venue as it is now"),
     # Frames.
     "unknown-camera": Kind(422, "The venue has no such camera"),
     "missing-camera": Kind(422, "A camera of the venue has no frame"),

@@ -176,10 +176,19 @@ class CameraIn(_Lens):
         return self
 
 
-class Camera(_Lens):
-    """A camera of a venue with its stored pose."""
+class PosedCamera(_Lens):
+    """A camera as it stands: its lens, and where it is and looks."""
 
     pose: Pose
+
+
+class Camera(PosedCamera):
+    """A camera of a venue with its stored pose."""
+
+    @property
+    def posed(self) -> PosedCamera:
+        """What a calibration says of it, and nothing else."""
+        return PosedCamera(id=self.id, image_size=self.image_size, intrinsics=self.intrinsics, pose=self.pose)
 
 
 Place = Annotated[list[Annotated[Number, Field(ge=-200, le=200)]], Field(min_length=2, max_length=2)]
@@ -473,6 +482,20 @@ class Venue(_Place):
         ]
         return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras)
 
+    def with_state(self, cameras: list[PosedCamera], ridge: list[list[float]] | None) -> Venue:
+        """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
+        then = {camera.id: camera for camera in cameras}
+        back = [
+            camera.model_copy(update={"pose": then[camera.id].pose, "intrinsics": then[camera.id].intrinsics})
+            for camera in self.cameras
+        ]
+        field = FieldOfPlay.model_validate(self.field.model_dump() | {"ridge": ridge})
+        return self.model_copy(update={"cameras": back, "field": field})
+
+    def stands_like(self, other: Venue) -> bool:
+        """Whether the cameras of both are the same and stand alike, with the ridge that their poses belong to."""
+        return self.cameras == other.cameras and self.field.ridge == other.field.ridge
+
     def calibrates_like(self, other: Venue) -> bool:
         """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
         return self.field == other.field and self.cameras == other.cameras
@@ -489,21 +512,88 @@ class Venues(Wire):
     next_cursor: str | None = None
 
 
-class HeldPose(Wire):
-    """A pose that a camera had from `since` on, and what brought it: a `put`, or a `calibration` by `job`."""
+class Moved(Wire):
+    """From the stored pose to the new one; `pixels`: mean shift of the visible pitch."""
 
-    camera: Id
+    rotation_deg: float
+    position_m: float
+    pixels: float | None
+
+
+class Movement(Wire):
+    """How a camera stands against others of its states; null: there was none, or it is not known."""
+
+    moved: Moved | None = Field(description="Since the revision before.")
+    drift: Moved | None = Field(description="Since the revision `drift_since`.")
+    drift_since: int = Field(description="The last revision in which the camera was put where it is: the first pose.")
+
+
+class RevisionCamera(Movement):
+    """A camera in a revision of its venue."""
+
+    id: Id
     pose: Pose
-    cause: Literal["put", "calibration"]
-    job: str | None
-    since: datetime
 
 
-class PoseHistory(Wire):
-    """A page of poses, newest first; the newest of each camera holds now. `next_cursor`: null on the last page."""
+# What brought a revision: a PUT, a calibration by itself, a result that was accepted by hand, an older revision.
+Cause = Literal["put", "calibrated", "accepted", "restored"]
 
-    poses: list[HeldPose]
+
+class Revision(Wire):
+    """The poses that a venue had from a moment on, with the lenses and the ridge that they belong to."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "revision": 2,
+                    "at": "2026-11-21T10:00:09Z",
+                    "cause": "calibrated",
+                    "job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
+                    "restored_from": None,
+                    "stitch_error_px": 0.2,
+                    "ridge": [[-18.5, 0.0, 0.2367], [18.5, 0.0, 0.2367]],
+                    "cameras": [
+                        {
+                            "id": "left",
+                            "pose": {
+                                "rotation": [1.675, 0.372, -0.462],
+                                "position": [-1.48, -49.49, 7.84],
+                                "translation": [-20.06, 3.73, 45.85],
+                            },
+                            "moved": {"rotation_deg": 0.1, "position_m": 0.02, "pixels": 4.1},
+                            "drift": {"rotation_deg": 0.1, "position_m": 0.02, "pixels": 4.1},
+                            "drift_since": 1,
+                        }
+                    ],
+                }
+            ]
+        }
+    )
+
+    revision: int = Field(description="Counts from 1; the newest holds now.")
+    at: datetime
+    cause: Cause
+    job: str | None = Field(description="Whose poses these are; of a restored one, whose were rejected by hand.")
+    restored_from: int | None = Field(description="The revision that was put back.")
+    stitch_error_px: float | None = Field(description="As the job said; null: nobody measured it.")
+    ridge: list[Row] | None
+    cameras: list[RevisionCamera]
+
+
+class History(Wire):
+    """A page of revisions, newest first. `next_cursor`: null on the last page."""
+
+    revisions: list[Revision]
     next_cursor: int | None = None
+
+
+class Restore(Wire):
+    """Which revision is to hold again."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"revision": 1}]})
+
+    revision: Annotated[Whole, Field(ge=1, le=2**31 - 1)]
 
 
 class Options(Wire):
@@ -633,14 +723,6 @@ class Sigma(Wire):
 
     rotation_deg: float
     position_m: float
-
-
-class Moved(Wire):
-    """From the stored pose to the new one; `pixels`: mean shift of the visible pitch."""
-
-    rotation_deg: float
-    position_m: float
-    pixels: float | None
 
 
 class CameraResult(Wire):
@@ -879,6 +961,7 @@ class Job(Wire):
                     "error": None,
                     "result": None,
                     "callback": None,
+                    "venue_revision": None,
                     "links": {"self": "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"},
                 }
             ]
@@ -899,6 +982,9 @@ class Job(Wire):
     result: Result | IntrinsicsResult | LocateResult | FieldResult | None
     callback: CallbackState | None = Field(
         None, description="Null before the end, without `callback_url`, and in what a `callback_url` gets."
+    )
+    venue_revision: int | None = Field(
+        None, description="The revision of the venue that its poses became, by themselves or by hand; null: none."
     )
     links: dict[str, str]
 

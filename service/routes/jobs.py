@@ -17,9 +17,11 @@ from service.problems import Problem
 from service.routes.documented import headers, needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
+from service.routes.venues import revision_unfit
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Job, Jobs, Status
 from service.store.engine import AWAY
-from service.store.jobs import Pictures, State
+from service.store.jobs import MovedOn, NoPoses, Pictures, State
+from service.store.revisions import RevisionUnfit
 
 log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
@@ -98,6 +100,47 @@ def cancel_job(job: Existing, context: InContext) -> Response:
     return job_answer(context.jobs.get(job.id) or job)
 
 
+@router.post("/{job_id}/accept", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))
+def accept_job(job: Existing, context: InContext) -> Response:
+    """Let the poses of a calibration hold that the gate rejected, or that was a dry run. Nothing changes if they do.
+
+    Only while the venue is as the calibration found it.
+    """
+    return _decided(context, job, context.jobs.accept)
+
+
+@router.post("/{job_id}/reject", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))
+def reject_job(job: Existing, context: InContext) -> Response:
+    """Put back what was before the poses of a calibration. Nothing changes if they never held or were put back.
+
+    Only while they are the last that came; to go back further, `POST /venues/{id}/restore`.
+    """
+    return _decided(context, job, context.jobs.reject)
+
+
+def _decided(context: Context, job: Job, decide: Callable[[str], None]) -> Response:
+    try:
+        decide(job.id)
+    except NoPoses:
+        raise _no_poses(job) from None
+    except MovedOn as moved:
+        newest = moved.newest
+        is_now = f"at revision {newest.revision} ({newest.cause})" if newest else "deleted"
+        raise Problem(
+            "venue-moved-on",
+            f"Venue {job.venue} is {is_now}, or has another pitch; see GET /venues/{job.venue}/history and decide.",
+            job=job.id,
+            got=newest and newest.revision,
+        ) from None
+    except RevisionUnfit as unfit:
+        raise revision_unfit(unfit) from None
+    return job_answer(context.jobs.get(job.id) or job)
+
+
+def _no_poses(job: Job) -> Problem:
+    return Problem("poses-not-found", "It has not found any yet." if job.open else "It found none.", job=job.id)
+
+
 async def _not_seen_to_its_end(
     job: Existing,
     context: InContext,
@@ -150,7 +193,7 @@ def job_poses(
     """The poses that a job found, accepted or not, in the format of another tool."""
     venue = context.jobs.posed(job.id)
     if venue is None:
-        raise Problem("poses-not-found", "It has not found any yet." if job.open else "It found none.", job=job.id)
+        raise _no_poses(job)
     return exported(context, venue, f"{venue.id}-{job.id}", form, wanted)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Response
 
@@ -12,7 +12,8 @@ from service.problems import Problem
 from service.routes.documented import headers, needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
-from service.schemas import ID_PATTERN, FormatName, PoseHistory, Venue, VenueIn, Venues
+from service.schemas import ID_PATTERN, FormatName, History, Restore, Venue, VenueIn, Venues
+from service.store.revisions import NoSuchRevision, RevisionUnfit
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 
@@ -20,6 +21,11 @@ router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 def no_such_venue(venue_id: str) -> Problem:
     """The same answer wherever a venue is named."""
     return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
+
+
+def revision_unfit(unfit: RevisionUnfit) -> Problem:
+    """The same answer wherever a revision is put back."""
+    return Problem("revision-unfit", f"{unfit} PUT the venue with the poses that you want.")
 
 
 @router.put(
@@ -95,29 +101,79 @@ def get_venue(
 @router.get(
     "/{venue_id}/poses",
     openapi_extra=needs("read"),
-    response_model=PoseHistory | dict[str, Any],
-    responses={**DOCUMENTS, **problems(404)},
+    response_class=Response,
+    responses={**DOCUMENTS, 200: DOCUMENTS[200] | headers("ETag"), **problems(404)},
 )
-def list_poses(
+def venue_poses(
     venue_id: VenueIdPath,
     context: InContext,
     wanted: Annotated[Wanted, Depends()],
-    form: Annotated[FormatName | None, Query(alias="format", description="The poses that hold now, as a file.")] = None,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-    cursor: Annotated[int | None, Query(ge=0, le=2**31)] = None,
-) -> PoseHistory | Response:
-    """With `format`: the poses that hold now, for another tool. Without: every pose that held, newest first, in pages.
-
-    The history is the way back from a calibration that should not have been.
-    """
+    form: Annotated[FormatName, Query(alias="format")] = "json",
+) -> Response:
+    """The poses that hold now, in the format of another tool."""
     venue = context.venues.get(venue_id)
     if venue is None:
         raise no_such_venue(venue_id)
-    if form is not None:
-        return exported(context, venue, venue.id, form, wanted)
-    page = context.venues.poses(venue_id, cursor, limit + 1)
+    return exported(context, venue, venue.id, form, wanted)
+
+
+@router.get(
+    "/{venue_id}/history",
+    openapi_extra=needs("read"),
+    response_model=History,
+    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
+)
+def venue_history(
+    venue_id: VenueIdPath,
+    context: InContext,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 50,
+    cursor: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
+    if_none_match: Annotated[str | None, Header()] = None,
+) -> Response:
+    """Every change of the poses with its cause, newest first, in pages; how far each camera moved and has drifted."""
+    if context.venues.get(venue_id) is None:
+        raise no_such_venue(venue_id)
+    page = context.venues.history(venue_id, cursor, limit + 1)
     more = len(page) > limit
-    return PoseHistory(poses=[pose for _, pose in page[:limit]], next_cursor=page[limit - 1][0] if more else None)
+    shown = History(revisions=page[:limit], next_cursor=page[limit - 1].revision if more else None)
+    body = shown.model_dump_json().encode()
+    tag = etags.of(body)
+    head = {"ETag": etags.quoted(tag), "Cache-Control": "no-cache"}
+    if if_none_match is not None and etags.names(if_none_match, tag):
+        return Response(status_code=304, headers=head)
+    return Response(body, headers=head, media_type="application/json")
+
+
+@router.post(
+    "/{venue_id}/restore",
+    openapi_extra=needs("calibrate"),
+    responses={200: headers("ETag"), **problems(404, 408, 409, 412, 413, 415)},
+)
+def restore_venue(
+    venue_id: VenueIdPath,
+    wanted: Restore,
+    response: Response,
+    context: InContext,
+    if_match: Annotated[str | None, Header()] = None,
+) -> Venue:
+    """Let the poses of a revision hold again, with their lenses and their ridge; that is a revision of its own."""
+
+    def allow(before: Venue | None) -> None:
+        if before is None:
+            raise no_such_venue(venue_id)
+        if if_match is not None and not etags.names(if_match, _tag(before)):
+            raise Problem(
+                "venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=_tag(before)
+            )
+
+    try:
+        restored = context.venues.restore(venue_id, wanted.revision, allow)
+    except NoSuchRevision:
+        raise Problem("revision-not-found", f"GET /venues/{venue_id}/history lists those there are.") from None
+    except RevisionUnfit as unfit:
+        raise revision_unfit(unfit) from None
+    response.headers["ETag"] = etags.quoted(_tag(restored))
+    return restored
 
 
 @router.delete("/{venue_id}", openapi_extra=needs("admin"), status_code=204, responses=problems(404, 409, 412))

@@ -17,14 +17,15 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.engine import clock, reading, serialise, writing
 from service.store.jobs import frame_folder, pictures_folder
+from service.store.revisions import TAKEN
 
 j = tables.jobs.c
-h = tables.pose_history.c
+r = tables.revisions.c
 left = tables.leftovers.c
 LAST_ACCEPTED = (
-    sa.select(h.job)
-    .where(h.venue == j.venue, h.job.is_not(None))
-    .order_by(h.id.desc())
+    sa.select(r.job)
+    .where(r.venue == j.venue, r.cause.in_(TAKEN))
+    .order_by(r.number.desc())
     .limit(1)
     .correlate(tables.jobs)
     .scalar_subquery()

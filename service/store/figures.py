@@ -8,7 +8,7 @@ from datetime import datetime
 
 import sqlalchemy as sa
 
-from service.schemas import OPEN, Result
+from service.schemas import OPEN, Result, Revision
 from service.store import tables, tallies
 from service.store.engine import clock, reading
 from service.store.tallies import Key
@@ -89,6 +89,12 @@ def note_quality(connection: sa.Connection, venue_id: str, result: Result, now: 
     known = connection.execute(sa.update(tables.venue_quality).where(q.venue == venue_id).values(**values))
     if known.rowcount == 0:
         connection.execute(sa.insert(tables.venue_quality).values(venue=venue_id, **values))
+
+
+def note_restored(connection: sa.Connection, venue_id: str, revision: Revision) -> None:
+    """An older revision holds again, inside the caller's serialised transaction."""
+    values = {"stitch_error_px": revision.stitch_error_px}
+    connection.execute(sa.update(tables.venue_quality).where(q.venue == venue_id).values(**values))
 
 
 def forget_quality(connection: sa.Connection, venue_id: str) -> None:

@@ -21,6 +21,7 @@ import sqlalchemy as sa
 
 from service.schemas import (
     OPEN,
+    Cause,
     FieldOptions,
     FieldResult,
     IntrinsicsOptions,
@@ -33,6 +34,7 @@ from service.schemas import (
     Options,
     Progress,
     Result,
+    Revision,
     Status,
     Venue,
 )
@@ -41,7 +43,8 @@ from service.store.deliveries import add_delivery, delivery_of
 from service.store.engine import clock, reading, serialise, writing
 from service.store.figures import note_quality
 from service.store.outcomes import End
-from service.store.venues import find_venue, save_poses, save_venue, venue_lock
+from service.store.revisions import TAKEN, add_revision, newest_revision, revision_of_job
+from service.store.venues import find_venue, put_back, save_venue, venue_lock
 
 PRIORITIES = {"live": 1, "routine": 100}
 CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
@@ -106,6 +109,17 @@ class VenueGone(Exception):  # noqa: N818
 
 class VenueReplaced(Exception):  # noqa: N818
     """The pitch or a lens of the venue was changed while its frames arrived: they were checked against another one."""
+
+
+class NoPoses(Exception):  # noqa: N818
+    """The job is no calibration that found poses (yet)."""
+
+
+class MovedOn(Exception):  # noqa: N818
+    """The venue is not as the job left or found it: to decide about the job would undo other changes."""
+
+    def __init__(self, newest: Revision | None) -> None:
+        self.newest = newest
 
 
 class QueueFull(Exception):  # noqa: N818
@@ -384,9 +398,7 @@ class Jobs:
         moves = result.accepted and not task.options.dry_run
         note_quality(connection, task.venue.id, result, clock(connection), moved=moves)
         if moves:
-            poses = {camera.id: camera.pose for camera in result.cameras}
-            save_venue(connection, now_stored.with_result(result))
-            save_poses(connection, task.venue.id, poses, "calibration", task.job_id)
+            self._take(connection, now_stored.with_result(result), "calibrated", task.job_id, result)
         return result
 
     def fail(self, task: Task, error: JobError) -> None:
@@ -398,6 +410,54 @@ class Jobs:
         """End a job that is still open; its worker notices."""
         with writing(self._engine) as connection:
             self._end(connection, job_id, _open(job_id), "cancelled")
+
+    # By hand
+
+    def accept(self, job_id: str) -> None:
+        """Let the poses that a calibration found hold, whatever the gate said; nothing to do if they do.
+
+        Raises `MovedOn` if the venue is not the one that the calibration began with, `NoPoses` if it found none.
+        """
+        with writing(self._engine) as connection:
+            began_with, result, newest = self._found(connection, job_id)
+            if newest is not None and newest.job == job_id and newest.cause in TAKEN:
+                return
+            now_stored = find_venue(connection, began_with.id)
+            if now_stored is None or not now_stored.calibrates_like(began_with):
+                raise MovedOn(newest)
+            note_quality(connection, began_with.id, result, clock(connection), moved=True)
+            self._take(connection, now_stored.with_result(result), "accepted", job_id, result)
+            self._touch(connection, job_id)
+
+    def reject(self, job_id: str) -> None:
+        """Put back what was before a calibration's poses held; nothing to do if they never did or were put back.
+
+        Raises `MovedOn` if something else has come since, `NoPoses` if it found none.
+        """
+        with writing(self._engine) as connection:
+            began_with, _, newest = self._found(connection, job_id)
+            if newest is None or revision_of_job(connection, job_id) is None:
+                return
+            if newest.job != job_id:
+                raise MovedOn(newest)
+            if newest.cause in TAKEN:
+                now_stored = find_venue(connection, began_with.id)
+                assert now_stored is not None
+                put_back(connection, now_stored, newest.revision - 1, rejected_job=job_id)
+                self._touch(connection, job_id)
+
+    def _found(self, connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revision | None]:
+        """What a calibration began with and what it found, and the revision that its venue is at, which stays."""
+        done = [j.id == job_id, j.kind == "calibration", j.result.is_not(None)]
+        row = connection.execute(sa.select(j.venue, j.venue_document, j.result).where(*done)).one_or_none()
+        if row is None:
+            raise NoPoses
+        serialise(connection, venue_lock(row.venue))
+        newest = newest_revision(connection, row.venue)
+        return Venue.model_validate(row.venue_document), Result.model_validate(row.result), newest
+
+    def _touch(self, connection: sa.Connection, job_id: str) -> None:
+        connection.execute(sa.update(tables.jobs).where(j.id == job_id).values(**_changed(clock(connection))))
 
     # Tidying
 
@@ -414,6 +474,11 @@ class Jobs:
             return self._end(connection, job_id, _open(job_id), "failed", error=error)
 
     # Parts
+
+    def _take(self, connection: sa.Connection, venue: Venue, cause: Cause, job_id: str, result: Result) -> None:
+        """Let a venue be as a calibration found it."""
+        save_venue(connection, venue)
+        add_revision(connection, venue, cause, job_id, stitch_error_px=result.stitch_error_px)
 
     def _end(
         self,
@@ -475,6 +540,7 @@ class Jobs:
             error=row.error,
             result=row.result,
             callback=delivery_of(connection, row.id) if row.finished_at and row.options["callback_url"] else None,
+            venue_revision=revision_of_job(connection, row.id) if row.kind == "calibration" and row.result else None,
             links=_links(row),
         )
 

@@ -30,17 +30,28 @@ venues = sa.Table(
     sa.Column("updated_at", Instant, nullable=False),
 )
 
-# Every pose that ever held, and what brought it: a PUT (no job) or an accepted job.
-pose_history = sa.Table(
-    "pose_history",
+# Every state that the cameras of a venue were ever in, and what brought it.
+revisions = sa.Table(
+    "revisions",
     metadata,
     sa.Column("id", sa.Integer, primary_key=True),
-    sa.Column("venue", sa.String(64), nullable=False, index=True),
-    sa.Column("camera", sa.String(64), nullable=False),
-    sa.Column("pose", sa.JSON, nullable=False),
-    sa.Column("cause", sa.String(32), nullable=False),
+    sa.Column("venue", sa.String(64), nullable=False),
+    # Counts from 1 in each venue.
+    sa.Column("number", sa.Integer, nullable=False),
+    sa.Column("at", Instant, nullable=False),
+    # schemas.Cause.
+    sa.Column("cause", sa.String(16), nullable=False),
+    # Whose poses they are, or, of what was put back, whose were rejected by hand.
     sa.Column("job", sa.String(26)),
-    sa.Column("since", Instant, nullable=False),
+    sa.Column("restored_from", sa.Integer),
+    sa.Column("stitch_error_px", sa.Double),
+    # schemas.PosedCamera of each, and the ridge that their poses belong to.
+    sa.Column("cameras", sa.JSON, nullable=False),
+    sa.Column("ridge", sa.JSON, nullable=False),
+    # schemas.Movement by camera.
+    sa.Column("movements", sa.JSON, nullable=False),
+    sa.Index("revisions_by_venue", "venue", "number", unique=True),
+    sa.Index("revisions_by_job", "job"),
 )
 
 jobs = sa.Table(

@@ -1,4 +1,4 @@
-"""Venues and the history of their poses: all SQL about them."""
+"""Venues, and the way back to how they were: all SQL about them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import sqlalchemy as sa
 
-from service.schemas import HeldPose, Pose, Venue
+from service.schemas import Revision, Venue
 from service.store import tables
 from service.store.engine import clock, reading, serialise, writing
-from service.store.figures import forget_quality
+from service.store.figures import forget_quality, note_restored
+from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
 
 
 class Venues:
@@ -37,11 +38,22 @@ class Venues:
             serialise(connection, venue_lock(venue.id))
             before = find_venue(connection, venue.id)
             allow(before)
-            known = before.poses if before else {}
-            moved = {camera: pose for camera, pose in venue.poses.items() if known.get(camera) != pose}
             save_venue(connection, venue)
-            save_poses(connection, venue.id, moved, "put")
+            if before is None or not venue.stands_like(before):
+                add_revision(connection, venue, "put")
             return before is None
+
+    def restore(self, venue_id: str, number: int, allow: Callable[[Venue | None], None]) -> Venue:
+        """Let a revision hold again unless `allow` raises at the sight of the venue.
+
+        Raises `NoSuchRevision` and `RevisionUnfit`. Nothing is written if it holds anyway.
+        """
+        with writing(self._engine) as connection:
+            serialise(connection, venue_lock(venue_id))
+            before = find_venue(connection, venue_id)
+            allow(before)
+            assert before is not None
+            return put_back(connection, before, number)
 
     def delete(self, venue_id: str, allow: Callable[[Venue | None, str | None], None]) -> None:
         """Forget a venue and its poses unless `allow` raises at the sight of it or of its active job."""
@@ -53,21 +65,14 @@ class Venues:
                 )
             )
             allow(find_venue(connection, venue_id), active)
-            connection.execute(sa.delete(tables.pose_history).where(tables.pose_history.c.venue == venue_id))
+            forget_revisions(connection, venue_id)
             forget_quality(connection, venue_id)
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
 
-    def poses(self, venue_id: str, before: int | None, limit: int) -> list[tuple[int, HeldPose]]:
-        """Up to `limit` poses that held, newest first, those older than number `before`, with their numbers."""
-        h = tables.pose_history.c
-        query = sa.select(tables.pose_history).where(h.venue == venue_id).order_by(h.id.desc()).limit(limit)
-        if before is not None:
-            query = query.where(h.id < before)
+    def history(self, venue_id: str, before: int | None, limit: int) -> list[Revision]:
+        """Up to `limit` revisions of a venue, newest first, those before number `before`."""
         with reading(self._engine) as connection:
-            return [
-                (row.id, HeldPose(camera=row.camera, pose=row.pose, cause=row.cause, job=row.job, since=row.since))
-                for row in connection.execute(query)
-            ]
+            return revisions_of(connection, venue_id, before, limit)
 
 
 def venue_lock(venue_id: str) -> str:
@@ -90,14 +95,11 @@ def save_venue(connection: sa.Connection, venue: Venue) -> None:
         connection.execute(sa.insert(table).values(id=venue.id, **values))
 
 
-def save_poses(
-    connection: sa.Connection, venue_id: str, poses: dict[str, Pose], cause: str, job: str | None = None
-) -> None:
-    """Add poses that hold from now on to the history, inside the caller's transaction."""
-    now = clock(connection)
-    rows = [
-        {"venue": venue_id, "camera": camera, "pose": pose.model_dump(), "cause": cause, "job": job, "since": now}
-        for camera, pose in poses.items()
-    ]
-    if rows:
-        connection.execute(sa.insert(tables.pose_history), rows)
+def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job: str | None = None) -> Venue:
+    """Let a revision of a venue hold again, inside the caller's serialised transaction."""
+    then, revision = state_at(connection, venue, number)
+    if not then.stands_like(venue):
+        save_venue(connection, then)
+        add_revision(connection, then, "restored", rejected_job, revision, revision.stitch_error_px)
+        note_restored(connection, venue.id, revision)
+    return then

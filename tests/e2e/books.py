@@ -38,22 +38,21 @@ def mistakes(service: Service) -> Iterator[str]:
     """What does not add up, in words."""
     with service.database() as connection:
         jobs = connection.execute(sa.select(tables.jobs)).all()
-        poses = connection.execute(sa.select(tables.pose_history).order_by(tables.pose_history.c.id)).all()
+        revisions = connection.execute(sa.select(tables.revisions).order_by(tables.revisions.c.id)).all()
         venues = connection.execute(sa.select(tables.venues)).all()
         known_to_queue = set(queued(connection))
-    moved = Counter((pose.job, pose.camera) for pose in poses if pose.job)
-    accepted = [job for job in jobs if job.result and job.result["accepted"] and not job.options["dry_run"]]
-    due = Counter((job.id, camera["id"]) for job in accepted for camera in job.result["cameras"])
+    moved = Counter(revision.job for revision in revisions if revision.cause == "calibrated")
+    due = {job.id for job in jobs if job.result and job.result["accepted"] and not job.options["dry_run"]}
     ids = {job.id for job in jobs}
+    yield from (f"job {job} moved its venue {count} times" for job, count in moved.items() if count > 1)
     # The history outlives the jobs, of which retention has deleted some.
-    due.update((job, camera) for job, camera in moved if job not in ids)
-    yield from (f"job {job} moved camera {camera} {count} times" for (job, camera), count in (moved - due).items())
-    yield from (f"job {job} did not move camera {camera}" for job, camera in due - moved)
-    last = {(pose.venue, pose.camera): pose.pose for pose in poses}
+    yield from (f"job {job} moved its venue" for job in (moved.keys() & ids) - due)
+    yield from (f"job {job} did not move its venue" for job in due - moved.keys())
+    last = {revision.venue: revision for revision in revisions}
     for venue in venues:
-        for camera in venue.document["cameras"]:
-            if camera["pose"] != last[venue.id, camera["id"]]:
-                yield f"camera {camera['id']} of {venue.id} does not stand where the last pose of the history is"
+        for camera in last[venue.id].cameras:
+            if camera not in venue.document["cameras"]:
+                yield f"camera {camera['id']} of {venue.id} does not stand where the last revision has it"
     yield from (f"the queue knows {job}, which is no job" for job in known_to_queue - ids)
     yield from (f"the queue does not know {job}" for job in ids - known_to_queue)
     stored = set(files(service.blob_url))

@@ -1,12 +1,14 @@
 """Services for the tests: one that many tests share, and fresh ones to be killed."""
 
 import re
+import subprocess
+import sys
 
 import pytest
 
 from tests import disks
 from tests.disks import may_mount
-from tests.e2e.running import Service
+from tests.e2e.running import Service, png
 from tests.homes import environment
 
 
@@ -45,3 +47,17 @@ def small_disk(tmp_path):
 def name(request):
     """A venue id of the test's own."""
     return re.sub("[^a-z0-9]+", "-", request.node.name.lower())[-60:].strip("-")
+
+
+@pytest.fixture
+def esc(service, tmp_path):
+    """Run `esc`; files of the test are in the folder it runs in."""
+    for side in ("left", "right"):
+        (tmp_path / f"{side}.png").write_bytes(png())
+
+    def esc(*arguments, url=service.url):
+        command = [sys.executable, "-m", "service.cli", *arguments]
+        environment = service.environment | {"ESC_URL": url}
+        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+
+    return esc

@@ -10,21 +10,6 @@ import pytest
 
 from tests.e2e.running import png, venue, wait_for
 
-
-@pytest.fixture
-def esc(service, tmp_path):
-    """Run `esc`; files of the test are in the folder it runs in."""
-    for side in ("left", "right"):
-        (tmp_path / f"{side}.png").write_bytes(png())
-
-    def esc(*arguments, url=service.url):
-        command = [sys.executable, "-m", "service.cli", *arguments]
-        environment = service.environment | {"ESC_URL": url}
-        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=60)
-
-    return esc
-
-
 FRAMES = ("left=left.png", "right=right.png")
 
 

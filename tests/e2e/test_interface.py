@@ -33,9 +33,12 @@ REACHED = {
     ("GET", "/jobs/*/poses", 200),
     ("GET", "/jobs/*/poses", 422),
     ("GET", "/venues/*/poses", 200),
+    ("GET", "/venues/*/history", 200),
+    ("POST", "/venues/*/restore", 200),
     ("GET", "/jobs/*/preview.jpg", 200),
     ("GET", "/jobs/*/overlay/left.jpg", 200),
     ("POST", "/jobs/*/cancel", 200),
+    ("POST", "/jobs/*/reject", 200),
 }
 
 

@@ -38,17 +38,6 @@ def test_an_accepted_result_moves_the_stored_poses(service, name):
     assert [c["pose"] for c in answer.json()["cameras"]] == [c["pose"] for c in result["cameras"]]
 
 
-def test_the_poses_that_held_before_stay_in_the_history(service, name):
-    before = [camera["pose"] for camera in service.http.get(f"/venues/{service.venue(name)}").json()["cameras"]]
-    job = service.end(service.submit(name).json()["id"])["id"]
-    first = service.http.get(f"/venues/{name}/poses", params={"limit": 3}).json()
-    rest = service.http.get(f"/venues/{name}/poses", params={"cursor": first["next_cursor"]}).json()
-    poses = first["poses"] + rest["poses"]
-    assert [(pose["cause"], pose["job"]) for pose in poses] == [("calibration", job)] * 2 + [("put", None)] * 2
-    assert [pose["pose"] for pose in poses[:1:-1]] == before
-    assert service.http.get("/venues/nowhere/poses").status_code == 404
-
-
 @pytest.mark.parametrize(("behaviour", "options"), [("reject", {}), ("fail", {}), ("accept", {"dry_run": True})])
 def test_any_other_result_leaves_them_untouched(service, name, behaviour, options):
     service.venue(name, behaviour)

@@ -100,7 +100,7 @@ def test_a_look_reads_no_table_from_end_to_end_that_grows_with_jobs_or_venues(tm
             for row in connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", values)
         ]
     assert any("jobs" in step for step in steps)
-    grows = ("jobs", "venues", "deliveries", "venue_quality", "pose_history")
+    grows = ("jobs", "venues", "deliveries", "venue_quality", "revisions")
     assert [
         step for step in steps if step.startswith("SCAN") and step.split()[1] in grows and "INDEX" not in step
     ] == []

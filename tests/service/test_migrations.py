@@ -25,6 +25,7 @@ NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 VENUE = VenueIn.model_validate(VENUE_EXAMPLE).stored()
 DONE, WAITING = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "01KAJ3Q6WZ5T3Y8R0N4M2C7B1E"
 RECEIVER = "https://example.com/"
+FIRST_POSE = VENUE.cameras[0].pose.model_copy(update={"position": [-1.5, -49.5, 7.9]})
 FRAMES = {"left": [f"frames/{WAITING}/left/0"]}
 RESULT = {
     "accepted": True,
@@ -68,7 +69,15 @@ def job(id_, **values):
 # What each table held at the first revision, and what later ones added.
 ROWS = {
     "venues": [{"id": VENUE.id, "document": VENUE.model_dump(mode="json"), "revision": 3, "updated_at": NOON}],
+    # Until revision 0009.
     "pose_history": [
+        {
+            "venue": VENUE.id,
+            "camera": "left",
+            "pose": FIRST_POSE.model_dump(),
+            "cause": "put",
+            "since": NOON - timedelta(days=1),
+        },
         {
             "venue": VENUE.id,
             "camera": "left",
@@ -76,7 +85,7 @@ ROWS = {
             "cause": "calibration",
             "job": DONE,
             "since": NOON,
-        }
+        },
     ],
     "jobs": [
         job(
@@ -104,6 +113,19 @@ ROWS = {
         }
     ],
     "tallies": [{"metric": ENDED, "labels": "succeeded,accepted,", "value": 3}],
+    "revisions": [
+        {
+            "venue": VENUE.id,
+            "number": number,
+            "at": NOON - timedelta(days=2 - number),
+            "cause": cause,
+            "job": job,
+            "cameras": [VENUE.cameras[0].model_copy(update={"pose": pose}).posed.model_dump(mode="json")],
+            "ridge": VENUE.field.ridge,
+            "movements": {"left": {"moved": None, "drift": None, "drift_since": 1}},
+        }
+        for number, cause, job, pose in ((1, "put", None, FIRST_POSE), (2, "calibrated", DONE, VENUE.cameras[0].pose))
+    ],
     "venue_quality": [{"venue": VENUE.id, "stitch_error_px": 0.2, "moved_px": 2.0, "accepted_at": NOON}],
 }
 
@@ -141,8 +163,10 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     migrate(engine)
     venues, jobs = Venues(engine), Jobs(engine)
     assert venues.get(VENUE.id) == VENUE
-    ((_, held),) = venues.poses(VENUE.id, None, 10)
-    assert (held.cause, held.job, held.since, held.pose) == ("calibration", DONE, NOON, VENUE.cameras[0].pose)
+    put, held = reversed(venues.history(VENUE.id, None, 10))
+    assert (put.revision, put.cause, put.job, put.cameras[0].pose) == (1, "put", None, FIRST_POSE)
+    assert (held.revision, held.cause, held.job, held.at) == (2, "calibrated", DONE, NOON)
+    assert (held.cameras[0].pose, held.cameras[0].drift_since) == (VENUE.cameras[0].pose, 1)
     done = jobs.get(DONE)
     assert (done.status, done.created_at, done.finished_at) == ("succeeded", NOON, NOON)
     assert done.result == Result.model_validate(RESULT)
@@ -192,7 +216,12 @@ def test_an_upgraded_database_takes_new_rows(old, revision):
     # Numbers go on where those of the old rows ended.
     moved = VENUE.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
     Venues(engine).put(VENUE.with_poses({"left": moved}), lambda _: None)
-    assert [held.cause for _, held in Venues(engine).poses(VENUE.id, None, 10)] == ["put", "calibration"]
+    held = Venues(engine).history(VENUE.id, None, 10)
+    assert [(revision.revision, revision.cause) for revision in held] == [(3, "put"), (2, "calibrated"), (1, "put")]
+    # What was never measured is not made up; what comes now is.
+    assert [revision.cameras[0].moved is None for revision in held] == [False, True, True]
+    Venues(engine).restore(VENUE.id, 1, lambda _: None)
+    assert Venues(engine).get(VENUE.id).cameras[0].pose == FIRST_POSE
     key = Keys(engine).add("guest", "read", NOON + timedelta(days=36500))
     assert key.startswith("esc_")
     # What ended before files were ever deleted is past its time like any other.

@@ -35,21 +35,6 @@ def test_migrating_twice_changes_nothing(engine):
 
 
 @in_both_homes
-def test_every_pose_that_held_is_remembered_with_its_cause(engine):
-    venues = Venues(engine)
-    venue = VenueIn.model_validate(VENUE_EXAMPLE).stored()
-    venues.put(venue, lambda _: None)
-    venues.put(venue.model_copy(update={"name": "renamed"}), lambda _: None)
-    moved = venue.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
-    venues.put(venue.with_poses({"left": moved}), lambda _: None)
-    held = [pose for _, pose in venues.poses("tsukuba", None, 10)]
-    assert [(pose.camera, pose.cause, pose.pose.position[2]) for pose in held] == [
-        ("left", "put", 9.0),
-        ("left", "put", 7.84),
-    ]
-
-
-@in_both_homes
 def test_a_refused_put_changes_nothing(engine):
     venues = Venues(engine)
 

@@ -134,8 +134,7 @@ def _age(running: Service) -> None:
 def _sample(running: Service, worker: int) -> Sample:
     with running.database() as connection:
         jobs, poses = (
-            connection.scalar(sa.select(sa.func.count()).select_from(rows))
-            for rows in (tables.jobs, tables.pose_history)
+            connection.scalar(sa.select(sa.func.count()).select_from(rows)) for rows in (tables.jobs, tables.revisions)
         )
         entries = len(queued(connection))
     blobs = running.data / "blobs"

@@ -1,0 +1,159 @@
+"""The history of venues: every state that their cameras were in. All SQL about it.
+
+A revision is written in the transaction that changes the venue, with how far each camera moved: reading a year of drift
+computes nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sqlalchemy as sa
+
+from service import motion
+from service.schemas import Camera, Cause, Movement, PosedCamera, Revision, RevisionCamera, Venue
+from service.store import tables
+from service.store.engine import clock
+
+r = tables.revisions.c
+# Whose poses hold, or held.
+TAKEN: tuple[Cause, ...] = ("calibrated", "accepted")
+
+
+class NoSuchRevision(Exception):  # noqa: N818
+    """The venue never had one of this number."""
+
+
+class RevisionUnfit(Exception):  # noqa: N818
+    """The venue is no longer one that the revision fits; the message says why."""
+
+
+def add_revision(
+    connection: sa.Connection,
+    venue: Venue,
+    cause: Cause,
+    job: str | None = None,
+    restored: Revision | None = None,
+    stitch_error_px: float | None = None,
+) -> None:
+    """Write down the state that a venue has from now on, inside the caller's serialised transaction."""
+    before = _newest_row(connection, venue.id)
+    number = 1 if before is None else before.number + 1
+    movements = _movements(connection, venue, number, before, cause, restored)
+    connection.execute(
+        sa.insert(tables.revisions).values(
+            venue=venue.id,
+            number=number,
+            at=clock(connection),
+            cause=cause,
+            job=job,
+            restored_from=None if restored is None else restored.revision,
+            stitch_error_px=stitch_error_px,
+            cameras=[camera.posed.model_dump(mode="json") for camera in venue.cameras],
+            ridge=venue.field.ridge,
+            movements={camera: movement.model_dump() for camera, movement in movements.items()},
+        )
+    )
+
+
+def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None:
+    """The one that holds, inside the caller's transaction."""
+    row = _newest_row(connection, venue_id)
+    return None if row is None else _revision(row)
+
+
+def revisions_of(connection: sa.Connection, venue_id: str, before: int | None, limit: int) -> list[Revision]:
+    """Up to `limit` revisions, newest first, those before number `before`."""
+    query = sa.select(tables.revisions).where(r.venue == venue_id).order_by(r.number.desc()).limit(limit)
+    if before is not None:
+        query = query.where(r.number < before)
+    return [_revision(row) for row in connection.execute(query)]
+
+
+def revision_of_job(connection: sa.Connection, job_id: str) -> int | None:
+    """The number of the revision that a job's poses became last."""
+    query = sa.select(sa.func.max(r.number)).where(r.job == job_id, r.cause.in_(TAKEN))
+    number: int | None = connection.scalar(query)
+    return number
+
+
+def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venue, Revision]:
+    """A venue as it was at a revision, and that revision. Raises where there is none or it does not fit any more."""
+    row = connection.execute(sa.select(tables.revisions).where(r.venue == venue.id, r.number == number)).one_or_none()
+    if row is None:
+        raise NoSuchRevision
+    cameras = [PosedCamera.model_validate(camera) for camera in row.cameras]
+    then, now = ({camera.id: camera.image_size for camera in some} for some in (cameras, venue.cameras))
+    if then != now:
+        raise RevisionUnfit(f"It has the cameras {_in_words(then)}, and the venue now has {_in_words(now)}.")
+    try:
+        return venue.with_state(cameras, row.ridge), _revision(row)
+    except ValueError:
+        raise RevisionUnfit("Its ridge is none of the pitch that the venue now has.") from None
+
+
+def forget_revisions(connection: sa.Connection, venue_id: str) -> None:
+    """The venue is gone."""
+    connection.execute(sa.delete(tables.revisions).where(r.venue == venue_id))
+
+
+def _movements(
+    connection: sa.Connection, venue: Venue, number: int, before: Any, cause: Cause, restored: Revision | None
+) -> dict[str, Movement]:
+    last = _cameras(before)
+    since = {camera: movement["drift_since"] for camera, movement in before.movements.items()} if before else {}
+    if restored is not None:
+        since = {camera.id: camera.drift_since for camera in restored.cameras}
+    for camera in venue.cameras:
+        if camera.id not in since or (cause == "put" and last.get(camera.id) != camera.posed):
+            since[camera.id] = number
+    firsts = {first: _cameras_at(connection, venue.id, first) for first in set(since.values()) - {number}}
+    return {
+        camera.id: _movement(venue, camera, last.get(camera.id), firsts.get(since[camera.id], {}), since[camera.id])
+        for camera in venue.cameras
+    }
+
+
+def _movement(
+    venue: Venue, camera: Camera, last: PosedCamera | None, firsts: dict[str, PosedCamera], since: int
+) -> Movement:
+    def from_there(then: PosedCamera | None) -> Any:
+        return None if then is None else motion.moved(venue.field, then, camera)
+
+    return Movement(moved=from_there(last), drift=from_there(firsts.get(camera.id, camera)), drift_since=since)
+
+
+def _newest_row(connection: sa.Connection, venue_id: str) -> Any:
+    query = sa.select(tables.revisions).where(r.venue == venue_id).order_by(r.number.desc()).limit(1)
+    return connection.execute(query).one_or_none()
+
+
+def _cameras_at(connection: sa.Connection, venue_id: str, number: int) -> dict[str, PosedCamera]:
+    query = sa.select(r.cameras).where(r.venue == venue_id, r.number == number)
+    return _cameras(connection.execute(query).one())
+
+
+def _cameras(row: Any) -> dict[str, PosedCamera]:
+    if row is None:
+        return {}
+    return {camera["id"]: PosedCamera.model_validate(camera) for camera in row.cameras}
+
+
+def _revision(row: Any) -> Revision:
+    return Revision(
+        revision=row.number,
+        at=row.at,
+        cause=row.cause,
+        job=row.job,
+        restored_from=row.restored_from,
+        stitch_error_px=row.stitch_error_px,
+        ridge=row.ridge,
+        cameras=[
+            RevisionCamera.model_validate({"id": camera["id"], "pose": camera["pose"], **row.movements[camera["id"]]})
+            for camera in row.cameras
+        ],
+    )
+
+
+def _in_words(sizes: dict[str, list[int]]) -> str:
+    return ", ".join(f"{camera} ({width}x{height})" for camera, (width, height) in sizes.items())
