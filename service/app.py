@@ -64,6 +64,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(Access, metrics=context.metrics)
     app.add_middleware(Conventions)
     documented.document_callback(app)
+    documented.document_alarms(app)
     problems.install(app)
     _answer_outages(app)
     for routes in (venues, calibrate, intrinsics, locate, field, jobs, health, docs):

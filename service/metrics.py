@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
+from typing import get_args
 
 import structlog
 from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector
@@ -16,6 +17,8 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
 from service.disk import Disk
+from service.schemas import AlarmRule
+from service.store.alarms import BEGUN
 from service.store.deliveries import CALLBACKS
 from service.store.engine import AWAY
 from service.store.figures import Figures, VenueQuality, WorkerSeen
@@ -68,6 +71,7 @@ class _Stored(Collector):
         yield from _queue(figures)
         yield from _jobs(figures.tallies)
         yield from _venues(figures.venues)
+        yield from _alarms(figures)
         yield from _workers(figures.workers, self._silence_s)
         yield from _callbacks(figures)
 
@@ -135,14 +139,31 @@ def _venues(venues: list[VenueQuality]) -> Iterator[Metric]:
     accepted = GaugeMetricFamily(
         "esc_venue_accepted_timestamp_seconds", "When poses were last accepted.", labels=["venue"]
     )
+    drift = GaugeMetricFamily(
+        "esc_venue_drift_pixels", "How far its worst camera is from where it was put.", labels=["venue"]
+    )
     for venue in venues:
+        if venue.drift_px is not None:
+            drift.add_metric([venue.venue], venue.drift_px)
         if venue.stitch_error_px is not None:
             stitch.add_metric([venue.venue], venue.stitch_error_px)
         if venue.moved_px is not None:
             moved.add_metric([venue.venue], venue.moved_px)
         if venue.accepted_at is not None:
             accepted.add_metric([venue.venue], venue.accepted_at.timestamp())
-    yield from (stitch, moved, accepted)
+    yield from (stitch, moved, drift, accepted)
+
+
+def _alarms(figures: Figures) -> Iterator[Metric]:
+    ringing = GaugeMetricFamily("esc_alarms", "Alarms of venues and cameras that ring.", labels=["rule"])
+    begun = CounterMetricFamily("esc_alarms_begun", "Alarms that began to ring.", labels=["rule"])
+    for rule in get_args(AlarmRule):
+        ringing.add_metric([rule], figures.alarms.get(rule, 0))
+        begun.add_metric([rule], figures.tallies.get((BEGUN, (rule,)), 0))
+    of_venues = GaugeMetricFamily("esc_venue_alarm", "1 for what rings, the longest first.", labels=["venue", "rule"])
+    for alarm in figures.ringing:
+        of_venues.add_metric([alarm.venue, alarm.rule], 1)
+    yield from (ringing, begun, of_venues)
 
 
 def _workers(workers: list[WorkerSeen], silence_s: float) -> Iterator[Metric]:

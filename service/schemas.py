@@ -390,6 +390,14 @@ VENUE_EXAMPLE: dict[str, Any] = {
 }
 
 
+ALARMS_EXAMPLE: dict[str, Any] = {
+    "moved_since_last_px": 40,
+    "rejected_in_a_row": 3,
+    "not_calibrated_for_h": 24,
+    "callback_url": "https://example.com/alarms",
+}
+
+
 class _Place(Wire):
     id: Id
     name: Name = ""
@@ -409,12 +417,35 @@ class Site(_Place):
     cameras: list[CameraIn] = []
 
 
+class Alarms(Wire):
+    """When to sound the alarm about a venue; each rule may be left out."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [ALARMS_EXAMPLE]})
+
+    moved_since_last_px: Annotated[Number, Field(gt=0)] | None = Field(
+        None, description="A calibration moves the pitch in the picture of a camera by more than this."
+    )
+    moved_since_first_px: Annotated[Number, Field(gt=0)] | None = Field(
+        None, description="A camera's picture is further than this from where the camera was put."
+    )
+    rejected_in_a_row: Annotated[Whole, Field(ge=1, le=1000)] | None = Field(
+        None, description="So many calibrations one after the other are rejected or fail."
+    )
+    not_calibrated_for_h: Annotated[Number, Field(gt=0, le=10000)] | None = Field(
+        None, description="No poses are accepted for so many hours."
+    )
+    callback_url: CallbackUrl | None = Field(
+        None, description="Told when an alarm begins and when it is over, signed (Standard Webhooks)."
+    )
+
+
 class VenueIn(_Place):
     """A venue as it is sent."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
 
     cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
+    alarms: Alarms | None = None
 
     @model_validator(mode="after")
     def _cameras_differ(self) -> Self:
@@ -429,13 +460,14 @@ class VenueIn(_Place):
             Camera(id=c.id, image_size=c.image_size, intrinsics=c.intrinsics, pose=Pose.of(c.pose))
             for c in self.cameras
         ]
-        return Venue(id=self.id, name=self.name, field=self.field, cameras=cameras)
+        return Venue(id=self.id, name=self.name, field=self.field, cameras=cameras, alarms=self.alarms)
 
 
 class Venue(_Place):
     """A venue with the poses that hold now."""
 
     cameras: list[Camera]
+    alarms: Alarms | None = None
 
     @property
     def poses(self) -> dict[str, Pose]:
@@ -480,7 +512,7 @@ class Venue(_Place):
             )
             for c in self.cameras
         ]
-        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras)
+        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras, alarms=self.alarms)
 
     def with_state(self, cameras: list[PosedCamera], ridge: list[list[float]] | None) -> Venue:
         """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
@@ -586,6 +618,47 @@ class History(Wire):
 
     revisions: list[Revision]
     next_cursor: int | None = None
+
+
+AlarmRule = Literal["moved-since-last", "moved-since-first", "rejected-in-a-row", "not-calibrated"]
+
+
+class Alarm(Wire):
+    """An alarm that rings, of one camera or (null) of the whole venue."""
+
+    rule: AlarmRule
+    camera: Id | None
+    since: datetime
+    why: str
+
+
+class VenueHealth(Wire):
+    """How a venue is doing. `state` is `alarm` while one of its alarms rings."""
+
+    state: Literal["ok", "alarm"]
+    alarms: list[Alarm]
+    revision: int = Field(description="The one that holds.")
+    cameras: list[RevisionCamera] = Field(description="Where they stand, and how far that is from where they were put.")
+    stitch_error_px: float | None = Field(description="Of the poses that hold, by the last result.")
+    accepted_at: datetime | None = Field(description="When poses were last accepted.")
+    rejected_in_a_row: int = Field(description="Calibrations that were rejected or failed since then.")
+
+
+class VenueAlarm(Alarm):
+    """An alarm with its venue."""
+
+    venue: Id
+
+
+class AlarmEvent(Wire):
+    """What the `callback_url` of a venue's alarms gets, at least once: an alarm began, or is over.
+
+    Every attempt has the same `webhook-id`.
+    """
+
+    type: Literal["alarm.began", "alarm.ended"]
+    timestamp: datetime = Field(description="When it began or ended.")
+    data: VenueAlarm
 
 
 class Restore(Wire):

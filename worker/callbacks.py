@@ -1,4 +1,4 @@
-"""Callbacks: who asked to be told of the end of a job is told, again and again for a day if need be."""
+"""Callbacks: who asked to be told of a job's end or an alarm is told, again and again for a day if need be."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 import httpx
 import structlog
 
-from service.schemas import Job, JobEvent
+from service.schemas import JobEvent
 from service.settings import Settings
 from service.store.deliveries import Deliveries, Delivery
 from service.store.jobs import Jobs
@@ -53,13 +53,13 @@ class Callbacks:
         return 0.0 if len(due) == AT_ONCE else LOOK_S
 
     def _attempt(self, delivery: Delivery) -> None:
-        job = self._jobs.get(delivery.job_id)
-        if job is None:
+        body = self._body(delivery)
+        if body is None:
             self._deliveries.give_up(delivery, "the job was deleted")
             return
-        with structlog.contextvars.bound_contextvars(job=job.id, attempt=delivery.attempt):
+        with structlog.contextvars.bound_contextvars(**_named(delivery), attempt=delivery.attempt):
             try:
-                answer = self._send(delivery.url, job)
+                answer = self._send(delivery, body)
             except Exception as error:  # whatever comes of this address, it is one attempt of one delivery
                 self._failed(delivery, str(error) or type(error).__name__)
                 return
@@ -71,12 +71,18 @@ class Callbacks:
             else:
                 self._failed(delivery, f"answered {answer.status}: {_printable(answer.text)}", answer.retry_after_s)
 
-    def _send(self, url: str, job: Job) -> webhook.Answer:
-        body = JobEvent.of(job).model_dump_json().encode()
+    def _body(self, delivery: Delivery) -> bytes | None:
+        """What is to be told; None: nothing any more."""
+        if delivery.event is not None:
+            return delivery.event.model_dump_json().encode()
+        job = self._jobs.get(delivery.id)
+        return None if job is None else JobEvent.of(job).model_dump_json().encode()
+
+    def _send(self, delivery: Delivery, body: bytes) -> webhook.Answer:
         # A job ends once: its id is the id of the event, the same at every attempt.
-        signature = webhook.headers(job.id, self._now(), body, self._settings.webhook_keys)
+        signature = webhook.headers(delivery.id, self._now(), body, self._settings.webhook_keys)
         private = self._settings.callback_allow_private
-        return webhook.send(url, body, signature, self._tls, allow_private=private)
+        return webhook.send(delivery.url, body, signature, self._tls, allow_private=private)
 
     def _failed(self, delivery: Delivery, why: str, asked_s: int = 0) -> None:
         if delivery.attempt > len(PAUSES_S):
@@ -89,6 +95,11 @@ class Callbacks:
     def _give_up(self, delivery: Delivery, why: str) -> None:
         self._deliveries.give_up(delivery, why)
         log.error("callback given up", why=why)
+
+
+def _named(delivery: Delivery) -> dict[str, str]:
+    """For the log."""
+    return {"job": delivery.id} if delivery.event is None else {"venue": delivery.event.data.venue}
 
 
 def _printable(text: str) -> str:

@@ -34,8 +34,10 @@ from service.store.deliveries import Deliveries
 from service.store.engine import AWAY, connect, migrate
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs, Task
+from service.store.venues import Venues
 from service.store.workers import Workers
 from worker import retention
+from worker.alarms import Alarms
 from worker.callbacks import Callbacks
 from worker.message import Message
 from worker.retention import Retention
@@ -99,6 +101,7 @@ class Worker:
         self._retention = Retention(settings, Expiry(engine), blobs, self._workers, self._queue.forget)
         deliveries = Deliveries(engine)
         self._callbacks = Callbacks(settings, deliveries, self._jobs, deliveries.now)
+        self._alarms = Alarms(Venues(engine))
 
     def start(self) -> None:
         """Show up and take jobs."""
@@ -108,9 +111,10 @@ class Worker:
     def look_after(self, stop: threading.Event) -> None:
         """Give signs of life, take over from the dead, end what the queue has given up.
 
-        Beside that, in threads of their own, tidy up and tell who asked for it of the ends of jobs.
+        Beside that, in threads of their own, tidy up, tell who asked for it of the ends of jobs and of alarms, and see
+        which alarms have come of time that has passed.
         """
-        for look in (self._retention.look, self._callbacks.look):
+        for look in (self._retention.look, self._callbacks.look, self._alarms.look):
             threading.Thread(target=_again_and_again, args=(look, stop), daemon=True).start()
         beaten, judging_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):

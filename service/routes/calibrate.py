@@ -17,7 +17,8 @@ from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.routes.venues import no_such_venue
 from service.schemas import Job, Options, Venue
-from service.store.jobs import Origin, Submission, new_job_id
+from service.store.ids import new_id
+from service.store.jobs import Origin, Submission
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -66,7 +67,7 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
         callbacks.check(options.callback_url, context.settings)
     files = uploads.frames_of(venue, form, context)
     content_hash = uploads.checked(context, venue, files, options)
-    job_id = new_job_id()
+    job_id = new_id()
     seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
     paths = uploads.frame_paths(job_id, files)
     submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths, origin=origin)

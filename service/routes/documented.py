@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from service.problems import MEDIA_TYPE
 from service.schemas import (
     OPTIONS_PART,
+    AlarmEvent,
     FieldOptions,
     IntrinsicsOptions,
     JobEvent,
@@ -64,6 +65,14 @@ def document_callback(app: FastAPI) -> None:
         `webhook-id`, `webhook-timestamp` and `webhook-signature` are those of Standard Webhooks (`v1`, HMAC-SHA256 with
         the secret of the service). The same event can arrive more than once; its `webhook-id` is the job's.
         """
+
+
+def document_alarms(app: FastAPI) -> None:
+    """Add to the document what the `callback_url` of a venue's alarms gets."""
+
+    @app.webhooks.post("alarm", status_code=204, tags=["venues"])
+    def alarm(event: AlarmEvent) -> None:
+        """Sent once when an alarm of a venue begins and once when it is over, signed and retried as `job-ended` is."""
 
 
 def reference(model: type[BaseModel]) -> dict[str, str]:

@@ -18,7 +18,8 @@ from service.routes.documented import frames_upload, headers, needs, problems
 from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.schemas import FieldOptions, Job, Venue
-from service.store.jobs import Origin, Submission, new_job_id
+from service.store.ids import new_id
+from service.store.jobs import Origin, Submission
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -60,7 +61,7 @@ def _submit(context: Context, venue: Venue, form: FormData, idempotency_key: str
     files = uploads.frames_of(venue, form, context)
     # The same frames may be those of a calibration with the same key, which is another job.
     sent = hashlib.sha256(f"field {uploads.checked(context, venue, files, options)}".encode()).hexdigest()
-    job_id = new_job_id()
+    job_id = new_id()
     seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
     paths = uploads.frame_paths(job_id, files)
     submission = Submission(job_id, venue, seeded, sent, idempotency_key, paths, "field", origin)

@@ -19,7 +19,8 @@ from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.schemas import OPTIONS_PART, PHOTOS_PART, IntrinsicsOptions, Job
-from service.store.jobs import Origin, Submission, frame_folder, new_job_id
+from service.store.ids import new_id
+from service.store.jobs import Origin, Submission, frame_folder
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -82,7 +83,7 @@ def _submit(context: Context, form: FormData, idempotency_key: str | None, origi
         data = photo.file.read()
         border.check_photo(name, data, context.settings)
         sent.update(f"\n{name} {hashlib.sha256(data).hexdigest()}".encode())
-    job_id = new_job_id()
+    job_id = new_id()
     # A file may be called anything.
     paths = {name: [f"{frame_folder(job_id)}/photos/{number}"] for number, name in enumerate(files)}
     submission = Submission(job_id, None, options, sent.hexdigest(), idempotency_key, paths, "intrinsics", origin)

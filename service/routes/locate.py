@@ -19,7 +19,8 @@ from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
 from service.schemas import ID_PATTERN, OPEN, OPTIONS_PART, Camera, Job, LocateOptions, Venue
-from service.store.jobs import Origin, Submission, new_job_id
+from service.store.ids import new_id
+from service.store.jobs import Origin, Submission
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -95,7 +96,7 @@ def _submit(
         data = frame.file.read()
         border.check(camera, data, context.settings)
         sent.update(hashlib.sha256(data).digest())
-    job_id = new_job_id()
+    job_id = new_id()
     paths = uploads.frame_paths(job_id, files)
     submission = Submission(job_id, venue, options, sent.hexdigest(), idempotency_key, paths, "locate", origin)
     return uploads.enqueue_upload(context, submission, files, context.queue.enqueue_light)

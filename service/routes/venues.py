@@ -6,13 +6,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Response
 
-from service import etags
+from service import callbacks, etags
 from service.context import InContext, VenueIdPath
 from service.problems import Problem
 from service.routes.documented import headers, needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
-from service.schemas import ID_PATTERN, FormatName, History, Restore, Venue, VenueIn, Venues
+from service.schemas import ID_PATTERN, FormatName, History, Restore, Venue, VenueHealth, VenueIn, Venues
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
@@ -48,6 +48,8 @@ def put_venue(
     """Create or replace a venue. Its poses are where the next calibration starts."""
     if venue.id != venue_id:
         raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
+    if venue.alarms is not None and venue.alarms.callback_url is not None:
+        callbacks.check(venue.alarms.callback_url, context.settings)
 
     def allow(before: Venue | None) -> None:
         tag = _tag(before) if before else None
@@ -142,6 +144,15 @@ def venue_history(
     if if_none_match is not None and etags.names(if_none_match, tag):
         return Response(status_code=304, headers=head)
     return Response(body, headers=head, media_type="application/json")
+
+
+@router.get("/{venue_id}/health", openapi_extra=needs("read"), responses=problems(404))
+def venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
+    """How a venue is doing: the alarms that ring, since when and why, and how far its cameras have drifted."""
+    health = context.venues.health(venue_id)
+    if health is None:
+        raise no_such_venue(venue_id)
+    return health
 
 
 @router.post(

@@ -1,19 +1,21 @@
-"""Deliveries: who is to be told of the end of a job. All SQL about them.
+"""Deliveries: who is to be told of the end of a job, or of an alarm. All SQL about them.
 
-A delivery is written in the transaction that ends its job. To attempt it is to put it off first: whoever dies over an
-attempt leaves it to be attempted again, so it is made at least once, by one worker at a time.
+A delivery is written in the transaction that makes true what it tells. To attempt it is to put it off first: whoever
+dies over an attempt leaves it to be attempted again, so it is made at least once, by one worker at a time.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas import CallbackState
+from service.schemas import AlarmEvent, CallbackState
 from service.store import tables, tallies
 from service.store.engine import clock, reading, serialise, writing
+from service.store.ids import new_id
 
 CALLBACKS = "callbacks"
 LONGEST_ERROR = 500
@@ -22,11 +24,12 @@ d = tables.deliveries.c
 
 @dataclass(frozen=True)
 class Delivery:
-    """An attempt, the first is number 1, to tell `url` of the end of a job."""
+    """An attempt, the first is number 1, to tell `url` of an alarm's event, or (None) that the job `id` has ended."""
 
-    job_id: str
+    id: str
     url: str
     attempt: int
+    event: AlarmEvent | None
 
 
 class Deliveries:
@@ -49,9 +52,9 @@ class Deliveries:
         with writing(self._engine) as connection:
             serialise(connection, "deliveries")
             rows = connection.execute(due).all()
-            begun = sa.update(tables.deliveries).where(d.job.in_([row.job for row in rows]))
+            begun = sa.update(tables.deliveries).where(d.id.in_([row.id for row in rows]))
             connection.execute(begun.values(attempts=d.attempts + 1, due_at=again_at))
-            return [Delivery(row.job, row.url, row.attempts + 1) for row in rows]
+            return [_delivery(row) for row in rows]
 
     def again(self, delivery: Delivery, at: datetime, why: str) -> None:
         """An attempt failed; there will be another."""
@@ -70,22 +73,31 @@ class Deliveries:
         with writing(self._engine) as connection:
             if _write(connection, delivery, status=outcome, **values):
                 tallies.add(connection, {(CALLBACKS, (outcome,)): 1})
+                if delivery.event is not None:
+                    # That of a job goes with its job; nobody asks how far the telling of an alarm has come.
+                    connection.execute(sa.delete(tables.deliveries).where(d.id == delivery.id))
 
 
 def _write(connection: sa.Connection, delivery: Delivery, **values: datetime | str) -> bool:
     # Of an attempt that took so long that another one was begun, nothing is written down.
-    this_attempt = (d.job == delivery.job_id, d.attempts == delivery.attempt, d.status == "waiting")
+    this_attempt = (d.id == delivery.id, d.attempts == delivery.attempt, d.status == "waiting")
     return connection.execute(sa.update(tables.deliveries).where(*this_attempt).values(**values)).rowcount == 1
 
 
 def add_delivery(connection: sa.Connection, job_id: str, url: str, now: datetime) -> None:
     """Have `url` told that the job has ended, when and if the caller's transaction commits."""
-    connection.execute(sa.insert(tables.deliveries).values(job=job_id, url=url, status="waiting", due_at=now))
+    connection.execute(sa.insert(tables.deliveries).values(id=job_id, url=url, status="waiting", due_at=now))
+
+
+def add_alarm_delivery(connection: sa.Connection, event: AlarmEvent, url: str, now: datetime) -> None:
+    """Have `url` told of an alarm, when and if the caller's transaction commits."""
+    told = {"id": new_id(), "url": url, "status": "waiting", "due_at": now, "event": event.model_dump(mode="json")}
+    connection.execute(sa.insert(tables.deliveries).values(**told))
 
 
 def delivery_of(connection: sa.Connection, job_id: str) -> CallbackState | None:
     """How far the telling of a job's end has come; None: nobody is to be told (yet)."""
-    row = connection.execute(sa.select(tables.deliveries).where(d.job == job_id)).one_or_none()
+    row = connection.execute(sa.select(tables.deliveries).where(d.id == job_id)).one_or_none()
     if row is None:
         return None
     return CallbackState(
@@ -94,3 +106,8 @@ def delivery_of(connection: sa.Connection, job_id: str) -> CallbackState | None:
         last_error=row.last_error,
         next_attempt_at=row.due_at if row.status == "waiting" else None,
     )
+
+
+def _delivery(row: sa.Row[Any]) -> Delivery:
+    event = None if row.event is None else AlarmEvent.model_validate(row.event)
+    return Delivery(row.id, row.url, row.attempts + 1, event)

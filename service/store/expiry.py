@@ -72,7 +72,7 @@ class Expiry:
         with writing(self._engine) as connection:
             serialise(connection, "expiry")
             connection.execute(sa.delete(tables.jobs).where(j.id.in_(job_ids), j.finished_at.is_not(None)))
-            connection.execute(sa.delete(tables.deliveries).where(tables.deliveries.c.job.in_(job_ids)))
+            connection.execute(sa.delete(tables.deliveries).where(tables.deliveries.c.id.in_(job_ids)))
             self._leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)
 
     def expect_upload(self, job_id: str, grace: timedelta) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 import sqlalchemy as sa
 
@@ -15,6 +16,7 @@ from service.store.tallies import Key
 
 j = tables.jobs.c
 q = tables.venue_quality.c
+a = tables.alarms.c
 
 
 @dataclass(frozen=True)
@@ -40,12 +42,22 @@ class VenueQuality:
 
     `stitch_error_px` is that of the poses that hold since then: of the new ones if they were accepted, or else of those
     before. `moved_px`: how far the picture of the pitch was found to have moved, at the camera that moved most.
+    `drift_px`: the same since a camera was put where it is, by the poses that hold.
     """
 
     venue: str
     stitch_error_px: float | None
     moved_px: float | None
     accepted_at: datetime | None
+    drift_px: float | None = None
+
+
+@dataclass(frozen=True)
+class Ringing:
+    """An alarm of a venue, of one of its cameras or of several."""
+
+    venue: str
+    rule: str
 
 
 @dataclass(frozen=True)
@@ -57,6 +69,8 @@ class Figures:
     callbacks_waiting: int
     workers: list[WorkerSeen]
     venues: list[VenueQuality]
+    alarms: Mapping[str, int]
+    ringing: list[Ringing]
     tallies: Mapping[Key, float]
 
 
@@ -71,6 +85,8 @@ def look(engine: sa.Engine, most_venues: int) -> Figures:
             callbacks_waiting=_callbacks_waiting(connection),
             workers=_workers(connection, now),
             venues=_venues(connection, most_venues),
+            alarms=_alarms(connection),
+            ringing=_ringing(connection, most_venues),
             tallies=tallies.read(connection),
         )
 
@@ -81,20 +97,32 @@ def note_quality(connection: sa.Connection, venue_id: str, result: Result, now: 
     `moved`: its poses hold from now on.
     """
     shifts = [camera.moved.pixels for camera in result.cameras if camera.moved.pixels is not None]
-    values = {
-        "stitch_error_px": result.stitch_error_px if moved else result.stitch_error_before_px,
-        "moved_px": max(shifts, default=None),
-        **({"accepted_at": now} if moved else {}),
-    }
-    known = connection.execute(sa.update(tables.venue_quality).where(q.venue == venue_id).values(**values))
-    if known.rowcount == 0:
+    note(
+        connection,
+        venue_id,
+        stitch_error_px=result.stitch_error_px if moved else result.stitch_error_before_px,
+        moved_px=max(shifts, default=None),
+        **({"accepted_at": now, "rejected_in_a_row": 0} if moved else {}),
+    )
+
+
+def note_unaccepted(connection: sa.Connection, venue_id: str) -> None:
+    """A calibration brought no poses, inside the caller's serialised transaction."""
+    note(connection, venue_id)
+    one_more = {"rejected_in_a_row": q.rejected_in_a_row + 1}
+    connection.execute(sa.update(tables.venue_quality).where(q.venue == venue_id).values(**one_more))
+
+
+def note(connection: sa.Connection, venue_id: str, **values: Any) -> None:
+    """Write down what is known of a venue now, inside the caller's serialised transaction."""
+    known = sa.update(tables.venue_quality).where(q.venue == venue_id).values(venue=venue_id, **values)
+    if connection.execute(known).rowcount == 0:
         connection.execute(sa.insert(tables.venue_quality).values(venue=venue_id, **values))
 
 
 def note_restored(connection: sa.Connection, venue_id: str, revision: Revision) -> None:
     """An older revision holds again, inside the caller's serialised transaction."""
-    values = {"stitch_error_px": revision.stitch_error_px}
-    connection.execute(sa.update(tables.venue_quality).where(q.venue == venue_id).values(**values))
+    note(connection, venue_id, stitch_error_px=revision.stitch_error_px)
 
 
 def forget_quality(connection: sa.Connection, venue_id: str) -> None:
@@ -129,4 +157,17 @@ def _venues(connection: sa.Connection, most: int) -> list[VenueQuality]:
     # Two looks at an index, not one at every venue: one camera has no stitch error.
     rows = list(connection.execute(quality.where(error.is_not(None)).order_by(error.desc()).limit(most)))
     rows += connection.execute(quality.where(error.is_(None)).limit(most - len(rows)))
-    return [VenueQuality(row.venue, row.stitch_error_px, row.moved_px, row.accepted_at) for row in rows]
+    return [VenueQuality(row.venue, row.stitch_error_px, row.moved_px, row.accepted_at, row.drift_px) for row in rows]
+
+
+def _alarms(connection: sa.Connection) -> dict[str, int]:
+    """How many ring, by rule."""
+    query = sa.select(a.rule, sa.func.count().label("alarms")).group_by(a.rule)
+    return {row.rule: row.alarms for row in connection.execute(query)}
+
+
+def _ringing(connection: sa.Connection, most: int) -> list[Ringing]:
+    """Those that have rung for longest, whichever the camera."""
+    since = sa.func.min(a.since)
+    query = sa.select(a.venue, a.rule).group_by(a.venue, a.rule).order_by(since).limit(most)
+    return [Ringing(row.venue, row.rule) for row in connection.execute(query)]

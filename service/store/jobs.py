@@ -9,8 +9,6 @@ Moments are the database's: the clocks of several machines differ.
 
 from __future__ import annotations
 
-import os
-import time
 import uuid
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
@@ -39,15 +37,15 @@ from service.schemas import (
     Venue,
 )
 from service.store import tables, tallies
+from service.store.alarms import settle_alarms
 from service.store.deliveries import add_delivery, delivery_of
 from service.store.engine import clock, reading, serialise, writing
-from service.store.figures import note_quality
+from service.store.figures import note_quality, note_unaccepted
 from service.store.outcomes import End
 from service.store.revisions import TAKEN, add_revision, newest_revision, revision_of_job
 from service.store.venues import find_venue, put_back, save_venue, venue_lock
 
 PRIORITIES = {"live": 1, "routine": 100}
-CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 DONE = Progress(stage="preview", fraction=1.0)
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
 AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult
@@ -155,12 +153,6 @@ class State:
 
     revision: int
     status: Status
-
-
-def new_job_id() -> str:
-    """A ULID: 48 bits of milliseconds and 80 of chance in Crockford's base 32, so ids sort by time."""
-    number = int(time.time() * 1000) << 80 | int.from_bytes(os.urandom(10))
-    return "".join(CROCKFORD[number >> shift & 31] for shift in range(125, -1, -5))
 
 
 class Jobs:
@@ -399,12 +391,14 @@ class Jobs:
         note_quality(connection, task.venue.id, result, clock(connection), moved=moves)
         if moves:
             self._take(connection, now_stored.with_result(result), "calibrated", task.job_id, result)
+        elif not task.options.dry_run:
+            self._miss(connection, now_stored)
         return result
 
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
-            self._end(connection, task.job_id, _fence(task), "failed", error=error)
+            self._fail(connection, task.job_id, _fence(task), error)
 
     def cancel(self, job_id: str) -> None:
         """End a job that is still open; its worker notices."""
@@ -443,7 +437,7 @@ class Jobs:
             if newest.cause in TAKEN:
                 now_stored = find_venue(connection, began_with.id)
                 assert now_stored is not None
-                put_back(connection, now_stored, newest.revision - 1, rejected_job=job_id)
+                settle_alarms(connection, put_back(connection, now_stored, newest.revision - 1, rejected_job=job_id))
                 self._touch(connection, job_id)
 
     def _found(self, connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revision | None]:
@@ -471,7 +465,7 @@ class Jobs:
     def abandon(self, job_id: str, error: JobError) -> bool:
         """End an open job that the queue has given up; False if it has ended meanwhile."""
         with writing(self._engine) as connection:
-            return self._end(connection, job_id, _open(job_id), "failed", error=error)
+            return self._fail(connection, job_id, _open(job_id), error)
 
     # Parts
 
@@ -479,6 +473,25 @@ class Jobs:
         """Let a venue be as a calibration found it."""
         save_venue(connection, venue)
         add_revision(connection, venue, cause, job_id, stitch_error_px=result.stitch_error_px)
+        settle_alarms(connection, venue)
+
+    def _miss(self, connection: sa.Connection, venue: Venue) -> None:
+        """A calibration that was to bring poses brought none."""
+        note_unaccepted(connection, venue.id)
+        settle_alarms(connection, venue)
+
+    def _fail(
+        self, connection: sa.Connection, job_id: str, still: list[sa.ColumnElement[bool]], error: JobError
+    ) -> bool:
+        row = connection.execute(sa.select(j.kind, j.venue, j.options).where(j.id == job_id)).one()
+        if row.kind != "calibration" or row.options["dry_run"]:
+            return self._end(connection, job_id, still, "failed", error=error)
+        serialise(connection, venue_lock(row.venue))
+        ended = self._end(connection, job_id, still, "failed", error=error)
+        venue = find_venue(connection, row.venue)
+        if ended and venue is not None:
+            self._miss(connection, venue)
+        return ended
 
     def _end(
         self,

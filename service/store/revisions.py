@@ -6,6 +6,7 @@ computes nothing.
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
@@ -14,6 +15,7 @@ from service import motion
 from service.schemas import Camera, Cause, Movement, PosedCamera, Revision, RevisionCamera, Venue
 from service.store import tables
 from service.store.engine import clock
+from service.store.figures import note
 
 r = tables.revisions.c
 # Whose poses hold, or held.
@@ -54,12 +56,22 @@ def add_revision(
             movements={camera: movement.model_dump() for camera, movement in movements.items()},
         )
     )
+    drifts = [movement.drift.pixels for movement in movements.values() if movement.drift]
+    note(connection, venue.id, drift_px=max((drift for drift in drifts if drift is not None), default=None))
 
 
 def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None:
     """The one that holds, inside the caller's transaction."""
     row = _newest_row(connection, venue_id)
     return None if row is None else _revision(row)
+
+
+def first_revision_at(connection: sa.Connection, venue_id: str) -> datetime:
+    """When the venue was made."""
+    at: datetime = connection.execute(
+        sa.select(r.at).where(r.venue == venue_id).order_by(r.number).limit(1)
+    ).scalar_one()
+    return at
 
 
 def revisions_of(connection: sa.Connection, venue_id: str, before: int | None, limit: int) -> list[Revision]:

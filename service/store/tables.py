@@ -127,11 +127,12 @@ leftovers = sa.Table(
     sa.Index("leftovers_by_due", "due_at"),
 )
 
-# Who asked to be told of the end of a job: written with that end, attempted until it succeeds or is given up.
+# Who is to be told of what: written with what happened, attempted until it succeeds or is given up.
 deliveries = sa.Table(
     "deliveries",
     metadata,
-    sa.Column("job", sa.String(26), primary_key=True),
+    # Of the job that has ended, or of an alarm's event.
+    sa.Column("id", sa.String(26), primary_key=True),
     sa.Column("url", sa.String(2048), nullable=False),
     # `waiting`, then `delivered` or `given-up`.
     sa.Column("status", sa.String(16), nullable=False),
@@ -140,6 +141,8 @@ deliveries = sa.Table(
     sa.Column("due_at", Instant, nullable=False),
     # Why the last attempt that failed did.
     sa.Column("last_error", sa.String(500)),
+    # schemas.AlarmEvent; null: that the job has ended.
+    sa.Column("event", sa.JSON(none_as_null=True)),
     sa.Index("deliveries_by_due", "status", "due_at"),
 )
 
@@ -162,7 +165,28 @@ venue_quality = sa.Table(
     sa.Column("moved_px", sa.Double),
     # When the poses that hold were accepted; null: they were put.
     sa.Column("accepted_at", Instant),
+    # Of the camera that is furthest from where it was put.
+    sa.Column("drift_px", sa.Double),
+    # Calibrations since the last accepted one that were not, nor dry runs.
+    sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
+    # When an alarm rings if nothing happens before.
+    sa.Column("alarm_due_at", Instant),
     sa.Index("venues_by_stitch_error", "stitch_error_px"),
+    sa.Index("venues_by_alarm", "alarm_due_at"),
+)
+
+# Those that ring.
+alarms = sa.Table(
+    "alarms",
+    metadata,
+    sa.Column("venue", sa.String(64), primary_key=True),
+    # schemas.AlarmRule.
+    sa.Column("rule", sa.String(32), primary_key=True),
+    # Empty: of the whole venue.
+    sa.Column("camera", sa.String(64), primary_key=True),
+    sa.Column("since", Instant, nullable=False),
+    sa.Column("why", sa.String(500), nullable=False),
+    sa.Index("alarms_by_since", "since"),
 )
 
 # The heartbeat of the workers.

@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import sqlalchemy as sa
 
-from service.schemas import Revision, Venue
+from service.schemas import Revision, Venue, VenueHealth
 from service.store import tables
+from service.store.alarms import forget_alarms, health_of, settle_alarms, venues_with_alarms_due
 from service.store.engine import clock, reading, serialise, writing
 from service.store.figures import forget_quality, note_restored
 from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
@@ -41,6 +42,7 @@ class Venues:
             save_venue(connection, venue)
             if before is None or not venue.stands_like(before):
                 add_revision(connection, venue, "put")
+            settle_alarms(connection, venue)
             return before is None
 
     def restore(self, venue_id: str, number: int, allow: Callable[[Venue | None], None]) -> Venue:
@@ -53,7 +55,26 @@ class Venues:
             before = find_venue(connection, venue_id)
             allow(before)
             assert before is not None
-            return put_back(connection, before, number)
+            restored = put_back(connection, before, number)
+            settle_alarms(connection, restored)
+            return restored
+
+    def settle_alarms(self, venue_id: str) -> None:
+        """Let the alarms of a venue begin and end that go by the time."""
+        with writing(self._engine) as connection:
+            serialise(connection, venue_lock(venue_id))
+            venue = find_venue(connection, venue_id)
+            if venue is not None:
+                settle_alarms(connection, venue)
+
+    def with_alarms_due(self, limit: int) -> list[str]:
+        """Up to `limit` venues of which a time has passed that an alarm goes by."""
+        return venues_with_alarms_due(self._engine, limit)
+
+    def health(self, venue_id: str) -> VenueHealth | None:
+        """How a venue is doing."""
+        with reading(self._engine) as connection:
+            return health_of(connection, venue_id)
 
     def delete(self, venue_id: str, allow: Callable[[Venue | None, str | None], None]) -> None:
         """Forget a venue and its poses unless `allow` raises at the sight of it or of its active job."""
@@ -66,6 +87,7 @@ class Venues:
             )
             allow(find_venue(connection, venue_id), active)
             forget_revisions(connection, venue_id)
+            forget_alarms(connection, venue_id)
             forget_quality(connection, venue_id)
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
 

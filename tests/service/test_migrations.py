@@ -13,7 +13,8 @@ from service.store.deliveries import Deliveries
 from service.store.engine import MIGRATIONS, connect, migrate, writing
 from service.store.expiry import Expiry
 from service.store.figures import VenueQuality, look
-from service.store.jobs import Jobs, Submission, new_job_id
+from service.store.ids import new_id
+from service.store.jobs import Jobs, Submission
 from service.store.keys import Keys
 from service.store.outcomes import ENDED
 from service.store.venues import Venues
@@ -104,7 +105,9 @@ ROWS = {
     "leftovers": [{"folder": "frames/lost", "due_at": NOON}],
     "deliveries": [
         {
+            # Called `id` since revision 0010.
             "job": DONE,
+            "id": DONE,
             "url": RECEIVER,
             "status": "waiting",
             "attempts": 1,
@@ -112,6 +115,7 @@ ROWS = {
             "last_error": "timed out",
         }
     ],
+    "alarms": [{"venue": VENUE.id, "rule": "not-calibrated", "camera": "", "since": NOON, "why": "No poses."}],
     "tallies": [{"metric": ENDED, "labels": "succeeded,accepted,", "value": 3}],
     "revisions": [
         {
@@ -182,9 +186,12 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     )
     assert Expiry(engine).leftovers(NOON, 10) == (["frames/lost"] if revision >= "0004" else [])
     due = Deliveries(engine).attempt(NOON, NOON, 10)
-    assert [(delivery.job_id, delivery.attempt) for delivery in due] == ([(DONE, 2)] if revision >= "0005" else [])
+    assert [(delivery.id, delivery.attempt) for delivery in due] == ([(DONE, 2)] if revision >= "0005" else [])
     error = "timed out" if revision >= "0006" else None
     assert [state.last_error for state in [jobs.get(DONE).callback] if state] == ([error] if revision >= "0005" else [])
+    health = venues.health(VENUE.id)
+    assert [alarm.why for alarm in health.alarms] == (["No poses."] if revision >= "0010" else [])
+    assert (health.revision, health.rejected_in_a_row) == (2, 0)
     seen = look(engine, 10)
     assert seen.tallies == ({(ENDED, ("succeeded", "accepted", "")): 3} if revision >= "0007" else {})
     assert seen.venues == ([VenueQuality(VENUE.id, 0.2, 2.0, NOON)] if revision >= "0007" else [])
@@ -196,7 +203,7 @@ def test_an_upgraded_database_takes_new_rows(old, revision):
     engine = old(revision)
     migrate(engine)
     lens = Submission(
-        new_job_id(),
+        new_id(),
         None,
         IntrinsicsOptions(board=Board(columns=9, rows=6, square_m=0.03)),
         "l",
@@ -207,7 +214,7 @@ def test_an_upgraded_database_takes_new_rows(old, revision):
     points = [{"world": [x, y], "pixel": [0, 0]} for x in (0, 1) for y in (0, 1)]
     clicks = LocateOptions.model_validate({"points": points})
     # A venue with an active calibration takes any number of first poses.
-    place = Submission(new_job_id(), VENUE, clicks, "p", None, {"left": []}, "locate")
+    place = Submission(new_id(), VENUE, clicks, "p", None, {"left": []}, "locate")
     for submission in (lens, place):
         job, new = Jobs(engine).submit(submission, 100, lambda *_: None)
         assert (new, job.kind, job.queue_position) == (True, submission.kind, 2 if submission is lens else 1)

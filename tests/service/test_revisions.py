@@ -2,29 +2,11 @@
 
 import pytest
 
-from service.schemas import FieldOfPlay, Intrinsics, Pose
+from service.schemas import FieldOfPlay, Intrinsics
 from service.store.jobs import MovedOn, NoPoses
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 from tests.homes import in_both_homes
-from tests.worker.stock import Stock, result
-
-
-@pytest.fixture
-def stock(home, tmp_path):
-    stock = Stock(tmp_path, **home.settings(tmp_path))
-    yield stock
-    stock.engine.dispose()
-
-
-def anyway(_):
-    """Allow it."""
-
-
-def calibrated(stock, accepted=True, **options) -> str:
-    job_id = stock.submitted("v", **options)
-    task = stock.jobs.begin(job_id)
-    stock.jobs.finish(task, result(task.venue, accepted), [])
-    return job_id
+from tests.worker.stock import anyway, result
 
 
 def told(stock):
@@ -35,21 +17,13 @@ def standing(stock):
     return round(stock.venues.get("v").cameras[0].pose.position[0], 6)
 
 
-def moved_by_hand(stock, x, **camera):
-    venue = stock.venue("v")
-    left, *others = venue.cameras
-    pose = Pose.at(left.pose.rotation, [x, *left.pose.position[1:]])
-    moved = venue.model_copy(update={"cameras": [left.model_copy(update={"pose": pose, **camera}), *others]})
-    stock.venues.put(moved, anyway)
-
-
 @in_both_homes
 def test_every_change_of_the_poses_is_a_revision_with_its_cause(stock):
     stock.venue("v")
-    job = calibrated(stock)
-    calibrated(stock, accepted=False)
-    calibrated(stock, dry_run=True)
-    moved_by_hand(stock, -3.0)
+    job = stock.calibrated("v")
+    stock.calibrated("v", accepted=False)
+    stock.calibrated("v", dry_run=True)
+    stock.moved_by_hand("v", -3.0)
     stock.venues.restore("v", 1, anyway)
     assert told(stock) == [
         (4, "restored", None, 1),
@@ -74,13 +48,13 @@ def test_a_put_that_moves_nothing_is_no_revision(stock):
 def test_drift_is_counted_from_where_each_camera_was_put(stock):
     stock.venue("v")
     for _ in range(3):
-        calibrated(stock)
+        stock.calibrated("v")
     left, right = stock.venues.history("v", None, 1)[0].cameras
     assert (left.moved.position_m, left.drift.position_m) == (pytest.approx(0.001), pytest.approx(0.003))
     assert left.drift.pixels == pytest.approx(3 * left.moved.pixels, rel=0.01)
     assert (left.drift_since, right.drift_since) == (1, 1)
-    moved_by_hand(stock, -3.0)
-    calibrated(stock)
+    stock.moved_by_hand("v", -3.0)
+    stock.calibrated("v")
     left, right = stock.venues.history("v", None, 1)[0].cameras
     assert (left.drift_since, left.drift.position_m) == (5, pytest.approx(0.001))
     assert (right.drift_since, right.drift.position_m) == (1, pytest.approx(0.004))
@@ -94,7 +68,7 @@ def test_an_older_revision_holds_again_with_its_lenses_and_its_ridge(stock):
     ridge = [[-10.0, 0.0, 0.2], [10.0, 0.0, 0.2]]
     crowned = before.model_copy(update={"field": before.field.model_copy(update={"ridge": ridge})})
     stock.venues.put(crowned, anyway)
-    moved_by_hand(stock, -3.0, intrinsics=longer)
+    stock.moved_by_hand("v", -3.0, intrinsics=longer)
     stock.venues.restore("v", 1, anyway)
     assert stock.venues.get("v") == before
     stock.venues.restore("v", 3, anyway)
@@ -129,7 +103,7 @@ def test_a_revision_that_does_not_fit_is_refused(stock):
 @in_both_homes
 def test_a_venue_that_is_made_again_has_a_history_of_its_own(stock):
     stock.venue("v")
-    moved_by_hand(stock, -3.0)
+    stock.moved_by_hand("v", -3.0)
     stock.venues.delete("v", lambda *_: None)
     stock.venue("v")
     assert told(stock) == [(1, "put", None, None)]
@@ -142,7 +116,7 @@ def test_a_venue_that_is_made_again_has_a_history_of_its_own(stock):
 @pytest.mark.parametrize("how", [{"accepted": False}, {"dry_run": True}])
 def test_a_result_that_did_not_move_the_venue_can_be_taken_by_hand(stock, how):
     stock.venue("v")
-    job = calibrated(stock, **how)
+    job = stock.calibrated("v", **how)
     assert (standing(stock), stock.jobs.get(job).venue_revision) == (-1.0, None)
     for _ in range(2):
         stock.jobs.accept(job)
@@ -153,7 +127,7 @@ def test_a_result_that_did_not_move_the_venue_can_be_taken_by_hand(stock, how):
 @in_both_homes
 def test_what_was_taken_can_be_given_back_and_taken_again(stock):
     stock.venue("v")
-    job = calibrated(stock)
+    job = stock.calibrated("v")
     for _ in range(2):
         stock.jobs.reject(job)
     assert (standing(stock), told(stock)[0]) == (-1.0, (3, "restored", job, 1))
@@ -166,11 +140,11 @@ def test_what_was_taken_can_be_given_back_and_taken_again(stock):
 @in_both_homes
 def test_nothing_by_hand_undoes_what_came_later(stock):
     stock.venue("v")
-    refused, taken = calibrated(stock, accepted=False), calibrated(stock)
+    refused, taken = stock.calibrated("v", accepted=False), stock.calibrated("v")
     with pytest.raises(MovedOn) as moved:
         stock.jobs.accept(refused)
     assert moved.value.newest.revision == 2
-    moved_by_hand(stock, -3.0)
+    stock.moved_by_hand("v", -3.0)
     for decide in (stock.jobs.accept, stock.jobs.reject):
         with pytest.raises(MovedOn):
             decide(taken)
@@ -180,7 +154,7 @@ def test_nothing_by_hand_undoes_what_came_later(stock):
 @in_both_homes
 def test_giving_back_what_never_held_changes_nothing(stock):
     stock.venue("v")
-    stock.jobs.reject(calibrated(stock, accepted=False))
+    stock.jobs.reject(stock.calibrated("v", accepted=False))
     assert told(stock) == [(1, "put", None, None)]
 
 
@@ -196,7 +170,7 @@ def test_a_job_without_poses_has_none_to_take(stock):
 @in_both_homes
 def test_poses_that_were_found_for_another_venue_are_not_taken(stock):
     venue = stock.venue("v")
-    job = calibrated(stock, accepted=False)
+    job = stock.calibrated("v", accepted=False)
     stock.venues.put(venue.model_copy(update={"field": FieldOfPlay(length_m=104, width_m=68)}), anyway)
     with pytest.raises(MovedOn):
         stock.jobs.accept(job)
@@ -205,7 +179,7 @@ def test_poses_that_were_found_for_another_venue_are_not_taken(stock):
 @in_both_homes
 def test_what_is_decided_while_a_job_runs_is_not_undone_by_its_result(stock):
     stock.venue("v")
-    first = calibrated(stock)
+    first = stock.calibrated("v")
     running = stock.jobs.begin(stock.submitted("v"))
     stock.jobs.reject(first)
     stock.jobs.finish(running, result(running.venue, True), [])

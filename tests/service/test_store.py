@@ -11,7 +11,8 @@ from service.schemas import VENUE_EXAMPLE, Intrinsics, VenueIn
 from service.store import tables
 from service.store.blobs import Blobs
 from service.store.engine import migrate
-from service.store.jobs import Jobs, new_job_id
+from service.store.ids import new_id
+from service.store.jobs import Jobs
 from service.store.venues import Venues
 from service.store.workers import Workers
 from tests.homes import in_both_homes, on_servers
@@ -47,7 +48,7 @@ def test_a_refused_put_changes_nothing(engine):
 
 
 def test_job_ids_sort_by_time():
-    ids = [new_job_id() for _ in range(3)]
+    ids = [new_id() for _ in range(3)]
     assert all(len(one) == 26 for one in ids)
     assert ids[0][:8] == ids[2][:8]
 
@@ -55,9 +56,9 @@ def test_job_ids_sort_by_time():
 @in_both_homes
 def test_jobs_that_are_not_there_are_none(engine):
     jobs = Jobs(engine)
-    assert jobs.get(new_job_id()) is None
-    assert jobs.begin(new_job_id()) is None
-    assert jobs.states([new_job_id()]) == {}
+    assert jobs.get(new_id()) is None
+    assert jobs.begin(new_id()) is None
+    assert jobs.states([new_id()]) == {}
 
 
 @in_both_homes

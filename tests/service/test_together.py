@@ -11,7 +11,8 @@ from service.queue import migrate as migrate_queue
 from service.schemas import CameraResult, JobError, Moved, Options, Pose, Provenance, Result, VenueIn
 from service.store import jobs as store
 from service.store.engine import connect, migrate
-from service.store.jobs import Jobs, QueueFull, Submission, new_job_id
+from service.store.ids import new_id
+from service.store.jobs import Jobs, QueueFull, Submission
 from service.store.venues import Venues
 from service.store.workers import Workers
 from tests.e2e.running import venue
@@ -27,7 +28,7 @@ def stored(name):
 
 
 def submission(name, content="c"):
-    return Submission(new_job_id(), stored(name), Options(seed=1), content, None, {"left": ["frames/x/left/0"]})
+    return Submission(new_id(), stored(name), Options(seed=1), content, None, {"left": ["frames/x/left/0"]})
 
 
 def found():

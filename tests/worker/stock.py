@@ -12,7 +12,8 @@ from service.store.blobs import Blobs
 from service.store.deliveries import Deliveries
 from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
-from service.store.jobs import Jobs, Submission, new_job_id, picture_folder
+from service.store.ids import new_id
+from service.store.jobs import Jobs, Submission, picture_folder
 from service.store.venues import Venues
 from service.store.workers import Workers
 from tests.e2e.running import venue
@@ -31,7 +32,7 @@ class Stock:
 
     def submitted(self, venue_id: str, **options) -> str:
         """A job that waits, with a frame."""
-        job_id = new_job_id()
+        job_id = new_id()
         frames = {"left": [f"frames/{job_id}/left/0"]}
         self.blobs.put(frames["left"][0], b"frame")
         submission = Submission(job_id, self.venue(venue_id), Options(seed=1, **options), job_id, None, frames)
@@ -51,6 +52,21 @@ class Stock:
             connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job_id).values(finished_at=at))
         return job_id
 
+    def calibrated(self, venue_id: str, *, accepted: bool = True, **options) -> str:
+        """A job that has just ended."""
+        job_id = self.submitted(venue_id, **options)
+        task = self.jobs.begin(job_id)
+        self.jobs.finish(task, result(task.venue, accepted), [])
+        return job_id
+
+    def moved_by_hand(self, venue_id: str, x: float, **camera) -> None:
+        """Put the venue again, its first camera moved along the pitch."""
+        venue = self.venue(venue_id)
+        first, *others = venue.cameras
+        pose = Pose.at(first.pose.rotation, [x, *first.pose.position[1:]])
+        cameras = [first.model_copy(update={"pose": pose, **camera}), *others]
+        self.venues.put(venue.model_copy(update={"cameras": cameras}), anyway)
+
     def callbacks(self) -> dict[str, int]:
         """How many are in each state."""
         d = tables.deliveries.c
@@ -67,8 +83,12 @@ class Stock:
         stored = self.venues.get(venue_id)
         if stored is None:
             stored = VenueIn.model_validate(venue(venue_id)).stored()
-            self.venues.put(stored, lambda _: None)
+            self.venues.put(stored, anyway)
         return stored
+
+
+def anyway(_: object) -> None:
+    """Allow it."""
 
 
 def result(of: Venue, accepted: bool) -> Result:

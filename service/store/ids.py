@@ -1,0 +1,14 @@
+"""Ids of jobs and events."""
+
+from __future__ import annotations
+
+import os
+import time
+
+CROCKFORD = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
+
+
+def new_id() -> str:
+    """A ULID: 48 bits of milliseconds and 80 of chance in Crockford's base 32, so ids sort by time."""
+    number = int(time.time() * 1000) << 80 | int.from_bytes(os.urandom(10))
+    return "".join(CROCKFORD[number >> shift & 31] for shift in range(125, -1, -5))
