@@ -18,13 +18,15 @@ from service.bodylimit import BodyLimit
 from service.context import Context
 from service.conventions import Conventions
 from service.disk import Disk
+from service.intake import Intake
 from service.metrics import Metrics
 from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
 from service.readiness import Readiness
-from service.routes import calibrate, docs, documented, field, health, intrinsics, jobs, locate, venues
+from service.routes import calibrate, docs, documented, field, health, intrinsics, jobs, locate, snapshot, venues
 from service.settings import Settings
+from service.snapshots import Snapshots
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.blobs import Blobs
 from service.store.engine import AWAY as DATABASE_AWAY
@@ -35,6 +37,7 @@ from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.venues import Venues
 from service.store.workers import Workers
+from service.unattended import Unattended
 from service.watch import Watch
 
 # A client waits, and can come again.
@@ -67,7 +70,7 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_alarms(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, calibrate, intrinsics, locate, field, jobs, health, docs):
+    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, health, docs):
         app.include_router(routes.router)
     return app
 
@@ -79,21 +82,26 @@ def open_context(settings: Settings) -> Context:
     migrate_queue(settings.home_database_url)
     jobs_, workers, keys, disk = Jobs(engine), Workers(engine), Keys(engine), Disk(settings)
     blobs = Blobs(settings.home_blob_url, BLOB_PATIENCE_S)
+    venues_, expiry = Venues(engine), Expiry(engine)
+    snapshots, intake = Snapshots(settings), Intake(settings, jobs_, expiry, blobs)
     return Context(
         settings=settings,
         engine=engine,
         queue=Queue(settings.home_database_url),
         blobs=blobs,
         disk=disk,
-        venues=Venues(engine),
+        venues=venues_,
         jobs=jobs_,
-        expiry=Expiry(engine),
+        expiry=expiry,
         workers=workers,
         watch=Watch(jobs_.states),
         metrics=Metrics(lambda: look(engine, settings.metrics_venues), disk, settings.takeover_after_s),
         readiness=Readiness(jobs_, blobs, disk, workers, settings.takeover_after_s),
         keys=keys,
         gate=Gate(keys, settings),
+        snapshots=snapshots,
+        intake=intake,
+        unattended=Unattended(venues_, jobs_, snapshots, intake),
     )
 
 

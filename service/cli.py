@@ -25,6 +25,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service import lifeline, logs
 from service.client import Client, Refused
+from service.frames import PNG_START
 from service.schemas import (
     ID_PATTERN,
     CameraIn,
@@ -145,15 +146,21 @@ def worker(
 @app.command()
 def calibrate(
     venue: Annotated[str, typer.Argument()],
-    frames: Frames,
+    frames: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[CAMERA=FILE...]", help="Repeat a camera to fuse its frames. None: from the sources."),
+    ] = None,
     options: OptionsText = "{}",
     wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end.")] = False,
     key: Annotated[str | None, typer.Option("--idempotency-key", help="The same key is the same job.")] = None,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
-    """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the quality gate, 75 busy."""
-    files, chosen = _files(frames), _options(options)
+    """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the quality gate, 75 busy.
+
+    Without frames the service fetches them from the sources of the cameras.
+    """
+    files, chosen = _files(frames or []), _options(options)
     with Client(url, api_key) as client:
         job = client.calibrate(venue, files, chosen.model_dump(mode="json", exclude_unset=True), key)
         if not wait:
@@ -163,6 +170,25 @@ def calibrate(
             job = client.follow(job, lambda job: show(job.progress, _waiting(job)))
     _print(job)
     raise typer.Exit(_verdict(job))
+
+
+@app.command()
+def snapshot(
+    venue: Annotated[str, typer.Argument()],
+    camera: OneCamera = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder.")] = Path(),
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Save what the cameras show now, fetched by the service from their sources; prints CAMERA=FILE for each."""
+    with Client(url, api_key) as client:
+        cameras = [camera] if camera else [one.id for one in client.venue(venue).cameras]
+        output.mkdir(parents=True, exist_ok=True)
+        for one in cameras:
+            frame = client.snapshot(venue, one)
+            file = output / f"{one}.{'png' if frame.startswith(PNG_START) else 'jpg'}"
+            file.write_bytes(frame)
+            print(f"{one}={file}")
 
 
 @app.command()

@@ -94,6 +94,10 @@ class Client:
         """The poses that a job found, of one camera or all, as a file of another tool's format."""
         return self._document(f"/jobs/{job_id}/poses", form, camera)
 
+    def snapshot(self, venue_id: str, camera: str) -> bytes:
+        """What a camera shows now, a JPEG or PNG from its source."""
+        return self._answer("GET", f"/venues/{venue_id}/cameras/{camera}/snapshot").content
+
     def calibrate(
         self,
         venue_id: str,
@@ -101,7 +105,7 @@ class Client:
         options: Mapping[str, Any],
         idempotency_key: str | None = None,
     ) -> Job:
-        """Submit frames; the job may be an older one if the content is the same."""
+        """Submit frames, or none: then they are fetched. The job may be an older one if the content is the same."""
         return self._submit_frames(f"/venues/{venue_id}/calibrate", files, options, idempotency_key)
 
     def fit_field(
@@ -122,7 +126,8 @@ class Client:
             for camera, several in files.items()
             for path in several
         ]
-        if options:
+        # Never without a part: a form of none is none.
+        if options or not files:
             parts.append(("options", ("options.json", json.dumps(options).encode(), "application/json")))
         headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
         return Job.model_validate(self._json("POST", path, files=parts, headers=headers))

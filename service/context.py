@@ -10,17 +10,20 @@ from sqlalchemy import Engine
 
 from service.auth import Gate
 from service.disk import Disk
+from service.intake import Intake
 from service.metrics import Metrics
 from service.queue import Queue
 from service.readiness import Readiness
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN
 from service.settings import Settings
+from service.snapshots import Snapshots
 from service.store.blobs import Blobs
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.venues import Venues
 from service.store.workers import Workers
+from service.unattended import Unattended
 from service.watch import Watch
 
 
@@ -42,6 +45,9 @@ class Context:
     readiness: Readiness
     keys: Keys
     gate: Gate
+    snapshots: Snapshots
+    intake: Intake
+    unattended: Unattended
 
 
 async def _context(request: Request) -> Context:

@@ -72,6 +72,9 @@ KINDS: dict[str, Kind] = {
     "truncated-image": Kind(422, "The frame ends too early"),
     "too-many-pixels": Kind(422, "The frame has too many pixels"),
     "frame-size": Kind(422, "The frame does not have the size of the camera"),
+    # Sources of frames.
+    "source-refused": Kind(422, "The source of a camera is not allowed"),
+    "source-failed": Kind(502, "The source of a camera gave no frame"),
     # Formats of poses.
     "format-cannot-hold": Kind(422, "The format cannot hold this camera"),
     "camera-needed": Kind(422, "The format holds one camera"),

@@ -7,9 +7,10 @@ Cameras are OpenCV's: x right, y down, z forward, pixel centres at integers.
 from __future__ import annotations
 
 import math
-from datetime import datetime
+from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
+from urllib.parse import urlsplit, urlunsplit
 
 from pydantic import (
     AfterValidator,
@@ -28,6 +29,7 @@ from pydantic import (
 )
 
 from fields.template import NAMES, Extent, Template, load
+from service.schedule import next_time
 
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
@@ -53,6 +55,33 @@ Row = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Side = Annotated[Whole, Field(ge=32, le=LARGEST_SIDE)]
 # Written as browsers understand it: 0x7f.1 is 127.0.0.1 from here on, for whoever looks at it.
 CallbackUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(lambda url: str(HttpUrl(url)))]
+
+
+# Stands where user and password were in a source that is shown.
+HIDDEN = "***"
+SOURCE_SCHEMES = ("http", "https", "rtsp", "rtsps")
+
+
+def _is_a_source(url: str) -> str:
+    """Written as it is kept; an address with user or password in it is no reason to repeat them in an error."""
+    try:
+        parts = urlsplit(url)
+        complete = parts.scheme in SOURCE_SCHEMES and parts.hostname and (parts.port is None or parts.port > 0)
+    except ValueError:
+        complete = False
+    if not complete or not url.isascii() or not url.isprintable() or " " in url or "#" in url:
+        raise ValueError(f"a source is an address that begins with one of {', '.join(SOURCE_SCHEMES)} and names a host")
+    return url
+
+
+SourceUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(_is_a_source)]
+
+
+def without_credentials(url: str) -> tuple[str, str | None]:
+    """A source as it is shown, and what was before the `@`, None if there is none."""
+    parts = urlsplit(url)
+    userinfo, at, host = parts.netloc.rpartition("@")
+    return (urlunsplit(parts._replace(netloc=f"{HIDDEN}@{host}")), userinfo) if at else (url, None)
 
 
 class Wire(BaseModel):
@@ -165,6 +194,12 @@ class CameraIn(_Lens):
     """A camera of a venue as it is sent."""
 
     pose: PoseIn
+    source: SourceUrl | None = Field(
+        None,
+        description="Where its frames can be fetched: the address of a JPEG or PNG, or an RTSP stream. User and "
+        f"password are not shown again: `{HIDDEN}@` stands for them, and sent back keeps them.",
+        examples=["http://user:password@10.1.0.7/snapshot.jpg"],
+    )
 
     @model_validator(mode="after")
     def _above_the_pitch(self) -> Self:
@@ -184,6 +219,8 @@ class PosedCamera(_Lens):
 
 class Camera(PosedCamera):
     """A camera of a venue with its stored pose."""
+
+    source: str | None = Field(None, description="Where its frames can be fetched.")
 
     @property
     def posed(self) -> PosedCamera:
@@ -439,6 +476,24 @@ class Alarms(Wire):
     )
 
 
+class Schedule(Wire):
+    """When the service calibrates a venue by itself, with frames from the sources of its cameras."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"cron": "*/15 6-23 * * *", "time_zone": "Europe/Berlin"}]}
+    )
+
+    cron: Annotated[str, StringConstraints(max_length=100)] = Field(
+        description="Cron's five fields: minute, hour, day, month, day of the week."
+    )
+    time_zone: Annotated[str, StringConstraints(max_length=64)] = Field("UTC", description="A name of IANA's.")
+
+    @model_validator(mode="after")
+    def _fires(self) -> Self:
+        next_time(self.cron, self.time_zone, datetime.now(UTC))
+        return self
+
+
 class VenueIn(_Place):
     """A venue as it is sent."""
 
@@ -446,6 +501,14 @@ class VenueIn(_Place):
 
     cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
     alarms: Alarms | None = None
+    schedule: Schedule | None = None
+
+    @model_validator(mode="after")
+    def _can_be_fetched(self) -> Self:
+        blind = [camera.id for camera in self.cameras if camera.source is None]
+        if self.schedule is not None and blind:
+            raise ValueError(f"a schedule needs a source of every camera, and {', '.join(blind)} has none")
+        return self
 
     @model_validator(mode="after")
     def _cameras_differ(self) -> Self:
@@ -454,13 +517,25 @@ class VenueIn(_Place):
             raise ValueError("two cameras have the same id")
         return self
 
+    @property
+    def credentials(self) -> dict[str, str | None]:
+        """User and password of each camera's source, as they were sent."""
+        return {c.id: without_credentials(c.source)[1] for c in self.cameras if c.source is not None}
+
     def stored(self) -> Venue:
         """The venue with poses in both conventions."""
         cameras = [
-            Camera(id=c.id, image_size=c.image_size, intrinsics=c.intrinsics, pose=Pose.of(c.pose))
+            Camera(
+                id=c.id,
+                image_size=c.image_size,
+                intrinsics=c.intrinsics,
+                pose=Pose.of(c.pose),
+                source=None if c.source is None else without_credentials(c.source)[0],
+            )
             for c in self.cameras
         ]
-        return Venue(id=self.id, name=self.name, field=self.field, cameras=cameras, alarms=self.alarms)
+        given = {"alarms": self.alarms, "schedule": self.schedule}
+        return Venue(id=self.id, name=self.name, field=self.field, cameras=cameras, **given)
 
 
 class Venue(_Place):
@@ -468,11 +543,17 @@ class Venue(_Place):
 
     cameras: list[Camera]
     alarms: Alarms | None = None
+    schedule: Schedule | None = None
 
     @property
     def poses(self) -> dict[str, Pose]:
         """Where each camera stands and looks, by its id."""
         return {camera.id: camera.pose for camera in self.cameras}
+
+    @property
+    def posed(self) -> list[PosedCamera]:
+        """What calibrations say of the cameras, and nothing else."""
+        return [camera.posed for camera in self.cameras]
 
     def with_poses(self, poses: dict[str, Pose]) -> Venue:
         """The same venue, cameras moved."""
@@ -509,10 +590,12 @@ class Venue(_Place):
                 image_size=c.image_size,
                 intrinsics=c.intrinsics,
                 pose=PoseIn(rotation=c.pose.rotation, position=c.pose.position),
+                source=c.source,
             )
             for c in self.cameras
         ]
-        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras, alarms=self.alarms)
+        given = {"alarms": self.alarms, "schedule": self.schedule}
+        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras, **given)
 
     def with_state(self, cameras: list[PosedCamera], ridge: list[list[float]] | None) -> Venue:
         """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
@@ -526,11 +609,11 @@ class Venue(_Place):
 
     def stands_like(self, other: Venue) -> bool:
         """Whether the cameras of both are the same and stand alike, with the ridge that their poses belong to."""
-        return self.cameras == other.cameras and self.field.ridge == other.field.ridge
+        return self.posed == other.posed and self.field.ridge == other.field.ridge
 
     def calibrates_like(self, other: Venue) -> bool:
         """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
-        return self.field == other.field and self.cameras == other.cameras
+        return self.field == other.field and self.posed == other.posed
 
     def films_like(self, other: Venue) -> bool:
         """Whether frames of the one are frames of the other: same pitch and lenses, wherever the cameras stand."""
@@ -632,6 +715,14 @@ class Alarm(Wire):
     why: str
 
 
+class ScheduleState(Wire):
+    """When a venue is calibrated next, and what came of the last time."""
+
+    next_at: datetime
+    last_job: str | None
+    last_error: str | None = Field(description="Why the last time brought no job.")
+
+
 class VenueHealth(Wire):
     """How a venue is doing. `state` is `alarm` while one of its alarms rings."""
 
@@ -642,6 +733,7 @@ class VenueHealth(Wire):
     stitch_error_px: float | None = Field(description="Of the poses that hold, by the last result.")
     accepted_at: datetime | None = Field(description="When poses were last accepted.")
     rejected_in_a_row: int = Field(description="Calibrations that were rejected or failed since then.")
+    schedule: ScheduleState | None = None
 
 
 class VenueAlarm(Alarm):

@@ -19,6 +19,8 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
 FREED_ANGLES = " ".join(rf"-?{angle}([+-]\d{{1,3}}(\.\d+)?)?" for angle in ("pan", "tilt", "roll"))
 FREED_AXES = re.compile(rf"(-?[xyz] ){{3}}{FREED_ANGLES}")
+# Not all digits, or an address that has a digit too many would count as a name.
+HOST_PATTERN = re.compile(r"(?=.*[A-Za-z*])[A-Za-z0-9*._-]+")
 BLOB_URL = re.compile(r"(file|s3)://.+")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
@@ -65,6 +67,17 @@ class Settings(BaseSettings):
     )
     max_photos: int = Field(100, ge=1, description="Photos of a board in one request.")
     queue_limit: int = Field(100, ge=1, description="Jobs that may wait; more are answered with 429.")
+
+    # Frames that the service fetches itself.
+    sources: list[str] = Field(
+        [],
+        description="Hosts of cameras that frames may be fetched from, names with wildcards and networks: JSON, "
+        'such as ["*.cams.lan", "10.1.0.0/16"]. Empty: none.',
+    )
+    source_timeout_s: float = Field(15, gt=0, le=120, description="For the frames of a venue, all cameras at once.")
+    source_program: list[str] = Field(
+        [sys.executable, "-P", "-m", "worker.snapshot"], description="What fetches frames, beside API and worker."
+    )
 
     # Poses in other formats.
     freed_axes: str = Field(
@@ -125,6 +138,19 @@ class Settings(BaseSettings):
         if url is not None and not BLOB_URL.fullmatch(url):
             raise ValueError("expected is s3://bucket, s3://bucket/folder or file:///folder")
         return url
+
+    @field_validator("sources")
+    @classmethod
+    def _are_hosts(cls, patterns: list[str]) -> list[str]:
+        for pattern in patterns:
+            try:
+                ipaddress.ip_network(pattern)
+            except ValueError:
+                if not HOST_PATTERN.fullmatch(pattern):
+                    raise ValueError(
+                        f"{pattern} is neither a host's name, such as *.cams.lan, nor a network such as 10.1.0.0/16"
+                    ) from None
+        return patterns
 
     @field_validator("freed_axes")
     @classmethod

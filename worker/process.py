@@ -24,23 +24,29 @@ import structlog
 from pydantic import ValidationError
 
 from service import lifeline, tracing
+from service.disk import Disk
+from service.intake import Intake
 from service.problems import KINDS, first_line, type_of
-from service.queue import WorkerQueue
+from service.queue import Queue, WorkerQueue
 from service.queue import migrate as migrate_queue
 from service.schemas import JobError, Progress
 from service.settings import Settings
+from service.snapshots import Snapshots
 from service.store.blobs import Blobs
 from service.store.deliveries import Deliveries
 from service.store.engine import AWAY, connect, migrate
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs, Task
+from service.store.schedules import Schedules
 from service.store.venues import Venues
 from service.store.workers import Workers
+from service.unattended import Unattended
 from worker import retention
 from worker.alarms import Alarms
 from worker.callbacks import Callbacks
 from worker.message import Message
 from worker.retention import Retention
+from worker.scheduled import Scheduled
 from worker.spans import Spans
 
 BEAT_S = 2.0
@@ -101,7 +107,12 @@ class Worker:
         self._retention = Retention(settings, Expiry(engine), blobs, self._workers, self._queue.forget)
         deliveries = Deliveries(engine)
         self._callbacks = Callbacks(settings, deliveries, self._jobs, deliveries.now)
-        self._alarms = Alarms(Venues(engine))
+        venues, expiry = Venues(engine), Expiry(engine)
+        self._alarms = Alarms(venues)
+        intake = Intake(settings, self._jobs, expiry, blobs)
+        unattended = Unattended(venues, self._jobs, Snapshots(settings), intake)
+        enqueue = Queue(settings.home_database_url).enqueue
+        self._scheduled = Scheduled(Schedules(engine), venues, unattended, Disk(settings), enqueue)
 
     def start(self) -> None:
         """Show up and take jobs."""
@@ -111,10 +122,10 @@ class Worker:
     def look_after(self, stop: threading.Event) -> None:
         """Give signs of life, take over from the dead, end what the queue has given up.
 
-        Beside that, in threads of their own, tidy up, tell who asked for it of the ends of jobs and of alarms, and see
-        which alarms have come of time that has passed.
+        Beside that, in threads of their own, tidy up, tell who asked for it of the ends of jobs and of alarms, see
+        which alarms have come of time that has passed, and submit what schedules ask for.
         """
-        for look in (self._retention.look, self._callbacks.look, self._alarms.look):
+        for look in (self._retention.look, self._callbacks.look, self._alarms.look, self._scheduled.look):
             threading.Thread(target=_again_and_again, args=(look, stop), daemon=True).start()
         beaten, judging_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):

@@ -1,8 +1,6 @@
 """One webhook: signed as Standard Webhooks 1.0 says, and sent to no address that was not checked.
 
-The name is looked up once and the connection is made to an address of that answer: a name that points elsewhere a
-moment later (DNS rebinding) leads nowhere. Redirects are not followed and proxies of the environment are not used, for
-the same reason. github.com/standard-webhooks/standard-webhooks, spec/standard-webhooks.md
+github.com/standard-webhooks/standard-webhooks, spec/standard-webhooks.md
 """
 
 from __future__ import annotations
@@ -11,16 +9,15 @@ import asyncio
 import base64
 import hashlib
 import hmac
-import socket
 import ssl
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from importlib.metadata import version
 
 import httpx
 
 from service.callbacks import is_public
+from worker import outgoing
 
 # From the first connection to the answer.
 TIMEOUT_S = 10.0
@@ -57,12 +54,7 @@ def send(url: str, body: bytes, signature: Mapping[str, str], tls: ssl.SSLContex
     """POST a body of JSON; raises `NotSent` if no answer came in time."""
     target = httpx.URL(url)
     addresses = _look_up(target, allow_private)
-    head = {
-        **signature,
-        "Host": target.netloc.decode("ascii"),
-        "Content-Type": "application/json",
-        "User-Agent": f"esc/{version('esc-calibration')}",
-    }
+    head = {**signature, "Content-Type": "application/json"}
     try:
         # Not httpx's own limits: those are per read, and a receiver that sends a byte every nine seconds keeps them.
         return asyncio.run(_within(TIMEOUT_S, target, addresses, body, head, tls))
@@ -74,15 +66,13 @@ def send(url: str, body: bytes, signature: Mapping[str, str], tls: ssl.SSLContex
 
 def _look_up(target: httpx.URL, allow_private: bool) -> list[str]:
     """The addresses of a name, all of them checked."""
-    name, port = target.raw_host.decode("ascii"), target.port or {"http": 80, "https": 443}[target.scheme]
     try:
-        found = socket.getaddrinfo(name, port, type=socket.SOCK_STREAM)
-    except (OSError, UnicodeError) as error:
-        raise NotSent(f"{name} cannot be looked up: {error}") from None
-    addresses = [str(address[0]) for *_, address in found]
+        addresses = outgoing.look_up(target)
+    except outgoing.NotFound as error:
+        raise NotSent(str(error)) from None
     refused = [] if allow_private else [address for address in addresses if not is_public(address)]
     if refused:
-        raise NotSent(f"{name} is {refused[0]}, not on the public internet; see ESC_CALLBACK_ALLOW_PRIVATE")
+        raise NotSent(f"{target.host} is {refused[0]}, not on the public internet; see ESC_CALLBACK_ALLOW_PRIVATE")
     return addresses
 
 
@@ -106,10 +96,7 @@ async def _within(
 async def _post(
     client: httpx.AsyncClient, target: httpx.URL, address: str, body: bytes, head: Mapping[str, str]
 ) -> Answer:
-    # The certificate is checked against the name, whatever address the connection goes to.
-    name = {"sni_hostname": target.raw_host.decode("ascii")}
-    request = client.stream("POST", target.copy_with(host=address), content=body, headers=head, extensions=name)
-    async with request as response:
+    async with outgoing.stream(client, "POST", target, address, content=body, headers=head) as response:
         beginning = b""
         async for chunk in response.aiter_raw():
             beginning += chunk

@@ -11,6 +11,7 @@ from starlette.datastructures import FormData
 
 from service import callbacks
 from service.context import Context, InContext, VenueIdPath
+from service.intake import REFUSALS
 from service.routes import uploads
 from service.routes.documented import frames_upload, headers, needs, problems
 from service.routes.guarded import Guarded
@@ -22,7 +23,7 @@ from service.store.jobs import Origin, Submission
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
-UPLOAD = frames_upload(Options)
+UPLOAD = frames_upload(Options, required=False)
 
 
 @router.post(
@@ -32,7 +33,7 @@ UPLOAD = frames_upload(Options)
     responses={
         200: {"model": Job, "description": "This content is already a job", **headers("ETag")},
         202: headers("ETag", "Location", "Retry-After"),
-        **problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
+        **problems(400, 404, 408, 409, 413, 415, 422, 429, 502, 507),
     },
     openapi_extra=UPLOAD | needs("calibrate"),
 )
@@ -44,9 +45,16 @@ async def calibrate(
         str | None, Header(pattern=uploads.KEY_PATTERN, description=uploads.KEY_DESCRIPTION)
     ] = None,
 ) -> Response:
-    """Submit a frame (or several) per camera. Follow the job at `Location`."""
-    uploads.require_form(request)
+    """Submit a frame (or several) per camera, or none at all. Follow the job at `Location`.
+
+    Without frames (no body, or a form with `options` alone) the service fetches one from the source of each camera.
+    """
+    bodiless = uploads.is_empty(request)
+    if not bodiless:
+        uploads.require_form(request)
     stored = await run_in_threadpool(expecting, context, venue_id)
+    if bodiless:
+        return await run_in_threadpool(fetch, context, stored, Options(), idempotency_key, request.state.origin)
     async with uploads.form_of(request, uploads.most_frames(context, stored)) as form:
         return await run_in_threadpool(submit, context, stored, form, idempotency_key, request.state.origin)
 
@@ -65,6 +73,8 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
     options = uploads.options_of(form, Options)
     if options.callback_url is not None:
         callbacks.check(options.callback_url, context.settings)
+    if uploads.has_no_frames(form) and any(camera.source for camera in venue.cameras):
+        return fetch(context, venue, options, idempotency_key, origin)
     files = uploads.frames_of(venue, form, context)
     content_hash = uploads.checked(context, venue, files, options)
     job_id = new_id()
@@ -72,4 +82,13 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
     paths = uploads.frame_paths(job_id, files)
     submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths, origin=origin)
     job, new = uploads.enqueue_upload(context, submission, files, context.queue.enqueue)
+    return job_answer(job, status=202 if new else 200)
+
+
+def fetch(context: Context, venue: Venue, options: Options, idempotency_key: str | None, origin: Origin) -> Response:
+    """Make what the cameras of `venue` show now a job."""
+    try:
+        job, new = context.unattended.calibrate(venue, options, idempotency_key, origin, context.queue.enqueue)
+    except REFUSALS as refusal:
+        raise uploads.in_words(refusal, venue.id, context.settings) from None
     return job_answer(job, status=202 if new else 200)

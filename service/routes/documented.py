@@ -80,8 +80,8 @@ def reference(model: type[BaseModel]) -> dict[str, str]:
     return {"$ref": f"{SCHEMAS}{model.__name__}"}
 
 
-def frames_upload(options: type[BaseModel]) -> dict[str, Any]:
-    """The body of a route that takes frames of all cameras of a venue."""
+def frames_upload(options: type[BaseModel], *, required: bool = True) -> dict[str, Any]:
+    """The body of a route that takes frames of all cameras of a venue; or not `required`, fetches them."""
     schema = {
         "type": "object",
         "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part to send "
@@ -92,7 +92,7 @@ def frames_upload(options: type[BaseModel]) -> dict[str, Any]:
     }
     encoding = {OPTIONS_PART: {"contentType": "application/json"}}
     content = {"multipart/form-data": {"schema": schema, "encoding": encoding}}
-    return {"requestBody": {"required": True, "content": content}}
+    return {"requestBody": {"required": required, "content": content}}
 
 
 def needs(scope: Scope) -> dict[str, Any]:

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
-from datetime import timedelta
 from typing import TypeVar
 
-import sqlalchemy as sa
 from fastapi import Request
 from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 
 from service import frames as border
+from service import intake
 from service.context import Context
+from service.intake import REFUSALS, Enqueue, Refusal
 from service.problems import Problem, invalid
 from service.routes.jobs import RETRY_AFTER_S
 from service.routes.venues import no_such_venue
 from service.schemas import OPTIONS_PART, Job, Venue
+from service.settings import Settings
 from service.store.jobs import (
     KeyReused,
     QueueFull,
@@ -27,15 +28,12 @@ from service.store.jobs import (
     VenueBusy,
     VenueGone,
     VenueReplaced,
-    frame_folder,
 )
 
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
 KEY_DESCRIPTION = "The same key and the same content are the same job, for as long as that job is kept."
 LONGEST_OPTIONS = 64 * 1024
 PARTS_TOO_MANY = 100
-# Longer than any upload takes from its first stored frame to its job.
-UPLOAD_GRACE = timedelta(hours=1)
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -43,6 +41,16 @@ def require_form(request: Request) -> None:
     """Refuse what is no form before it is read."""
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
         raise Problem("not-multipart", "Send each picture as a file part of a form, as curl -F does.")
+
+
+def is_empty(request: Request) -> bool:
+    """Whether a request has no body."""
+    return request.headers.get("content-length", "0") == "0" and "transfer-encoding" not in request.headers
+
+
+def has_no_frames(form: FormData) -> bool:
+    """Whether a form has options at most."""
+    return all(name == OPTIONS_PART for name in form)
 
 
 def require_room(context: Context) -> None:
@@ -108,48 +116,23 @@ def checked(context: Context, venue: Venue, files: dict[str, list[UploadFile]], 
 
 
 def enqueue_upload(
-    context: Context,
-    submission: Submission,
-    files: Mapping[str, Sequence[UploadFile]],
-    enqueue: Callable[[sa.Connection, str, int], None],
+    context: Context, submission: Submission, files: Mapping[str, Sequence[UploadFile]], enqueue: Enqueue
 ) -> tuple[Job, bool]:
     """Store the files of a checked submission and make it a job, or find the job it already is; says if it is new."""
-    venue_id = None if submission.venue is None else submission.venue.id
     try:
-        known = context.jobs.same_as(venue_id, submission.idempotency_key, submission.content_hash, submission.kind)
-        if known is not None:
-            return known, False
-        # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
-        context.expiry.expect_upload(submission.job_id, UPLOAD_GRACE)
-        _store(context, submission, files)
-        job, new = context.jobs.submit(submission, context.settings.queue_limit, enqueue)
-    except (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull) as refusal:
-        context.blobs.delete_under(frame_folder(submission.job_id))
-        raise _in_words(refusal, venue_id or "", context) from None
-    if not new:
-        context.blobs.delete_under(frame_folder(submission.job_id))
-    # After any other error the frames stay: whether the transaction was committed is then not known.
-    return job, new
+        opened = {name: [upload.file for upload in several] for name, several in files.items()}
+        return context.intake.take(submission, opened, enqueue)
+    except REFUSALS as refusal:
+        raise in_words(refusal, "" if submission.venue is None else submission.venue.id, context.settings) from None
 
 
 def frame_paths(job_id: str, files: Mapping[str, Sequence[UploadFile]]) -> dict[str, list[str]]:
     """Where the frames of a job will lie, by camera."""
-    return {
-        camera: [f"{frame_folder(job_id)}/{camera}/{number}" for number in range(len(frames))]
-        for camera, frames in files.items()
-    }
+    return intake.frame_paths(job_id, {camera: len(several) for camera, several in files.items()})
 
 
-def _store(context: Context, submission: Submission, files: Mapping[str, Sequence[UploadFile]]) -> None:
-    for name, uploads in files.items():
-        for path, file in zip(submission.frames[name], uploads, strict=True):
-            file.file.seek(0)
-            context.blobs.put(path, file.file.read())
-
-
-def _in_words(
-    refusal: KeyReused | VenueBusy | VenueGone | VenueReplaced | QueueFull, venue_id: str, context: Context
-) -> Problem:
+def in_words(refusal: Refusal, venue_id: str, settings: Settings) -> Problem:
+    """Why a submission becomes no job."""
     match refusal:
         case KeyReused():
             return Problem("idempotency-key-reused", "Use a new key for new frames.", job=refusal.job_id)
@@ -169,5 +152,5 @@ def _in_words(
                 headers={"Retry-After": str(RETRY_AFTER_S)},
             )
         case QueueFull():
-            waiting = context.settings.queue_limit
+            waiting = settings.queue_limit
             return Problem("queue-full", f"{waiting} jobs wait; try again.", headers={"Retry-After": "30"})

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Response
 
-from service import callbacks, etags
+from service import callbacks, etags, sources
 from service.context import InContext, VenueIdPath
 from service.problems import Problem
 from service.routes.documented import headers, needs, problems
@@ -59,7 +59,12 @@ def put_venue(
             raise Problem("venue-changed", "The venue is already there.", got=tag)
 
     stored = venue.stored()
-    new = context.venues.put(stored, allow)
+    sources.check(stored, context.settings.sources)
+
+    def credentials(before: Venue | None, known: dict[str, str]) -> dict[str, str]:
+        return sources.credentials_of(stored, venue.credentials, before, known)
+
+    new = context.venues.put(stored, allow, credentials)
     response.headers["ETag"] = etags.quoted(_tag(stored))
     response.status_code = 201 if new else 200
     return stored

@@ -26,6 +26,7 @@ from service.store.deliveries import add_alarm_delivery
 from service.store.engine import clock, reading
 from service.store.figures import note
 from service.store.revisions import TAKEN, first_revision_at, newest_revision
+from service.store.schedules import schedule_of
 
 BEGUN = "alarms_begun"
 # Rule and camera, which is empty where the alarm is of the whole venue.
@@ -74,6 +75,7 @@ def health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
         stitch_error_px=quality.stitch_error_px if quality else None,
         accepted_at=quality.accepted_at if quality else None,
         rejected_in_a_row=quality.rejected_in_a_row if quality else 0,
+        schedule=schedule_of(connection, venue_id),
     )
 
 

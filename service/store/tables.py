@@ -189,6 +189,30 @@ alarms = sa.Table(
     sa.Index("alarms_by_since", "since"),
 )
 
+# When each venue that has a schedule is calibrated next.
+schedules = sa.Table(
+    "schedules",
+    metadata,
+    sa.Column("venue", sa.String(64), primary_key=True),
+    sa.Column("cron", sa.String(100), nullable=False),
+    sa.Column("time_zone", sa.String(64), nullable=False),
+    # The time it is fired for, and when somebody is to look at it: later while a worker is at it.
+    sa.Column("due_at", Instant, nullable=False),
+    sa.Column("look_at", Instant, nullable=False),
+    sa.Column("last_job", sa.String(26)),
+    sa.Column("last_error", sa.String(500)),
+    sa.Index("schedules_by_look", "look_at"),
+)
+
+# User and password of the sources of cameras, as they stand in a URL: the venue itself is shown to who may read.
+credentials = sa.Table(
+    "credentials",
+    metadata,
+    sa.Column("venue", sa.String(64), primary_key=True),
+    sa.Column("camera", sa.String(64), primary_key=True),
+    sa.Column("userinfo", sa.String(1024), nullable=False),
+)
+
 # The heartbeat of the workers.
 workers = sa.Table(
     "workers",

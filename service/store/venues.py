@@ -12,6 +12,7 @@ from service.store.alarms import forget_alarms, health_of, settle_alarms, venues
 from service.store.engine import clock, reading, serialise, writing
 from service.store.figures import forget_quality, note_restored
 from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
+from service.store.schedules import forget_schedule, plan
 
 
 class Venues:
@@ -33,16 +34,26 @@ class Venues:
         with reading(self._engine) as connection:
             return [Venue.model_validate(document) for document in connection.scalars(query)]
 
-    def put(self, venue: Venue, allow: Callable[[Venue | None], None]) -> bool:
-        """Store a venue unless `allow` raises at the sight of what is there; says whether it is new."""
+    def put(
+        self,
+        venue: Venue,
+        allow: Callable[[Venue | None], None],
+        credentials: Callable[[Venue | None, dict[str, str]], dict[str, str]] = lambda _, __: {},
+    ) -> bool:
+        """Store a venue unless `allow` raises at the sight of what is there; says whether it is new.
+
+        `credentials`: those of its sources, by what is there and those that are stored; it may raise too.
+        """
         with writing(self._engine) as connection:
             serialise(connection, venue_lock(venue.id))
             before = find_venue(connection, venue.id)
             allow(before)
+            _keep(connection, venue.id, credentials(before, _credentials(connection, venue.id)))
             save_venue(connection, venue)
             if before is None or not venue.stands_like(before):
                 add_revision(connection, venue, "put")
             settle_alarms(connection, venue)
+            plan(connection, venue)
             return before is None
 
     def restore(self, venue_id: str, number: int, allow: Callable[[Venue | None], None]) -> Venue:
@@ -88,8 +99,15 @@ class Venues:
             allow(find_venue(connection, venue_id), active)
             forget_revisions(connection, venue_id)
             forget_alarms(connection, venue_id)
+            forget_schedule(connection, venue_id)
+            _keep(connection, venue_id, {})
             forget_quality(connection, venue_id)
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
+
+    def credentials(self, venue_id: str) -> dict[str, str]:
+        """User and password of the sources of a venue that have some, by camera."""
+        with reading(self._engine) as connection:
+            return _credentials(connection, venue_id)
 
     def history(self, venue_id: str, before: int | None, limit: int) -> list[Revision]:
         """Up to `limit` revisions of a venue, newest first, those before number `before`."""
@@ -125,3 +143,15 @@ def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job:
         add_revision(connection, then, "restored", rejected_job, revision, revision.stitch_error_px)
         note_restored(connection, venue.id, revision)
     return then
+
+
+def _credentials(connection: sa.Connection, venue_id: str) -> dict[str, str]:
+    rows = connection.execute(sa.select(tables.credentials).where(tables.credentials.c.venue == venue_id))
+    return {row.camera: row.userinfo for row in rows}
+
+
+def _keep(connection: sa.Connection, venue_id: str, credentials: dict[str, str]) -> None:
+    connection.execute(sa.delete(tables.credentials).where(tables.credentials.c.venue == venue_id))
+    rows = [{"venue": venue_id, "camera": camera, "userinfo": userinfo} for camera, userinfo in credentials.items()]
+    if rows:
+        connection.execute(sa.insert(tables.credentials), rows)

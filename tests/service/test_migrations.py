@@ -116,6 +116,10 @@ ROWS = {
         }
     ],
     "alarms": [{"venue": VENUE.id, "rule": "not-calibrated", "camera": "", "since": NOON, "why": "No poses."}],
+    "credentials": [{"venue": VENUE.id, "camera": "left", "userinfo": "user:secret"}],
+    "schedules": [
+        {"venue": VENUE.id, "cron": "0 3 * * *", "time_zone": "UTC", "due_at": NOON, "look_at": NOON, "last_job": DONE}
+    ],
     "tallies": [{"metric": ENDED, "labels": "succeeded,accepted,", "value": 3}],
     "revisions": [
         {
@@ -192,6 +196,8 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     health = venues.health(VENUE.id)
     assert [alarm.why for alarm in health.alarms] == (["No poses."] if revision >= "0010" else [])
     assert (health.revision, health.rejected_in_a_row) == (2, 0)
+    assert venues.credentials(VENUE.id) == ({"left": "user:secret"} if revision >= "0011" else {})
+    assert [state.last_job for state in [health.schedule] if state] == ([DONE] if revision >= "0012" else [])
     seen = look(engine, 10)
     assert seen.tallies == ({(ENDED, ("succeeded", "accepted", "")): 3} if revision >= "0007" else {})
     assert seen.venues == ([VenueQuality(VENUE.id, 0.2, 2.0, NOON)] if revision >= "0007" else [])

@@ -1,0 +1,100 @@
+"""Schedules of venues: all SQL about them.
+
+To fire is to put off first, as deliveries are attempted: one worker fires at a time, and whoever dies over it leaves it
+to be fired again. The next time is reckoned from when the last one was done with, so times that were missed fire once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+import sqlalchemy as sa
+
+from service.schedule import next_time
+from service.schemas import ScheduleState, Venue
+from service.store import tables
+from service.store.engine import clock, reading, serialise, writing
+
+LONGEST_ERROR = 500
+s = tables.schedules.c
+
+
+@dataclass(frozen=True)
+class Firing:
+    """The calibration of a venue that was due at a time."""
+
+    venue_id: str
+    due_at: datetime
+    cron: str
+    time_zone: str
+
+
+class Schedules:
+    """The schedules in the database."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def now(self) -> datetime:
+        """The time that they fire by."""
+        with reading(self._engine) as connection:
+            return clock(connection)
+
+    def fire(self, now: datetime, again_at: datetime, limit: int) -> list[Firing]:
+        """Up to `limit` that are due; fired again at `again_at` unless they are done with before."""
+        due = sa.select(tables.schedules).where(s.look_at <= now).order_by(s.look_at).limit(limit)
+        with reading(self._engine) as connection:
+            if connection.execute(due).first() is None:
+                return []
+        with writing(self._engine) as connection:
+            serialise(connection, "schedules")
+            rows = connection.execute(due).all()
+            put_off = sa.update(tables.schedules).where(s.venue.in_([row.venue for row in rows]))
+            connection.execute(put_off.values(look_at=again_at))
+            return [Firing(row.venue, row.due_at, row.cron, row.time_zone) for row in rows]
+
+    def done(self, firing: Firing, now: datetime, job_id: str | None, error: str | None) -> None:
+        """Wait for the next time. `error`: why there is no job."""
+        next_at = next_time(firing.cron, firing.time_zone, now)
+        # A venue that was put meanwhile with another schedule has other times.
+        same = (
+            s.venue == firing.venue_id,
+            s.due_at == firing.due_at,
+            s.cron == firing.cron,
+            s.time_zone == firing.time_zone,
+        )
+        values = {
+            "due_at": next_at,
+            "look_at": next_at,
+            "last_error": None if error is None else error[:LONGEST_ERROR],
+            **({} if job_id is None else {"last_job": job_id}),
+        }
+        with writing(self._engine) as connection:
+            connection.execute(sa.update(tables.schedules).where(*same).values(**values))
+
+
+def plan(connection: sa.Connection, venue: Venue) -> None:
+    """Let a venue be calibrated by the schedule it has now, inside the caller's serialised transaction."""
+    wanted = venue.schedule
+    known = connection.execute(sa.select(tables.schedules).where(s.venue == venue.id)).one_or_none()
+    if wanted and known and (known.cron, known.time_zone) == (wanted.cron, wanted.time_zone):
+        return
+    forget_schedule(connection, venue.id)
+    if wanted is not None:
+        next_at = next_time(wanted.cron, wanted.time_zone, clock(connection))
+        values = {"cron": wanted.cron, "time_zone": wanted.time_zone, "due_at": next_at, "look_at": next_at}
+        connection.execute(sa.insert(tables.schedules).values(venue=venue.id, **values))
+
+
+def schedule_of(connection: sa.Connection, venue_id: str) -> ScheduleState | None:
+    """When a venue is calibrated next, and what came of the last time."""
+    row = connection.execute(sa.select(tables.schedules).where(s.venue == venue_id)).one_or_none()
+    if row is None:
+        return None
+    return ScheduleState(next_at=row.due_at, last_job=row.last_job, last_error=row.last_error)
+
+
+def forget_schedule(connection: sa.Connection, venue_id: str) -> None:
+    """Nothing fires for the venue any more."""
+    connection.execute(sa.delete(tables.schedules).where(s.venue == venue_id))
