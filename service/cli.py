@@ -13,7 +13,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
@@ -415,10 +414,20 @@ def venue_history(
 ) -> None:
     """Print a line per change of the poses, newest first: revision, time, cause, job, pixels moved and drifted."""
     with Client(url, api_key) as client:
-        for revision in islice(client.history(venue), limit):
+        for revision in client.history(venue, limit):
             cause = revision.cause if revision.restored_from is None else f"restored {revision.restored_from}"
             cameras = " ".join(f"{c.id}:{_pixels(c.moved)}/{_pixels(c.drift)}" for c in revision.cameras)
             print(f"{revision.revision}\t{revision.at:%Y-%m-%dT%H:%M:%SZ}\t{cause}\t{revision.job or '-'}\t{cameras}")
+
+
+@venue_app.command("health")
+def venue_health(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Print how a venue is doing: alarms, drift, schedule. Exit: 0 ok, 3 an alarm rings."""
+    with Client(url, api_key) as client:
+        health = client.venue_health(venue)
+    _print(health)
+    if health.state != "ok":
+        raise typer.Exit(REJECTED)
 
 
 @venue_app.command("restore")
