@@ -1,12 +1,7 @@
 """Alarms of venues: each begins once and is over once, in both homes."""
 
-from datetime import timedelta
-
-import sqlalchemy as sa
-
 from service.schemas import Alarms as Rules
 from service.schemas import JobError
-from service.store import tables
 from service.store.figures import look
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway
@@ -21,15 +16,8 @@ def watched(stock, **rules):
     stock.venues.put(venue.model_copy(update={"alarms": Rules(callback_url=URL, **rules)}), anyway)
 
 
-def events(stock):
-    """What is to be told: the rule and whether it began."""
-    with stock.engine.connect() as connection:
-        rows = connection.scalars(sa.select(tables.deliveries.c.event).order_by(tables.deliveries.c.id)).all()
-    return sorted((event["timestamp"], event["data"]["rule"], event["type"]) for event in rows)
-
-
 def told(stock):
-    return [(rule, what.removeprefix("alarm.")) for _, rule, what in events(stock)]
+    return [(event.data.rule, event.type.removeprefix("alarm.")) for event in stock.alarms_told()]
 
 
 def rings(stock):
@@ -39,17 +27,6 @@ def rings(stock):
 def failed(stock, **options):
     task = stock.jobs.begin(stock.submitted("v", **options))
     stock.jobs.fail(task, ERROR)
-
-
-def some_time_passes(stock, **time):
-    """Everything happened so much earlier."""
-    by = timedelta(**time)
-    with stock.engine.begin() as connection:
-        for table, columns in ((tables.revisions, ["at"]), (tables.venue_quality, ["accepted_at", "alarm_due_at"])):
-            for row in connection.execute(sa.select(table)).mappings().all():
-                earlier = {name: row[name] - by for name in columns if row[name] is not None}
-                key = [column == row[column.name] for column in table.primary_key]
-                connection.execute(sa.update(table).where(*key).values(earlier))
 
 
 @in_both_homes
@@ -123,13 +100,13 @@ def test_what_was_not_calibrated_for_long_rings_without_anything_happening(stock
     duty = Alarms(stock.venues)
     duty.look()
     assert rings(stock) == []
-    some_time_passes(stock, hours=25)
+    stock.time_passes(hours=25)
     for _ in range(2):
         assert duty.look() > 0
     assert (rings(stock), told(stock)) == ([("not-calibrated", None)], [("not-calibrated", "began")])
     stock.calibrated("v")
     assert told(stock)[1:] == [("not-calibrated", "ended")]
-    some_time_passes(stock, hours=25)
+    stock.time_passes(hours=25)
     duty.look()
     assert told(stock)[2:] == [("not-calibrated", "began")]
 

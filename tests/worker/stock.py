@@ -1,11 +1,11 @@
 """A home on a real database with real files, filled with jobs that ended when a test says."""
 
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import sqlalchemy as sa
 
-from service.schemas import CameraResult, JobError, Moved, Options, Pose, Provenance, Result, Venue, VenueIn
+from service.schemas import AlarmEvent, CameraResult, JobError, Moved, Options, Pose, Provenance, Result, Venue, VenueIn
 from service.settings import Settings
 from service.store import tables
 from service.store.blobs import Blobs
@@ -66,6 +66,26 @@ class Stock:
         pose = Pose.at(first.pose.rotation, [x, *first.pose.position[1:]])
         cameras = [first.model_copy(update={"pose": pose, **camera}), *others]
         self.venues.put(venue.model_copy(update={"cameras": cameras}), anyway)
+
+    def time_passes(self, **time: float) -> None:
+        """All that alarms go by was so much earlier."""
+        by = timedelta(**time)
+        moments = {tables.revisions: ["at"], tables.venue_quality: ["accepted_at", "alarm_due_at"]}
+        with self.engine.begin() as connection:
+            for table, names in moments.items():
+                for row in connection.execute(sa.select(table)).mappings().all():
+                    earlier = {name: row[name] - by for name in names if row[name] is not None}
+                    key = [column == row[column.name] for column in table.primary_key]
+                    if earlier:
+                        connection.execute(sa.update(table).where(*key).values(earlier))
+
+    def alarms_told(self) -> list[AlarmEvent]:
+        """What is to be told of alarms, as it happened."""
+        d = tables.deliveries.c
+        with self.engine.connect() as connection:
+            events = connection.scalars(sa.select(d.event).where(d.event.is_not(None)))
+            told = [AlarmEvent.model_validate(event) for event in events]
+        return sorted(told, key=lambda event: (event.timestamp, event.data.rule, event.data.camera or ""))
 
     def callbacks(self) -> dict[str, int]:
         """How many are in each state."""

@@ -1,0 +1,211 @@
+"""A year of a venue in two dozen days: rendered frames, the real network, engine, gate, store and alarms.
+
+Cameras creep, a storm turns them, one is exchanged for another, cables are swapped, a lens is dirty, a frame is of
+another pitch, nobody calibrates for weeks. Whatever comes: what is stored is right, or is what was stored before.
+"""
+
+import cv2
+import numpy as np
+import pytest
+
+from service import motion
+from service.schemas import Alarms as Rules
+from service.schemas import VenueIn
+from tests.calibration.synthetic import CROWNED, camera, moved, paint_frame
+from tests.worker.stock import Stock, anyway
+from worker import job
+from worker.alarms import Alarms
+from worker.calibration.camera import Camera, Intrinsics
+from worker.calibration.field import Field
+
+SIZE, FOCAL, LENS = (640, 360), 400.0, (-0.12, 0.02, 0.0, 0.0, 0.0)
+OTHER_PITCH = Field(92.0, 50.0)
+# Of 640: what of 4K would be 9 px. The lines themselves are 1 to 3 px wide here.
+RIGHT_PX = 1.5
+STORM_RAD = 0.014
+RULES = Rules(
+    moved_since_last_px=4,
+    moved_since_first_px=5,
+    rejected_in_a_row=3,
+    not_calibrated_for_h=20 * 24,
+    callback_url="https://example.com/alarms",
+)
+Frames = dict[str, np.ndarray]
+
+
+def cameras() -> list[Camera]:
+    return [
+        camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0), FOCAL, LENS, SIZE),
+        camera("right", (1.0, -48.0, 10.0), (20.0, 0.0), FOCAL, LENS, SIZE),
+    ]
+
+
+def stored(of: list[Camera], name: str = "v"):
+    return VenueIn.model_validate(
+        {
+            "id": name,
+            "field": {"length_m": 105, "width_m": 68, "line_width_m": 0.12, "ridge": CROWNED.ridge.tolist()},
+            "cameras": [
+                {
+                    "id": c.id,
+                    "image_size": list(SIZE),
+                    "intrinsics": {"matrix": cameras()[0].intrinsics.matrix.tolist(), "distortion": list(LENS)},
+                    "pose": {"rotation": c.pose.rotation.tolist(), "position": c.pose.position.tolist()},
+                }
+                for c in of
+            ],
+            "alarms": RULES.model_dump(),
+        }
+    ).stored()
+
+
+@pytest.fixture
+def stock(tmp_path):
+    stock = Stock(tmp_path, threads=2)
+    yield stock
+    stock.engine.dispose()
+
+
+class Year:
+    """The venue as it is in truth, and the service that looks after it."""
+
+    def __init__(self, home: Stock) -> None:
+        self.home = home
+        self.duty = Alarms(home.venues)
+        self.rng = np.random.default_rng(2026)
+        self.creep = {side: np.zeros(6) for side in ("left", "right")}
+        self.rejected: dict[str, str] = {}
+        self.today = ""
+        home.venues.put(stored(cameras()), anyway)
+
+    def truth(self) -> list[Camera]:
+        return [moved(c, tuple(self.creep[c.id][:3]), tuple(self.creep[c.id][3:])) for c in cameras()]
+
+    def pass_(self, days: float) -> None:
+        """Heat and wind have them creep, by some tenths of a pixel; the worker looks after the alarms."""
+        for creep in self.creep.values():
+            creep[:3] += self.rng.normal(0, 0.0008, 3)
+            creep[3:] += self.rng.normal(0, 0.004, 3)
+        self.home.time_passes(days=days)
+        self.duty.look()
+
+    def storm(self) -> None:
+        for creep, sign in zip(self.creep.values(), (1, -1), strict=True):
+            creep[:3] += np.array([sign * STORM_RAD, STORM_RAD / 2, 0.0])
+
+    def frames(self, pitch: Field = CROWNED) -> Frames:
+        return {c.id: paint_frame(pitch, c) for c in self.truth()}
+
+    def day(self, called: str, frames: Frames) -> bool:
+        """A calibration; says whether its poses were taken, which must then be right."""
+        files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
+        task = self.home.jobs.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
+        before = self.home.venues.get("v")
+        found = job.solve(task.venue, files, task.options, self.home.settings, lambda _: None)
+        self.home.jobs.finish(task, found.result, [])
+        now = self.home.venues.get("v")
+        if not found.result.accepted:
+            self.rejected[called] = found.result.rejected_because
+            assert now == before
+            return False
+        assert self.wrong_by() < RIGHT_PX, f"{called}: a pose that is {self.wrong_by():.1f} px off was accepted"
+        return True
+
+    def wrong_by(self) -> float:
+        """How far (px) the worst stored camera is from where it really is."""
+        now = self.home.venues.get("v")
+        pairs = zip(stored(self.truth()).cameras, now.cameras, strict=True)
+        return max(motion.moved(now.field, truth, held).pixels for truth, held in pairs)
+
+    def told(self) -> list[tuple[str, str | None, str]]:
+        return [(e.data.rule, e.data.camera, e.type.removeprefix("alarm.")) for e in self.home.alarms_told()]
+
+
+def smeared(frame: np.ndarray) -> np.ndarray:
+    """Through rain that has dried: half of it is fog, and a drop covers the middle."""
+    height, width = frame.shape[:2]
+    fog = cv2.GaussianBlur(frame, (0, 0), 9)
+    amount = np.clip(np.linspace(1.6, -0.6, width), 0, 1)[None, :, None]
+    dirty = amount * (0.5 * fog + 70) + (1 - amount) * frame
+    cv2.circle(dirty, (width // 2, int(0.6 * height)), height // 5, (60, 75, 80), -1)
+    return dirty.astype(np.uint8)
+
+
+def exchanged(of: Camera) -> Camera:
+    """Another model in its place: its lens is 5 % longer."""
+    longer = Intrinsics(of.intrinsics.matrix * np.array([[1.05], [1.05], [1.0]]), of.intrinsics.distortion, SIZE)
+    matrix = longer.matrix.copy()
+    matrix[:2, 2] = of.intrinsics.matrix[:2, 2]
+    return Camera(of.id, Intrinsics(matrix, of.intrinsics.distortion, SIZE), of.pose)
+
+
+@pytest.mark.timeout(900)
+def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stock, monkeypatch):
+    # Nobody looks at the pictures.
+    monkeypatch.setattr(job, "_draw", lambda *_: {})
+    year = Year(stock)
+
+    year.pass_(1)
+    assert year.day("a first day", year.frames())
+    year.pass_(15)
+    assert year.day("a month later", year.frames())
+    year.pass_(1)
+    others = year.frames() | {"right": paint_frame(OTHER_PITCH, year.truth()[1])}
+    assert not year.day("a frame of another pitch", others)
+    year.pass_(12)
+    year.day("a dirty lens", year.frames() | {"left": smeared(year.frames()["left"])})
+    assert year.told() == []
+
+    # Nobody is there.
+    year.pass_(25)
+    assert year.told() == [("not-calibrated", None, "began")]
+    assert year.day("somebody is back", year.frames())
+    assert year.told().pop() == ("not-calibrated", None, "ended")
+
+    year.storm()
+    year.pass_(15)
+    assert year.day("after a storm", year.frames())
+    assert {camera.rule for camera in stock.venues.health("v").alarms} == {"moved-since-last", "moved-since-first"}
+    year.pass_(1)
+    assert year.day("the day after", year.frames())
+
+    for number in range(3):
+        year.pass_(1)
+        frames = year.frames()
+        swapped = {"left": frames["right"], "right": frames["left"]}
+        assert not year.day(f"swapped cables, day {number}", swapped)
+    assert year.told().pop() == ("rejected-in-a-row", None, "began")
+    year.pass_(1)
+    assert year.day("cables put right", year.frames())
+    assert year.told().pop() == ("rejected-in-a-row", None, "ended")
+
+    year.pass_(15)
+    left, right = year.truth()
+    changed = {"left": paint_frame(CROWNED, left), "right": paint_frame(CROWNED, exchanged(right))}
+    assert not year.day("a camera was exchanged", changed)
+
+    newest = stock.venues.history("v", None, 1)[0].revision
+    before = stock.venues.get("v")
+    stock.venues.restore("v", newest - 1, anyway)
+    assert stock.venues.get("v") != before
+    stock.venues.restore("v", newest, anyway)
+    assert stock.venues.get("v") == before
+    stock.venues.restore("v", newest - 1, anyway)
+    year.pass_(1)
+    assert year.day("from poses that were put back", year.frames())
+
+    begun = [(rule, camera) for rule, camera, what in year.told() if what == "began"]
+    assert sorted(begun, key=str) == [
+        ("moved-since-first", "left"),
+        ("moved-since-first", "right"),
+        ("moved-since-last", "left"),
+        ("moved-since-last", "right"),
+        ("not-calibrated", None),
+        ("rejected-in-a-row", None),
+    ]
+    over = [(rule, camera) for rule, camera, what in year.told() if what == "ended"]
+    assert len(over) == len(set(over))
+    # Where the storm left them, they are still.
+    still = {(alarm.rule, alarm.camera) for alarm in stock.venues.health("v").alarms}
+    assert still == set(begun) - set(over) == {("moved-since-first", "left"), ("moved-since-first", "right")}
+    print("\n".join(f"{day}: {why}" for day, why in year.rejected.items()))
