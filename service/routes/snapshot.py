@@ -21,7 +21,7 @@ PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINA
 
 @router.get(
     "/venues/{venue_id}/cameras/{camera}/snapshot",
-    openapi_extra=needs("calibrate"),
+    openapi_extra=needs("read"),
     response_class=Response,
     responses={**PICTURE, **problems(404, 413, 422, 502)},
 )

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.e2e.running import venue
 from tests.e2e.test_watching import families
 
 ROOT = Path(__file__).parents[2]
@@ -29,16 +30,23 @@ def promtool(missing):
     return shutil.which("promtool") or missing("promtool")
 
 
-def test_every_figure_that_is_asked_for_is_there(service, name):
-    service.end(service.submit(service.venue(name)).json()["id"])
+@pytest.fixture
+def moved(service, name):
+    """A venue that was calibrated, and has an alarm that rings."""
+    service.http.put(f"/venues/{name}", json=venue(name) | {"alarms": {"moved_since_last_px": 0.001}})
+    service.end(service.submit(name).json()["id"])
+    yield
+    service.http.delete(f"/venues/{name}").raise_for_status()
+
+
+def test_every_figure_that_is_asked_for_is_there(service, moved):
     there = {sample.name for family in families(service).values() for sample in family.samples}
     asked = {metric for query in QUERIES for metric in METRIC.findall(query)}
     assert len(asked) > 20
     assert asked - there - MADE_BY_PROMETHEUS == set()
 
 
-def test_every_label_that_is_asked_for_is_there(service, name):
-    service.end(service.submit(service.venue(name)).json()["id"])
+def test_every_label_that_is_asked_for_is_there(service, moved):
     there = {label for family in families(service).values() for sample in family.samples for label in sample.labels}
     asked = set()
     for query in QUERIES:
