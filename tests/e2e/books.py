@@ -15,7 +15,6 @@ from service.store.jobs import picture_folder
 from tests.e2e.running import Service, wait_for
 from tests.homes import files
 
-
 POSED = ("id", "image_size", "intrinsics", "pose")
 
 

@@ -11,10 +11,11 @@ from threading import Barrier
 import pytest
 import sqlalchemy as sa
 
+from service.schemas import Alarms
 from service.settings import Settings
 from tests.homes import in_both_homes
 from tests.worker.receiver import Dripping, Endless, NulSaying, Receiver, Silent
-from tests.worker.stock import Stock
+from tests.worker.stock import Stock, anyway
 from worker import webhook
 from worker.callbacks import ATTEMPT, Callbacks
 
@@ -103,6 +104,35 @@ def test_every_end_is_told(stock, receiver, clock, how):
         home.jobs.cancel(home.submitted("v", callback_url=hook.url))
     callbacks(home, clock).look()
     assert json.loads(hook.received[0].body)["type"] == how
+
+
+@in_both_homes
+def test_an_alarm_is_told_when_it_begins_and_when_it_is_over_and_nothing_is_left(stock, receiver, clock):
+    home, hook = stock(), receiver(Receiver, 500, 204)
+    rules = Alarms(rejected_in_a_row=1, callback_url=hook.url)
+    home.venues.put(home.venue("v").model_copy(update={"alarms": rules}), anyway)
+    home.calibrated("v", accepted=False)
+    duty = callbacks(home, clock)
+    duty.look()
+    clock.goes_on(minutes=1)
+    duty.look()
+    home.calibrated("v")
+    duty.look()
+    failed, began, ended = hook.received
+    assert failed.headers["webhook-id"] == began.headers["webhook-id"] != ended.headers["webhook-id"]
+    event = json.loads(began.body)
+    assert (event["type"], event["timestamp"]) == ("alarm.began", event["data"]["since"])
+    assert event["data"] == {
+        "venue": "v",
+        "rule": "rejected-in-a-row",
+        "camera": None,
+        "since": event["timestamp"],
+        "why": "The last 1 calibrations were rejected or failed.",
+    }
+    assert json.loads(ended.body)["type"] == "alarm.ended"
+    signed = webhook.headers(ended.headers["webhook-id"], clock.now, ended.body, home.settings.webhook_keys)
+    assert ended.headers.items() >= signed.items()
+    assert home.callbacks() == {}
 
 
 def test_a_job_that_asked_for_nothing_is_not_told_of(stock):
@@ -259,7 +289,7 @@ def test_workers_that_look_at_once_do_not_attempt_the_same(stock, clock):
     with ThreadPoolExecutor(workers) as pool:
         attempts = [delivery for found in pool.map(attempt, range(workers)) for delivery in found]
     assert [delivery.attempt for delivery in attempts] == [1, 1, 1]
-    assert len({delivery.job_id for delivery in attempts}) == 3
+    assert len({delivery.id for delivery in attempts}) == 3
 
 
 def test_a_worker_without_a_secret_sends_nothing_unsigned(stock, receiver, clock):
