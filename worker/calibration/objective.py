@@ -103,7 +103,9 @@ class BlurredResponse:
     def minus(self, coarser: BlurredResponse) -> BlurredResponse:
         """The difference to a coarser blur of the same picture."""
         size = (self.values.shape[1], self.values.shape[0])
-        return BlurredResponse(self.values - cv2.resize(coarser.values, size), self.shrink)
+        difference = cv2.resize(coarser.values, size)
+        np.subtract(self.values, difference, out=difference)
+        return BlurredResponse(np.asarray(difference, dtype=np.float32), self.shrink)
 
     def at(self, column: Plane, row: Plane) -> Response:
         """Values (P, N) at pixels of the full-size picture; 0 outside it and at NaN."""
