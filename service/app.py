@@ -25,6 +25,7 @@ from service.queue import migrate as migrate_queue
 from service.readiness import Readiness
 from service.routes import calibrate, docs, documented, field, health, intrinsics, jobs, locate, venues
 from service.settings import Settings
+from service.sharedreads import SharedReads
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.blobs import Blobs
 from service.store.engine import AWAY as DATABASE_AWAY
@@ -88,6 +89,7 @@ def open_context(settings: Settings) -> Context:
         jobs=jobs_,
         expiry=Expiry(engine),
         workers=workers,
+        reads=SharedReads(jobs_.get),
         watch=Watch(jobs_.states),
         metrics=Metrics(lambda: look(engine, settings.metrics_venues), disk, settings.takeover_after_s),
         readiness=Readiness(jobs_, blobs, disk, workers, settings.takeover_after_s),

@@ -15,6 +15,7 @@ from service.queue import Queue
 from service.readiness import Readiness
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN
 from service.settings import Settings
+from service.sharedreads import SharedReads
 from service.store.blobs import Blobs
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs
@@ -37,6 +38,7 @@ class Context:
     jobs: Jobs
     expiry: Expiry
     workers: Workers
+    reads: SharedReads
     watch: Watch
     metrics: Metrics
     readiness: Readiness

@@ -1,7 +1,8 @@
 """The venues of `make bench`: rendered once into `runs/bench`, read from there afterwards.
 
 Half of them match their model to the last digit. The other half are as real ones are: a lens that its calibration met
-to a pixel or so, a ground that swells by centimetres, paint that lies half a centimetre beside itself, and fringes of colour.
+to a pixel or so, a ground that swells by centimetres, paint that lies half a centimetre beside itself, and colours that
+the lens puts beside each other.
 """
 
 from __future__ import annotations
