@@ -57,7 +57,7 @@ from worker.outcome import (
 )
 
 log = structlog.get_logger()
-BEHIND_THE_OTHERS = 5
+BEHIND_THE_OTHERS = 10
 """Niceness: answers of the API and heartbeats of the worker on the same machine go before the computation."""
 
 
