@@ -18,7 +18,7 @@ from worker.calibration.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
 from worker.calibration.linemeasurement import Measurements, measure_lines
 from worker.calibration.parameters import Parameter
 from worker.calibration.residuals import Unknowns
-from worker.calibration.robust import Weigh, huber_weights, tukey_weights
+from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.uncertainty import Determined, Deviation, judge
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
@@ -28,7 +28,7 @@ The last rounds are there for measurements that change with the pose, and end as
 """
 ASSESSING_SEARCH_PX = 8.0
 MOST_STEPS = 4
-"""Per round and loss."""
+"""Per round."""
 SETTLED_M = 5e-5
 """Cameras that a step, or a whole round, moves less than this have arrived."""
 
@@ -81,9 +81,10 @@ def refine(
         unknowns = unknowns.around(here.pitch, here.lines)
         measured = measure_all(here.on_ground(unknowns), here.cameras, sight, search)
         before = here
-        # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several.
-        for weigh in (huber_weights, tukey_weights):
-            here = _settled(here, cameras, measured, unknowns, stitch_weight, weigh)
+        # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
+        # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
+        here = _settled(here, cameras, measured, unknowns, stitch_weight)
+        here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
         uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
         here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
         if here.farthest_from(before) < SETTLED_M:
@@ -98,11 +99,10 @@ def _settled(
     measured: Sequence[Measurements],
     unknowns: Unknowns,
     stitch_weight: float,
-    weigh: Weigh,
 ) -> Estimate:
-    """Steps on the same measurements until they lead nowhere."""
+    """Where Huber's loss of the same measurements is least."""
     for _ in range(MOST_STEPS):
-        before, here = here, step(here, found, measured, unknowns, stitch_weight, weigh)
+        before, here = here, step(here, found, measured, unknowns, stitch_weight, huber_weights)
         if here.farthest_from(before) < SETTLED_M:
             break
     return here
