@@ -26,6 +26,7 @@ from service.queue import migrate as migrate_queue
 from service.readiness import Readiness
 from service.routes import calibrate, docs, documented, field, health, intrinsics, jobs, locate, snapshot, venues
 from service.settings import Settings
+from service.sharedreads import SharedReads
 from service.snapshots import Snapshots
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.blobs import Blobs
@@ -94,6 +95,7 @@ def open_context(settings: Settings) -> Context:
         jobs=jobs_,
         expiry=expiry,
         workers=workers,
+        reads=SharedReads(jobs_.get),
         watch=Watch(jobs_.states),
         metrics=Metrics(lambda: look(engine, settings.metrics_venues), disk, settings.takeover_after_s),
         readiness=Readiness(jobs_, blobs, disk, workers, settings.takeover_after_s),

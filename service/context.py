@@ -16,6 +16,7 @@ from service.queue import Queue
 from service.readiness import Readiness
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN
 from service.settings import Settings
+from service.sharedreads import SharedReads
 from service.snapshots import Snapshots
 from service.store.blobs import Blobs
 from service.store.expiry import Expiry
@@ -40,6 +41,7 @@ class Context:
     jobs: Jobs
     expiry: Expiry
     workers: Workers
+    reads: SharedReads
     watch: Watch
     metrics: Metrics
     readiness: Readiness

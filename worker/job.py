@@ -57,11 +57,14 @@ from worker.outcome import (
 )
 
 log = structlog.get_logger()
+BEHIND_THE_OTHERS = 10
+"""Niceness: answers of the API and heartbeats of the worker on the same machine go before the computation."""
 
 
 def main(job_id: str, run_token: str) -> None:
     """Compute the job that the parent has begun."""
     lifeline.end_with_parent()
+    os.nice(BEHIND_THE_OTHERS)
     say = _line_to_parent()
     settings = Settings()
     logs.configure(settings)

@@ -49,8 +49,8 @@ def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None)
     return Response(body, status, headers, "application/json")
 
 
-def _existing(job_id: JobIdPath, context: InContext) -> Job:
-    job = context.jobs.get(job_id)
+async def _existing(job_id: JobIdPath, context: InContext) -> Job:
+    job = await context.reads.get(job_id)
     if job is None:
         kept = f"{context.settings.keep_jobs_days:g} days"
         raise Problem("job-not-found", f"GET /jobs lists those there are; they are deleted {kept} after their end.")
@@ -278,4 +278,4 @@ async def _state(context: Context, job: Job) -> State | None:
 
 
 async def _read_again(context: Context, job: Job) -> Job:
-    return await run_in_threadpool(context.jobs.get, job.id) or job
+    return await context.reads.get(job.id) or job

@@ -12,6 +12,7 @@ import argparse
 import copy
 import sys
 import tempfile
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from service.client import Client
 from service.schemas import Job, VenueIn
 from tests.demo.__main__ import service
 from tests.real.pair import FOLDER, RealPair
-from worker.calibration.camera import Pose
+from worker.calibration.camera import Pose, rotation_angles_deg
 
 CAUGHT_PX = 5.0
 console = Console(highlight=False, soft_wrap=True)
@@ -45,7 +46,7 @@ def main() -> int:
 
 def run(client: Client, pair: RealPair, kind: str, count: int) -> int:
     """Calibrate from the first `count` starts of a kind; how many were accepted within `CAUGHT_PX`."""
-    caught, positions = 0, []
+    caught, ends = 0, []
     for number in range(count):
         job = calibrate(client, pair, kind, number)
         if job.result is None:
@@ -56,18 +57,27 @@ def run(client: Client, pair: RealPair, kind: str, count: int) -> int:
         good = job.result.accepted and max(rms.values()) <= CAUGHT_PX
         caught += good
         if good:
-            positions.append(np.concatenate([pose.position for pose in poses.values()]))
+            ends.append(poses)
         console.print(
             f"{kind} {number:2d}  clicked points {' '.join(f'{name} {px:6.2f} px' for name, px in rms.items())}  "
             f"stitch {_px(job.result.stitch_error_before_px)} -> {_px(job.result.stitch_error_px)}  "
             f"IoU {' '.join(f'{c.iou:.2f}' for c in job.result.cameras)}  "
             f"{sum(job.result.timings_s.values()):4.1f} s  {job.result.rejected_because or 'accepted'}"
         )
-    spread = 100 * np.ptp(positions, axis=0).max() if len(positions) > 1 else 0.0
+    shift_m, turn_deg = spread(ends)
     console.print(
-        f"{kind}: {caught} of {count} accepted within {CAUGHT_PX:.0f} px; positions differ by {spread:.2f} cm"
+        f"{kind}: {caught} of {count} accepted within {CAUGHT_PX:.0f} px; "
+        f"they differ by up to {100 * shift_m:.2f} cm and {turn_deg:.4f} degrees"
     )
     return caught
+
+
+def spread(ends: list[dict[str, Pose]]) -> tuple[float, float]:
+    """The largest difference, metres and degrees, between the poses of one camera in two runs."""
+    pairs = [(a[name], b[name]) for a, b in combinations(ends, 2) for name in a]
+    shifts = [float(np.linalg.norm(a.position - b.position)) for a, b in pairs]
+    turns = [float(rotation_angles_deg(a.rotation, b.rotation)) for a, b in pairs]
+    return max(shifts, default=0.0), max(turns, default=0.0)
 
 
 def calibrate(client: Client, pair: RealPair, kind: str, number: int) -> Job:

@@ -78,7 +78,7 @@ def test_the_edge_of_a_short_dash_is_drawn_along_it():
     above = camera("above", (-11.0, 0.0, 4.0), (-11.0, 0.01), focal=2000.0)
     dash = next(m for m in field("handball").markings() if m.name == "left free-throw line, front, dash 5")
     grey = np.full((540, 960, 3), 90, np.uint8)
-    drawn = (overlay(field("handball"), above, above, grey) != grey).any(axis=-1)
+    drawn = (overlay((field("handball"), above), (field("handball"), above), grey) != grey).any(axis=-1)
     middle = above.project(field("handball").lift(dash.centre.mean(axis=0, keepdims=True)))[0].round().astype(int)
     # 15 cm of it are 75 px; a disc as wide as the line would be 25 px high.
     rows = np.flatnonzero(drawn[middle[1] - 60 : middle[1] + 61, middle[0] - 20 : middle[0] + 21].any(axis=1)) - 60

@@ -60,6 +60,9 @@ def main(job_id: str, run_token: str) -> None:
         case "fail":
             say(error=JobError(type="/problems/no-markings-in-view", title="", detail="It is black.", camera="left"))
             return
+    if task.kind not in ("calibration", "field"):
+        say(error=JobError(type="/problems/no-pose", title="", detail="This program only moves cameras."))
+        return
     blobs = Blobs(settings.home_blob_url)
     pictures = ["preview", "birdseye", *(f"overlay_{camera.id}" for camera in task.venue.cameras)]
     if behaviour == "reject":

@@ -20,7 +20,7 @@ from service.store.engine import connect, writing
 from tests.homes import files
 
 PROGRAM = [sys.executable, str(Path(__file__).parent / "program.py")]
-DEADLINE_S = 30
+DEADLINE_S = 90
 SIZE = (64, 48)
 
 

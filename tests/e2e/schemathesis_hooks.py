@@ -14,10 +14,19 @@ def map_case(context, case):
     match case.operation.label:
         case "PUT /venues/{venue_id}":
             case.body["id"] = case.path_parameters["venue_id"]
-        case "POST /venues/{venue_id}/calibrate":
-            options = {name: part for name, part in case.body.items() if name == "options"}
-            case.body = options | {camera: png(shade=len(str(options)) % 256) for camera in ("left", "right")}
+        case "POST /venues/{venue_id}/calibrate" | "POST /venues/{venue_id}/field/fit":
+            case.body = _options(case) | {camera: _frame(case) for camera in ("left", "right")}
+        case "POST /intrinsics":
+            case.body = _options(case) | {"photos": _frame(case)}
     return case
+
+
+def _options(case):
+    return {name: part for name, part in case.body.items() if name == "options"}
+
+
+def _frame(case):
+    return png(shade=len(str(_options(case))) % 256)
 
 
 @schemathesis.hook

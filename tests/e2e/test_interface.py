@@ -28,6 +28,7 @@ REACHED = {
     ("PUT", "/venues/*", 412),
     ("DELETE", "/venues/*", 204),
     ("POST", "/venues/*/calibrate", 202),
+    ("POST", "/venues/*/cameras/left/locate", 202),
     ("GET", "/jobs/*", 200),
     ("GET", "/jobs/*/events", 200),
     ("GET", "/jobs/*/poses", 200),

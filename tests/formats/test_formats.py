@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from service.formats import colmap, freed, opencv, opentrackio, plain, soccernet
+from service.formats.lens import Shot
 from service.problems import Problem
 from service.schemas import Camera
 from tests.formats.cameras import ALL_OF_OPENCV_8, RADIAL, WITH_THIN_PRISM, WITH_TILT, farthest, seen_points, shot
@@ -287,3 +288,14 @@ def test_a_lens_that_a_format_has_no_place_for_is_refused_and_named(write, camer
 
 def test_coefficients_that_are_zero_need_no_place():
     assert colmap.write([shot([0.1, 0.01, 0, 0] + [0] * 10)])
+
+
+@pytest.mark.parametrize("write", [opencv.write, opentrackio.write, soccernet.write, lambda one: colmap.write([one])])
+def test_a_fisheye_is_refused_by_formats_that_know_no_such_lens(write):
+    glass = shot([-0.02, 0.004, 0.0, 0.0])
+    lens = glass.camera.intrinsics.model_copy(update={"model": "fisheye"})
+    fisheye = Shot(glass.camera.model_copy(update={"intrinsics": lens}), 1)
+    assert write(glass)
+    with pytest.raises(Problem, match="json and st-map hold every lens") as refused:
+        write(fisheye)
+    assert refused.value.kind == "format-cannot-hold"

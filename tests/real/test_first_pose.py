@@ -76,6 +76,13 @@ def test_a_calibration_accepts_the_first_poses_and_ends_at_the_clicked_points(re
     )
     assert found.rejected_because is None
     for camera, result in zip(cameras, found.cameras, strict=True):
-        given = clicks(real_pair, camera.id)
+        given = clicks(real_pair, camera.id)[~beside(located[camera.id])]
         off = camera.with_pose(result.pose).project(given.world) - given.pixel
         assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 4
+
+
+def beside(found):
+    """The clicks (N,) of which the first pose says that they are on no point: one of the left camera, 14 px off."""
+    doubted = np.array([click.doubted and click.exchanged_with is None for click in found.clicks])
+    assert doubted.sum() <= 1
+    return doubted

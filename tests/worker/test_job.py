@@ -10,7 +10,7 @@ import pytest
 from service.schemas import Options, VenueIn
 from service.settings import Settings
 from tests.worker.stock import Stock
-from worker import job
+from worker import job, outcome
 from worker.calibration import calibrate as engine
 from worker.calibration.camera import Pose
 from worker.calibration.diagnosis import Suspicion
@@ -75,7 +75,7 @@ def asked(monkeypatch):
             assert provider == "CPUExecutionProvider"
 
     monkeypatch.setattr(job, "calibrate", calibrate)
-    monkeypatch.setattr(job, "Segmenter", Segmenter)
+    monkeypatch.setattr(outcome, "Segmenter", Segmenter)
     return asked
 
 

@@ -64,6 +64,11 @@ class Estimate:
         values, heights = self.values + values, self.heights + heights
         return replace(self, pitch=pitch, lines=lines, cameras=cameras, values=values, heights=heights)
 
+    def farthest_from(self, other: Estimate) -> float:
+        """How far, in metres, the camera that moved most is from where it was in another estimate."""
+        shifts = [a.pose.position - b.pose.position for a, b in zip(self.cameras, other.cameras, strict=True)]
+        return float(np.linalg.norm(shifts, axis=1).max())
+
     def prior(self, unknowns: Unknowns) -> Array:
         """Information (U, U) on every unknown before any line is measured."""
         known = np.zeros((len(unknowns), len(unknowns)))

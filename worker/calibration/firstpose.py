@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import comb
 
 import cv2
 import numpy as np
@@ -25,7 +26,7 @@ from worker.calibration.camera import (
     project,
     rotation_angles_deg,
 )
-from worker.calibration.pointfit import Clicks, PointFit, fit, refit
+from worker.calibration.pointfit import POSE_NUMBERS, Clicks, PointFit, fit, refit
 from worker.calibration.residuals import moved
 
 FEWEST_CLICKS = 4
@@ -57,6 +58,8 @@ HEIGHTS_M = (0.5, 200.0)
 FARTHEST_M = 500.0
 MOST_DOUBTED = 0.25
 """Share of the clicks; where more are doubted, something is wrong with all of them."""
+LARGEST_CHANCE = 1e-3
+"""Poses that may be expected to explain as much by chance; see `expected_by_chance`."""
 COLLINEAR = 0.01
 """Width to length of a set of points below which they are a line."""
 FOLDS = 10
@@ -381,7 +384,7 @@ def _judged(
         spread_px,
         gain,
         _warnings(best, gain),
-        _rejection(best, rivals, spread_px, verdicts, landmarks),
+        _rejection(clicks, best, rivals, spread_px, verdicts, landmarks),
     )
 
 
@@ -389,22 +392,30 @@ def _verdicts(clicks: Clicks, best: PointFit, landmarks: Mapping[str, Array]) ->
     """What became of each click as it was sent; `best.clicks` may have other labels."""
     given = best.camera.project(clicks.world) - clicks.pixel
     residuals = np.where(np.isfinite(given).all(axis=1), np.linalg.norm(given, axis=1), np.inf)
+    own = {name: number for number, name in enumerate(clicks.names)}
+    relabelled = _relabelled(clicks, best)
+    explained = relabelled & ~best.doubted
     verdicts = []
     for number, name in enumerate(clicks.names):
-        moved_to = best.clicks.names[number]
-        relabelled_ = not np.array_equal(best.clicks.world[number], clicks.world[number])
-        doubted = relabelled_ or bool(best.doubted[number])
-        like = _nearest(best, clicks.pixel[number], landmarks) if doubted and not relabelled_ else None
+        other = best.clicks.names[number]
+        exchanged = bool(explained[number] and explained[own[other]])
+        doubted = bool(relabelled[number] or best.doubted[number])
+        like = _nearest(best, clicks.pixel[number], landmarks) if doubted and not exchanged else None
         verdicts.append(
             Click(
                 name,
                 float(residuals[number]),
                 doubted,
-                moved_to if relabelled_ else None,
+                other if exchanged else None,
                 None if like == name else like,
             )
         )
     return verdicts
+
+
+def _relabelled(clicks: Clicks, best: PointFit) -> NDArray[np.bool_]:
+    """Which clicks (N,) the fit takes for another point than their own."""
+    return np.asarray((best.clicks.world != clicks.world).any(axis=1))
 
 
 def _nearest(best: PointFit, pixel: Array, landmarks: Mapping[str, Array]) -> str | None:
@@ -419,6 +430,7 @@ def _nearest(best: PointFit, pixel: Array, landmarks: Mapping[str, Array]) -> st
 
 
 def _rejection(
+    clicks: Clicks,
     best: PointFit,
     rivals: Sequence[PointFit],
     spread_px: float,
@@ -427,14 +439,17 @@ def _rejection(
 ) -> str | None:
     relative = best.camera.intrinsics.relative_size
     position = best.camera.pose.position
-    unexplained = [v.name for v in verdicts if v.doubted and v.exchanged_with is None]
-    believed = len(verdicts) - len(unexplained)
-    if believed < FEWEST_CLICKS or len(unexplained) > believed:
-        return f"no pose explains more than {believed} of {len(verdicts)} points: check their labels and add more"
+    believed = int((~best.doubted).sum())
     if best.rms_px > LARGEST_RMS_PX * relative:
         return (
             f"the points disagree by {best.rms_px:.0f} px rms, at most {LARGEST_RMS_PX * relative:.0f} are taken: a "
             "label or the lens is wrong; with more points it can be said which"
+        )
+    chosen = any(verdict.doubted for verdict in verdicts)
+    if believed < FEWEST_CLICKS or (chosen and expected_by_chance(clicks, best) > LARGEST_CHANCE):
+        return (
+            f"no pose explains more than {believed} of {len(clicks)} points, and as many fit some pose by chance: "
+            "check their labels and add more"
         )
     if rivals:
         x, y, z = rivals[0].camera.pose.position
@@ -443,11 +458,32 @@ def _rejection(
             f"({position[0]:.1f}, {position[1]:.1f}, {position[2]:.1f}) m: {_what_to_add(best, landmarks)}"
         )
     if spread_px > LARGEST_SIGMA_PX * relative:
-        return f"the points fix the view to {spread_px:.0f} px only: {_what_to_add(best, landmarks)}"
+        fixed = (
+            f"fix the view to {spread_px:.0f} px only"
+            if spread_px < max(best.camera.intrinsics.size)
+            else "fix no view"
+        )
+        return f"the points {fixed}: {_what_to_add(best, landmarks)}"
     if not HEIGHTS_M[0] <= position[2] <= HEIGHTS_M[1] or np.linalg.norm(position) > FARTHEST_M:
         x, y, z = position
         return f"the camera would stand at ({x:.1f}, {y:.1f}, {z:.1f}) m: check the labels, the pitch and the lens"
     return None
+
+
+def expected_by_chance(clicks: Clicks, best: PointFit) -> float:
+    """How many poses would explain as many clicks as closely, after as many exchanges, if no label were right.
+
+    Moisan and Stival, "A probabilistic criterion to detect rigid point matches", IJCV 57, 2004: a pose is proposed by
+    any three clicks, up to four times, and of the others any number may fit it.
+    """
+    believed = ~best.doubted
+    number, fitting = len(clicks), int(believed.sum())
+    exchanged = int(_relabelled(clicks, best).sum()) // 2
+    width, height = best.camera.intrinsics.size
+    farthest = max(float(best.residual_px[believed].max()), best.noise_px)
+    spare = fitting - (POSE_NUMBERS + len(best.free)) / 2
+    ways = 4 * max(number - 3, 1) * comb(number, fitting) * comb(fitting, 3) * comb(number, 2) ** exchanged
+    return float(ways * (np.pi * farthest**2 / (width * height)) ** spare)
 
 
 def _what_to_add(best: PointFit, landmarks: Mapping[str, Array]) -> str:

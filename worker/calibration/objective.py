@@ -91,18 +91,21 @@ class BlurredResponse:
         """Blur (H, W) by `sigma` px; coarse blurs are kept at a coarse size, where sampling stays in the cache."""
         shrink = max(1, 2 ** int(np.log2(max(sigma / 2, 1))))
         bottom, right = -response.shape[0] % shrink, -response.shape[1] % shrink
-        padded = cv2.copyMakeBorder(response, 0, bottom, 0, right, cv2.BORDER_CONSTANT)
-        size = (padded.shape[1] // shrink, padded.shape[0] // shrink)
-        small = cv2.resize(padded, size, interpolation=cv2.INTER_AREA)
+        if bottom or right:
+            response = np.pad(response, ((0, bottom), (0, right)))
+        size = (response.shape[1] // shrink, response.shape[0] // shrink)
+        small = response if shrink == 1 else cv2.resize(response, size, interpolation=cv2.INTER_AREA)
         # Averaging shrink x shrink pixels is itself a blur, of variance (shrink² - 1) / 12.
         remaining = sqrt(sigma**2 - (shrink**2 - 1) / 12) / shrink
         blurred = cv2.GaussianBlur(small, (0, 0), remaining, borderType=cv2.BORDER_CONSTANT)
-        return cls(blurred.astype(np.float32), shrink)
+        return cls(np.asarray(blurred, dtype=np.float32), shrink)
 
     def minus(self, coarser: BlurredResponse) -> BlurredResponse:
         """The difference to a coarser blur of the same picture."""
         size = (self.values.shape[1], self.values.shape[0])
-        return BlurredResponse(self.values - cv2.resize(coarser.values, size), self.shrink)
+        difference = cv2.resize(coarser.values, size)
+        np.subtract(self.values, difference, out=difference)
+        return BlurredResponse(np.asarray(difference, dtype=np.float32), self.shrink)
 
     def at(self, column: Plane, row: Plane) -> Response:
         """Values (P, N) at pixels of the full-size picture; 0 outside it and at NaN."""

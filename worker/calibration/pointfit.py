@@ -20,11 +20,14 @@ from worker.calibration.residuals import moved
 CLICK_PX = 2.0
 """How well people click, in pixels of a 4K frame, and after how many numbers of evidence that belief counts half."""
 CLICK_EVIDENCE = 4.0
-FINEST_CLICK_PX = 0.5
 LENS_NUMBERS = ("focal length", "centre x", "centre y", "k1", "k2")
 POSE_NUMBERS = 6
-ROUNDS, STEPS = 8, 6
-"""Of new weights, and of Levenberg-Marquardt with the same weights."""
+LEAST_NOISE_PX = (16.0, 8.0, 4.0, CLICK_PX)
+"""In the rounds before any click is believed or doubted, in pixels of a 4K frame: a start from three clicks fits those
+exactly, and they alone must not settle how well people click.
+"""
+VERDICTS, STEPS = 4, 6
+"""Rounds in which each click is believed or doubted, and steps of Levenberg-Marquardt with the same weights."""
 RAY_STEP = TERM_STEP = 1e-6
 SQUARE_WITHIN = 0.02
 """Pixels this near to square are square: a board that says otherwise by less was misread."""
@@ -111,18 +114,20 @@ def fit(clicks: Clicks, start: Camera, free: tuple[str, ...] = ()) -> PointFit:
         start = start.with_lens(two_terms(start.intrinsics))
     problem = _Problem(clicks, start.intrinsics, free)
     camera, change = start, np.zeros(len(free))
-    noise = _median_noise(problem.off(camera), start.intrinsics)
-    for number in range(ROUNDS):
-        squared = np.sum(problem.off(camera) ** 2, axis=1) / noise**2
+    for least in LEAST_NOISE_PX:
+        noise = problem.median_noise(camera, least)
         # Cauchy's weights while the fit may still be far away; then the likelihood's own verdict on each click.
+        squared = np.sum(problem.off(camera) ** 2, axis=1) / noise**2
         soft = 1 / (1 + np.nan_to_num(squared, nan=np.inf) / 4)
-        verdict = click_costs(squared * noise**2, noise, start.intrinsics.size) < anywhere_cost(start.intrinsics.size)
-        weights = soft if number < ROUNDS // 2 else verdict.astype(float)
-        camera, change = problem.descend(camera, change, weights / noise**2)
-        noise = problem.noise(camera, weights if number >= ROUNDS // 2 else None)
+        camera, change = problem.descend(camera, change, soft / noise**2)
+    noise = problem.median_noise(camera, CLICK_PX)
+    for _ in range(VERDICTS):
+        believed = problem.believed(camera, noise)
+        camera, change = problem.descend(camera, change, believed / noise**2)
+        noise = problem.noise(camera, believed)
     off = problem.off(camera)
-    kept = click_costs(np.sum(off**2, axis=1), noise, start.intrinsics.size) < anywhere_cost(start.intrinsics.size)
-    return PointFit(camera, clicks, free, off, noise, problem.covariance(camera, change, kept / noise**2))
+    weights = problem.believed(camera, noise) / noise**2
+    return PointFit(camera, clicks, free, off, noise, problem.covariance(camera, change, weights))
 
 
 def refit(before: PointFit, clicks: Clicks) -> PointFit:
@@ -175,14 +180,6 @@ def _border(lens: Intrinsics) -> Array:
     return np.concatenate([np.stack(side, axis=1) for side in sides])
 
 
-def _median_noise(off: Array, lens: Intrinsics) -> float:
-    """Per axis; half of the clicks may be anywhere. The median of a distance is 1.18 of either axis's deviation."""
-    squared = np.nan_to_num(np.sum(off**2, axis=1), nan=np.inf)
-    middle = float(np.sqrt(np.median(squared))) / 1.1774
-    largest = 0.1 * max(lens.size)
-    return float(np.clip(middle, FINEST_CLICK_PX * lens.relative_size, largest))
-
-
 class _Problem:
     """Least squares of clicks over a pose and the free numbers of a lens."""
 
@@ -225,15 +222,25 @@ class _Problem:
         # A pose that the clicks do not fix has an infinite variance; as good as infinite will do.
         return np.linalg.pinv(normal + 1e-12 * np.eye(len(normal)), hermitian=True).astype(float)
 
-    def noise(self, camera: Camera, kept: Array | None) -> float:
-        """Of a click, per axis (px): by the median, or from the clicks that are `kept` (N,) 1 and the belief."""
-        off = self.off(camera)
-        if kept is None:
-            return _median_noise(off, self.lens)
-        squared = float(np.nansum(kept[:, None] * off**2))
-        numbers = max(2 * float(kept.sum()) - POSE_NUMBERS - len(self.index), 0.0)
-        believed = (CLICK_PX * self.lens.relative_size) ** 2
-        return float(np.sqrt((CLICK_EVIDENCE * believed + squared) / (CLICK_EVIDENCE + numbers)))
+    def median_noise(self, camera: Camera, least: float) -> float:
+        """Of a click, per axis (px), not below `least` (px of a 4K frame); half of the clicks may be anywhere."""
+        squared = np.nan_to_num(np.sum(self.off(camera) ** 2, axis=1), nan=np.inf)
+        # The median of a distance is 1.18 of either axis's deviation.
+        middle = float(np.sqrt(np.median(squared))) / 1.1774
+        return float(np.clip(middle, least * self.lens.relative_size, 0.1 * max(self.lens.size)))
+
+    def believed(self, camera: Camera, noise: float) -> Array:
+        """1 for clicks (N,) that are likelier where their point is than anywhere in the picture, 0 for others."""
+        squared = np.sum(self.off(camera) ** 2, axis=1)
+        costs = click_costs(np.nan_to_num(squared, nan=np.inf), noise, self.lens.size)
+        return (costs < anywhere_cost(self.lens.size)).astype(float)
+
+    def noise(self, camera: Camera, believed: Array) -> float:
+        """Of a click, per axis (px), from those that are `believed` (N,) and from how well people click."""
+        squared = float(np.nansum(believed[:, None] * self.off(camera) ** 2))
+        numbers = max(2 * float(believed.sum()) - POSE_NUMBERS - len(self.index), 0.0)
+        expected = (CLICK_PX * self.lens.relative_size) ** 2
+        return float(np.sqrt((CLICK_EVIDENCE * expected + squared) / (CLICK_EVIDENCE + numbers)))
 
     def _moved(self, camera: Camera, change: Array, move: Array) -> tuple[Camera, Array]:
         then = change + move[POSE_NUMBERS:]

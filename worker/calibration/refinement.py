@@ -22,10 +22,15 @@ from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.uncertainty import Determined, Deviation, judge
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
-"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
+"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame.
+
+The last rounds are there for measurements that change with the pose, and end as soon as they do not.
+"""
 ASSESSING_SEARCH_PX = 8.0
-HUBER_STEPS, TUKEY_STEPS = 4, 3
+MOST_STEPS = 4
 """Per round."""
+SETTLED_M = 5e-5
+"""Cameras that a step, or a whole round, moves less than this have arrived."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +80,32 @@ def refine(
     for search in searches_px:
         unknowns = unknowns.around(here.pitch, here.lines)
         measured = measure_all(here.on_ground(unknowns), here.cameras, sight, search)
-        # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several.
-        for weigh in [huber_weights] * HUBER_STEPS + [tukey_weights] * TUKEY_STEPS:
-            here = step(here, cameras, measured, unknowns, stitch_weight, weigh)
+        before = here
+        # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
+        # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
+        here = _settled(here, cameras, measured, unknowns, stitch_weight)
+        here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
         uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
         here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
+        if here.farthest_from(before) < SETTLED_M:
+            break
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
     return _assessed(here, cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
+
+
+def _settled(
+    here: Estimate,
+    found: Sequence[Camera],
+    measured: Sequence[Measurements],
+    unknowns: Unknowns,
+    stitch_weight: float,
+) -> Estimate:
+    """Where Huber's loss of the same measurements is least."""
+    for _ in range(MOST_STEPS):
+        before, here = here, step(here, found, measured, unknowns, stitch_weight, huber_weights)
+        if here.farthest_from(before) < SETTLED_M:
+            break
+    return here
 
 
 def assess(

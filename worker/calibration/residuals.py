@@ -135,11 +135,7 @@ class _View:
         cls, points: Array, cameras: Sequence[Camera], index: int, measured: Measurements, unknowns: Unknowns
     ) -> _View:
         here = points[measured.index]
-        changes = np.concatenate([JACOBIAN_STEP * np.eye(POSE), -JACOBIAN_STEP * np.eye(POSE), np.zeros((1, POSE))])
-        poses = [moved(cameras[index], change).pose for change in changes]
-        rotations = np.stack([pose.rotation for pose in poses])
-        positions = np.stack([pose.position for pose in poses])
-        pixels = project(here, rotations, positions, cameras[index].intrinsics)
+        pixels = project(here, *_small_changes(cameras[index].pose), cameras[index].intrinsics)
         expected = np.einsum("pmi,mi->pm", pixels, measured.normal)
         offset = np.sum(measured.pixel * measured.normal, axis=1) - expected[-1]
         jacobian = np.zeros((len(measured), unknowns.dense))
@@ -148,6 +144,12 @@ class _View:
             jacobian[:, column] = -_slope(here, cameras[index], index, measured, parameter)
         known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         return cls(measured[known], offset[known], jacobian[known])
+
+
+def _small_changes(pose: Pose) -> tuple[Array, Array]:
+    """Rotations and positions (13, 3) of a pose after a step forward, a step back in each number, and none."""
+    changes = np.concatenate([JACOBIAN_STEP * np.eye(POSE), -JACOBIAN_STEP * np.eye(POSE), np.zeros((1, POSE))])
+    return rotation_vectors(rotation_matrices(changes[:, :3]) @ pose.matrix), pose.position + changes[:, 3:]
 
 
 def _slope(points: Array, camera: Camera, index: int, measured: Measurements, parameter: Parameter) -> Array | float:

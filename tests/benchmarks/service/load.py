@@ -29,7 +29,7 @@ from tests.homes import Embedded
 
 DEMO = Path(__file__).parents[2] / "demo"
 ENGINE = [sys.executable, "-P", "-m", "worker.job"]
-PER_S = 550
+PER_S = 510
 POLLERS_CORE = max(os.sched_getaffinity(0))
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 

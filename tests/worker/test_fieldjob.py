@@ -1,0 +1,35 @@
+"""Fields that cannot be fitted are refused before anything is computed."""
+
+import pytest
+
+from service.schemas import FieldOptions, VenueIn
+from service.settings import Settings
+from worker.fieldjob import solve
+from worker.outcome import Failure
+
+
+def refusal(tmp_path, template, length_m, width_m):
+    """How a fit of such a field ends on a machine that has no network: of the field first."""
+    camera = {
+        "id": "left",
+        "image_size": [320, 180],
+        "intrinsics": {"matrix": [[220, 0, 160], [0, 220, 90], [0, 0, 1]], "distortion": []},
+        "pose": {"rotation": [1.675, 0.372, -0.462], "position": [-1, -49, 8]},
+    }
+    field = {"template": template, "length_m": length_m, "width_m": width_m}
+    venue = VenueIn.model_validate({"id": "v", "field": field, "cameras": [camera]}).stored()
+    with pytest.raises(Failure) as refused:
+        solve(venue, {"left": []}, FieldOptions(), Settings(model=tmp_path / "none.onnx"), lambda _: None)
+    return refused.value.error
+
+
+def test_a_field_whose_dashes_are_more_when_it_is_wider_is_not_fitted(tmp_path):
+    error = refusal(tmp_path, "rugby-union", 100.0, 70.0)
+    assert error.type == "/problems/no-field-fit"
+    assert "more dashes with another width" in error.detail
+    assert "measure this field with a tape" in error.detail
+
+
+@pytest.mark.parametrize(("template", "length_m", "width_m"), [("football", 105.0, 68.0), ("hockey", 91.4, 55.0)])
+def test_a_field_whose_lines_stay_is_not_refused_for_them(tmp_path, template, length_m, width_m):
+    assert refusal(tmp_path, template, length_m, width_m).type == "/problems/model-missing"
