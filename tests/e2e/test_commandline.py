@@ -84,7 +84,7 @@ def test_a_busy_service_is_told_apart(service, esc, name):
 
 
 def test_usage_errors_are_told_before_anything_is_sent(esc):
-    for arguments in (("left",), ("left=nowhere.png",), ("=x",), (*FRAMES, "--options", "{"), ()):
+    for arguments in (("left",), ("left=nowhere.png",), ("=x",), (*FRAMES, "--options", "{")):
         assert esc("calibrate", "v", *arguments).returncode == 2
 
 

@@ -1,4 +1,4 @@
-"""A year of a venue in two dozen days: rendered frames, the real network, engine, gate, store and alarms.
+"""A year of a venue in fourteen days: rendered frames, the real network, engine, gate, store and alarms.
 
 Cameras creep, a storm turns them, one is exchanged for another, cables are swapped, a lens is dirty, a frame is of
 another pitch, nobody calibrates for weeks. Whatever comes: what is stored is right, or is what was stored before.
@@ -153,7 +153,8 @@ def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stoc
     others = year.frames() | {"right": paint_frame(OTHER_PITCH, year.truth()[1])}
     assert not year.day("a frame of another pitch", others)
     year.pass_(12)
-    year.day("a dirty lens", year.frames() | {"left": smeared(year.frames()["left"])})
+    clean = year.frames()
+    year.day("a dirty lens", clean | {"left": smeared(clean["left"])})
     assert year.told() == []
 
     # Nobody is there.
