@@ -51,14 +51,15 @@ def tradeoff(rows: Mapping[float, Sequence[dict]]) -> Path:
 
 
 def convergence(curves: Sequence[Sequence[float]]) -> Path:
-    """The best loss over the generations; it jumps where a finer level begins."""
+    """The best loss over the generations; it jumps where a finer level begins, sooner where nothing moves any more."""
     figure, axis = plt.subplots(figsize=(6, 3.4))
     for number, losses in enumerate(curves):
         axis.plot(np.arange(1, len(losses) + 1), losses, lw=1.2, label=f"start {number + 1}")
     axis.set_xlabel("generation")
     axis.set_ylabel("loss of the best")
-    axis.set_ylim(0, 1)
-    axis.legend(frameon=False)
+    axis.set_ylim(0, 1.15 * max(max(losses) for losses in curves))
+    axis.set_title("five levels of blur, coarse to fine", fontsize=10)
+    axis.legend(frameon=False, loc="upper left")
     axis.grid(alpha=0.3)
     return _saved(figure, "convergence")
 

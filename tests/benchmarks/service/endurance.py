@@ -118,7 +118,7 @@ def _followed(running: Service, job: str) -> dict:
         found = answer.json() if answer.status_code == 200 else None
         return found if found and found["finished_at"] else None
 
-    return wait_for(ended, deadline_s=120)
+    return wait_for(ended, deadline_s=600)
 
 
 def _age(running: Service) -> None:
