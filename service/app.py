@@ -24,7 +24,19 @@ from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
 from service.readiness import Readiness
-from service.routes import calibrate, docs, documented, field, health, intrinsics, jobs, locate, snapshot, venues
+from service.routes import (
+    calibrate,
+    docs,
+    documented,
+    field,
+    health,
+    intrinsics,
+    jobs,
+    locate,
+    pictures,
+    snapshot,
+    venues,
+)
 from service.settings import Settings
 from service.sharedreads import SharedReads
 from service.snapshots import Snapshots
@@ -71,7 +83,7 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_alarms(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, health, docs):
+    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, pictures, health, docs):
         app.include_router(routes.router)
     return app
 
