@@ -25,6 +25,7 @@ from service.queue import Queue
 from service.queue import migrate as migrate_queue
 from service.readiness import Readiness
 from service.routes import (
+    again,
     calibrate,
     docs,
     documented,
@@ -83,7 +84,7 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_alarms(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, pictures, health, docs):
+    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, again, pictures, health, docs):
         app.include_router(routes.router)
     return app
 
