@@ -49,6 +49,7 @@ from service.store.expiry import Expiry
 from service.store.figures import look
 from service.store.jobs import Jobs
 from service.store.keys import Keys
+from service.store.sessions import Sessions
 from service.store.venues import Venues
 from service.store.workers import Workers
 from service.unattended import Unattended
@@ -113,7 +114,7 @@ def open_context(settings: Settings) -> Context:
         metrics=Metrics(lambda: look(engine, settings.metrics_venues), disk, settings.takeover_after_s),
         readiness=Readiness(jobs_, blobs, disk, workers, settings.takeover_after_s),
         keys=keys,
-        gate=Gate(keys, settings),
+        gate=Gate(keys, Sessions(engine), settings),
         snapshots=snapshots,
         intake=intake,
         unattended=Unattended(venues_, jobs_, snapshots, intake),
