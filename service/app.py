@@ -20,6 +20,7 @@ from service.conventions import Conventions
 from service.disk import Disk
 from service.intake import Intake
 from service.metrics import Metrics
+from service.pages import ROUTERS as PAGES
 from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
@@ -43,6 +44,7 @@ from service.sharedreads import SharedReads
 from service.snapshots import Snapshots
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.blobs import Blobs
+from service.store.ends import Ends
 from service.store.engine import AWAY as DATABASE_AWAY
 from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
@@ -87,6 +89,8 @@ def create_app(settings: Settings) -> FastAPI:
     _answer_outages(app)
     for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, again, pictures, health, docs):
         app.include_router(routes.router)
+    for router in PAGES:
+        app.include_router(router)
     return app
 
 
@@ -107,6 +111,7 @@ def open_context(settings: Settings) -> Context:
         disk=disk,
         venues=venues_,
         jobs=jobs_,
+        ends=Ends(engine),
         expiry=expiry,
         workers=workers,
         reads=SharedReads(jobs_.get),
