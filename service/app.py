@@ -20,22 +20,38 @@ from service.conventions import Conventions
 from service.disk import Disk
 from service.intake import Intake
 from service.metrics import Metrics
+from service.pages import ROUTERS as PAGES
 from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
 from service.readiness import Readiness
-from service.routes import calibrate, docs, documented, field, health, intrinsics, jobs, locate, snapshot, venues
+from service.routes import (
+    again,
+    calibrate,
+    docs,
+    documented,
+    field,
+    health,
+    intrinsics,
+    jobs,
+    locate,
+    pictures,
+    snapshot,
+    venues,
+)
 from service.settings import Settings
 from service.sharedreads import SharedReads
 from service.snapshots import Snapshots
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.blobs import Blobs
+from service.store.ends import Ends
 from service.store.engine import AWAY as DATABASE_AWAY
 from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
 from service.store.figures import look
 from service.store.jobs import Jobs
 from service.store.keys import Keys
+from service.store.sessions import Sessions
 from service.store.venues import Venues
 from service.store.workers import Workers
 from service.unattended import Unattended
@@ -71,8 +87,10 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_alarms(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, health, docs):
+    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, again, pictures, health, docs):
         app.include_router(routes.router)
+    for router in PAGES:
+        app.include_router(router)
     return app
 
 
@@ -93,6 +111,7 @@ def open_context(settings: Settings) -> Context:
         disk=disk,
         venues=venues_,
         jobs=jobs_,
+        ends=Ends(engine),
         expiry=expiry,
         workers=workers,
         reads=SharedReads(jobs_.get),
@@ -100,7 +119,7 @@ def open_context(settings: Settings) -> Context:
         metrics=Metrics(lambda: look(engine, settings.metrics_venues), disk, settings.takeover_after_s),
         readiness=Readiness(jobs_, blobs, disk, workers, settings.takeover_after_s),
         keys=keys,
-        gate=Gate(keys, settings),
+        gate=Gate(keys, Sessions(engine), settings),
         snapshots=snapshots,
         intake=intake,
         unattended=Unattended(venues_, jobs_, snapshots, intake),

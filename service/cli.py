@@ -203,6 +203,7 @@ def run(
         err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")
     # Before NumPy is loaded, which the next line does.
     os.environ |= settings.native_environment
+    from service.store.jobs import picture_file
     from worker import job
 
     stored = _checked(VenueIn, venue.read_text(), str(venue)).stored()
@@ -214,7 +215,7 @@ def run(
     output.mkdir(parents=True, exist_ok=True)
     (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
     for name, picture in outcome.pictures.items():
-        (output / f"{name}.jpg").write_bytes(picture)
+        (output / picture_file(name)).write_bytes(picture)
     _print(outcome.result)
     raise typer.Exit(_gate(outcome.result))
 

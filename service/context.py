@@ -19,6 +19,7 @@ from service.settings import Settings
 from service.sharedreads import SharedReads
 from service.snapshots import Snapshots
 from service.store.blobs import Blobs
+from service.store.ends import Ends
 from service.store.expiry import Expiry
 from service.store.jobs import Jobs
 from service.store.keys import Keys
@@ -39,6 +40,7 @@ class Context:
     disk: Disk
     venues: Venues
     jobs: Jobs
+    ends: Ends
     expiry: Expiry
     workers: Workers
     reads: SharedReads

@@ -937,6 +937,7 @@ class Result(Wire):
     diagnosis: list[Suspicion] = Field([], description="What the lines say is wrong with what the venue says.")
     stitch_error_px: float | None
     stitch_error_before_px: float | None
+    stitch_error_limit_px: float | None = Field(None, description="What the gate lets pass at most.")
     loss: float | None
     generations: int
     timings_s: dict[str, float]

@@ -51,6 +51,7 @@ class Settings(BaseSettings):
         description="Names under which a service that asks for no keys may be called, beside addresses and localhost: "
         'JSON, such as ["esc.truck.lan"].',
     )
+    session_hours: float = Field(12, gt=0, description="After which a browser has to sign in again.")
     rate_per_s: float = Field(250, gt=0, description="Requests of one key to one API process.")
     rate_burst: int = Field(500, ge=1, description="Requests of one key at once, after a pause.")
 
@@ -86,6 +87,10 @@ class Settings(BaseSettings):
     )
     map_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.stmap"], description="What computes ST maps; called with their origin."
+    )
+    pose_program: list[str] = Field(
+        [sys.executable, "-P", "-m", "worker.clickedpose"],
+        description="What finds a first pose while its points are being clicked.",
     )
 
     # The worker.

@@ -32,22 +32,18 @@ from service.schemas import (
 from service.settings import Settings
 from service.store.blobs import AWAY, Blobs
 from service.store.engine import connect
-from service.store.jobs import Jobs, Task, picture_folder
+from service.store.jobs import Jobs, Task, picture_file, picture_folder
 from worker import fieldjob, lensjob, locatejob
 from worker.calibration import calibrate as engine
-from worker.calibration import stitching
 from worker.calibration.calibrate import CalibrationError, calibrate
-from worker.calibration.camera import Camera
-from worker.calibration.field import Field
+from worker.calibration.quality import Gate
 from worker.message import Message
 from worker.outcome import (
     PREVIEW_FRACTION,
     Failure,
     Outcome,
-    Picture,
     camera_of,
     decoded_frame,
-    jpeg,
     number,
     pitch_of,
     segmenter_of,
@@ -55,8 +51,8 @@ from worker.outcome import (
     wire_lens,
     wire_progress,
 )
+from worker.pictures import Remembering, draw
 
-log = structlog.get_logger()
 BEHIND_THE_OTHERS = 10
 """Niceness: answers of the API and heartbeats of the worker on the same machine go before the computation."""
 
@@ -117,15 +113,16 @@ def solve(
     frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
     decoded = time.perf_counter()
     pitch, cameras = pitch_of(venue.field), [camera_of(camera) for camera in venue.cameras]
+    network = Remembering(segmenter, frames)
     try:
         found = calibrate(
-            pitch, cameras, frames, segmenter, _engine_options(options), lambda step: report(wire_progress(step))
+            pitch, cameras, frames, network, _engine_options(options), lambda step: report(wire_progress(step))
         )
     except CalibrationError as error:
         raise Failure(error.kind, error.detail, error.camera) from error
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
     drawing = time.perf_counter()
-    pictures = _draw(pitch, cameras, found, frames)
+    pictures = draw(pitch, cameras, found, frames, network.responses)
     timings = {
         "decode": decoded - begun,
         **found.timings_s,
@@ -170,7 +167,7 @@ def _load(task: Task, blobs: Blobs) -> dict[str, list[bytes]]:
 def _store(task: Task, blobs: Blobs, pictures: Mapping[str, bytes]) -> None:
     for name, picture in pictures.items():
         try:
-            blobs.put(f"{picture_folder(task.job_id, task.run_token)}/{name}.jpg", picture)
+            blobs.put(f"{picture_folder(task.job_id, task.run_token)}/{picture_file(name)}", picture)
         except AWAY as error:
             raise Failure("job-crashed", f"Its pictures cannot be stored: {first_line(error)}") from error
 
@@ -193,31 +190,6 @@ def _engine_options(options: schemas.Options) -> engine.Options:
     return engine.Options(**given)
 
 
-def _draw(
-    pitch: Field,
-    before: Sequence[Camera],
-    found: engine.Calibration,
-    frames: Mapping[str, Sequence[Picture]],
-) -> dict[str, bytes]:
-    after = [Camera(camera.id, camera.intrinsics, camera.pose) for camera in found.cameras]
-    first = {camera: several[0] for camera, several in frames.items()}
-    drawn: dict[str, Callable[[], Picture]] = {
-        "preview": lambda: stitching.preview(found.pitch, after, first),
-        "birdseye": lambda: stitching.birdseye(found.pitch, after, first),
-    }
-    for old, new in zip(before, after, strict=True):
-        drawn[f"overlay_{old.id}"] = lambda old=old, new=new: stitching.overlay(  # type: ignore[misc]
-            (pitch, old), (found.pitch, new), first[old.id]
-        )
-    pictures = {}
-    for name, draw in drawn.items():
-        try:
-            pictures[name] = jpeg(draw())
-        except Exception:  # poses that were rejected may look anywhere; a picture is not worth losing the reason
-            log.warning("cannot draw", picture=name, exc_info=True)
-    return pictures
-
-
 def _result(
     found: engine.Calibration, options: schemas.Options, timings_s: Mapping[str, float], provenance: Provenance
 ) -> Result:
@@ -233,6 +205,7 @@ def _result(
         diagnosis=[schemas.Suspicion(**vars(suspicion)) for suspicion in found.suspicions],
         stitch_error_px=number(found.stitch_error_px),
         stitch_error_before_px=number(found.stitch_error_before_px),
+        stitch_error_limit_px=Gate().largest_stitch_error_px,
         loss=number(found.loss),
         generations=found.generations,
         timings_s={stage: round(seconds, 3) for stage, seconds in timings_s.items()},

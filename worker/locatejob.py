@@ -44,19 +44,25 @@ def locate(
     begun = time.perf_counter()
     pitch = pitch_of(field)
     picture = None if frame is None else decoded_frame(camera, list(lens.size), frame)
-    clicks = _clicks(camera, pitch, points)
+    clicks = clicks_of(camera, pitch, points)
     report(Progress(stage="fit", fraction=0.0))
-    try:
-        found = first_pose(clicks, lens, pitch.places(), camera)
-    except NoPose as error:
-        raise Failure("no-pose", f"Camera {camera}: {error}.", camera) from error
+    found = pose_of(camera, pitch, lens, clicks)
     fitted = time.perf_counter()
     drawn = jpeg(clicks_picture(pitch, clicks, found, picture))
     timings = {"fit": fitted - begun, "picture": time.perf_counter() - fitted}
-    return Outcome(_result(found, points, timings), {"points": drawn})
+    return Outcome(result_of(found, points, timings), {"points": drawn})
 
 
-def _clicks(camera: str, pitch: Field, points: list[ClickedPoint]) -> Clicks:
+def pose_of(camera: str, pitch: Field, lens: Intrinsics, clicks: Clicks) -> FirstPose:
+    """The first pose that fits the clicks."""
+    try:
+        return first_pose(clicks, lens, pitch.places(), camera)
+    except NoPose as error:
+        raise Failure("no-pose", f"Camera {camera}: {error}.", camera) from error
+
+
+def clicks_of(camera: str, pitch: Field, points: list[ClickedPoint]) -> Clicks:
+    """The clicks with their places on the pitch."""
     try:
         world = np.stack([_world(pitch, point) for point in points])
     except UnknownLandmark as error:
@@ -77,7 +83,8 @@ def _label(point: ClickedPoint) -> str:
     return point.world if isinstance(point.world, str) else f"({', '.join(f'{value:g}' for value in point.world)})"
 
 
-def _result(found: FirstPose, points: list[ClickedPoint], timings_s: dict[str, float]) -> LocateResult:
+def result_of(found: FirstPose, points: list[ClickedPoint], timings_s: dict[str, float]) -> LocateResult:
+    """A first pose for the wire."""
     given = {click.name: point.world for click, point in zip(found.clicks, points, strict=True)}
     return LocateResult(
         accepted=found.rejected_because is None,

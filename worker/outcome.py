@@ -40,7 +40,7 @@ R = TypeVar("R", bound=Result | IntrinsicsResult | LocateResult | FieldResult, c
 
 @dataclass(frozen=True)
 class Outcome(Generic[R]):
-    """A result and its pictures, JPEG by name: `preview`, `birdseye`, `overlay_<camera>`, `coverage`, `points`."""
+    """A result and the files of its pictures, by the names that `service.store.jobs.picture_file` knows."""
 
     result: R
     pictures: dict[str, bytes]
@@ -79,9 +79,15 @@ def decoded_frame(camera: str, image_size: list[int], file: bytes) -> Picture:
     return frame
 
 
-def jpeg(picture: Picture) -> bytes:
+def jpeg(picture: Picture, quality: int = JPEG_QUALITY) -> bytes:
     """The file of a picture."""
-    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return data.tobytes()
+
+
+def png(picture: Picture) -> bytes:
+    """The file of a picture with an opacity, BGRA."""
+    _, data = cv2.imencode(".png", picture)
     return data.tobytes()
 
 

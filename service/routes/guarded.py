@@ -34,7 +34,7 @@ class Guarded(APIRoute):
             return handle
 
         async def guarded(request: Request) -> Response:
-            await request.app.state.context.gate.admit(request, needed)
+            request.state.key = await request.app.state.context.gate.admit(request, needed)
             return await handle(request)
 
         return guarded

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterable, Callable
 from http import HTTPStatus
-from typing import Annotated, Any
+from typing import Annotated
 
 import structlog
-from fastapi import APIRouter, Depends, Header, HTTPException, Path, Query, Response
+from fastapi import APIRouter, Depends, Header, HTTPException, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
@@ -20,7 +20,7 @@ from service.routes.guarded import Guarded
 from service.routes.venues import revision_unfit
 from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Job, Jobs, Status
 from service.store.engine import AWAY
-from service.store.jobs import MovedOn, NoPoses, Pictures, State
+from service.store.jobs import MovedOn, NoPoses, State
 from service.store.revisions import RevisionUnfit
 
 log = structlog.get_logger()
@@ -30,9 +30,6 @@ RETRY_AFTER_S = 2
 LONGEST_WAIT_S = 60
 # An event at least this often, so that a client sees the queue move.
 EVENT_AT_LEAST_EVERY_S = 10
-JPEG: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"image/jpeg": {"schema": {"type": "string", "format": "binary"}}}}
-}
 
 
 def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
@@ -195,78 +192,6 @@ def job_poses(
     if venue is None:
         raise _no_poses(job)
     return exported(context, venue, f"{venue.id}-{job.id}", form, wanted)
-
-
-@router.get(
-    "/{job_id}/preview.jpg",
-    openapi_extra=needs("read"),
-    response_class=Response,
-    responses={**JPEG, **problems(404, 410)},
-)
-def preview(job: Existing, context: InContext) -> Response:
-    """One wide view stitched from all cameras."""
-    return _picture(context, job, "preview")
-
-
-@router.get(
-    "/{job_id}/birdseye.jpg",
-    openapi_extra=needs("read"),
-    response_class=Response,
-    responses={**JPEG, **problems(404, 410)},
-)
-def birdseye(job: Existing, context: InContext) -> Response:
-    """The pitch from above, 10 px/m, more of small ones."""
-    return _picture(context, job, "birdseye")
-
-
-@router.get(
-    "/{job_id}/overlay/{camera}.jpg",
-    openapi_extra=needs("read"),
-    response_class=Response,
-    responses={**JPEG, **problems(404, 410)},
-)
-def overlay(job: Existing, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext) -> Response:
-    """A camera's frame with the field drawn on it, before and after."""
-    return _picture(context, job, f"overlay_{camera}")
-
-
-@router.get(
-    "/{job_id}/coverage.jpg",
-    openapi_extra=needs("read"),
-    response_class=Response,
-    responses={**JPEG, **problems(404, 410)},
-)
-def coverage(job: Existing, context: InContext) -> Response:
-    """Of the intrinsics of a lens: where in the picture the board was seen, and residuals enlarged."""
-    return _picture(context, job, "coverage")
-
-
-@router.get(
-    "/{job_id}/points.jpg",
-    openapi_extra=needs("read"),
-    response_class=Response,
-    responses={**JPEG, **problems(404, 410)},
-)
-def points(job: Existing, context: InContext) -> Response:
-    """Of a first pose: the clicked points and the pitch as the pose has it, in the frame if one was sent."""
-    return _picture(context, job, "points")
-
-
-def _picture(context: Context, job: Job, name: str) -> Response:
-    pictures = context.jobs.pictures(job.id)
-    if pictures is None or name not in pictures.names:
-        detail = "The job has not come to its pictures yet." if job.open else "The job made no such picture."
-        raise Problem("picture-not-found", detail, job=job.id)
-    data = None if pictures.deleted else context.blobs.get(f"{pictures.folder}/{name}.jpg")
-    if data is None:
-        raise Problem("picture-deleted", _why_deleted(pictures, context.settings.keep_pictures_days), job=job.id)
-    return Response(data, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=3600"})
-
-
-def _why_deleted(pictures: Pictures, keep_days: float) -> str:
-    if pictures.deleted:
-        return f"Pictures are deleted {keep_days:g} days after the end of their job; the job and its numbers stay."
-    return "The job made it, but its file is gone from the store, and not by the service."
 
 
 def _later_than(seen: State | None) -> Callable[[State], bool]:

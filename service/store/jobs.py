@@ -46,6 +46,8 @@ from service.store.revisions import TAKEN, add_revision, newest_revision, revisi
 from service.store.venues import find_venue, put_back, save_venue, venue_lock
 
 PRIORITIES = {"live": 1, "routine": 100}
+# Pictures to be laid over others.
+LAYERS = ("seam", "stored", "new", "mask")
 DONE = Progress(stage="preview", fraction=1.0)
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
 AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult
@@ -267,10 +269,12 @@ class Jobs:
             except sa.exc.NoResultFound:
                 return None
 
-    def page(self, venue: str | None, status: str | None, before: str | None, limit: int) -> list[Job]:
+    def page(
+        self, venue: str | None, status: str | None, before: str | None, limit: int, kind: str | None = None
+    ) -> list[Job]:
         """Up to `limit` jobs, newest first, those older than `before`."""
         query = sa.select(tables.jobs).order_by(j.id.desc()).limit(limit)
-        for column, value in ((j.venue, venue), (j.status, status)):
+        for column, value in ((j.venue, venue), (j.status, status), (j.kind, kind)):
             if value is not None:
                 query = query.where(column == value)
         if before is not None:
@@ -292,6 +296,17 @@ class Jobs:
         if row is None:
             return None
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
+
+    def submission(self, job_id: str) -> Submission | None:
+        """What a job was made of; None if its frames are kept no more."""
+        with reading(self._engine) as connection:
+            row = connection.execute(ONE, {"job_id": job_id}).one_or_none()
+            task = self._task(connection, job_id)
+        if row is None or task is None or row.frames_deleted_at is not None:
+            return None
+        return Submission(
+            job_id, task.venue, task.options, row.content_hash, row.idempotency_key, task.frames, task.kind, task.origin
+        )
 
     def posed(self, job_id: str) -> Venue | None:
         """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
@@ -580,6 +595,11 @@ def picture_folder(job_id: str, run_token: str) -> str:
     return f"{pictures_folder(job_id)}/{run_token}"
 
 
+def picture_file(name: str) -> str:
+    """What the file of a picture is called: `overlay_left.jpg`; layers, which can be seen through, `mask_left.png`."""
+    return f"{name}.{'png' if name.partition('_')[0] in LAYERS else 'jpg'}"
+
+
 def _fence(task: Task) -> list[sa.ColumnElement[bool]]:
     return [j.id == task.job_id, j.run_token == task.run_token, j.status == "running"]
 
@@ -598,5 +618,5 @@ def _links(row: Any) -> dict[str, str]:
     if row.venue is not None:
         links["venue"] = f"/venues/{row.venue}"
     # `overlay_left` in the store is `overlay/left` in an address.
-    names = [name.replace("_", "/", 1) for name in row.pictures or () if row.pictures_deleted_at is None]
-    return links | {name: f"{base}/{name}.jpg" for name in names}
+    names = row.pictures or () if row.pictures_deleted_at is None else ()
+    return links | {name.replace("_", "/", 1): f"{base}/{picture_file(name).replace('_', '/', 1)}" for name in names}

@@ -239,3 +239,14 @@ api_keys = sa.Table(
     sa.Column("last_used_at", Instant),
     sa.Index("api_keys_by_hash", "hash", unique=True),
 )
+
+# Who is signed in with a browser; ends with the key as well.
+sessions = sa.Table(
+    "sessions",
+    metadata,
+    # SHA-256 of what is in the cookie.
+    sa.Column("hash", sa.String(64), primary_key=True),
+    # Of the key that it began with.
+    sa.Column("key_hash", sa.String(64), nullable=False),
+    sa.Column("expires_at", Instant, nullable=False),
+)

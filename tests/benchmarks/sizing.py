@@ -36,9 +36,9 @@ class Measured:
     core_s: float = 12.3
     elapsed_s: float = 7.0
     frame_mb: float = 5.76
-    picture_mb: float = 6.96
+    picture_mb: float = 8.62
     frames: int = 2
-    pictures: int = 4
+    pictures: int = 14
     # `make bench-rate`.
     transactions: float = 45
     wal_kb: float = 23

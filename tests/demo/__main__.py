@@ -55,6 +55,8 @@ def service(data: Path) -> Iterator[str]:
     finally:
         process.send_signal(signal.SIGTERM)
         process.wait(STARTING_S)
+        if process.stdout is not None:
+            process.stdout.close()
 
 
 def follow(client: Client, job: Job) -> Job:

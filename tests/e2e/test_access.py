@@ -14,6 +14,7 @@ from fastapi.routing import iter_route_contexts
 
 from service.app import create_app
 from service.auth import BELIEVED_FOR_S
+from service.pages.shown import SIGN_IN, Page
 from service.routes.guarded import Guarded
 from service.settings import Settings
 from service.store.engine import connect, migrate
@@ -23,7 +24,11 @@ from tests.e2e.running import Service, png, upload, venue, wait_for
 SCOPES = ("read", "calibrate", "admin")
 # What the service can do is no secret.
 OPEN = {"/livez", "/readyz", "/problems/{kind}", "/docs", "/docs/rapidoc-min.js", "/docs/LICENSE.txt"}
+# The way to sign in, and what it is drawn with.
+OPEN |= {"/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
 NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "DELETE": "admin"}
+# Pages that show nothing but how to change something, and a question that takes a body.
+OTHERWISE = {"/ui/venues/{venue_id}/calibrate": "calibrate", "/ui/new-venue": "admin", "/ui/new-venue/plan": "read"}
 JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"
 
 
@@ -85,8 +90,10 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             assert route.path == "/openapi.json", f"{route.path} is not guarded"
             continue
         (method,) = route.methods
-        needed = None if route.path in OPEN else NEEDED[method]
-        path = route.path.format(job_id=JOB, venue_id="nowhere", camera="left", kind="not-found")
+        needed = None if route.path in OPEN else OTHERWISE.get(route.path, NEEDED[method])
+        path = route.path.replace(":path", "").format(
+            job_id=JOB, venue_id="nowhere", camera="left", kind="not-found", of_edition="0", path="page.css"
+        )
         for caller in (None, *SCOPES):
             answer = guarded.http.request(method, path, headers=bearer(key[caller]) if caller else {})
             if needed is None or (caller and SCOPES.index(caller) >= SCOPES.index(needed)):
@@ -94,6 +101,8 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             else:
                 expected = 403 if caller else 401
             got = answer.status_code if answer.status_code in (401, 403) else "let in"
+            if isinstance(route.original_route, Page) and answer.headers.get("location", "").startswith(SIGN_IN):
+                got = 401
             assert (method, route.path, caller, got) == (method, route.path, caller, expected)
 
 

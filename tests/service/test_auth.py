@@ -9,11 +9,12 @@ from fastapi import APIRouter
 from starlette.requests import HTTPConnection
 from structlog.testing import capture_logs
 
-from service.auth import BELIEVED_FOR_S, GUESS_EVERY_S, GUESSES, Gate
+from service.auth import BELIEVED_FOR_S, COOKIE, GUESS_EVERY_S, GUESSES, Gate, page_token
 from service.problems import Problem
 from service.routes.guarded import Guarded
 from service.settings import Settings
-from service.store.keys import Keys
+from service.store.keys import Keys, hash_of
+from service.store.sessions import Sessions
 from tests.service.test_limits import Clock
 
 JUST_BEFORE, JUST_AFTER = BELIEVED_FOR_S - 0.1, BELIEVED_FOR_S + 0.1
@@ -27,24 +28,32 @@ def keys(engine):
 
 
 @pytest.fixture
+def sessions(engine):
+    return Sessions(engine)
+
+
+@pytest.fixture
 def clock():
     return Clock()
 
 
 @pytest.fixture
-def gate(keys, clock):
+def gate(keys, sessions, clock):
     """Of a service that listens on loopback."""
-    return Gate(keys, Settings(), clock)
+    return Gate(keys, sessions, Settings(), clock)
 
 
-def answer(gate, key=None, needed="read", address="192.0.2.1", scheme="Bearer"):
+def caller(key=None, address="192.0.2.1", scheme="Bearer", method="GET", **others):
+    """A request, with headers as named."""
+    sent = {"host": "localhost", **others} | ({} if key is None else {"authorization": f"{scheme} {key}"})
+    headers = [(name.replace("_", "-").encode(), value.encode()) for name, value in sent.items()]
+    return HTTPConnection({"type": "http", "method": method, "headers": headers, "client": (address, 50000)})
+
+
+def answer(gate, key=None, needed="read", **more):
     """`passed`, or the problem that says why not."""
-    headers = [(b"host", b"localhost")]
-    if key is not None:
-        headers.append((b"authorization", f"{scheme} {key}".encode()))
-    caller = HTTPConnection({"type": "http", "method": "GET", "headers": headers, "client": (address, 50000)})
     try:
-        asyncio.run(gate.admit(caller, needed))
+        asyncio.run(gate.admit(caller(key, **more), needed))
     except Problem as problem:
         return problem
     return "passed"
@@ -71,13 +80,13 @@ def test_a_service_that_asked_for_keys_goes_on_asking_when_the_last_one_is_remov
     assert kind(gate) == "key-missing"
 
 
-def test_beyond_this_machine_a_key_is_needed_even_if_there_is_none(keys):
-    assert kind(Gate(keys, Settings(host="0.0.0.0"))) == "key-missing"
+def test_beyond_this_machine_a_key_is_needed_even_if_there_is_none(keys, sessions):
+    assert kind(Gate(keys, sessions, Settings(host="0.0.0.0"))) == "key-missing"
 
 
-def test_switched_off_it_asks_for_nothing(keys):
+def test_switched_off_it_asks_for_nothing(keys, sessions):
     keys.add("ops", "admin")
-    assert kind(Gate(keys, Settings(host="0.0.0.0", auth="off")), needed="admin") == "passed"
+    assert kind(Gate(keys, sessions, Settings(host="0.0.0.0", auth="off")), needed="admin") == "passed"
 
 
 @pytest.mark.parametrize(
@@ -148,8 +157,8 @@ def test_uses_are_remembered_while_the_database_is_away(gate, keys, monkeypatch)
     assert keys.all()[0].last_used_at is not None
 
 
-def test_a_key_that_asks_too_often_is_told_when_to_come_back(keys, clock):
-    gate = Gate(keys, Settings(rate_per_s=0.5, rate_burst=3), clock)
+def test_a_key_that_asks_too_often_is_told_when_to_come_back(keys, sessions, clock):
+    gate = Gate(keys, sessions, Settings(rate_per_s=0.5, rate_burst=3), clock)
     hasty, other = keys.add("hasty", "read"), keys.add("other", "read")
     assert [kind(gate, hasty) for _ in range(3)] == ["passed"] * 3
     problem = answer(gate, hasty)
@@ -204,3 +213,56 @@ def test_a_refused_key_is_not_in_the_log(gate, keys):
 def test_a_route_that_does_not_say_who_may_call_it_cannot_be_made():
     with pytest.raises(TypeError, match="/new must say who may call it"):
         APIRouter(route_class=Guarded).get("/new")(lambda: None)
+
+
+@pytest.fixture
+def signed_in(gate, keys):
+    """The cookie of somebody who signed in with a key that may calibrate."""
+    key = keys.add("olga", "calibrate")
+    return asyncio.run(gate.sign_in(caller(), key))
+
+
+def with_cookie(gate, session, needed="read", **more):
+    return kind(gate, needed=needed, cookie=f"{COOKIE}={session}", **more)
+
+
+def test_who_signed_in_may_do_what_the_key_may(gate, signed_in):
+    assert with_cookie(gate, signed_in) == "passed"
+    assert with_cookie(gate, signed_in, "admin") == "scope-too-small"
+
+
+def test_what_changes_something_needs_the_token_of_the_page_as_well(gate, signed_in):
+    token = page_token(signed_in)
+    assert with_cookie(gate, signed_in, "calibrate", method="POST") == "token-missing"
+    assert with_cookie(gate, signed_in, "calibrate", method="POST", x_csrf_token="0" * 64) == "token-missing"
+    assert with_cookie(gate, signed_in, "calibrate", method="POST", x_csrf_token=token) == "passed"
+
+
+def test_a_session_ends_with_its_time(gate, keys, sessions, clock):
+    session = sessions.begin(keys.find(hash_of(keys.add("olga", "read"))), timedelta(seconds=-1))
+    assert with_cookie(gate, session) == "session-over"
+
+
+def test_a_session_ends_when_its_owner_signs_out(gate, signed_in):
+    assert with_cookie(gate, signed_in) == "passed"
+    asyncio.run(gate.sign_out(caller(cookie=f"{COOKIE}={signed_in}")))
+    assert with_cookie(gate, signed_in) == "session-over"
+
+
+def test_a_session_ends_with_its_key(gate, keys, signed_in, clock):
+    keys.add("another", "admin")
+    keys.remove("olga")
+    assert with_cookie(gate, signed_in) == "session-over"
+
+
+def test_nobody_signs_in_with_what_is_no_key(gate, keys):
+    keys.add("ops", "admin")
+    with pytest.raises(Problem) as refused:
+        asyncio.run(gate.sign_in(caller(), "esc_guessed"))
+    assert refused.value.kind == "key-unknown"
+
+
+def test_what_is_stored_of_a_session_does_not_open_the_door(gate, engine, signed_in):
+    with engine.connect() as connection:
+        (stored,) = connection.scalars(sa.text("SELECT hash FROM sessions"))
+    assert with_cookie(gate, stored) == "session-over"

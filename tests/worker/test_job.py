@@ -9,6 +9,7 @@ import pytest
 
 from service.schemas import Options, VenueIn
 from service.settings import Settings
+from service.store.jobs import picture_file
 from tests.worker.stock import Stock
 from worker import job, outcome
 from worker.calibration import calibrate as engine
@@ -51,6 +52,9 @@ def asked(monkeypatch):
 
     def calibrate(pitch, cameras, frames, segment, options, report, stop=None):
         asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options)
+        for several in frames.values():
+            for frame in several:
+                segment(frame, [])
         report(engine.Progress("evolution", 1.5, 3, float("inf")))
         results = [
             engine.CameraResult(
@@ -73,6 +77,9 @@ def asked(monkeypatch):
 
         def __init__(self, model, threads, provider):
             assert provider == "CPUExecutionProvider"
+
+        def __call__(self, frame, regions):
+            return np.full(frame.shape[:2], 255, np.uint8)
 
     monkeypatch.setattr(job, "calibrate", calibrate)
     monkeypatch.setattr(outcome, "Segmenter", Segmenter)
@@ -106,8 +113,10 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
     assert set(result.timings_s) == {"decode", "evolution", "preview"}
     assert [step.stage for step in steps] == ["evolution", "preview"]
-    assert set(outcome.pictures) == {"preview", "birdseye", "overlay_left", "overlay_right"}
-    assert all(picture.startswith(b"\xff\xd8") for picture in outcome.pictures.values())
+    of_cameras = {f"{kind}_{camera}" for kind in ("overlay", "frame", "stored", "new", "mask") for camera in files}
+    assert set(outcome.pictures) == {"preview", "preview_before", "seam", "birdseye"} | of_cameras
+    begins = {".jpg": b"\xff\xd8", ".png": b"\x89PNG"}
+    assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())
 
 
 def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, settings):

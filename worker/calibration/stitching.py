@@ -58,11 +58,24 @@ def preview(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Frame]
 
     `frames[camera.id]`: BGR (height, width, 3) of the size of the camera's intrinsics.
     """
-    view = viewpoint(pitch, cameras, width)
+    return stitched(pitch, viewpoint(pitch, cameras, width), cameras, frames).picture
+
+
+@dataclass(frozen=True)
+class Stitched:
+    """A view stitched from all cameras, BGR (H, W, 3); `owner` (H, W): number of the camera that counts most, or -1."""
+
+    picture: Frame
+    owner: NDArray[np.int8]
+
+
+def stitched(pitch: Field, view: Viewpoint, cameras: Sequence[Camera], frames: Mapping[str, Frame]) -> Stitched:
+    """What `preview` shows, from a given place: pictures of two sets of poses from one place can be compared."""
     points = _world_behind(pitch, view, _every_nth_pixel(view.size))
-    return _blend(
-        [_look(camera, frames[camera.id], _every_pixel(_project(camera, points), view)) for camera in cameras]
-    )
+    looks = [_look(camera, frames[camera.id], _every_pixel(_project(camera, points), view)) for camera in cameras]
+    best = np.argmax([look.quality for look in looks], axis=0)
+    seen = np.any([look.valid for look in looks], axis=0)
+    return Stitched(_blend(looks), np.where(seen, best, -1).astype(np.int8))
 
 
 def birdseye(
@@ -102,12 +115,8 @@ def overlay(stored: tuple[Field, Camera], new: tuple[Field, Camera], frame: Fram
     thickness = max(1, round(width / 3000))
     pitch, camera = new
     for marking in pitch.markings():
-        centre, *edges = (_project(camera, pitch.lift(line)) for line in outline(marking))
-        for edge in edges:
-            # Half a stroke outwards and a little more, so that the paint stays visible between two strokes.
-            outwards = edge - centre
-            outwards /= np.linalg.norm(outwards, axis=-1, keepdims=True)
-            draw_line(picture, edge + EDGE_GAP * thickness * outwards, NEW_COLOUR, thickness)
+        for line in frame_of(pitch, camera, marking, EDGE_GAP * thickness):
+            draw_line(picture, line, NEW_COLOUR, thickness)
     legend(picture, ((f"stored {legend_for}", STORED_COLOUR), (f"new {legend_for}", NEW_COLOUR)))
     return picture
 
@@ -381,7 +390,20 @@ def outline(marking: Marking) -> list[Array]:
     return [centre, centre + across, centre - across]
 
 
-def draw_line(picture: Frame, line: Array, colour: tuple[int, int, int], thickness: int) -> None:
+def frame_of(pitch: Field, camera: Camera, marking: Marking, gap: float) -> list[Array]:
+    """Both edges of a marking in a camera's pixels, (n, 2) each, moved `gap` outwards.
+
+    Half a stroke and a little more, and the paint stays visible between two strokes.
+    """
+    centre, *edges = (_project(camera, pitch.lift(line)) for line in outline(marking))
+    moved = []
+    for edge in edges:
+        outwards = edge - centre
+        moved.append(edge + gap * outwards / np.linalg.norm(outwards, axis=-1, keepdims=True))
+    return moved
+
+
+def draw_line(picture: Frame, line: Array, colour: tuple[int, ...], thickness: int) -> None:
     """Draw a polyline (n, 2) of sub-pixel positions, interrupted where it is NaN or far outside."""
     near = inside(line, (picture.shape[1], picture.shape[0]), margin=-1000.0)
     breaks = np.flatnonzero(~near)

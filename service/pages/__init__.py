@@ -1,0 +1,17 @@
+"""The operator's page: rendered here, drawn by plain HTML, CSS and a little JavaScript, nothing from the internet."""
+
+from fastapi import APIRouter
+
+from service.pages import assets, calibrate, jobs, newvenue, signin, venues
+
+ROUTERS: tuple[APIRouter, ...] = (
+    assets.router,
+    signin.router,
+    signin.out,
+    venues.router,
+    venues.data,
+    calibrate.router,
+    newvenue.router,
+    newvenue.data,
+    jobs.router,
+)

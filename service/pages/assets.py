@@ -1,0 +1,58 @@
+"""Static files of the page, under addresses that change with their content: a browser keeps them for a year."""
+
+from __future__ import annotations
+
+import hashlib
+import mimetypes
+from functools import cache
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Response
+
+from service import etags
+from service.problems import Problem
+from service.routes.documented import FOR_ALL
+from service.routes.guarded import Guarded
+
+FILES = Path(__file__).parent / "static"
+FOR_A_YEAR = "public, max-age=31536000, immutable"
+router = APIRouter(prefix="/ui/static", route_class=Guarded, include_in_schema=False)
+
+
+@cache
+def contents() -> dict[str, bytes]:
+    """Every file by its path."""
+    paths = sorted(path for path in FILES.rglob("*") if path.is_file())
+    return {path.relative_to(FILES).as_posix(): path.read_bytes() for path in paths}
+
+
+@cache
+def edition() -> str:
+    """A name of all files as they are: scripts import each other by relative addresses, so one name is for all."""
+    together = hashlib.sha256()
+    for path, content in contents().items():
+        together.update(path.encode() + b"\0" + hashlib.sha256(content).digest())
+    return together.hexdigest()[:16]
+
+
+def address(path: str) -> str:
+    """Where a file is."""
+    if path not in contents():
+        raise KeyError(path)
+    return f"/ui/static/{edition()}/{path}"
+
+
+@router.get("/{of_edition}/{path:path}", openapi_extra=FOR_ALL)
+async def static_file(of_edition: str, path: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
+    """A file; a page that was loaded before an update gets the new one, and does not keep it."""
+    content = contents().get(path)
+    if content is None:
+        raise Problem("not-found", f"The page has no file {path[:200]}; load it again.")
+    tag = etags.of(content)
+    kept = FOR_A_YEAR if of_edition == edition() else "no-cache"
+    head = {"ETag": etags.quoted(tag), "Cache-Control": kept}
+    if if_none_match is not None and etags.names(if_none_match, tag):
+        return Response(status_code=304, headers=head)
+    media_type = mimetypes.guess_type(path)[0] or "application/octet-stream"
+    return Response(content, headers=head, media_type=media_type)

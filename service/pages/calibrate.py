@@ -1,0 +1,25 @@
+"""Sending frames: which camera gets which, whether they fit, and how the calibration is to be done."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from service.context import InContext, VenueIdPath
+from service.pages.shown import Page, page
+from service.routes.documented import needs
+from service.routes.venues import no_such_venue
+
+router = APIRouter(route_class=Page, include_in_schema=False)
+
+
+@router.get("/ui/venues/{venue_id}/calibrate", openapi_extra=needs("calibrate"))
+def calibrate(venue_id: VenueIdPath, request: Request, context: InContext) -> Response:
+    """The form that a calibration begins with."""
+    venue = context.venues.get(venue_id)
+    if venue is None:
+        raise no_such_venue(venue_id)
+    limits = {
+        "frames": context.settings.max_frames_per_camera,
+        "bytes": round(context.settings.max_frame_mb * 1e6),
+    }
+    return page(request, "calibrate.html", venue=venue, limits=limits)

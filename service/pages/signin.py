@@ -1,0 +1,91 @@
+"""Signing in with a key, and out again."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from typing import Annotated
+from urllib.parse import parse_qs, urlsplit
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.responses import RedirectResponse
+
+from service.auth import COOKIE
+from service.context import InContext
+from service.pages.shown import HEADERS, SIGN_IN, Page, local, page
+from service.problems import KINDS, Problem
+from service.routes.documented import FOR_ALL
+from service.routes.guarded import Guarded
+
+LONGEST_FORM = 8192
+router = APIRouter(route_class=Page, include_in_schema=False)
+out = APIRouter(route_class=Guarded, include_in_schema=False)
+
+
+@router.get(SIGN_IN, openapi_extra=FOR_ALL)
+async def sign_in_page(
+    request: Request, context: InContext, wanted: Annotated[str, Query(alias="next", max_length=2048)] = "/"
+) -> Response:
+    """The form; where no key is asked for there is nothing to sign in to."""
+    if not await context.gate.asks_for_keys():
+        return RedirectResponse("/", HTTPStatus.SEE_OTHER)
+    return page(request, "sign_in.html", next=local(wanted), problem=None)
+
+
+@router.post(SIGN_IN, openapi_extra=FOR_ALL)
+async def sign_in(request: Request, context: InContext) -> Response:
+    """Begin a session if the key is one of this service."""
+    _require_own_page(request)
+    given = await _form(request)
+    target = local(given.get("next", "/"))
+    try:
+        session = await context.gate.sign_in(request, given.get("key", ""))
+    except Problem as problem:
+        status = KINDS[problem.kind].status
+        return page(request, "sign_in.html", status, next=target, problem=problem)
+    answer = RedirectResponse(target, HTTPStatus.SEE_OTHER, HEADERS)
+    answer.set_cookie(
+        COOKIE,
+        session,
+        max_age=round(3600 * context.settings.session_hours),
+        httponly=True,
+        samesite="strict",
+        secure=_over_tls(request),
+    )
+    return answer
+
+
+@out.post("/ui/sign-out", openapi_extra=FOR_ALL)
+async def sign_out(request: Request, context: InContext) -> Response:
+    """End the session; without one there is nothing to end."""
+    _require_own_page(request)
+    await context.gate.sign_out(request)
+    answer = Response(status_code=HTTPStatus.NO_CONTENT)
+    answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=_over_tls(request))
+    return answer
+
+
+def _require_own_page(request: Request) -> None:
+    """Nobody is signed in, or out, by a page of another site.
+
+    A browser says by itself where a request comes from: by `Sec-Fetch-Site` where it trusts the address (https, or
+    localhost), by `Origin` anywhere.
+    """
+    site, origin = request.headers.get("sec-fetch-site"), request.headers.get("origin")
+    foreign = site != "same-origin" if site else origin and urlsplit(origin).netloc != request.headers.get("host")
+    if foreign:
+        raise Problem("origin-foreign", "Sign in on a page of this service.", got=(origin or site or "")[:200])
+
+
+async def _form(request: Request) -> dict[str, str]:
+    """The fields of a form that has no files."""
+    body = b""
+    async for piece in request.stream():
+        body += piece
+        if len(body) > LONGEST_FORM:
+            raise Problem("body-too-large", "A key is shorter.")
+    return {name: values[0] for name, values in parse_qs(body.decode("utf-8", "replace")).items()}
+
+
+def _over_tls(request: Request) -> bool:
+    """Whether the browser speaks https, to us or to the proxy in front of us, which then says so."""
+    return request.url.scheme == "https" or request.headers.get("x-forwarded-proto", "") == "https"

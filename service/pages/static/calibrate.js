@@ -1,0 +1,130 @@
+// The form of a calibration: frames for each camera, looked at here, sent with their progress shown.
+
+import {signed} from "./page.js";
+import {objection, thumbnail} from "./frames.js";
+
+const form = document.getElementById("calibrate");
+const button = form.querySelector("button[type=submit]");
+const bar = document.getElementById("sent");
+const missing = document.getElementById("missing");
+const refused = document.getElementById("refused");
+
+class Drop {
+  constructor(box) {
+    this.box = box;
+    this.camera = box.dataset.camera;
+    this.size = [Number(box.dataset.width), Number(box.dataset.height)];
+    this.files = [];
+    this.input = box.querySelector("input[type=file]");
+    this.input.addEventListener("change", () => {
+      this.add([...this.input.files]);
+      this.input.value = "";
+    });
+    box.addEventListener("dragover", (event) => { event.preventDefault(); box.classList.add("over"); });
+    box.addEventListener("dragleave", () => box.classList.remove("over"));
+    box.addEventListener("drop", (event) => {
+      event.preventDefault();
+      event.stopPropagation();
+      box.classList.remove("over");
+      this.add([...event.dataTransfer.files]);
+    });
+  }
+
+  async add(files) {
+    const complaints = [];
+    for (const file of files) {
+      const why = this.files.length >= Number(form.dataset.most)
+        ? `${form.dataset.most} frames of a camera are allowed.`
+        : await objection(file, this.size, Number(form.dataset.bytes));
+      if (why) complaints.push(why);
+      else {
+        this.files.push(file);
+        await this.show(file);
+      }
+    }
+    const place = this.box.querySelector(".wrong");
+    place.textContent = complaints.join(" ");
+    place.hidden = complaints.length === 0;
+    tell();
+  }
+
+  async show(file) {
+    const item = document.createElement("li");
+    const remove = document.createElement("button");
+    remove.type = "button";
+    remove.className = "quiet small-button";
+    remove.textContent = "Remove";
+    remove.setAttribute("aria-label", `Remove ${file.name}`);
+    remove.addEventListener("click", () => {
+      this.files = this.files.filter((one) => one !== file);
+      item.remove();
+      this.input.focus();
+      tell();
+    });
+    const name = document.createElement("span");
+    name.className = "mono breaks";
+    name.textContent = file.name;
+    item.append(await thumbnail(file), name, remove);
+    this.box.querySelector(".thumbs").append(item);
+  }
+}
+
+const drops = [...form.querySelectorAll(".drop")].map((box) => new Drop(box));
+
+/** What still has to be chosen. */
+function tell() {
+  const without = drops.filter((drop) => drop.files.length === 0).map((drop) => drop.camera);
+  button.disabled = without.length > 0;
+  missing.textContent = without.length ? `No frame yet of ${without.join(", ")}` : "";
+}
+
+/** What was chosen, as the interface takes it; what was left open is not sent. */
+function options() {
+  const chosen = {};
+  for (const field of form.querySelectorAll(".options [name]")) {
+    if (field.type === "checkbox") {
+      if (field.checked) chosen[field.name] = true;
+    } else if (field.value) chosen[field.name] = "number" in field.dataset ? Number(field.value) : field.value;
+  }
+  return chosen;
+}
+
+function refuse(problem) {
+  refused.textContent = problem.detail || problem.title || "The service did not take the frames.";
+  refused.hidden = false;
+  bar.hidden = true;
+  tell();
+}
+
+function send(event) {
+  event.preventDefault();
+  const body = new FormData();
+  for (const drop of drops) for (const file of drop.files) body.append(drop.camera, file);
+  body.append("options", JSON.stringify(options()));
+  // Unlike fetch, it tells how much has been sent.
+  const request = new XMLHttpRequest();
+  request.open("POST", `/venues/${form.dataset.venue}/calibrate`);
+  for (const [name, value] of Object.entries(signed)) request.setRequestHeader(name, value);
+  request.upload.addEventListener("progress", ({loaded, total}) => {
+    bar.value = loaded / total;
+    missing.textContent = `${(loaded / 1e6).toFixed(1)} of ${(total / 1e6).toFixed(1)} MB`;
+  });
+  request.addEventListener("load", () => {
+    const answer = JSON.parse(request.responseText);
+    if (request.status < 300) location.assign(`/ui/jobs/${answer.id}`);
+    else refuse(answer);
+  });
+  request.addEventListener("error", () => refuse({detail: "The service cannot be reached."}));
+  refused.hidden = true;
+  bar.hidden = false;
+  button.disabled = true;
+  request.send(body);
+}
+
+document.addEventListener("dragover", (event) => event.preventDefault());
+document.addEventListener("drop", (event) => {
+  event.preventDefault();
+  for (const drop of drops) drop.add([...event.dataTransfer.files].filter((file) => file.name.toLowerCase().includes(drop.camera)));
+});
+form.addEventListener("submit", send);
+tell();

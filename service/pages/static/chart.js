@@ -1,0 +1,18 @@
+// uPlot in the colours of the page.
+
+import {styled} from "./page.js";
+
+const FONT = "12px system-ui, sans-serif";
+
+/** What all axes have in common. */
+export function axis(rest) {
+  return {stroke: styled("--dim"), grid: {stroke: styled("--line"), width: 1}, ticks: {stroke: styled("--line"), width: 1}, font: FONT, labelFont: FONT, ...rest};
+}
+
+/** A chart that fills its place, and keeps doing so. */
+export function fill(place, options, data) {
+  const size = () => ({width: place.clientWidth, height: place.classList.contains("small") ? 170 : 280});
+  const plot = new uPlot({...options, ...size()}, data, place);
+  new ResizeObserver(() => { if (plot.width !== place.clientWidth) plot.setSize(size()); }).observe(place);
+  return plot;
+}

@@ -1,0 +1,102 @@
+// The stitched view before and after: slider, seam, and a magnifier that goes along it.
+
+const STEP = 5;
+const REACH = 40;
+const SHORTEST = 20;
+
+const stage = document.querySelector(".compare");
+const slider = stage && stage.querySelector("img-comparison-slider");
+
+/** The slider of the library moves; what screen readers hear and how keys work is said here. */
+function speak() {
+  const value = Math.round(slider.value);
+  slider.setAttribute("aria-valuenow", value);
+  slider.setAttribute("aria-valuetext", `${value} % stored, ${100 - value} % new`);
+}
+
+function onKey(event) {
+  const steps = {ArrowLeft: -STEP, ArrowDown: -STEP, ArrowRight: STEP, ArrowUp: STEP, PageDown: -5 * STEP, PageUp: 5 * STEP, Home: -100, End: 100};
+  if (!(event.key in steps)) return;
+  event.preventDefault();
+  slider.value = Math.min(100, Math.max(0, slider.value + steps[event.key]));
+  speak();
+}
+
+/** Places along the seam, in pixels of the view: of each handover from its bottom to its top. */
+function alongTheSeam(image) {
+  const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
+  const context = canvas.getContext("2d", {willReadFrequently: true});
+  context.drawImage(image, 0, 0);
+  const {data, width, height} = context.getImageData(0, 0, canvas.width, canvas.height);
+  const chains = [];
+  for (let y = height - 1; y >= 0; y -= 1) {
+    for (let x = 0; x < width; x += 1) {
+      if (!data[4 * (y * width + x) + 3]) continue;
+      const chain = chains.find((one) => Math.hypot(one.at(-1).x - x, one.at(-1).y - y) < REACH);
+      if (!chain) chains.push([{x, y}]);
+      else if (chain.at(-1).y !== y) chain.push({x, y});
+    }
+  }
+  return chains.filter((chain) => chain.length >= SHORTEST).flat();
+}
+
+class Loupe {
+  constructor(box, before, after, seam) {
+    this.box = box;
+    this.before = before;
+    this.after = after;
+    this.range = box.querySelector("#along");
+    this.times = box.querySelector("#times");
+    this.reticle = stage.querySelector(".reticle");
+    this.seam = alongTheSeam(seam);
+    this.place = {x: after.naturalWidth / 2, y: after.naturalHeight / 2};
+    this.range.disabled = this.seam.length === 0;
+    box.hidden = this.reticle.hidden = false;
+    this.range.addEventListener("input", () => this.follow());
+    this.times.addEventListener("change", () => this.draw());
+    stage.addEventListener("pointermove", (event) => this.point(event));
+    new ResizeObserver(() => this.draw()).observe(stage);
+    this.follow();
+  }
+
+  follow() {
+    if (this.seam.length) this.place = this.seam[Math.round((this.range.value / 1000) * (this.seam.length - 1))];
+    this.draw();
+  }
+
+  point(event) {
+    const rect = stage.getBoundingClientRect();
+    const scale = this.after.naturalWidth / rect.width;
+    this.place = {x: (event.clientX - rect.left) * scale, y: (event.clientY - rect.top) * scale};
+    this.draw();
+  }
+
+  draw() {
+    const times = Number(this.times.value);
+    const {naturalWidth: wide, naturalHeight: high} = this.after;
+    const first = this.box.querySelector("canvas");
+    const width = Math.min(wide, first.width / times);
+    const height = Math.min(high, first.height / times);
+    const left = Math.min(Math.max(this.place.x - width / 2, 0), wide - width);
+    const top = Math.min(Math.max(this.place.y - height / 2, 0), high - height);
+    for (const [name, image] of [["before", this.before], ["after", this.after]]) {
+      const context = this.box.querySelector(`#loupe-${name}`).getContext("2d");
+      context.imageSmoothingEnabled = times < 4;
+      context.drawImage(image, left, top, width, height, 0, 0, first.width, first.height);
+    }
+    const scale = stage.clientWidth / wide;
+    for (const [side, value] of [["left", left], ["top", top], ["width", width], ["height", height]]) {
+      this.reticle.style.setProperty(side, `${value * scale}px`);
+    }
+  }
+}
+
+if (slider) {
+  const [before, after, seam] = ["#before", "#after", ".seam"].map((name) => stage.querySelector(name));
+  slider.addEventListener("slide", speak);
+  slider.addEventListener("keydown", onKey);
+  document.getElementById("seam-switch").addEventListener("change", (event) => { seam.hidden = !event.target.checked; });
+  Promise.all([before, after, seam].map((image) => image.decode()))
+    .then(() => new Loupe(document.querySelector(".loupe"), before, after, seam))
+    .catch(() => {});
+}

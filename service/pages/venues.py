@@ -1,0 +1,111 @@
+"""All venues at a glance, and one of them: is the seam clean, did the cameras move, shall it be taken?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args
+
+from fastapi import APIRouter, Query, Request, Response
+
+from service.context import Context, InContext, VenueIdPath
+from service.pages.shown import Page, page
+from service.pages.sparkline import Sparkline, sparkline
+from service.routes.documented import needs
+from service.routes.guarded import Guarded
+from service.routes.venues import no_such_venue
+from service.schemas import ID_PATTERN, Alarm, FormatName, Job, Revision, Venue
+from service.store.ends import Ended
+from service.store.revisions import TAKEN
+
+PER_PAGE = 50
+IN_SPARKLINE = 40
+# What a chart shows, and a table beside it.
+IN_CHART, IN_TABLE = 1000, 12
+router = APIRouter(route_class=Page, include_in_schema=False)
+data = APIRouter(route_class=Guarded, include_in_schema=False)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A venue in the list: its last calibration that ended, the one that is going on, a curve, and what rings."""
+
+    venue: Venue
+    last: Ended | None
+    active: Job | None
+    curve: Sparkline | None
+    alarms: list[Alarm]
+
+
+@router.get("/", openapi_extra=needs("read"))
+def venues(
+    request: Request, context: InContext, after: Annotated[str | None, Query(pattern=ID_PATTERN)] = None
+) -> Response:
+    """Every venue, with its last result."""
+    found = context.venues.page(after, PER_PAGE + 1)
+    shown, more = found[:PER_PAGE], len(found) > PER_PAGE
+    active = context.ends.active([venue.id for venue in shown])
+    rows = [_row(context, venue, active.get(venue.id)) for venue in shown]
+    return page(request, "venues.html", rows=rows, after=shown[-1].id if more else None, first=after is None)
+
+
+def _row(context: Context, venue: Venue, active: str | None) -> Row:
+    ends = context.ends.of(venue.id, IN_SPARKLINE)
+    results = [end for end in reversed(ends) if end.accepted is not None]
+    limit = results[-1].stitch_error_limit_px if results else None
+    curve = sparkline([end.stitch_error_px for end in results], limit)
+    health = context.venues.health(venue.id)
+    return Row(
+        venue,
+        ends[0] if ends else None,
+        context.jobs.get(active) if active else None,
+        curve,
+        health.alarms if health else [],
+    )
+
+
+@router.get("/ui/venues/{venue_id}", openapi_extra=needs("read"))
+def venue(venue_id: VenueIdPath, request: Request, context: InContext) -> Response:
+    """One venue: its last result in pictures and numbers, and how it came to it."""
+    stored = context.venues.get(venue_id)
+    if stored is None:
+        raise no_such_venue(venue_id)
+    ends = context.ends.of(venue_id, IN_TABLE)
+    newest = context.ends.newest_result(venue_id)
+    job = context.jobs.get(newest) if newest else None
+    revisions = context.venues.history(venue_id, None, IN_TABLE)
+    health = context.venues.health(venue_id)
+    active = context.ends.active([venue_id]).get(venue_id)
+    return page(
+        request,
+        "venue.html",
+        venue=stored,
+        ends=ends,
+        job=job,
+        revisions=revisions,
+        health=health,
+        holds=job is not None and holds(job, revisions[0]),
+        active=context.jobs.get(active) if active else None,
+        formats=get_args(FormatName),
+    )
+
+
+@data.get("/ui/venues/{venue_id}/history.json", openapi_extra=needs("read"))
+def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
+    """What the chart draws, oldest first: times in seconds, a value or null for each."""
+    ends = [end for end in reversed(context.ends.of(venue_id, IN_CHART)) if end.accepted is not None]
+    cameras = sorted({camera for end in ends for camera in end.moved})
+    return {
+        "at": [end.finished_at.timestamp() for end in ends],
+        "job": [end.job for end in ends],
+        "accepted": [end.accepted for end in ends],
+        "stitch_error_px": [end.stitch_error_px for end in ends],
+        "stitch_error_limit_px": next((end.stitch_error_limit_px for end in reversed(ends)), None),
+        "moved_px": {
+            camera: [end.moved[camera].pixels if camera in end.moved else None for end in ends] for camera in cameras
+        },
+    }
+
+
+def holds(job: Job, newest: Revision) -> bool:
+    """Whether the poses that a job found are those that its venue has."""
+    return newest.job == job.id and newest.cause in TAKEN

@@ -1,0 +1,46 @@
+"""Who is signed in with a browser, and with which key. What is stored is a hash; the token itself is in a cookie."""
+
+from __future__ import annotations
+
+import secrets
+from datetime import UTC, datetime, timedelta
+
+import sqlalchemy as sa
+
+from service.store.engine import reading, writing
+from service.store.keys import Key, hash_of
+from service.store.tables import api_keys, sessions
+
+s = sessions.c
+
+
+class Sessions:
+    """The sessions in the database."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def begin(self, key: Key, lasts: timedelta) -> str:
+        """Begin a session of the owner of a key and return its token. Those that are over are forgotten."""
+        token, now = secrets.token_urlsafe(32), datetime.now(UTC)
+        with writing(self._engine) as connection:
+            connection.execute(sa.delete(sessions).where(s.expires_at <= now))
+            values = {"hash": hash_of(token), "key_hash": key.hash, "expires_at": now + lasts}
+            connection.execute(sa.insert(sessions).values(**values))
+        return token
+
+    def key_of(self, hash_: str) -> Key | None:
+        """The key that the session with this hash began with; None if either is no more."""
+        query = (
+            sa.select(api_keys)
+            .join(sessions, s.key_hash == api_keys.c.hash)
+            .where(s.hash == hash_, s.expires_at > datetime.now(UTC))
+        )
+        with reading(self._engine) as connection:
+            row = connection.execute(query).one_or_none()
+        return None if row is None else Key(**row._mapping)
+
+    def end(self, hash_: str) -> None:
+        """Forget a session."""
+        with writing(self._engine) as connection:
+            connection.execute(sa.delete(sessions).where(s.hash == hash_))

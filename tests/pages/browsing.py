@@ -1,0 +1,92 @@
+"""A browser on the operator's page: Debian's Chromium, and what it must never have to complain about."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+
+ARGUMENTS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+AXE = Path(__file__).parent / "vendor" / "axe.min.js"
+PATIENCE_MS = 120_000
+# Called before any script of a page: what the policy refuses is no console message in every browser.
+WATCH_POLICY = """
+addEventListener("securitypolicyviolation", (event) => violated(`${event.violatedDirective}: ${event.blockedURI}`));
+"""
+
+
+def chromium() -> str | None:
+    """Where it is."""
+    return shutil.which("chromium")
+
+
+@contextmanager
+def browser_at(path: str) -> Iterator[Browser]:
+    expect.set_options(timeout=PATIENCE_MS)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def tab(
+    browser: Browser,
+    url: str,
+    scheme: str = "dark",
+    size: tuple[int, int] = (1280, 900),
+    forgiven: tuple[str, ...] = (),
+) -> Iterator[Page]:
+    """A page of a person of their own. Errors on the console but those that contain what is `forgiven` fail the test.
+
+    A browser writes there by itself that an answer was an error, such as 422 for a form that was to be refused.
+    """
+    complaints: list[str] = []
+    context = browser.new_context(base_url=url, color_scheme=scheme, viewport={"width": size[0], "height": size[1]})
+    context.set_default_timeout(PATIENCE_MS)
+    context.expose_function("violated", lambda what: complaints.append(f"policy: {what}"))
+    context.add_init_script(WATCH_POLICY)
+    page = context.new_page()
+    page.on("console", lambda said: complaints.append(f"{said.type}: {said.text}") if said.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(f"script: {error}"))
+    page.on("dialog", lambda dialog: dialog.accept())
+    try:
+        yield page
+    finally:
+        context.close()
+    unforgiven = [one for one in complaints if not any(part in one for part in forgiven)]
+    assert not unforgiven, unforgiven
+
+
+def look(part: Page | Locator) -> np.ndarray:
+    """What is to be seen of it: BGR."""
+    return cv2.imdecode(np.frombuffer(part.screenshot(), np.uint8), cv2.IMREAD_COLOR)
+
+
+def differs(one: np.ndarray, other: np.ndarray) -> float:
+    """The share of pixels that are clearly different."""
+    return float((np.abs(one.astype(int) - other.astype(int)).max(axis=-1) > 24).mean())
+
+
+def grave(page: Page) -> list[str]:
+    """What keeps people with a screen reader, a keyboard or weak eyes from using the page: axe-core's findings."""
+    # Evaluated by the debugger: the policy of the page would refuse a script from elsewhere.
+    page.evaluate(AXE.read_text())
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+    return [
+        f"{one['impact']}: {one['id']}: {one['nodes'][0]['html'][:200]} {one['nodes'][0]['failureSummary'][:300]}"
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]

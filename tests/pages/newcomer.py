@@ -1,0 +1,87 @@
+"""Somebody with two frames and the numbers of two lenses, who has never seen the service before."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import Page, expect
+
+from service.schemas import Pose, VenueIn
+from tests import demo
+from worker.calibration.camera import Camera
+from worker.outcome import camera_of, pitch_of
+
+DEMO = Path(demo.__file__).parent
+VENUE = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).stored()
+TRUTH = {camera: Pose.at(**pose) for camera, pose in json.loads((DEMO / "truth.json").read_text())["poses"].items()}
+# What can be clicked well: crossings of lines, on both sides of each frame.
+CLICKED = 7
+
+
+def goes_the_whole_way(page: Page) -> None:
+    """From an empty service to an accepted pose."""
+    page.goto("/")
+    page.get_by_role("link", name="New venue").click()
+    describe_the_pitch(page)
+    for number, camera in enumerate(VENUE.cameras):
+        if number:
+            page.get_by_role("button", name="Add a camera").click()
+        describe_a_camera(page, number)
+        click_points(page, number, camera.id)
+    create = page.get_by_role("button", name="Create and calibrate")
+    expect(create).to_be_enabled()
+    create.click()
+    page.wait_for_url("**/ui/jobs/*")
+    # Loads itself again at the end of the job.
+    expect(page.locator(".title .badge")).to_have_text("Accepted", timeout=300_000)
+
+
+def describe_the_pitch(page: Page) -> None:
+    field = VENUE.field
+    page.get_by_label("Id", exact=True).first.fill("newcomer")
+    page.get_by_label("Name", exact=True).fill("A newcomer's pitch")
+    page.get_by_label("Length, m").fill(str(field.length_m))
+    page.get_by_label("Width, m", exact=True).fill(str(field.width_m))
+    page.get_by_label("Height of the ridge, m").fill(str(field.ridge[0][2]))
+
+
+def describe_a_camera(page: Page, number: int) -> None:
+    camera = VENUE.cameras[number]
+    step = page.locator(".camera-step").nth(number)
+    step.get_by_label("Id", exact=True).fill(camera.id)
+    step.get_by_label("A frame of it").set_input_files(DEMO / f"{camera.id}.jpg")
+    (fx, _, cx), (_, fy, cy), _ = camera.intrinsics.matrix
+    for name, value in (("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)):
+        step.get_by_label(f"{name}, px").fill(str(value))
+    step.get_by_label("Distortion").fill(", ".join(map(str, camera.intrinsics.distortion)))
+
+
+def click_points(page: Page, number: int, camera: str) -> None:
+    step = page.locator(".camera-step").nth(number)
+    frame = step.locator("canvas[data-frame]")
+    frame.scroll_into_view_if_needed()
+    for name, pixel in points_to_click(camera).items():
+        step.locator("[data-point]").select_option(name)
+        box = frame.bounding_box()
+        place = (np.array(pixel) + 0.5) / VENUE.cameras[number].image_size * [box["width"], box["height"]]
+        frame.click(position={"x": float(place[0]), "y": float(place[1])})
+    expect(step.locator("[data-verdict]")).to_contain_text("Good")
+
+
+def points_to_click(camera: str) -> dict[str, list[float]]:
+    """Named points that are in view, and where: the first by x, the last, and those between them evenly."""
+    standing = true_camera(camera)
+    width, height = standing.intrinsics.size
+    pitch = pitch_of(VENUE.field)
+    names = sorted(VENUE.field.plan.places(VENUE.field.size))
+    pixels = standing.project(np.stack([pitch.place(name) for name in names]))
+    inside = (pixels > 30).all(axis=1) & (pixels < [width - 30, height - 30]).all(axis=1)
+    seen = sorted((pixel.tolist(), name) for name, pixel, visible in zip(names, pixels, inside, strict=True) if visible)
+    chosen = np.unique(np.linspace(0, len(seen) - 1, CLICKED).astype(int))
+    return {seen[index][1]: seen[index][0] for index in chosen}
+
+
+def true_camera(camera: str) -> Camera:
+    """The camera as it really stands."""
+    (stored,) = (one for one in VENUE.cameras if one.id == camera)
+    return camera_of(stored.model_copy(update={"pose": TRUTH[camera]}))

@@ -1,0 +1,98 @@
+"""Pictures of every page, light and dark, for the documents: `python -m tests.pages.screenshots build/pages`.
+
+Starts a service with the real engine, goes the newcomer's way on it, and fills a second venue with a month of results.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+from playwright.sync_api import Browser, Page
+
+from service.settings import Settings
+from service.store.engine import connect, writing
+from tests.demo.__main__ import service
+from tests.e2e.running import venue
+from tests.pages import newcomer
+from tests.pages.browsing import browser_at, chromium, tab
+from tests.pages.stocked import calibrations
+
+DESK, PHONE = (1280, 860), (390, 844)
+WEBP_QUALITY = 82
+# Taken as long as they are, up to this.
+TALLEST = 2400
+
+
+def main(folder: Path) -> None:
+    """Take them all."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = chromium()
+    if path is None:
+        raise SystemExit("install Chromium (Debian: apt-get install chromium)")
+    with tempfile.TemporaryDirectory(prefix="esc-pages-") as data, service(Path(data)) as url, browser_at(path) as one:
+        with tab(one, url) as page:
+            newcomer.goes_the_whole_way(page)
+            job = page.url.rpartition("/")[2]
+            stock(page, Path(data))
+        for scheme in ("dark", "light"):
+            take_all(one, url, job, scheme, folder)
+
+
+def stock(page: Page, data: Path) -> None:
+    """More venues than one, with something to see."""
+    for name, called in (("north", "North pitch"), ("south", "South pitch, cameras on the stand's roof")):
+        page.request.put(f"/venues/{name}", data=venue(name, called))
+    engine = connect(Settings(data=data).home_database_url)
+    with writing(engine) as connection:
+        calibrations(connection, "north", 200)
+    engine.dispose()
+
+
+def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) -> None:
+    with tab(browser, url, scheme, DESK) as page:
+        for name, address in (
+            ("venues", "/"),
+            ("venue", "/ui/venues/newcomer"),
+            ("history", "/ui/venues/north"),
+            ("jobs", "/ui/jobs"),
+            ("job", f"/ui/jobs/{job}"),
+            ("calibrate", "/ui/venues/newcomer/calibrate"),
+        ):
+            page.goto(address)
+            page.wait_for_load_state("networkidle")
+            if name == "calibrate":
+                for camera in ("left", "right"):
+                    page.locator(f"[data-camera={camera}] input[type=file]").set_input_files(
+                        newcomer.DEMO / f"{camera}.jpg"
+                    )
+                page.locator(".thumbs canvas").nth(1).wait_for()
+            save(page, folder / f"{name}-{scheme}.webp")
+        page.goto("/ui/new-venue")
+        newcomer.describe_the_pitch(page)
+        newcomer.describe_a_camera(page, 0)
+        newcomer.click_points(page, 0, "left")
+        save(page, folder / f"new-venue-{scheme}.webp")
+    with tab(browser, url, scheme, PHONE) as page:
+        for name, address in (("venues", "/"), ("venue", "/ui/venues/newcomer")):
+            page.goto(address)
+            page.wait_for_load_state("networkidle")
+            save(page, folder / f"{name}-phone-{scheme}.webp")
+
+
+def save(page: Page, path: Path) -> None:
+    """The whole page, or as much of it as a reader looks at."""
+    tall = min(TALLEST, page.evaluate("document.documentElement.scrollHeight"))
+    width = page.viewport_size["width"]
+    shot = page.screenshot(full_page=True, clip={"x": 0, "y": 0, "width": width, "height": tall})
+    picture = cv2.imdecode(np.frombuffer(shot, np.uint8), cv2.IMREAD_COLOR)
+    cv2.imwrite(str(path), picture, [cv2.IMWRITE_WEBP_QUALITY, WEBP_QUALITY])
+    print(f"{path} {path.stat().st_size / 1000:.0f} kB", flush=True)
+
+
+if __name__ == "__main__":
+    (target,) = sys.argv[1:] or ["build/pages"]
+    main(Path(target))

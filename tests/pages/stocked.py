@@ -1,0 +1,54 @@
+"""A venue with years of calibrations, written into the store as a worker would have done."""
+
+from datetime import UTC, datetime, timedelta
+
+import sqlalchemy as sa
+
+from service.schemas import Moved, Options, Venue, VenueIn
+from service.store import tables
+from service.store.ids import new_id
+from tests.e2e import running
+from tests.worker.stock import result
+
+
+def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:
+    """So many of them, a quarter of an hour apart; every tenth was rejected."""
+    venue: Venue = VenueIn.model_validate(running.venue(venue_id)).stored()
+    now = datetime.now(UTC)
+    rows = []
+    # They sort by time.
+    ids = sorted(new_id() for _ in range(count))
+    for number, job_id in enumerate(ids):
+        at = now - timedelta(minutes=15 * (count - number))
+        drift = 1 + number % 7
+        found = result(venue, number % 10 != 0)
+        cameras = [
+            camera.model_copy(update={"moved": Moved(rotation_deg=0.01, position_m=0.01, pixels=float(drift))})
+            for camera in found.cameras
+        ]
+        error = 0.1 + 0.1 * (number % 5) if found.accepted else 2.5
+        found = found.model_copy(update={"cameras": cameras, "stitch_error_px": error, "stitch_error_limit_px": 1.5})
+        rows.append(
+            {
+                "id": job_id,
+                "kind": "calibration",
+                "venue": venue_id,
+                "status": "succeeded",
+                "priority": 100,
+                "options": Options(seed=number).model_dump(mode="json"),
+                "content_hash": f"{number:064x}",
+                "venue_document": venue.model_dump(mode="json"),
+                "frames": {},
+                "attempt": 1,
+                "run_token": "0" * 32,
+                "result": found.model_dump(mode="json"),
+                "pictures": [],
+                "created_at": at,
+                "started_at": at,
+                "finished_at": at + timedelta(seconds=20),
+                "updated_at": at,
+                "frames_deleted_at": now,
+                "pictures_deleted_at": now,
+            }
+        )
+    connection.execute(sa.insert(tables.jobs), rows)

@@ -1,0 +1,259 @@
+"""Every page on a service whose venues' names say how their jobs end."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.e2e import running
+from tests.e2e.running import SIZE, Service, png
+from tests.pages.browsing import differs, grave, look
+from tests.pages.stocked import calibrations
+
+PHONE = (390, 800)
+
+
+@pytest.fixture(scope="module")
+def years(stub):
+    """A venue with calibrations enough for a chart."""
+    stub.venue("years")
+    with stub.database() as connection:
+        calibrations(connection, "years", 60)
+    return "years"
+
+
+@pytest.fixture(scope="module")
+def ended(stub):
+    """A job that was accepted, and one that was rejected."""
+    return {
+        name: stub.end(stub.submit(stub.venue(name, behaviour)).json()["id"])
+        for name, behaviour in (("fine", "accept"), ("poor", "reject"), ("broken", "fail"))
+    }
+
+
+@pytest.fixture
+def frames(tmp_path):
+    """A file of each camera that fits, and one that does not."""
+
+    def file(name, **size):
+        path = tmp_path / f"{name}.png"
+        path.write_bytes(png(**size))
+        return path
+
+    return {"left": file("left"), "right": file("right"), "wide": file("wide", width=2 * SIZE[0])}
+
+
+@pytest.fixture
+def start_empty(tmp_path):
+    empty = Service(tmp_path / "empty", "serve")
+    yield empty
+    empty.kill()
+
+
+def test_an_empty_service_says_what_to_do(start_empty, visit):
+    page = visit(start_empty.url)
+    expect(page.get_by_role("heading", name="No venue yet")).to_be_visible()
+    expect(page.get_by_role("link", name="New venue")).to_be_visible()
+
+
+def test_the_list_shows_each_venue_with_its_last_result(stub, ended, years, visit):
+    page = visit(stub.url)
+    for venue, says in (("fine", "Accepted"), ("poor", "Rejected"), ("broken", "Failed")):
+        row = page.locator(".venue-row", has=page.locator(f"a[href='/ui/venues/{venue}']"))
+        expect(row.locator(".badge")).to_have_text(says)
+    row = page.locator(".venue-row", has=page.locator("a[href='/ui/venues/years']"))
+    expect(row.get_by_role("img", name="Stitch error")).to_be_visible()
+
+
+def test_a_rejected_result_is_accepted_by_hand(stub, ended, visit):
+    page = visit(stub.url, "/ui/venues/poor")
+    expect(page.get_by_text("the lines do not fit")).to_be_visible()
+    expect(page.get_by_text("The poses from before still hold")).to_be_visible()
+    page.get_by_role("button", name="Accept anyway").click()
+    expect(page.get_by_text("These poses hold now")).to_be_visible()
+    assert stub.http.get("/venues/poor").json()["cameras"][0]["pose"]["position"][0] == -1.0 + 0.125
+
+
+def test_the_chart_has_the_results_the_movements_and_the_line_of_the_gate(stub, years, visit):
+    page = visit(stub.url, "/ui/venues/years")
+    chart = page.locator("#chart canvas")
+    chart.wait_for()
+    drawn = look(chart)
+    history = page.evaluate("fetch('/ui/venues/years/history.json').then((answer) => answer.json())")
+    assert len(history["at"]) == 60
+    for name in ("Gate", "Stitch error", "left moved"):
+        page.locator(".u-series", has_text=name).locator("th").click()
+        without = look(chart)
+        assert differs(drawn, without) > 0.001, name
+        drawn = without
+    page.get_by_label("Logarithmic").check()
+    page.wait_for_function("document.querySelectorAll('#chart canvas').length === 1")
+    assert differs(drawn, look(page.locator("#chart canvas"))) > 0.005
+
+
+def test_frames_are_looked_at_before_they_travel(stub, frames, visit):
+    page = visit(stub.url, f"/ui/venues/{stub.venue('sent', 'accept')}/calibrate")
+    send = page.get_by_role("button", name="Calibrate")
+    left, right = (page.locator(f"[data-camera={camera}] input[type=file]") for camera in ("left", "right"))
+    left.set_input_files(frames["wide"])
+    expect(page.get_by_text("wide.png has 128 × 48 pixels; this camera takes 64 × 48")).to_be_visible()
+    left.set_input_files(frames["left"])
+    expect(page.get_by_role("img", name="left.png")).to_be_visible()
+    expect(send).to_be_disabled()
+    right.set_input_files([frames["right"], frames["right"]])
+    page.locator("summary").click()
+    page.get_by_label("Dry run").check()
+    page.get_by_label("Seed").fill("11")
+    send.click()
+    page.wait_for_url("**/ui/jobs/*")
+    expect(page.locator(".title .badge")).to_have_text("Accepted")
+    job = stub.job(page.url.rpartition("/")[2])
+    options = job["result"]["provenance"]["options"]
+    assert (options["dry_run"], options["seed"]) == (True, 11)
+    assert job["venue_revision"] is None
+
+
+def test_a_frame_that_was_chosen_can_be_taken_away_again(stub, frames, visit):
+    page = visit(stub.url, f"/ui/venues/{stub.venue('sent', 'accept')}/calibrate")
+    page.locator("[data-camera=left] input[type=file]").set_input_files(frames["left"])
+    page.get_by_role("button", name="Remove left.png").click()
+    expect(page.get_by_text("No frame yet of left, right")).to_be_visible()
+
+
+def test_frames_dropped_on_the_page_find_their_cameras_by_their_names(stub, frames, visit):
+    page = visit(stub.url, f"/ui/venues/{stub.venue('sent', 'accept')}/calibrate")
+    bytes_ = list(frames["left"].read_bytes())
+    page.evaluate(
+        """(bytes) => {
+            const dropped = new DataTransfer();
+            for (const name of ["ground-left.png", "ground-right.png"]) {
+                dropped.items.add(new File([new Uint8Array(bytes)], name, {type: "image/png"}));
+            }
+            document.dispatchEvent(new DragEvent("drop", {dataTransfer: dropped, cancelable: true}));
+        }""",
+        bytes_,
+    )
+    for camera in ("left", "right"):
+        expect(page.locator(f"[data-camera={camera}]").get_by_role("img", name=f"ground-{camera}.png")).to_be_visible()
+
+
+def test_what_the_service_refuses_is_said_where_it_was_asked(stub, frames, visit):
+    venue = stub.venue("busy-page", "hang")
+    first = stub.submit(venue).json()["id"]
+    page = visit(stub.url, f"/ui/venues/{venue}/calibrate", forgiven=("409",))
+    for camera in ("left", "right"):
+        page.locator(f"[data-camera={camera}] input[type=file]").set_input_files(frames[camera])
+    page.locator("summary").click()
+    page.get_by_label("Dry run").check()
+    page.get_by_role("button", name="Calibrate").click()
+    expect(page.locator("#refused")).to_contain_text(f"Wait for job {first}")
+    stub.http.post(f"/jobs/{first}/cancel")
+
+
+def test_a_running_job_is_followed_and_cancelled(stub, visit):
+    job = stub.submit(stub.venue("followed", "accept 60")).json()["id"]
+    stub.running(job)
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    expect(page.locator(".stages [aria-current]")).to_have_text("evolution")
+    expect(page.locator("progress")).to_have_attribute("value", "0.5")
+    expect(page.locator("[data-live=loss] canvas")).to_be_visible()
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.locator(".title .badge")).to_have_text("Cancelled")
+    assert stub.job(job)["status"] == "cancelled"
+
+
+def test_the_page_of_a_venue_shows_what_runs_and_then_its_end(stub, visit):
+    venue = stub.venue("soon", "accept 60")
+    job = stub.submit(venue).json()["id"]
+    stub.running(job)
+    page = visit(stub.url, f"/ui/venues/{venue}")
+    expect(page.locator("section.live")).to_contain_text("evolution")
+    stub.http.post(f"/jobs/{job}/cancel")
+    expect(page.locator(".verdict-big")).to_have_text(re.compile("Cancelled"))
+    expect(page.locator("section.live")).to_have_count(0)
+
+
+def test_a_job_is_run_again_with_the_same_frames(stub, ended, visit):
+    page = visit(stub.url, f"/ui/jobs/{ended['fine']['id']}")
+    page.get_by_role("button", name="Again").click()
+    page.wait_for_url(lambda url: "/ui/jobs/" in url and ended["fine"]["id"] not in url)
+    again = stub.end(page.url.rpartition("/")[2])
+    seeds = [job["result"]["provenance"]["seed"] for job in (ended["fine"], again)]
+    assert seeds[0] == seeds[1]
+    assert again["status"] == "succeeded"
+
+
+def test_jobs_are_filtered(stub, ended, visit):
+    page = visit(stub.url, "/ui/jobs")
+    page.get_by_label("Venue").fill("broken")
+    page.get_by_label("Status").select_option("failed")
+    page.get_by_role("button", name="Filter").click()
+    expect(page.locator("tbody tr")).to_have_count(1)
+    expect(page.locator("tbody tr")).to_contain_text("Failed")
+    page.get_by_label("Status").select_option("succeeded")
+    page.get_by_role("button", name="Filter").click()
+    expect(page.get_by_role("heading", name="No jobs like that")).to_be_visible()
+
+
+def test_the_list_of_jobs_follows_what_happens(stub, visit):
+    job = stub.submit(stub.venue("listed", "accept 60")).json()["id"]
+    stub.running(job)
+    page = visit(stub.url, "/ui/jobs?venue=listed")
+    expect(page.locator("tbody .badge")).to_have_text("Running")
+    stub.http.post(f"/jobs/{job}/cancel")
+    expect(page.locator("tbody .badge")).to_have_text("Cancelled")
+
+
+@pytest.mark.parametrize("path", ["/ui/venues/nowhere", "/ui/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "/ui/venues/NO!"])
+def test_what_is_not_there_is_said_on_a_page(stub, visit, path):
+    page = visit(stub.url, path, forgiven=("404",))
+    expect(page.get_by_role("link", name="To the venues")).to_be_visible()
+    expect(page).to_have_title(re.compile("ESC"))
+
+
+def test_names_that_are_markup_are_text(stub, visit):
+    stub.http.put("/venues/markup", json=running.venue("markup", "<img src=x onerror=alert(1)>"))
+    page = visit(stub.url, "/ui/venues/markup")
+    expect(page.get_by_role("heading", level=1)).to_have_text("<img src=x onerror=alert(1)>")
+
+
+PAGES = {
+    "venues": "/",
+    "venue": "/ui/venues/years",
+    "venue-with-pictures": "/ui/venues/fine",
+    "venue-without": "/ui/venues/bare",
+    "calibrate": "/ui/venues/years/calibrate",
+    "jobs": "/ui/jobs",
+    "no-jobs": "/ui/jobs?venue=none",
+    "job": "/ui/jobs/{job}",
+    "failed-job": "/ui/jobs/{failed}",
+    "new-venue": "/ui/new-venue",
+}
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", PAGES)
+def test_nothing_serious_keeps_anybody_from_using_a_page(stub, years, ended, visit, name, scheme):
+    stub.venue("bare")
+    path = PAGES[name].format(job=ended["fine"]["id"], failed=ended["broken"]["id"])
+    page = visit(stub.url, path, scheme=scheme)
+    page.wait_for_load_state("networkidle")
+    assert grave(page) == []
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_phone_shows_a_page_without_scrolling_sideways(stub, years, ended, visit, name):
+    stub.venue("bare")
+    path = PAGES[name].format(job=ended["fine"]["id"], failed=ended["broken"]["id"])
+    page = visit(stub.url, path, size=PHONE)
+    page.wait_for_load_state("networkidle")
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+
+
+def test_the_keyboard_reaches_what_a_page_offers(stub, ended, visit):
+    page = visit(stub.url, "/ui/venues/fine")
+    reached = set()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("document.activeElement.textContent.trim() || document.activeElement.name"))
+    assert {"Skip to the content", "Venues", "Jobs", "Calibrate", "Reject"} <= reached

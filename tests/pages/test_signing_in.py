@@ -1,0 +1,138 @@
+"""A service that asks for keys, on its page."""
+
+import httpx
+import pytest
+from playwright.sync_api import expect
+
+from tests.e2e.running import Service, venue, wait_for
+from tests.e2e.test_access import keys_in
+from tests.pages.browsing import grave
+
+REFUSED = ("401", "403")
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory):
+    """The service, and a key of each scope."""
+    folder = tmp_path_factory.mktemp("guarded")
+    store = keys_in(folder)
+    keys = {scope: store.add(scope, scope) for scope in ("read", "calibrate", "admin")}
+    running = Service(folder)
+    admin = {"Authorization": f"Bearer {keys['admin']}"}
+    wait_for(lambda: running.http.put("/venues/field", json=venue("field"), headers=admin).status_code < 300)
+    yield running, keys
+    assert running.stop() == 0
+
+
+def sign_in(page, key):
+    page.get_by_label("Key").fill(key)
+    page.get_by_role("button", name="Sign in").click()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_way_in_is_open_to_everybody(guarded, visit, scheme):
+    page = visit(guarded[0].url, "/ui/venues/field", scheme=scheme)
+    expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
+    assert grave(page) == []
+
+
+def test_who_signs_in_comes_to_where_they_wanted_to_go(guarded, visit):
+    service, keys = guarded
+    page = visit(service.url, "/ui/venues/field")
+    sign_in(page, keys["calibrate"])
+    page.wait_for_url("**/ui/venues/field")
+    expect(page.get_by_text("Signed in as calibrate")).to_be_visible()
+    expect(page.get_by_role("link", name="Calibrate")).to_be_visible()
+
+
+def test_a_link_leads_nobody_to_another_site_by_way_of_signing_in(guarded, visit):
+    service, keys = guarded
+    page = visit(service.url, "/ui/sign-in?next=//evil.example/%5Cpath")
+    sign_in(page, keys["read"])
+    expect(page.get_by_role("heading", name="Venues")).to_be_visible()
+
+
+def test_a_wrong_key_is_told_so(guarded, visit):
+    page = visit(guarded[0].url, forgiven=REFUSED)
+    sign_in(page, "esc_wrong")
+    expect(page.get_by_role("alert")).to_contain_text("The key was not taken")
+
+
+def test_the_cookie_is_out_of_reach_of_scripts_and_other_sites(guarded, visit):
+    service, keys = guarded
+    page = visit(service.url)
+    sign_in(page, keys["read"])
+    expect(page.get_by_text("Signed in as")).to_be_visible()
+    (cookie,) = page.context.cookies()
+    assert (cookie["httpOnly"], cookie["sameSite"], cookie["secure"]) == (True, "Strict", False)
+    assert page.evaluate("document.cookie") == ""
+
+
+def test_behind_tls_the_cookie_stays_there(guarded):
+    service, keys = guarded
+    form = {"key": keys["read"], "next": "/"}
+    answer = service.http.post("/ui/sign-in", data=form, headers={"X-Forwarded-Proto": "https"})
+    assert "Secure" in answer.headers["Set-Cookie"]
+
+
+def test_who_may_only_read_finds_no_buttons_and_is_refused_without_them(guarded, visit):
+    service, keys = guarded
+    page = visit(service.url, "/ui/venues/field", forgiven=REFUSED)
+    sign_in(page, keys["read"])
+    expect(page.get_by_role("heading", name="Not calibrated yet")).to_be_visible()
+    expect(page.get_by_role("link", name="Calibrate")).to_have_count(0)
+    expect(page.get_by_role("button")).to_have_text(["Sign out"])
+    status = page.evaluate(
+        """() => fetch("/venues/field/restore", {
+            method: "POST",
+            headers: {
+                "Content-Type": "application/json",
+                "X-CSRF-Token": document.querySelector("meta[name=token]").content,
+            },
+            body: '{"revision": 1}',
+        }).then((answer) => answer.status)"""
+    )
+    assert status == 403
+    page.goto("/ui/new-venue")
+    expect(page.get_by_text("This needs a key of scope admin")).to_be_visible()
+
+
+def test_nothing_is_changed_without_the_token_of_the_page(guarded, visit):
+    service, keys = guarded
+    page = visit(service.url, "/ui/venues/field", forgiven=REFUSED)
+    sign_in(page, keys["admin"])
+    page.wait_for_url("**/ui/venues/field")
+    (cookie,) = page.context.cookies()
+    jar = {"Cookie": f"{cookie['name']}={cookie['value']}"}
+    refused = service.http.delete("/venues/field", headers=jar)
+    assert refused.json()["type"] == "/problems/token-missing"
+    assert service.http.get("/venues/field", headers=jar).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "headers", [{"Sec-Fetch-Site": "cross-site"}, {"Origin": "http://evil.example"}, {"Origin": "null"}]
+)
+def test_no_other_site_signs_anybody_in(guarded, headers):
+    service, keys = guarded
+    answer = service.http.post("/ui/sign-in", data={"key": keys["read"]}, headers=headers)
+    assert answer.status_code == 403
+    assert "Set-Cookie" not in answer.headers
+
+
+def test_who_signs_out_is_out(guarded, visit):
+    service, keys = guarded
+    page = visit(service.url, "/ui/venues/field")
+    sign_in(page, keys["admin"])
+    expect(page.get_by_text("Signed in as admin")).to_be_visible()
+    (cookie,) = page.context.cookies()
+    page.get_by_role("button", name="Sign out").click()
+    expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
+    assert page.context.cookies() == []
+    kept = httpx.get(f"{service.url}/venues", headers={"Cookie": f"{cookie['name']}={cookie['value']}"})
+    assert kept.json()["type"] == "/problems/session-over"
+
+
+def test_where_no_keys_are_asked_for_there_is_nothing_to_sign_in_to(stub, visit):
+    page = visit(stub.url, "/ui/sign-in")
+    expect(page.get_by_role("heading", name="Venues")).to_be_visible()
+    expect(page.get_by_role("button", name="Sign out")).to_have_count(0)

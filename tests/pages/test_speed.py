@@ -1,0 +1,25 @@
+"""How soon something is to be seen."""
+
+import pytest
+
+from tests.pages.stocked import calibrations
+
+FIRST_PAINT_MS = 1000
+
+
+@pytest.fixture(scope="module")
+def years(stub):
+    stub.venue("decade")
+    with stub.database() as connection:
+        calibrations(connection, "decade", 1000)
+    return "decade"
+
+
+def test_a_venue_with_a_thousand_jobs_is_painted_within_a_second(stub, years, visit):
+    page = visit(stub.url, f"/ui/venues/{years}")
+    page.locator("#chart canvas").wait_for()
+    paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
+    assert paint <= FIRST_PAINT_MS
+    assert (
+        page.evaluate("fetch('/ui/venues/decade/history.json').then((a) => a.json()).then((h) => h.at.length)") == 1000
+    )

@@ -1,0 +1,67 @@
+"""The first pose of a camera while its points are being clicked, in a process of its own: JSON in, JSON out.
+
+`python -m worker.clickedpose`. What comes is a `service.clicking.ClickedCamera`, what leaves a `ClickedPose`.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from math import isfinite
+
+from service import lifeline
+from service.clicking import ClickedCamera, ClickedPose, Polyline
+from worker.calibration.camera import Camera, inside
+from worker.calibration.field import Field
+from worker.calibration.stitching import outline
+from worker.locatejob import clicks_of, pose_of, result_of
+from worker.outcome import Failure, lens_of, pitch_of
+
+# A line is drawn as far as this beside the picture, in widths of it: what is further out is not worth drawing.
+BESIDE = 0.25
+# Of the points of a marking, which are a quarter of a metre apart.
+EVERY = 3
+
+
+def main() -> None:
+    """Read the clicks, write the pose."""
+    lifeline.end_with_parent()
+    asked = ClickedCamera.model_validate_json(sys.stdin.buffer.read())
+    sys.stdout.write(answer(asked).model_dump_json())
+
+
+def answer(asked: ClickedCamera) -> ClickedPose:
+    """The pose, the field as it has it, and where it expects each point; or why there is none."""
+    begun = time.perf_counter()
+    pitch = pitch_of(asked.field)
+    try:
+        clicks = clicks_of(asked.id, pitch, asked.points)
+        found = pose_of(asked.id, pitch, lens_of(asked.intrinsics, asked.image_size), clicks)
+    except Failure as failure:
+        return ClickedPose(result=None, error=failure.error, lines=[], expected=[])
+    result = result_of(found, asked.points, {"fit": time.perf_counter() - begun})
+    expected = [[float(x), float(y)] if isfinite(x + y) else None for x, y in found.camera.project(clicks.world)]
+    return ClickedPose(result=result, error=None, lines=_lines(pitch, found.camera), expected=expected)
+
+
+def _lines(pitch: Field, camera: Camera) -> list[Polyline]:
+    """Each marking in pixels, broken where the camera does not see it."""
+    lines: list[Polyline] = []
+    width, _ = camera.intrinsics.size
+    for marking in pitch.markings():
+        centre, *_ = outline(marking)
+        places = camera.project(pitch.lift(centre))
+        seen = inside(places, camera.intrinsics.size, margin=-BESIDE * width)
+        piece: Polyline = []
+        for number, (place, visible) in enumerate(zip(places.round(1).tolist(), seen, strict=True)):
+            if visible and (number % EVERY == 0 or number == len(places) - 1):
+                piece.append(place)
+            elif not visible:
+                lines.append(piece)
+                piece = []
+        lines.append(piece)
+    return [line for line in lines if len(line) > 1]
+
+
+if __name__ == "__main__":
+    main()

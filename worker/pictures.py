@@ -1,0 +1,106 @@
+"""The pictures of a calibration: what a person looks at before he trusts it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import cv2
+import numpy as np
+import structlog
+from numpy.typing import NDArray
+
+from worker.calibration import layers, stitching
+from worker.calibration.calibrate import Calibration, Segment
+from worker.calibration.camera import Camera
+from worker.calibration.field import Field
+from worker.calibration.segmentation import Region
+from worker.outcome import Picture, jpeg, png
+
+# Of the frames that layers are laid over: a wide screen. The overlays have the size of the frames.
+FRAME_WIDTH, PREVIEW_WIDTH = 1920, 1920
+FRAME_QUALITY = 75
+# A camera, and the pitch as its pose has it.
+Standing = tuple[Field, Camera]
+log = structlog.get_logger()
+
+
+class Remembering:
+    """A network that remembers what it said of the first frame of each camera."""
+
+    def __init__(self, segment: Segment, frames: Mapping[str, Sequence[Picture]]) -> None:
+        self._segment = segment
+        self._cameras = {id(several[0]): camera for camera, several in frames.items()}
+        self.responses: dict[str, NDArray[np.uint8]] = {}
+
+    def __call__(self, frame: Picture, regions: Sequence[Region]) -> NDArray[np.uint8]:
+        """As the network that is asked."""
+        response = self._segment(frame, regions)
+        if id(frame) in self._cameras:
+            self.responses[self._cameras[id(frame)]] = response
+        return response
+
+
+def draw(
+    pitch: Field,
+    before: Sequence[Camera],
+    found: Calibration,
+    frames: Mapping[str, Sequence[Picture]],
+    responses: Mapping[str, NDArray[np.uint8]],
+) -> dict[str, bytes]:
+    """Files by name; `responses`: what the network said of the first frame of each camera."""
+    after = [Camera(camera.id, camera.intrinsics, camera.pose) for camera in found.cameras]
+    first = {camera: several[0] for camera, several in frames.items()}
+    parts: list[Callable[[], dict[str, bytes]]] = [
+        lambda: _preview(found.pitch, after, first),
+        lambda: _preview_before((pitch, before), (found.pitch, after), first),
+        lambda: {"birdseye": jpeg(stitching.birdseye(found.pitch, after, first))},
+    ]
+    for old, new in zip(before, after, strict=True):
+        frame, response = first[old.id], responses.get(old.id)
+        parts += [
+            partial(_overlay, (pitch, old), (found.pitch, new), frame),
+            partial(_layers, (pitch, old), (found.pitch, new), frame, response),
+        ]
+    pictures: dict[str, bytes] = {}
+    for part in parts:
+        try:
+            pictures |= part()
+        except Exception:  # poses that were rejected may look anywhere; a picture is not worth losing the reason
+            log.warning("cannot draw", exc_info=True)
+    return pictures
+
+
+def _preview(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Picture]) -> dict[str, bytes]:
+    """One view by the new poses, and where one camera hands over to another in it."""
+    view = stitching.viewpoint(pitch, cameras, PREVIEW_WIDTH)
+    stitched = stitching.stitched(pitch, view, cameras, frames)
+    return {"preview": jpeg(stitched.picture), "seam": png(layers.seam_layer(stitched.owner))}
+
+
+def _preview_before(
+    stored: tuple[Field, Sequence[Camera]], new: tuple[Field, Sequence[Camera]], frames: Mapping[str, Picture]
+) -> dict[str, bytes]:
+    """The same view by the stored poses."""
+    view = stitching.viewpoint(*new, PREVIEW_WIDTH)
+    pitch, cameras = stored
+    return {"preview_before": jpeg(stitching.stitched(pitch, view, cameras, frames).picture)}
+
+
+def _overlay(stored: Standing, new: Standing, frame: Picture) -> dict[str, bytes]:
+    """The frame with both fields on it."""
+    return {f"overlay_{stored[1].id}": jpeg(stitching.overlay(stored, new, frame))}
+
+
+def _layers(stored: Standing, new: Standing, frame: Picture, response: NDArray[np.uint8] | None) -> dict[str, bytes]:
+    """The frame, smaller, and what can be laid over it."""
+    camera = stored[1].id
+    width, height = stored[1].intrinsics.size
+    size = (min(width, FRAME_WIDTH), round(height * min(1.0, FRAME_WIDTH / width)))
+    small = np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), np.uint8)
+    drawn = {
+        f"frame_{camera}": jpeg(small, FRAME_QUALITY),
+        f"stored_{camera}": png(layers.stored_layer(*stored, size)),
+        f"new_{camera}": png(layers.new_layer(*new, size)),
+    }
+    return drawn if response is None else drawn | {f"mask_{camera}": png(layers.mask_layer(response, size))}
