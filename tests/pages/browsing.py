@@ -1,6 +1,7 @@
 """A browser on the operator's page: Debian's Chromium, and what it must never have to complain about."""
 
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -73,6 +74,17 @@ def tab(
 def look(part: Page | Locator) -> np.ndarray:
     """What is to be seen of it: BGR."""
     return cv2.imdecode(np.frombuffer(part.screenshot(), np.uint8), cv2.IMREAD_COLOR)
+
+
+def wait_until(page: Page, true: str) -> None:
+    """Until an expression of JavaScript is true.
+
+    Asked anew by the debugger each time: what Playwright leaves in a page to ask for itself is refused by its policy.
+    """
+    end = time.monotonic() + PATIENCE_MS / 1000
+    while not page.evaluate(true):
+        assert time.monotonic() < end, f"never became true: {true}"
+        page.wait_for_timeout(50)
 
 
 def differs(one: np.ndarray, other: np.ndarray) -> float:

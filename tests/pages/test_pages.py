@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.e2e import running
 from tests.e2e.running import SIZE, Service, png
-from tests.pages.browsing import differs, grave, look
+from tests.pages.browsing import differs, grave, look, wait_until
 from tests.pages.stocked import calibrations
 
 PHONE = (390, 800)
@@ -87,7 +87,7 @@ def test_the_chart_has_the_results_the_movements_and_the_line_of_the_gate(stub, 
         assert differs(drawn, without) > 0.001, name
         drawn = without
     page.get_by_label("Logarithmic").check()
-    page.wait_for_function("document.querySelectorAll('#chart canvas').length === 1")
+    wait_until(page, "document.querySelectorAll('#chart canvas').length === 1")
     assert differs(drawn, look(page.locator("#chart canvas"))) > 0.005
 
 

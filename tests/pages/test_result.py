@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from tests.pages.browsing import differs, look
+from tests.pages.browsing import differs, look, wait_until
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def test_the_slider_shows_the_stored_poses_on_its_left_and_the_new_ones_on_its_r
         slider.press(key)
         expect(slider).to_have_attribute("aria-valuenow", value)
         # The library glides.
-        venue.wait_for_function("!document.querySelector('img-comparison-slider').shadowRoot.getAnimations().length")
+        wait_until(venue, "!document.querySelector('img-comparison-slider').shadowRoot.getAnimations().length")
         return look(picture)
 
     half = look(picture)
