@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 import time
 import uuid
-from urllib.parse import parse_qs
 
 import structlog
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders, QueryParams
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.metrics import Metrics
@@ -62,7 +61,7 @@ class Access:
         method = scope["method"] if scope["method"] in METHODS else "other"
         self._metrics.requests.labels(method, route, status).inc()
         # An answer that waits for a job's end would hide how fast the others are.
-        held = "?wait" if route == "/jobs/{job_id}" and b"wait" in parse_qs(scope["query_string"]) else ""
+        held = "?wait" if route == "/jobs/{job_id}" and "wait" in QueryParams(scope["query_string"]) else ""
         self._metrics.seconds.labels(method, route + held).observe(seconds)
         say = log.debug if scope["path"] in QUIET else log.info
         say("request", method=scope["method"], path=scope["path"], status=status, seconds=round(seconds, 4))

@@ -163,7 +163,7 @@ def venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
 @router.post(
     "/{venue_id}/restore",
     openapi_extra=needs("calibrate"),
-    responses={200: headers("ETag"), **problems(404, 408, 409, 412, 413, 415)},
+    responses={200: headers("ETag"), **problems(400, 404, 408, 409, 412, 413, 415)},
 )
 def restore_venue(
     venue_id: VenueIdPath,

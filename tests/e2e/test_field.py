@@ -5,7 +5,7 @@ import json
 import pytest
 
 from tests.e2e.running import upload
-from tests.e2e.test_commandline import FRAMES, esc  # noqa: F401  (a fixture)
+from tests.e2e.test_commandline import FRAMES
 
 
 def fit(service, name, options=None, headers=None, files=None):
@@ -53,7 +53,7 @@ def test_what_is_wrong_with_a_request_is_said_at_once(service, name):
 
 
 @pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3)])
-def test_esc_fits_the_field_of_a_stored_venue(service, esc, name, tmp_path, behaviour, code):  # noqa: F811
+def test_esc_fits_the_field_of_a_stored_venue(service, esc, name, tmp_path, behaviour, code):
     service.venue(name, behaviour)
     done = esc("field", "fit", name, *FRAMES, "-o", "fitted.json", "--pictures", "seen")
     assert done.returncode == code, done.stderr
@@ -66,7 +66,7 @@ def test_esc_fits_the_field_of_a_stored_venue(service, esc, name, tmp_path, beha
         assert service.http.get(f"/venues/{name}").json()["field"]["length_m"] == 104.25
 
 
-def test_neither_a_file_nor_an_id_is_a_usage_error(esc):  # noqa: F811
+def test_neither_a_file_nor_an_id_is_a_usage_error(esc):
     done = esc("field", "fit", "No Such.json", *FRAMES, "-o", "fitted.json")
     assert done.returncode == 2
     assert "There is no file No Such.json" in done.stderr

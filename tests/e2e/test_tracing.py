@@ -98,7 +98,13 @@ def test_a_trace_goes_from_the_caller_through_the_request_to_the_stages_of_the_j
     assert request.name == "POST /venues/{venue_id}/calibrate"
     (whole,) = [span for span in ours if span.name == "job"]
     assert whole.parent_span_id == request.span_id
-    assert attributes(whole) == {"esc.job": job, "esc.venue": "v", "esc.attempt": 1, "esc.outcome": "accepted"}
+    assert attributes(whole) == {
+        "esc.job": job,
+        "esc.kind": "calibration",
+        "esc.venue": "v",
+        "esc.attempt": 1,
+        "esc.outcome": "accepted",
+    }
     stages = sorted(
         (span for span in ours if span.parent_span_id == whole.span_id), key=lambda s: s.start_time_unix_nano
     )

@@ -192,7 +192,7 @@ def test_options_may_come_as_a_file_but_once(service, stadium):
 def test_what_is_no_form_is_refused(service, stadium):
     url = f"/venues/{stadium}/calibrate"
     assert service.http.post(url, json={}).json()["type"] == "/problems/not-multipart"
-    assert service.http.post(url).json()["type"] == "/problems/not-multipart"
+    assert service.http.post(url).json()["type"] == "/problems/missing-camera"
     no_boundary = service.http.post(url, content=b"x", headers={"Content-Type": "multipart/form-data"})
     assert no_boundary.json()["type"] == "/problems/malformed-request"
     torn = {"Content-Type": "multipart/form-data; boundary=x"}
@@ -223,6 +223,7 @@ def test_refused_frames_leave_nothing_behind(service, send):
         ("GET", "/jobs?cursor=%00"),
         ("GET", "/jobs?limit=1e9"),
         ("GET", "/jobs?venue=%ff"),
+        ("GET", "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D?%cb=1"),
         ("GET", "/venues/%00"),
         ("GET", "/venues/UPPER"),
         ("PATCH", "/venues"),

@@ -6,9 +6,10 @@ from io import BytesIO
 import pytest
 from starlette.datastructures import FormData, UploadFile
 
+from service import intake
 from service.app import open_context
 from service.problems import Problem
-from service.routes import calibrate, uploads
+from service.routes import calibrate
 from service.schemas import VenueIn
 from service.settings import Settings
 from service.store.jobs import Origin
@@ -78,7 +79,7 @@ def test_frames_that_were_checked_against_another_venue_are_to_be_sent_again(con
 
 
 def test_frames_are_on_the_list_of_what_goes_until_they_are_a_job(context, read, form, monkeypatch):
-    later = datetime.now(UTC) + 2 * uploads.UPLOAD_GRACE
+    later = datetime.now(UTC) + 2 * intake.UPLOAD_GRACE
 
     def killed(*_):
         raise KeyboardInterrupt
