@@ -12,7 +12,7 @@ from service.settings import Settings
 
 Polyline = list[list[float]]
 # Clicks come a second apart; a pose takes less.
-_poses = OneAtATime("first pose", longest_s=60, again_s=1)
+_poses = OneAtATime("first pose", longest_s=60, again_s=1, patience_s=10)
 
 
 class ClickedCamera(Wire):

@@ -16,15 +16,15 @@ log = structlog.get_logger()
 
 
 class OneAtATime:
-    """Runs of a program, one after the other; whoever comes meanwhile is told to come again."""
+    """Runs of a program, one after the other; whoever comes meanwhile waits a little, then is told to come again."""
 
-    def __init__(self, what: str, longest_s: float, again_s: int) -> None:
-        self._what, self._longest_s, self._again_s = what, longest_s, again_s
+    def __init__(self, what: str, longest_s: float, again_s: int, patience_s: float) -> None:
+        self._what, self._longest_s, self._again_s, self._patience_s = what, longest_s, again_s, patience_s
         self._turn = threading.Lock()
 
     def run(self, command: Sequence[str], environment: Mapping[str, str], given: bytes) -> bytes:
         """What the program writes to its standard output for what it is `given` on its input."""
-        if not self._turn.acquire(blocking=False):
+        if not self._turn.acquire(timeout=self._patience_s):
             raise Problem(
                 "unavailable", f"Another {self._what} is being made.", headers={"Retry-After": str(self._again_s)}
             )

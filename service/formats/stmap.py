@@ -9,7 +9,7 @@ from service.formats.lens import Shot
 from service.programs import OneAtATime
 
 # A 4K lens takes 10 s of one core, and its maps 100 MB.
-_maps = OneAtATime("set of ST maps", longest_s=60, again_s=10)
+_maps = OneAtATime("set of ST maps", longest_s=60, again_s=10, patience_s=0)
 
 
 def write(
