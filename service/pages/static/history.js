@@ -1,6 +1,6 @@
 // Stitch error and movement of a venue over time, with the line of the gate.
 
-import {axis, fill} from "./chart.js";
+import {CLOCK, axis, fill} from "./chart.js";
 import {call, onScheme, say, styled} from "./page.js";
 
 const place = document.getElementById("chart");
@@ -27,7 +27,7 @@ function draw(history) {
   const movement = logarithmic.checked ? {distr} : {distr, range: (plot, low, high) => [0, Math.max(high || 0, 1) * 1.08]};
   fill(place, {
     scales: {x: {time: true, range: around}, px: scale, moved: movement},
-    axes: [axis({}), axis({scale: "px", label: "stitch error, px (10 cm on the pitch)", size: 60}), axis({scale: "moved", side: 1, label: "moved, px in the picture", size: 60, grid: {show: false}})],
+    axes: [axis({values: CLOCK}), axis({scale: "px", label: "stitch error, px (10 cm on the pitch)", size: 60}), axis({scale: "moved", side: 1, label: "moved, px in the picture", size: 60, grid: {show: false}})],
     series: [
       {label: "Ended", value: "{YYYY}-{MM}-{DD} {HH}:{mm}"},
       {label: "Stitch error", scale: "px", stroke: styled("--good"), width: 2, points, value: px, spanGaps: true},
