@@ -31,6 +31,7 @@ SEEDS, STARTS = 3, 100
 SLOW_VENUES = ("pair-match-1", "apart-match", "pair-real-1", "apart-real")
 HOURLY_VENUES = ("one-match", "pair-match-1", "one-real", "pair-real-1")
 QUICK_VENUES = ("pair-match-1", "pair-real-1", "one-real")
+QUICK_SECTIONS = ("table", "capture", "convergence")
 PAPER = {
     "Start": "14.3 ± 3.5 | 16.2 ± 1.3 | 2.1 ± 0.4 | 96.2 ± 0.9",
     "Zhang (clicked corners)": "10.2 ± 1.1 | 5.0 ± 0.5 | 1.0 ± 0.1 | 98.3 ± 0.5",
@@ -45,8 +46,10 @@ WEIGHTS = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 def main() -> None:
     """Run what is asked for and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="three venues, one seed, ten starts, no slow presets")
-    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=list(SECTIONS))
+    parser.add_argument(
+        "--quick", action="store_true", help="five minutes: three venues, one seed, ten starts, no slow presets"
+    )
+    parser.add_argument("--only", nargs="+", choices=SECTIONS, help="instead of all, or of the quick ones")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of each method on each venue")
     parser.add_argument("--slow-seeds", type=int, help="of the presets that take a minute")
     parser.add_argument("--starts", type=int, default=STARTS, help="of each size, to be caught")
@@ -54,6 +57,8 @@ def main() -> None:
     options.venues = QUICK_VENUES if options.quick else tuple(VENUES)
     if options.quick:
         options.seeds, options.starts = 1, 10
+    if options.only is None:
+        options.only = QUICK_SECTIONS if options.quick else tuple(SECTIONS)
     if options.slow_seeds is None:
         options.slow_seeds = 0 if options.quick else 1
     cv2.setNumThreads(THREADS)
