@@ -142,7 +142,7 @@ def exchanged(of: Camera) -> Camera:
 @pytest.mark.timeout(900)
 def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stock, monkeypatch):
     # Nobody looks at the pictures.
-    monkeypatch.setattr(job, "_draw", lambda *_: {})
+    monkeypatch.setattr(job, "draw", lambda *_: {})
     year = Year(stock)
 
     year.pass_(1)
