@@ -1,7 +1,6 @@
 """A browser on the operator's page: Debian's Chromium, and what it must never have to complain about."""
 
 import shutil
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+
+from tests.e2e.running import wait_for
 
 ARGUMENTS = [
     "--headless",
@@ -81,10 +82,7 @@ def wait_until(page: Page, true: str) -> None:
 
     Asked anew by the debugger each time: what Playwright leaves in a page to ask for itself is refused by its policy.
     """
-    end = time.monotonic() + PATIENCE_MS / 1000
-    while not page.evaluate(true):
-        assert time.monotonic() < end, f"never became true: {true}"
-        page.wait_for_timeout(50)
+    wait_for(lambda: page.evaluate(true), PATIENCE_MS / 1000)
 
 
 def differs(one: np.ndarray, other: np.ndarray) -> float:

@@ -72,8 +72,13 @@ class Residuals:
 
 def moved(camera: Camera, change: Array) -> Camera:
     """The camera turned by change[:3] (rad, in its own frame) and shifted by change[3:] (m, in the world)."""
-    rotation = rotation_vectors(rotation_matrices(change[:3]) @ camera.pose.matrix)
-    return camera.with_pose(Pose(rotation, camera.pose.position + change[3:]))
+    return camera.with_pose(Pose(*_after(camera.pose, change)))
+
+
+def _after(pose: Pose, changes: Array) -> tuple[Array, Array]:
+    """Rotations and positions (..., 3) of a pose after changes (..., 6), see `moved`."""
+    rotations = rotation_vectors(rotation_matrices(changes[..., :3]) @ pose.matrix)
+    return rotations, pose.position + changes[..., 3:]
 
 
 def change_between(before: Camera, after: Camera) -> Array:
@@ -135,7 +140,9 @@ class _View:
         cls, points: Array, cameras: Sequence[Camera], index: int, measured: Measurements, unknowns: Unknowns
     ) -> _View:
         here = points[measured.index]
-        pixels = project(here, *_small_changes(cameras[index].pose), cameras[index].intrinsics)
+        # A step forward and one back in each number, and none.
+        changes = np.concatenate([JACOBIAN_STEP * np.eye(POSE), -JACOBIAN_STEP * np.eye(POSE), np.zeros((1, POSE))])
+        pixels = project(here, *_after(cameras[index].pose, changes), cameras[index].intrinsics)
         expected = np.einsum("pmi,mi->pm", pixels, measured.normal)
         offset = np.sum(measured.pixel * measured.normal, axis=1) - expected[-1]
         jacobian = np.zeros((len(measured), unknowns.dense))
@@ -144,12 +151,6 @@ class _View:
             jacobian[:, column] = -_slope(here, cameras[index], index, measured, parameter)
         known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         return cls(measured[known], offset[known], jacobian[known])
-
-
-def _small_changes(pose: Pose) -> tuple[Array, Array]:
-    """Rotations and positions (13, 3) of a pose after a step forward, a step back in each number, and none."""
-    changes = np.concatenate([JACOBIAN_STEP * np.eye(POSE), -JACOBIAN_STEP * np.eye(POSE), np.zeros((1, POSE))])
-    return rotation_vectors(rotation_matrices(changes[:, :3]) @ pose.matrix), pose.position + changes[:, 3:]
 
 
 def _slope(points: Array, camera: Camera, index: int, measured: Measurements, parameter: Parameter) -> Array | float:
