@@ -18,7 +18,7 @@ from models.training.cache import start_workers
 from models.training.evaluate import rendered
 from models.training.export import export, load
 from models.training.network import LEAK
-from worker.calibration.segmentation import Segmenter
+from worker.calibration.see.segmentation import Segmenter
 
 FOLDER = Path("runs/ablation")
 STEPS = 2000

@@ -24,9 +24,9 @@ from models.training.crops import random_crop, random_view
 from models.training.noise import Plane
 from models.training.render import Conditions, Rendering
 from models.training.surface import ground_patch, marking_distance, marking_shares, window_rays
-from worker.calibration.camera import LENSES, Camera, Pose
-from worker.calibration.field import Field
-from worker.calibration.segmentation import Segmenter, whole_frame
+from worker.calibration.scene.camera import LENSES, Camera, Pose
+from worker.calibration.scene.field import Field
+from worker.calibration.see.segmentation import Segmenter, whole_frame
 
 TOLERANCE_PX = 3
 AROUND_PITCH_M = 5.0

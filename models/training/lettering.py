@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.training.colours import Colour, random_colour
-from worker.calibration.field import Field
+from worker.calibration.scene.field import Field
 
 TEXEL_M = 0.04
 HERSHEY = (

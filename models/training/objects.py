@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from models.training.colours import Colour, hsv, random_colour
 from models.training.conditions import Conditions
 from models.training.world import World
-from worker.calibration.camera import Array, Camera
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.field import Field
 
 SHIFT = 4
 GOAL_HALF_WIDTH_M, GOAL_HEIGHT_M = 3.66, 2.44

@@ -18,8 +18,8 @@ from models.training.objects import Canvas, draw_objects
 from models.training.sensor import add_air, expose
 from models.training.surface import shade_ground, window_rays
 from models.training.world import World, build_world
-from worker.calibration.camera import Camera
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.field import Field
 
 __all__ = ["Conditions", "Rendering", "render_frame", "render_window"]
 

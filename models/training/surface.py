@@ -12,8 +12,8 @@ from models.training.conditions import Conditions
 from models.training.lettering import Letters
 from models.training.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
 from models.training.world import World
-from worker.calibration.camera import Camera
-from worker.calibration.field import Field, Marking
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.field import Field, Marking
 
 FARTHEST_M = 2500.0
 LEARNT_WIDTH_PX = 1.5

@@ -14,7 +14,7 @@ from models.training.colours import Colour, hsv, random_colour
 from models.training.conditions import Conditions
 from models.training.lettering import Letters, random_letters
 from models.training.noise import Noise
-from worker.calibration.field import Field
+from worker.calibration.scene.field import Field
 
 SIDES = ("near", "far", "left", "right")
 

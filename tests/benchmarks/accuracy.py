@@ -23,7 +23,7 @@ from tests.benchmarks.methods import METHODS, SLOW, THREADS, Seen, engine
 from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, VENUES, Scene, scene, started
 from tests.benchmarks.truth import Errors, apart, errors
 from worker.calibration.calibrate import Options, Progress, calibrate
-from worker.calibration.camera import Camera
+from worker.calibration.scene.camera import Camera
 
 ROWS = FOLDER / "rows.jsonl"
 CAUGHT_M, CAUGHT_DEG = 0.01, 0.01

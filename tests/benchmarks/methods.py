@@ -14,9 +14,9 @@ from models import MODEL_PATH
 from tests.benchmarks.scenes import Scene
 from tests.benchmarks.truth import apart_by_homography_px, overlapping
 from worker.calibration.calibrate import Calibration, Options, calibrate
-from worker.calibration.camera import Camera, Frame, Pose, inside
-from worker.calibration.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD, genome_of, with_genome
-from worker.calibration.segmentation import Region, Segmenter, whole_frame
+from worker.calibration.scene.camera import Camera, Frame, Pose, inside
+from worker.calibration.search.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD, genome_of, with_genome
+from worker.calibration.see.segmentation import Region, Segmenter, whole_frame
 
 THREADS = 2
 CLICK_NOISE_PX = 2.0

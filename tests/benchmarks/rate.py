@@ -25,9 +25,9 @@ import psycopg
 import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
-from service.schemas import CameraResult, Moved, Options, Pose, Progress, Provenance, Result, VenueIn
 from service.store import tables
 from service.store.engine import connect, migrate, writing
+from service.wire.schemas import CameraResult, Moved, Options, Pose, Progress, Provenance, Result, VenueIn
 from tests.e2e.running import upload, venue, wait_for
 from tests.homes import postgres_binaries, postgres_server
 from worker.message import Message

@@ -19,10 +19,10 @@ import numpy as np
 from rich.console import Console
 
 from service.client import Client
-from service.schemas import Job, VenueIn
+from service.wire.schemas import Job, VenueIn
 from tests.demo.__main__ import service
 from tests.real.pair import FOLDER, RealPair
-from worker.calibration.camera import Pose, rotation_angles_deg
+from worker.calibration.scene.camera import Pose, rotation_angles_deg
 
 CAUGHT_PX = 5.0
 console = Console(highlight=False, soft_wrap=True)

@@ -18,8 +18,8 @@ import numpy as np
 from models.training.conditions import Conditions
 from models.training.render import render_frame
 from tests.demo.render import outdated
-from worker.calibration.camera import Camera, Frame, Intrinsics, Pose
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Camera, Frame, Intrinsics, Pose
+from worker.calibration.scene.field import Field
 
 FOLDER = Path("runs/bench")
 SIZE = (3840, 2160)

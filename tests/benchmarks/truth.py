@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from tests.benchmarks.scenes import Scene
-from worker.calibration.camera import Camera, Intrinsics, inside, rotation_angles_deg
+from worker.calibration.scene.camera import Camera, Intrinsics, inside, rotation_angles_deg
 
 GRID_M = 0.5
 

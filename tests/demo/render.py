@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from models.training.render import Conditions, render_frame
-from worker.calibration.camera import Camera, Intrinsics, Pose, rotation_matrices, rotation_vectors
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Camera, Intrinsics, Pose, rotation_matrices, rotation_vectors
+from worker.calibration.scene.field import Field
 
 HERE = Path(__file__).parent
 SIZE = (3840, 2160)

@@ -10,8 +10,8 @@ from models.training.conditions import LIGHTS, NAMED
 from models.training.crops import random_view
 from models.training.render import Conditions, render_frame, render_window
 from models.training.venues import random_camera, random_field
-from worker.calibration.camera import Camera, Intrinsics, Pose, inside
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Camera, Intrinsics, Pose, inside
+from worker.calibration.scene.field import Field
 
 FIELD = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
 SIZE = (480, 270)

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from models.training.evaluate import real_cameras
-from worker.calibration.camera import Camera, Pose
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Camera, Pose
+from worker.calibration.scene.field import Field
 
 FOLDER = Path(__file__).parents[3] / "shared" / "real" / "tsukuba"
 

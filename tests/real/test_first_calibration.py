@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from tests.real.pair import FOLDER
-from worker.calibration.camera import Camera, Intrinsics, Pose
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Camera, Intrinsics, Pose
+from worker.calibration.scene.field import Field
 
 pytestmark = [pytest.mark.real, pytest.mark.timeout(1200)]
 DOCUMENT = Path(__file__).parents[2] / "docs" / "first-calibration.md"

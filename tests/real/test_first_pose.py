@@ -8,12 +8,12 @@ import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.real.pair import FOLDER
-from worker.calibration.boards import Board, find_board
 from worker.calibration.calibrate import Options, calibrate
-from worker.calibration.firstpose import first_pose
-from worker.calibration.lenscalibration import Photo, calibrate_lens
-from worker.calibration.pointfit import Clicks
-from worker.calibration.segmentation import Segmenter
+from worker.calibration.first.boards import Board, find_board
+from worker.calibration.first.first_pose import first_pose
+from worker.calibration.first.lens_calibration import Photo, calibrate_lens
+from worker.calibration.first.point_fit import Clicks
+from worker.calibration.see.segmentation import Segmenter
 
 pytestmark = pytest.mark.real
 BOARD = Board(9, 5, 0.1)

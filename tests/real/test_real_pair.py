@@ -4,7 +4,7 @@ import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
 from worker.calibration.calibrate import Options, calibrate
-from worker.calibration.segmentation import Segmenter
+from worker.calibration.see.segmentation import Segmenter
 
 pytestmark = pytest.mark.real
 

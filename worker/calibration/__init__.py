@@ -1,0 +1,1 @@
+"""The engine: arrays in, arrays out, by the stages of the paper."""

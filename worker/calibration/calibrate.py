@@ -11,12 +11,9 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.camera import Array, Camera, Frame, Intrinsics, Pose
-from worker.calibration.diagnosis import Suspicion, suspicions
-from worker.calibration.field import Field
-from worker.calibration.linemeasurement import brightness_of
-from worker.calibration.parameters import Parameter, free_focal_lengths, free_ridge
-from worker.calibration.quality import (
+from worker.calibration.finish.diagnosis import Suspicion, suspicions
+from worker.calibration.finish.refinement import Refined, Sight, assess, refine
+from worker.calibration.judge.quality import (
     CameraQuality,
     Gate,
     Movement,
@@ -26,12 +23,15 @@ from worker.calibration.quality import (
     rejection,
     ridge_rejection,
 )
-from worker.calibration.refinement import Refined, Sight, assess, refine
-from worker.calibration.registration import pairs_in_common, stitch_error_px
-from worker.calibration.sampling import median
-from worker.calibration.search import ALONE_ON_THE_GROUND, COARSE_TO_FINE, ON_THE_GROUND, Level, Strategy, search
-from worker.calibration.segmentation import Region, reachable_regions
-from worker.calibration.visibility import SeenLines
+from worker.calibration.judge.registration import pairs_in_common, stitch_error_px
+from worker.calibration.scene.camera import Array, Camera, Frame, Intrinsics, Pose
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.parameters import Parameter, free_focal_lengths, free_ridge
+from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.search.search import ALONE_ON_THE_GROUND, COARSE_TO_FINE, ON_THE_GROUND, Level, Strategy, search
+from worker.calibration.see.line_measurement import brightness_of
+from worker.calibration.see.sampling import median
+from worker.calibration.see.segmentation import Region, reachable_regions
 
 Response = NDArray[np.float32]
 Preset = Literal["esc", "paper", "scpr"]

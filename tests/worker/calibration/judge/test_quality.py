@@ -1,0 +1,106 @@
+"""Quality without ground truth, and the gate."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings
+from worker.calibration.judge.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
+
+
+@cache
+def scene():
+    one = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
+    return one, paint_markings(CROWNED, one)
+
+
+PAIR = [(scene()[0], scene()[0])]
+
+
+def good():
+    return CameraQuality(scene()[0], 0.9, 0.3, 0.2, Sigma(0.5, 0.1), Sigma(0.01, 0.01), Movement(0.5, 0.1, 12.0))
+
+
+def test_the_true_pose_explains_the_markings():
+    one, response = scene()
+    assert markings_iou(CROWNED, one, response) > 0.7
+
+
+def test_a_moved_pose_explains_fewer():
+    one, response = scene()
+    assert markings_iou(CROWNED, moved(one, (0.02, 0, 0)), response) < 0.4
+
+
+def test_markings_beside_the_expected_ones_count_against_a_pose():
+    one, response = scene()
+    cluttered = response.copy()
+    cluttered[300:330:4, 200:700] = 1
+    assert markings_iou(CROWNED, one, cluttered) < markings_iou(CROWNED, one, response)
+
+
+def test_what_is_off_the_pitch_does_not_count():
+    one, response = scene()
+    lettering = response.copy()
+    lettering[:60] = 1  # sky
+    assert markings_iou(CROWNED, one, lettering) == pytest.approx(markings_iou(CROWNED, one, response))
+
+
+def test_a_black_segmentation_explains_nothing():
+    one, response = scene()
+    assert markings_iou(CROWNED, one, np.zeros_like(response)) == 0
+
+
+def test_a_pose_that_sees_no_pitch_explains_nothing():
+    one, response = scene()
+    assert markings_iou(CROWNED, moved(one, (2.0, 0, 0)), response) == 0
+
+
+def test_a_good_result_passes_the_gate():
+    assert rejection([good(), good()], PAIR, 0.3, Gate()) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        ({"iou": 0.1}, "do not fit this pitch"),
+        ({"residual_px": None}, "fewer than 30 points"),
+        ({"repeatability": None}, "fewer than 30 points"),
+        ({"residual_px": 9.0}, "px from where the pose puts them"),
+        ({"repeatability": Sigma(1.0, 0.1)}, "do not determine"),
+        ({"repeatability": Sigma(0.01, 2.0)}, "do not determine"),
+        ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
+        ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
+        ({"iou_before": 0.99}, "stored pose fits the frame better"),
+    ],
+)
+def test_the_gate_names_the_camera_and_the_cause(change, cause):
+    reason = rejection([replace(good(), **change)], [], None, Gate())
+    assert reason.startswith("camera left: ")
+    assert cause in reason
+
+
+def test_cameras_that_do_not_fit_each_other_do_not_pass():
+    assert "stitch error 4.00 px" in rejection([good(), good()], PAIR, 4.0, Gate())
+
+
+def test_cameras_that_should_overlap_and_cannot_be_compared_do_not_pass():
+    assert "left and left should show the same markings" in rejection([good(), good()], PAIR, None, Gate())
+    assert rejection([good(), good()], [], None, Gate()) is None
+
+
+def test_every_bad_camera_is_named():
+    left, right = replace(good(), iou=0.1), replace(good(), camera=replace(scene()[0], id="right"), residual_px=9.0)
+    reason = rejection([left, right], [], None, Gate())
+    assert "camera left: " in reason
+    assert "camera right: " in reason
+
+
+def test_movement_is_told_in_degrees_metres_and_pixels():
+    one, _ = scene()
+    turned = Movement.between(PITCH, one, moved(one, by=(0.3, 0, 0.4)))
+    assert turned.rotation_deg == pytest.approx(0)
+    assert turned.position_m == pytest.approx(0.5)
+    assert turned.pixels > 1
+    assert Movement.between(PITCH, one, one) == Movement(0.0, 0.0, 0.0)

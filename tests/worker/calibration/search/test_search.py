@@ -1,0 +1,67 @@
+"""The levels of a search: who hands over to whom, and when."""
+
+import numpy as np
+
+from tests.worker.calibration.synthetic import CROWNED, pair
+from worker.calibration.search.search import Level, Strategy, genome_of, search, with_genome
+
+
+class Bowl:
+    """A loss that is least at `bottom` and known to a step of `coarseness`."""
+
+    def __init__(self, bottom, coarseness):
+        self.bottom, self.coarseness = bottom, coarseness
+
+    def losses(self, genomes):
+        return np.floor(np.linalg.norm(genomes - self.bottom, axis=1) / self.coarseness) * self.coarseness
+
+
+def searched(levels, generations):
+    cameras, steps = pair(), []
+    strategy = Strategy(16, 32, generations, 0.5)
+    rng = np.random.default_rng(0)
+    found = search(
+        CROWNED,
+        cameras,
+        [None] * len(cameras),
+        levels,
+        strategy,
+        rng,
+        lambda number, loss: steps.append((number, loss)),
+    )
+    return found, steps
+
+
+def level(coarseness, patience=None, by=0.05):
+    bottom = genome_of(pair()) + by
+    return Level(1.0, lambda *_: Bowl(bottom, coarseness), patience)
+
+
+def test_a_level_in_which_nothing_moves_ends_early_and_the_next_one_begins():
+    found, steps = searched([level(1e3, patience=6), level(1e-6)], 40)
+    assert found.generations == 6 + 20
+    assert [number for number, _ in steps] == list(range(1, 27))
+
+
+def test_a_level_without_patience_uses_all_its_generations():
+    found, _ = searched([level(1e3)], 40)
+    assert found.generations == 40
+
+
+def test_the_best_never_gets_worse_within_a_level():
+    _, steps = searched([level(1e-6)], 30)
+    losses = [loss for _, loss in steps]
+    assert losses == sorted(losses, reverse=True)
+
+
+def test_generations_are_shared_among_the_levels():
+    found, _ = searched([level(1e-6), level(1e-6), level(1e-6)], 10)
+    assert found.generations == 10
+
+
+def test_a_genome_is_the_poses_of_all_cameras():
+    cameras = pair()
+    again = with_genome(cameras, genome_of(cameras))
+    for before, after in zip(cameras, again, strict=True):
+        np.testing.assert_array_equal(before.pose.rotation, after.pose.rotation)
+        np.testing.assert_array_equal(before.pose.position, after.pose.position)

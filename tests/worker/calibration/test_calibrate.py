@@ -1,0 +1,160 @@
+"""The whole engine on painted frames, with a segmentation that sees white on green."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame, pair
+from worker.calibration.calibrate import CalibrationError, Options, Stopped, calibrate
+from worker.calibration.judge.quality import Gate, ridge_rejection
+from worker.calibration.scene.camera import rotation_angles_deg
+from worker.calibration.scene.parameters import free_focal_lengths
+
+TURN = (0.006, -0.005, 0.004)
+SHIFT = (0.05, -0.06, 0.04)
+
+
+@cache
+def frames():
+    return {c.id: (paint_frame(CROWNED, c),) for c in pair()}
+
+
+def white_on_green(frame, regions):
+    assert regions
+    is_sky = (frame[..., 0] > 200) & (frame[..., 2] < 200)
+    whiteness = np.clip((frame.min(axis=-1) - 70.0) * 2, 0, 255)
+    return np.where(is_sky, 0, whiteness).astype(np.uint8)
+
+
+def outdated():
+    return [moved(c, TURN, SHIFT) for c in pair()]
+
+
+def run(cameras=None, pictures=None, **options):
+    return calibrate(CROWNED, cameras or outdated(), pictures or frames(), white_on_green, Options(**options))
+
+
+@cache
+def result():
+    return run(seed=3)
+
+
+def test_outdated_poses_are_found_again():
+    for truth, found in zip(pair(), result().cameras, strict=True):
+        assert np.linalg.norm(found.pose.position - truth.pose.position) < 0.03
+        assert rotation_angles_deg(found.pose.rotation, truth.pose.rotation) < 0.02
+    assert result().accepted
+
+
+def test_the_stitch_error_falls():
+    assert result().stitch_error_before_px > 1
+    assert result().stitch_error_px < 0.2
+
+
+def test_what_moved_is_told():
+    for found, was in zip(result().cameras, outdated(), strict=True):
+        assert found.moved.position_m == pytest.approx(np.linalg.norm(SHIFT), abs=0.03)
+        assert found.moved.rotation_deg == pytest.approx(
+            rotation_angles_deg(found.pose.rotation, was.pose.rotation), abs=1e-9
+        )
+
+
+def test_the_same_seed_gives_the_same_poses_to_the_last_digit():
+    again = run(seed=3)
+    for first, second in zip(result().cameras, again.cameras, strict=True):
+        np.testing.assert_array_equal(first.pose.rotation, second.pose.rotation)
+        np.testing.assert_array_equal(first.pose.position, second.pose.position)
+
+
+def test_one_camera_alone_has_no_stitch_error():
+    found = run(cameras=outdated()[:1])
+    assert found.stitch_error_px is None
+    assert found.accepted
+
+
+def test_black_frames_are_rejected_and_the_camera_is_named():
+    dark = {"left": frames()["left"], "right": (np.zeros_like(frames()["right"][0]),)}
+    found = run(pictures=dark)
+    assert found.rejected_because.startswith("camera right: ")
+
+
+def test_frames_of_another_place_are_rejected():
+    elsewhere = {name: (np.ascontiguousarray(f[0][::-1, ::-1]),) for name, f in frames().items()}
+    assert not run(pictures=elsewhere).accepted
+
+
+def test_a_stored_pose_that_looks_at_the_sky_is_an_error_that_names_the_camera():
+    left, right = outdated()
+    with pytest.raises(CalibrationError, match="camera right sees") as caught:
+        run(cameras=[left, moved(right, (1.2, 0, 0))])
+    assert caught.value.camera == "right"
+
+
+def test_what_walks_through_one_of_three_frames_does_not_matter():
+    with_player = {name: [f[0].copy() for _ in range(3)] for name, f in frames().items()}
+    with_player["left"][1][200:400, 500:560] = 255
+    found = run(pictures=with_player)
+    for truth, camera in zip(pair(), found.cameras, strict=True):
+        assert np.linalg.norm(camera.pose.position - truth.pose.position) < 0.03
+
+
+def test_progress_runs_through_the_stages_and_never_back():
+    steps = []
+    calibrate(CROWNED, outdated(), frames(), white_on_green, Options(generations=10), steps.append)
+    fractions = [step.fraction for step in steps]
+    assert fractions == sorted(fractions)
+    assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]
+    assert [step.generation for step in steps if step.stage == "evolution"] == list(range(1, 11))
+
+
+def test_a_request_to_stop_ends_it_at_the_next_generation():
+    seen = []
+
+    def stop():
+        return sum(step.stage == "evolution" for step in seen) >= 3
+
+    with pytest.raises(Stopped):
+        calibrate(CROWNED, outdated(), frames(), white_on_green, Options(), seen.append, stop)
+    assert sum(step.stage == "evolution" for step in seen) == 3
+
+
+@pytest.mark.parametrize("preset", ["paper", "scpr"])
+def test_the_papers_presets_run_through_the_same_door(preset):
+    found = run(preset=preset, generations=2, parents=4, offspring=4)
+    assert found.generations == 2
+    assert len(found.cameras) == 2
+
+
+def with_longer_lens(camera, by):
+    return free_focal_lengths([camera])[0].applied([camera], CROWNED, by)[0][0]
+
+
+def test_a_focal_length_that_heat_has_changed_is_found_when_asked_for():
+    left, right = outdated()
+    found = run(cameras=[with_longer_lens(left, 2.0), right], fit_focal_length=True)
+    assert found.accepted
+    assert found.cameras[0].intrinsics.matrix[0, 0] == pytest.approx(600.0, abs=0.3)
+    assert run(cameras=[with_longer_lens(left, 2.0), right]).cameras[0].intrinsics.matrix[0, 0] == 602.0
+
+
+def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers():
+    left, right = outdated()
+    other = replace(left.intrinsics, distortion=left.intrinsics.distortion + [0.02, 0, 0, 0, 0])
+    found = run(cameras=[replace(left, intrinsics=other), right])
+    told = {(s.camera, s.quantity): s for s in found.suspicions}
+    assert told["left", "k1"].deviation == pytest.approx(-0.02, abs=3 * told["left", "k1"].sigma)
+    assert "camera left fit best with a first radial coefficient" in told["left", "k1"].detail
+    assert result().suspicions == []
+
+
+def test_a_ridge_below_the_ground_is_rejected():
+    assert "ridge at -0.100 m" in ridge_rejection(CROWNED.raised(-0.45), Gate())
+    assert ridge_rejection(CROWNED, Gate()) is None
+    assert ridge_rejection(CROWNED.flat(), Gate()) is None
+
+
+def test_a_camera_that_sees_something_else_says_nothing_of_its_lens():
+    elsewhere = {**frames(), "left": (np.ascontiguousarray(frames()["left"][0][::-1, ::-1]),)}
+    assert {s.camera for s in run(pictures=elsewhere).suspicions} <= {"right"}

@@ -1,0 +1,98 @@
+"""The engine on fields of other sports, and on one of somebody's own: nothing in it knows football."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fields.template import Template, load
+from tests.worker.calibration.synthetic import camera, moved, paint_frame
+from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
+from worker.calibration.calibrate import Options, calibrate
+from worker.calibration.draw.stitching import birdseye, overlay
+from worker.calibration.scene.camera import rotation_angles_deg
+from worker.calibration.scene.field import Field
+
+# A tennis court, as a venue would give it: half of it, named as its owner likes.
+TENNIS = Template(
+    marking=[
+        {"name": "doubles sideline", "line": [[-11.885, -5.485], [11.885, -5.485]]},
+        {"name": "other doubles sideline", "line": [[-11.885, 5.485], [11.885, 5.485]]},
+        {"name": "singles sideline", "line": [[-11.885, -4.115], [11.885, -4.115]]},
+        {"name": "other singles sideline", "line": [[-11.885, 4.115], [11.885, 4.115]]},
+        {"name": "baseline", "line": [[-11.885, -5.485], [-11.885, 5.485]], "width": 0.1},
+        {"name": "other baseline", "line": [[11.885, -5.485], [11.885, 5.485]], "width": 0.1},
+        {"name": "service line", "line": [[-6.4, -4.115], [-6.4, 4.115]]},
+        {"name": "other service line", "line": [[6.4, -4.115], [6.4, 4.115]]},
+        {"name": "centre service line", "line": [[-6.4, 0], [6.4, 0]]},
+    ]
+)
+SPORTS = ("basketball", "futsal", "handball", "hockey", "rugby-union", "tennis")
+every_sport = pytest.mark.parametrize("sport", SPORTS)
+
+
+@cache
+def field(sport):
+    if sport == "tennis":
+        return Field(23.77, 10.97, 0.05, template=TENNIS)
+    template = load(sport)
+    size = {name: extent.default for name, extent in template.size.items()}
+    return Field(size["length"], size["width"], size["line"], template=template)
+
+
+@cache
+def cameras(sport):
+    """Two cameras side by side, as high as the field is large."""
+    length, width = field(sport).length, field(sport).width
+    lens = {"distortion": (-0.12, 0.02, 0.0, 0.0, 0.0)}
+    return [
+        camera(name, (side * 0.01 * length, -0.72 * width, 0.18 * width + 1), (side * 0.2 * length, 0.0), **lens)
+        for name, side in (("left", -1), ("right", 1))
+    ]
+
+
+@cache
+def frames(sport):
+    return {c.id: (paint_frame(field(sport), c),) for c in cameras(sport)}
+
+
+@every_sport
+def test_outdated_poses_are_found_again(sport):
+    outdated = [moved(c, TURN, SHIFT) for c in cameras(sport)]
+    found = calibrate(field(sport), outdated, frames(sport), white_on_green, Options(seed=3))
+    assert found.accepted, found.rejected_because
+    for truth, result in zip(cameras(sport), found.cameras, strict=True):
+        assert np.linalg.norm(result.pose.position - truth.pose.position) < 0.03
+        assert rotation_angles_deg(result.pose.rotation, truth.pose.rotation) < 0.05
+    assert found.stitch_error_px < 0.2
+
+
+def test_short_dashes_are_lines_and_marks_are_spots():
+    spots = {sport: {m.name for m in field(sport).markings() if m.spot} for sport in ("handball", "hockey", "futsal")}
+    assert spots["handball"] == set()
+    assert spots["hockey"] == {"left penalty spot", "right penalty spot"}
+    assert len(spots["futsal"]) == 9
+
+
+def test_the_edge_of_a_short_dash_is_drawn_along_it():
+    above = camera("above", (-11.0, 0.0, 4.0), (-11.0, 0.01), focal=2000.0)
+    dash = next(m for m in field("handball").markings() if m.name == "left free-throw line, front, dash 5")
+    grey = np.full((540, 960, 3), 90, np.uint8)
+    drawn = (overlay((field("handball"), above), (field("handball"), above), grey) != grey).any(axis=-1)
+    middle = above.project(field("handball").lift(dash.centre.mean(axis=0, keepdims=True)))[0].round().astype(int)
+    # 15 cm of it are 75 px; a disc as wide as the line would be 25 px high.
+    rows = np.flatnonzero(drawn[middle[1] - 60 : middle[1] + 61, middle[0] - 20 : middle[0] + 21].any(axis=1)) - 60
+    assert (rows.min() < -35, rows.max() > 35) == (True, True)
+
+
+def test_the_view_from_above_of_a_court_is_not_tiny():
+    pictures = {name: several[0] for name, several in frames("basketball").items()}
+    height, width, _ = birdseye(field("basketball"), cameras("basketball"), pictures).shape
+    assert width > 800
+    assert height > 400
+
+
+def test_a_flat_field_keeps_its_markings():
+    roofed = Field(28, 15, 0.05, np.array([[-5.0, 0, 0.1], [5.0, 0, 0.1]]), load("basketball"))
+    assert [marking.name for marking in roofed.flat().markings()] == [m.name for m in roofed.markings()]
+    assert roofed.flat().height(np.zeros(2)) == 0

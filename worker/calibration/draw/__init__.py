@@ -1,0 +1,1 @@
+"""Pictures and maps, for people and for programs that draw."""

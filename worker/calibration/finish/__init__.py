@@ -1,0 +1,1 @@
+"""From near the truth onto it: least squares over measured lines, and how sure that is."""

@@ -1,0 +1,111 @@
+"""Where a least squares over everything unknown stands, and its steps: cameras, pitch, and the ground under it.
+
+A weak prior holds each camera near where the search left it. Where lines tell something it changes nothing. Where they
+do not (a lone touchline) it keeps the camera from running away along them, and the covariance says how little is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from worker.calibration.finish.normal_equations import normal_equations
+from worker.calibration.finish.residuals import POSE, Unknowns, change_between, moved, residuals
+from worker.calibration.finish.robust import Weigh
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.field import Field, LinePoints
+from worker.calibration.scene.ground import UNEVEN_M
+from worker.calibration.see.line_measurement import Measurements
+
+PRIOR_RAD, PRIOR_M = 0.03, 1.0
+"""Standard deviation, per axis, of where a camera is before any line is measured."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Where the finish stands: cameras and pitch, with `values` (E,) in them, and `heights` (K,) of the ground.
+
+    `lines`: the pitch's line points, as many as it had in the beginning.
+    """
+
+    pitch: Field
+    lines: LinePoints
+    cameras: list[Camera]
+    values: Array
+    heights: Array
+    uneven_m: float = UNEVEN_M
+
+    @classmethod
+    def at(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> Estimate:
+        """Before any step."""
+        return cls(
+            pitch,
+            pitch.line_points(),
+            list(cameras),
+            np.zeros(len(unknowns.parameters)),
+            np.zeros(len(unknowns.ground)),
+        )
+
+    def on_ground(self, unknowns: Unknowns) -> LinePoints:
+        """The line points of the pitch, on its ground."""
+        up = unknowns.ground.under_points(self.heights, np.arange(len(self.lines)))
+        return replace(self.lines, position=self.lines.position + up[:, None] * [0.0, 0.0, 1.0])
+
+    def moved(self, move: Array, unknowns: Unknowns) -> Estimate:
+        """After a step (U,)."""
+        poses, values, heights = np.split(move, [POSE * unknowns.cameras, unknowns.dense])
+        pitch, cameras = self.pitch, self.cameras
+        for parameter, by in zip(unknowns.parameters, values.tolist(), strict=True):
+            cameras, pitch = parameter.applied(cameras, pitch, by)
+        lines = self.lines if pitch is self.pitch else pitch.same_line_points(self.lines)
+        cameras = [moved(camera, change) for camera, change in zip(cameras, poses.reshape(-1, POSE), strict=True)]
+        values, heights = self.values + values, self.heights + heights
+        return replace(self, pitch=pitch, lines=lines, cameras=cameras, values=values, heights=heights)
+
+    def farthest_from(self, other: Estimate) -> float:
+        """How far, in metres, the camera that moved most is from where it was in another estimate."""
+        shifts = [a.pose.position - b.pose.position for a, b in zip(self.cameras, other.cameras, strict=True)]
+        return float(np.linalg.norm(shifts, axis=1).max())
+
+    def prior(self, unknowns: Unknowns) -> Array:
+        """Information (U, U) on every unknown before any line is measured."""
+        known = np.zeros((len(unknowns), len(unknowns)))
+        poses = [PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3
+        expected = [parameter.expected**-2 for parameter in unknowns.parameters]
+        known[: unknowns.dense, : unknowns.dense] = np.diag([*(poses * unknowns.cameras), *expected])
+        known[unknowns.dense :, unknowns.dense :] = unknowns.ground.precision / self.uneven_m**2
+        return known
+
+    def away(self, found: Sequence[Camera]) -> Array:
+        """How far (U,) every unknown is from where it was `found` by the search or given."""
+        changes = [change_between(before, now) for before, now in zip(found, self.cameras, strict=True)]
+        return np.concatenate([*changes, self.values, self.heights])
+
+
+def step(
+    here: Estimate,
+    found: Sequence[Camera],
+    measured: Sequence[Measurements],
+    unknowns: Unknowns,
+    stitch_weight: float,
+    weigh: Weigh,
+) -> Estimate:
+    """One Gauss-Newton step for everything together; `found`: where the search left the cameras."""
+    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, weigh)
+    equations = normal_equations(rows, unknowns)
+    prior = here.prior(unknowns)
+    pull = equations.gradient + prior @ here.away(found)
+    move = np.asarray(np.linalg.solve(equations.information + prior, -pull), dtype=float)
+    return here.moved(move, unknowns)
+
+
+def unevenness(
+    here: Estimate, measured: Sequence[Measurements], unknowns: Unknowns, stitch_weight: float, weigh: Weigh
+) -> float:
+    """How uneven a ground the heights speak for, a standard deviation in metres."""
+    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, weigh)
+    information = normal_equations(rows, unknowns).information + here.prior(unknowns)
+    covariance = np.asarray(np.linalg.inv(information)[unknowns.dense :, unknowns.dense :], dtype=float)
+    return unknowns.ground.unevenness(here.heights, covariance, here.uneven_m)

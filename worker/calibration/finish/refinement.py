@@ -1,0 +1,152 @@
+"""The finish: all cameras at once onto the measured lines, by a robust Gauss-Newton, and how sure that is.
+
+Found with the poses: how the ground swells, and whatever number of lens or field is left free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.finish.estimate import Estimate, step, unevenness
+from worker.calibration.finish.residuals import Unknowns
+from worker.calibration.finish.robust import huber_weights, tukey_weights
+from worker.calibration.finish.uncertainty import Determined, Deviation, judge
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.field import Field, LinePoints
+from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
+from worker.calibration.scene.parameters import Parameter
+from worker.calibration.see.line_measurement import Measurements, measure_lines
+
+SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
+"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame.
+
+The last rounds are there for measurements that change with the pose, and end as soon as they do not.
+"""
+ASSESSING_SEARCH_PX = 8.0
+MOST_STEPS = 4
+"""Per round."""
+SETTLED_M = 5e-5
+"""Cameras that a step, or a whole round, moves less than this have arrived."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a finish looks at: per camera `brightness` (H, W) of its frame (`line_measurement.brightness_of`), and
+    `responses` (H, W), its segmentation in 0..1.
+    """
+
+    brightness: Sequence[NDArray[np.float32]]
+    responses: Sequence[NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Refined:
+    """The finished cameras on their pitch; per camera, None where it had too few measurements and stayed where it was:
+
+    `covariance` (6, 6) of (rotation in the camera's frame rad, position m), `repeatability` (6, 6) the same for whom
+    lenses and field are what they are said to be, `residual_px` the rms of its lines. `deviations`: what the lines say
+    of lenses and field. `found`: what was left free, in that order.
+    """
+
+    pitch: Field
+    cameras: list[Camera]
+    covariance: list[Array | None]
+    repeatability: list[Array | None]
+    residual_px: list[float | None]
+    deviations: list[Deviation]
+    found: list[Determined]
+
+
+def refine(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    sight: Sight,
+    stitch_weight: float,
+    free: Sequence[Parameter] = (),
+    searches_px: Sequence[float] = SEARCH_PX,
+) -> Refined:
+    """Measure the lines and move the cameras onto them, round by round with a narrower search.
+
+    `free`: numbers of lenses and field to be found along with the poses; pitch and cameras come back with them.
+    """
+    if stitch_weight == 0 and len(cameras) > 1 and not free:
+        return _each_alone(pitch, cameras, sight)
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
+    here = Estimate.at(pitch, cameras, unknowns)
+    for search in searches_px:
+        unknowns = unknowns.around(here.pitch, here.lines)
+        measured = measure_all(here.on_ground(unknowns), here.cameras, sight, search)
+        before = here
+        # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
+        # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
+        here = _settled(here, cameras, measured, unknowns, stitch_weight)
+        here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
+        uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
+        here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
+        if here.farthest_from(before) < SETTLED_M:
+            break
+    # Judged by a wider search than the last round's, which could not see an error larger than itself.
+    return _assessed(here, cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
+
+
+def _settled(
+    here: Estimate,
+    found: Sequence[Camera],
+    measured: Sequence[Measurements],
+    unknowns: Unknowns,
+    stitch_weight: float,
+) -> Estimate:
+    """Where Huber's loss of the same measurements is least."""
+    for _ in range(MOST_STEPS):
+        before, here = here, step(here, found, measured, unknowns, stitch_weight, huber_weights)
+        if here.farthest_from(before) < SETTLED_M:
+            break
+    return here
+
+
+def assess(
+    pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float, free: Sequence[Parameter] = ()
+) -> Refined:
+    """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
+    return _assessed(Estimate.at(pitch, cameras, unknowns), cameras, sight, unknowns, stitch_weight)
+
+
+def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
+    """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
+    return [
+        measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.relative_size)
+        for camera, bright, response in zip(cameras, sight.brightness, sight.responses, strict=True)
+    ]
+
+
+def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Refined:
+    """Cameras that need not agree, each on a ground of its own."""
+    ends = [
+        refine(pitch, [camera], Sight([bright], [response]), 0.0)
+        for camera, bright, response in zip(cameras, sight.brightness, sight.responses, strict=True)
+    ]
+    return Refined(
+        pitch,
+        [end.cameras[0] for end in ends],
+        [end.covariance[0] for end in ends],
+        [end.repeatability[0] for end in ends],
+        [end.residual_px[0] for end in ends],
+        [deviation for end in ends for deviation in end.deviations if deviation.camera is not None],
+        [],
+    )
+
+
+def _assessed(
+    here: Estimate, found: Sequence[Camera], sight: Sight, unknowns: Unknowns, stitch_weight: float
+) -> Refined:
+    measured = measure_all(here.on_ground(unknowns), here.cameras, sight, ASSESSING_SEARCH_PX)
+    # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
+    ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
+    prior, away = ordinary.prior(unknowns), here.away(found)
+    judged = judge(here.pitch, here.lines, here.cameras, measured, unknowns, here.heights, prior, away, stitch_weight)
+    return Refined(here.pitch, here.cameras, **vars(judged))

@@ -1,0 +1,175 @@
+"""How sure the finish is, and what the lines say of what it takes for known: lenses and field.
+
+Poses are found for the lenses and the field as they are given, because that is how they are used. If those are a
+little off, the poses are off with them, and no residual need show it. So the lines are asked once more, with the
+numbers of every lens and of the field unknown: the poses that are then best are nearer the truth, and how far they are
+from the poses that are answered belongs to their error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from worker.calibration.finish.normal_equations import error_of_measurement, normal_equations
+from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS, POSE, Unknowns, residuals, rms_px
+from worker.calibration.finish.robust import tukey_weights
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.field import Field, LinePoints
+from worker.calibration.scene.parameters import LensParameter, Parameter, field_parameters, lens_parameters
+from worker.calibration.see.line_measurement import Measurements
+
+TRUST, TRUST_NUMBERS = 0.05, 1.0
+"""Lens and field are thought to be off by this part of what is expected before they are seen, and how many numbers of
+evidence that is worth."""
+EVIDENCE_STEPS = 12
+LARGEST_FACTOR = 100.0
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far a number of a lens (`camera`) or of the field (None) seems to be from what it is taken for.
+
+    `sigma`: of that estimate; `expected`: how far off it is after a good calibration. In the unit that `name` ends on.
+    """
+
+    camera: str | None
+    name: str
+    value: float
+    sigma: float
+    expected: float
+
+
+@dataclass(frozen=True)
+class Determined:
+    """How well the lines fix a number that was left free: its `sigma`, with what lenses and field may be off, where
+    `expected` was how far off it might have been before. `entangled`: which other unknown number moves most with it,
+    and their correlation.
+    """
+
+    sigma: float
+    entangled: tuple[Parameter, float] | None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Per camera, None where it had too few measurements: `covariance` (6, 6), `repeatability` (6, 6), `residual_px`;
+    see `Refined`, also for `deviations` and `found`.
+    """
+
+    covariance: list[Array | None]
+    repeatability: list[Array | None]
+    residual_px: list[float | None]
+    deviations: list[Deviation]
+    found: list[Determined]
+
+
+def judge(
+    pitch: Field,
+    lines: LinePoints,
+    cameras: Sequence[Camera],
+    measured: Sequence[Measurements],
+    solved: Unknowns,
+    heights: Array,
+    prior: Array,
+    away: Array,
+    stitch_weight: float,
+) -> Judged:
+    """Judge an answer that was found with `solved` unknown; `lines` of the pitch are those that were `measured`.
+
+    `prior` (U, U): the information on them before any line was measured; `away` (U,): how far they are from it.
+    """
+    suspects = _suspects(pitch, cameras, solved)
+    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(pitch, lines)
+    rows = residuals(lines.position, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
+    equations = normal_equations(rows, unknowns)
+    kept = np.r_[: solved.dense, unknowns.dense : len(unknowns)]
+    asked = np.arange(solved.dense, unknowns.dense)
+
+    # Given the suspects, everything else follows: what is left of the equations is about the suspects alone.
+    inverse = np.linalg.inv(equations.information[np.ix_(kept, kept)] + prior)
+    left_over = equations.gradient[kept] + prior @ away
+    effect = inverse @ equations.information[np.ix_(kept, asked)]
+    information = equations.information[np.ix_(asked, asked)] - equations.information[np.ix_(asked, kept)] @ effect
+    pull = effect.T @ left_over - equations.gradient[asked]
+    certainty = _certainty(information, pull, suspects)
+    value = np.linalg.solve(information + np.diag(certainty), pull)
+    nearer = -inverse @ left_over - effect @ value
+
+    everything = np.zeros_like(equations.information)
+    everything[np.ix_(kept, kept)] = prior
+    everything[asked, asked] = certainty
+    full = np.linalg.inv(equations.information + everything)
+    measurement = error_of_measurement(rows, unknowns)
+    covariance = full @ (measurement + everything) @ full
+    alone = inverse @ (measurement[np.ix_(kept, kept)] + prior) @ inverse
+    enough = [len(found) >= FEWEST_MEASUREMENTS for found in measured]
+    return Judged(
+        [_of_pose(covariance, nearer, i) if known else None for i, known in enumerate(enough)],
+        [_of_pose(alone, np.zeros(len(alone)), i) if known else None for i, known in enumerate(enough)],
+        [rms_px(lines.position, camera, found) for camera, found in zip(cameras, measured, strict=True)],
+        [
+            Deviation(
+                cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
+                suspect.name,
+                float(value[i]),
+                float(np.sqrt(covariance[asked[i], asked[i]])),
+                suspect.expected,
+            )
+            for i, suspect in enumerate(suspects)
+        ],
+        [_determined(number, unknowns, covariance, nearer) for number in range(len(solved.parameters))],
+    )
+
+
+def _suspects(pitch: Field, cameras: Sequence[Camera], solved: Unknowns) -> list[Parameter]:
+    """The numbers of lenses and field that were not solved for."""
+    known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
+    everything = [*lens_parameters(cameras), *field_parameters(pitch)]
+    return [p for p in everything if (getattr(p, "camera", None), p.name) not in known]
+
+
+def _certainty(information: Array, pull: Array, suspects: Sequence[Parameter]) -> Array:
+    """Information (S,) on the suspects before the lines were measured, by what the lines say of how good each lens is.
+
+    MacKay's evidence update, as for the ground (`Ground.unevenness`): one scale for each lens, and one for each measure
+    of the field, which were not taken together as the numbers of a lens are.
+    """
+    owner = np.array([getattr(suspect, "camera", -1 - number) for number, suspect in enumerate(suspects)])
+    expected = np.array([suspect.expected for suspect in suspects])
+    factor = np.ones(len(suspects))
+    for _ in range(EVIDENCE_STEPS):
+        certainty = (expected * factor) ** -2
+        covariance = np.linalg.inv(information + np.diag(certainty))
+        determined = 1 - np.diag(covariance) * certainty
+        power = (covariance @ pull / expected) ** 2
+        for one in np.unique(owner):
+            its = owner == one
+            evidence = max(float(determined[its].sum()), 0.0) + TRUST_NUMBERS
+            scale = np.sqrt((power[its].sum() + TRUST_NUMBERS * TRUST**2) / evidence)
+            factor[its] = min(scale, LARGEST_FACTOR)
+    return np.asarray((expected * factor) ** -2)
+
+
+def _determined(number: int, unknowns: Unknowns, covariance: Array, nearer: Array) -> Determined:
+    """What is known of the free parameter of this number."""
+    first = POSE * unknowns.cameras
+    at = first + number
+    variance = np.diag(covariance)[first : unknowns.dense]
+    together = np.sqrt(variance * variance[number])
+    jointly = covariance[at, first : unknowns.dense]
+    correlation = np.divide(jointly, together, out=np.zeros_like(together), where=together > 0)
+    correlation[number] = 0.0
+    most = int(np.argmax(np.abs(correlation)))
+    return Determined(
+        float(np.sqrt(variance[number] + nearer[at] ** 2)),
+        None if most == number else (unknowns.parameters[most], float(correlation[most])),
+    )
+
+
+def _of_pose(covariance: Array, nearer: Array, camera: int) -> Array:
+    """Second moment (6, 6) of one pose's error: its variance, and how far it is from where it should be."""
+    its = slice(POSE * camera, POSE * (camera + 1))
+    return np.asarray(covariance[its, its] + np.outer(nearer[its], nearer[its]))

@@ -1,0 +1,495 @@
+"""A lens from photos of a board: Zhang's method by OpenCV, with no more terms than the photos can justify.
+
+A small residual proves little: with enough terms every set of photos fits. So each lens is judged by photos it was not
+fitted to, the simplest that foretells them as well as the best is taken, and how much the numbers change when photos
+are left out is told beside OpenCV's own standard deviations, which take each corner for an independent witness.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.first.boards import Sighting
+from worker.calibration.scene.camera import LENSES, Array, Intrinsics, LensModel, rotation_matrices
+
+FEWEST_PHOTOS, FEW_PHOTOS = 4, 10
+FOLDS = 5
+ROUNDS = 4
+HURTS, HURTS_PX = 3.0, 1.0
+"""A photo hurts where the others foretell it this many times worse than the median, and at least so badly."""
+MOST_LEFT_OUT = 0.3
+BLURRED, BLURRED_PX = 2.0, 6.0
+"""Edges wider than this many times the median, and at least so wide."""
+CELLS = (8, 5)
+"""Columns and rows of the picture in which corners are counted."""
+FEW_CELLS = 0.6
+UNSURE = 0.01
+"""Of the focal length, or of the picture's width for the centre: more is not sure enough for a pitch."""
+ZONES = (("top left", "top", "top right"), ("left", "middle", "right"), ("bottom left", "bottom", "bottom right"))
+
+Fate = Literal["used", "no-board", "wrong-size", "hurts"]
+
+
+@dataclass(frozen=True)
+class Photo:
+    """A photo by its name, its `size` (width, height) and what was seen in it."""
+
+    name: str
+    size: tuple[int, int]
+    sighting: Sighting | None
+
+
+@dataclass(frozen=True)
+class PhotoVerdict:
+    """What became of a photo. `rms_px`: how well its corners fit; `left_out_px`: how well the other photos foretell it.
+
+    `blurred`: its edges are wide beside those of the others.
+    """
+
+    name: str
+    fate: Fate
+    rms_px: float | None
+    left_out_px: float | None
+    blurred: bool
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Corners (rows, columns) per cell of the picture; `empty`: the ninths that none reached, corners of it first."""
+
+    cells: NDArray[np.intp]
+    empty: Sequence[str]
+
+    @property
+    def share(self) -> float:
+        """Of the cells that a corner of the board reached."""
+        return float(np.mean(self.cells > 0))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A lens that was tried: its free numbers, and rms residuals of photos fitted and of photos left out."""
+
+    terms: tuple[str, ...]
+    rms_px: float
+    left_out_px: float
+
+
+@dataclass(frozen=True)
+class LensCalibration:
+    """The lens and what it is worth.
+
+    `sigma`: one standard deviation per free number, by OpenCV, corners independent; `spread`: the same by leaving out
+    photos (a jackknife over `FOLDS` groups). `corners` and `off` (N, 2): those used, and projected minus seen, px.
+    """
+
+    lens: Intrinsics
+    terms: tuple[str, ...]
+    rms_px: float
+    left_out_px: float
+    sigma: Mapping[str, float]
+    spread: Mapping[str, float]
+    photos: Sequence[PhotoVerdict]
+    coverage: Coverage
+    trials: Sequence[Trial]
+    warnings: Sequence[str]
+    corners: Array = field(repr=False)
+    off: Array = field(repr=False)
+
+
+class NoLens(Exception):  # noqa: N818
+    """The photos cannot fix a lens: says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A lens to try: OpenCV's flags, and the names of the numbers they leave free."""
+
+    terms: tuple[str, ...]
+    flags: int
+
+
+_PINHOLE = cv2.CALIB_USE_INTRINSIC_GUESS
+_ONE_F = _PINHOLE | cv2.CALIB_FIX_ASPECT_RATIO
+_STRAIGHT = cv2.CALIB_ZERO_TANGENT_DIST
+_K1 = cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3
+_FISHEYE = cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW | cv2.CALIB_USE_INTRINSIC_GUESS
+LADDERS: Mapping[LensModel, Sequence[Rung]] = {
+    "opencv": (
+        Rung(("f", "k1"), _ONE_F | _STRAIGHT | _K1 | cv2.CALIB_FIX_PRINCIPAL_POINT),
+        Rung(("f", "cx", "cy", "k1"), _ONE_F | _STRAIGHT | _K1),
+        Rung(("f", "cx", "cy", "k1", "k2"), _ONE_F | _STRAIGHT | cv2.CALIB_FIX_K3),
+        Rung(("f", "cx", "cy", "k1", "k2", "p1", "p2"), _ONE_F | cv2.CALIB_FIX_K3),
+        Rung(("f", "cx", "cy", "k1", "k2", "p1", "p2", "k3"), _ONE_F),
+        Rung(("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"), _PINHOLE),
+        Rung(
+            ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+            _PINHOLE | cv2.CALIB_RATIONAL_MODEL,
+        ),
+    ),
+    "fisheye": (
+        Rung(("fx", "fy", "cx", "cy", "k1"), _FISHEYE | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_K4),
+        Rung(("fx", "fy", "cx", "cy", "k1", "k2"), _FISHEYE | cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_K4),
+        Rung(("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"), _FISHEYE),
+    ),
+}
+"""From the simplest to the richest. Sensors have square pixels; a picture stretched by a converter has not."""
+NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
+    "opencv": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+    "fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
+}
+
+
+def calibrate_lens(
+    photos: Sequence[Photo], model: LensModel, report: Callable[[float], None] = lambda _: None
+) -> LensCalibration:
+    """The lens of the camera that took the photos; `report` gets 0..1. Deterministic. Raises `NoLens`."""
+    size = _common_size(photos)
+    used = {p.name: p.sighting for p in photos if p.sighting is not None and p.size == size}
+    _require_enough(used, photos)
+    most = int(MOST_LEFT_OUT * len(used))
+    hurting: dict[str, float] = {}
+    for number in range(ROUNDS):
+        chosen = _choose(list(used.values()), size, model, _part(report, number))
+        bad = _hurting(list(used), chosen.left_out_by_photo, most - len(hurting))
+        # What the last round would leave out has been fitted, and its figures are those of that fit.
+        if not bad or number == ROUNDS - 1:
+            break
+        hurting |= bad
+        used = {name: sighting for name, sighting in used.items() if name not in bad}
+    return _result(photos, size, used, hurting, chosen)
+
+
+def _part(report: Callable[[float], None], number: int) -> Callable[[float], None]:
+    """Reports a share 0..1 of one round as one of all."""
+    return lambda share: report((number + share) / ROUNDS)
+
+
+def _common_size(photos: Sequence[Photo]) -> tuple[int, int]:
+    sizes = Counter(photo.size for photo in photos if photo.sighting is not None)
+    if not sizes:
+        raise NoLens(
+            f"none of {len(photos)} photos shows the board: are columns and rows its inner corners, where four squares "
+            "meet, and is all of it in the picture?"
+        )
+    return sizes.most_common(1)[0][0]
+
+
+def _require_enough(used: Mapping[str, Sighting], photos: Sequence[Photo]) -> None:
+    if len(used) < FEWEST_PHOTOS:
+        raise NoLens(
+            f"{len(used)} of {len(photos)} photos show the board in one size of picture, {FEWEST_PHOTOS} must: "
+            "take 15 or more, near and far, tilted both ways, into every corner of the picture"
+        )
+
+
+# Which lens
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """OpenCV's answer: the board's place in each photo, `sigma` (K,) in the order of `NUMBERS`, rms `by_photo`."""
+
+    lens: Intrinsics
+    turns: Sequence[Array]
+    shifts: Sequence[Array]
+    sigma: Array
+    by_photo: Array
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A rung: its fit to all photos, and what the fits without some of them say of those, and of the numbers."""
+
+    rung: Rung
+    fit: _Fit
+    left_out_by_photo: Array
+    spread: Array
+
+    @property
+    def trial(self) -> Trial:
+        return Trial(self.rung.terms, _rms(self.fit.by_photo), _rms(self.left_out_by_photo))
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    tried: Sequence[_Tried]
+    best: _Tried
+
+    @property
+    def left_out_by_photo(self) -> Array:
+        return self.best.left_out_by_photo
+
+
+def _choose(
+    sightings: Sequence[Sighting], size: tuple[int, int], model: LensModel, report: Callable[[float], None]
+) -> _Chosen:
+    """The simplest rung that foretells photos as well as the best one, within a standard error of the difference."""
+    tried = []
+    for step, rung in enumerate(LADDERS[model]):
+        report(step / len(LADDERS[model]))
+        try:
+            tried.append(_try(sightings, size, model, rung))
+        except cv2.error:
+            # OpenCV gives up where the photos cannot carry the terms.
+            continue
+    if not tried:
+        raise NoLens("OpenCV finds no lens that fits these photos: take more, nearer and tilted both ways")
+    best = min(tried, key=lambda one: one.trial.left_out_px)
+    return _Chosen(tried, next(one for one in tried if _as_good(one.left_out_by_photo, best.left_out_by_photo)))
+
+
+def _as_good(left_out: Array, best: Array) -> bool:
+    """Whether residuals (photos,) are no larger than the best ones but for a standard error of the difference."""
+    worse = left_out**2 - best**2
+    return bool(worse.mean() <= worse.std(ddof=1) / np.sqrt(len(worse)))
+
+
+def _try(sightings: Sequence[Sighting], size: tuple[int, int], model: LensModel, rung: Rung) -> _Tried:
+    count = min(FOLDS, len(sightings))
+    left_out = np.empty(len(sightings))
+    numbers = []
+    for fold in range(count):
+        out = [i for i in range(len(sightings)) if i % count == fold]
+        without = _fit([s for i, s in enumerate(sightings) if i not in out], size, model, rung)
+        left_out[out] = [_foretold_px(without.lens, sightings[i]) for i in out]
+        numbers.append(_numbers(without.lens))
+    return _Tried(rung, _fit(sightings, size, model, rung), left_out, _jackknife(numbers))
+
+
+def _fit(sightings: Sequence[Sighting], size: tuple[int, int], model: LensModel, rung: Rung) -> _Fit:
+    world = [s.world.astype(np.float32) for s in sightings]
+    pixel = [s.pixel.astype(np.float32) for s in sightings]
+    return (_fit_fisheye if model == "fisheye" else _fit_pinhole)(world, pixel, size, rung)
+
+
+def _fit_pinhole(
+    world: list[NDArray[np.float32]], pixel: list[NDArray[np.float32]], size: tuple[int, int], rung: Rung
+) -> _Fit:
+    guess = _centred(float(max(size)), size)
+    _, matrix, distortion, turns, shifts, sigma, _, by_photo = cv2.calibrateCameraExtended(
+        world, pixel, size, guess, np.zeros(8 if rung.flags & cv2.CALIB_RATIONAL_MODEL else 5), flags=rung.flags
+    )
+    lens = LENSES["opencv"](_floats(matrix), _floats(distortion).ravel(), size)
+    numbers = _floats(sigma).ravel()[: len(NUMBERS["opencv"])]
+    return _Fit(lens, _vectors(turns), _vectors(shifts), numbers, _floats(by_photo).ravel())
+
+
+def _fit_fisheye(
+    world: list[NDArray[np.float32]], pixel: list[NDArray[np.float32]], size: tuple[int, int], rung: Rung
+) -> _Fit:
+    # From a lens of 180 degrees across the longer side.
+    guess = _centred(max(size) / np.pi, size)
+    _, matrix, distortion, turns, shifts = cv2.fisheye.calibrate(
+        [w[None] for w in world], [p[None] for p in pixel], size, guess, np.zeros((4, 1)), flags=rung.flags
+    )
+    lens = LENSES["fisheye"](_floats(matrix), _floats(distortion).ravel(), size)
+    places = _vectors(turns), _vectors(shifts)
+    off = [_off(lens, *place) for place in zip(*places, map(_floats, world), map(_floats, pixel), strict=True)]
+    by_photo = np.array([_rms(np.linalg.norm(o, axis=1)) for o in off])
+    sigma = _fisheye_sigma(lens, *places, [_floats(w) for w in world], rung, np.concatenate(off))
+    return _Fit(lens, *places, sigma, by_photo)
+
+
+def _centred(focal: float, size: tuple[int, int]) -> Array:
+    return np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
+
+
+def _fisheye_sigma(
+    lens: Intrinsics, turns: Sequence[Array], shifts: Sequence[Array], world: Sequence[Array], rung: Rung, off: Array
+) -> Array:
+    """What `calibrateCameraExtended` gives for a pinhole: the boards' places taken out of the normal matrix (Schur)."""
+    names = NUMBERS["fisheye"]
+    free = np.array([name in rung.terms for name in names])
+    information = np.zeros((int(free.sum()), int(free.sum())))
+    for turn, shift, corners in zip(turns, shifts, world, strict=True):
+        _, jacobian = cv2.fisheye.projectPoints(corners[None], turn, shift, lens.matrix, lens.distortion)
+        # Its columns: fx fy cx cy k1 to k4, the turn, the shift, the skew.
+        slopes = _floats(jacobian)
+        a, b = slopes[:, :8][:, free], slopes[:, 8:14]
+        information += a.T @ a - a.T @ b @ np.linalg.solve(b.T @ b, b.T @ a)
+    spare = max(off.size - int(free.sum()) - 6 * len(world), 1)
+    variance = np.diag(np.linalg.pinv(information, hermitian=True)) * np.sum(off**2) / spare
+    sigma = np.zeros(len(names))
+    sigma[free] = np.sqrt(np.maximum(variance, 0.0))
+    return sigma
+
+
+def _foretold_px(lens: Intrinsics, sighting: Sighting) -> float:
+    """Rms of the corners of a photo by a lens that was not fitted to it; only the board's place is."""
+    unforetold = float(max(lens.size))
+    rays = lens.undistort(sighting.pixel)
+    known = np.isfinite(rays).all(axis=1)
+    if known.sum() < 6:
+        return unforetold
+    found, turn, shift = cv2.solvePnP(sighting.world[known], rays[known], np.eye(3), None)
+    if not found:
+        return unforetold
+    off = _off(lens, _floats(turn).ravel(), _floats(shift).ravel(), sighting.world, sighting.pixel)
+    return _rms(np.linalg.norm(np.nan_to_num(off, nan=unforetold), axis=1))
+
+
+def _off(lens: Intrinsics, turn: Array, shift: Array, world: Array, pixel: Array) -> Array:
+    """Projected minus seen (N, 2) of a board at OpenCV's rvec and tvec."""
+    points = world @ rotation_matrices(turn).T + shift
+    return lens.distort(points[:, :2] / points[:, 2:]) - pixel
+
+
+def _floats(values: Any) -> Array:
+    """As NumPy has numbers, whatever OpenCV calls them."""
+    return np.asarray(values, dtype=float)
+
+
+def _vectors(columns: Any) -> list[Array]:
+    return [_floats(column).ravel() for column in columns]
+
+
+def _numbers(lens: Intrinsics) -> Array:
+    """In the order of `NUMBERS`."""
+    terms = lens.coefficients[: len(NUMBERS[lens.model]) - 4]
+    return np.array([lens.matrix[0, 0], lens.matrix[1, 1], lens.matrix[0, 2], lens.matrix[1, 2], *terms])
+
+
+def _jackknife(parts: Sequence[Array]) -> Array:
+    """Standard deviations of numbers from what they are without each of some groups."""
+    numbers = np.stack(parts)
+    return np.sqrt((len(parts) - 1) * np.mean((numbers - numbers.mean(axis=0)) ** 2, axis=0))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+# Which photos
+
+
+def _hurting(names: Sequence[str], left_out_px: Array, most: int) -> dict[str, float]:
+    """The photos, up to `most`, that the others foretell far worse than each other."""
+    limit = max(HURTS * float(np.median(left_out_px)), HURTS_PX)
+    worst = np.argsort(-left_out_px)[: max(most, 0)]
+    return {names[i]: float(left_out_px[i]) for i in worst if left_out_px[i] > limit}
+
+
+def _result(
+    photos: Sequence[Photo],
+    size: tuple[int, int],
+    used: Mapping[str, Sighting],
+    hurting: Mapping[str, float],
+    chosen: _Chosen,
+) -> LensCalibration:
+    best = chosen.best
+    lens, fit = best.fit.lens, best.fit
+    off = [
+        _off(lens, turn, shift, s.world, s.pixel)
+        for turn, shift, s in zip(fit.turns, fit.shifts, used.values(), strict=True)
+    ]
+    corners = np.concatenate([s.pixel for s in used.values()])
+    sigma, spread = _by_name(fit.sigma, best.rung, lens), _by_name(best.spread, best.rung, lens)
+    coverage = cover(corners, size)
+    return LensCalibration(
+        lens,
+        best.rung.terms,
+        best.trial.rms_px,
+        best.trial.left_out_px,
+        sigma,
+        spread,
+        _verdicts(photos, size, used, hurting, best),
+        coverage,
+        [one.trial for one in chosen.tried],
+        _warnings(lens, chosen, sigma, spread, coverage, len(used)),
+        corners,
+        np.concatenate(off),
+    )
+
+
+def _verdicts(
+    photos: Sequence[Photo],
+    size: tuple[int, int],
+    used: Mapping[str, Sighting],
+    hurting: Mapping[str, float],
+    best: _Tried,
+) -> list[PhotoVerdict]:
+    rms = dict(zip(used, best.fit.by_photo.tolist(), strict=True))
+    foretold = dict(hurting) | dict(zip(used, best.left_out_by_photo.tolist(), strict=True))
+    edges = [p.sighting.edge_px for p in photos if p.sighting and p.sighting.edge_px]
+    wide = max(BLURRED * float(np.median(edges)), BLURRED_PX) if edges else np.inf
+
+    def fate(photo: Photo) -> Fate:
+        if photo.sighting is None:
+            return "no-board"
+        if photo.size != size:
+            return "wrong-size"
+        return "hurts" if photo.name in hurting else "used"
+
+    return [
+        PhotoVerdict(
+            p.name,
+            fate(p),
+            rms.get(p.name),
+            foretold.get(p.name),
+            bool(p.sighting and p.sighting.edge_px and p.sighting.edge_px > wide),
+        )
+        for p in photos
+    ]
+
+
+def _by_name(values: Array, rung: Rung, lens: Intrinsics) -> dict[str, float]:
+    known = dict(zip(NUMBERS[lens.model], values.tolist(), strict=True))
+    # One focal length: OpenCV keeps the ratio and gives the deviation of fy alone.
+    known["f"] = max(known["fx"], known["fy"])
+    return {term: known[term] for term in rung.terms}
+
+
+# What it is worth
+
+
+def cover(corners: Array, size: tuple[int, int]) -> Coverage:
+    """Where in a picture of `size` (width, height) corners (N, 2) were seen."""
+    extent = ((0, size[1]), (0, size[0]))
+    cells, _, _ = np.histogram2d(corners[:, 1], corners[:, 0], bins=(CELLS[1], CELLS[0]), range=extent)
+    ninths, _, _ = np.histogram2d(corners[:, 1], corners[:, 0], bins=(3, 3), range=extent)
+    empty = [ZONES[row][column] for row, column in np.argwhere(ninths == 0)]
+    return Coverage(cells.astype(np.intp), sorted(empty, key=lambda name: " " not in name))
+
+
+def _warnings(
+    lens: Intrinsics,
+    chosen: _Chosen,
+    sigma: Mapping[str, float],
+    spread: Mapping[str, float],
+    coverage: Coverage,
+    count: int,
+) -> list[str]:
+    found = []
+    if coverage.empty or coverage.share < FEW_CELLS:
+        where = f" and nothing {', '.join(coverage.empty)}" if coverage.empty else ""
+        found.append(
+            f"the board reached {coverage.share:.0%} of the picture{where}: there the lens is a guess, and with it the "
+            "principal point. Add photos with the board in those places"
+        )
+    worst = {name: max(sigma[name], spread[name]) for name in sigma}
+    focal = max(worst.get(name, 0.0) for name in ("f", "fx", "fy"))
+    centre = max(worst.get(name, 0.0) for name in ("cx", "cy"))
+    if focal > UNSURE * lens.matrix[0, 0]:
+        found.append(f"the focal length is sure to {focal:.0f} px only: tilt the board more, both ways")
+    if centre > UNSURE * lens.size[0]:
+        found.append(f"the principal point is sure to {centre:.0f} px only: add photos all over the picture")
+    if "cx" not in sigma:
+        found.append("the photos do not fix the principal point: it was left in the middle of the picture")
+    best, richest = chosen.best.trial, chosen.tried[-1].trial
+    more = [term for term in richest.terms if term.startswith(("k", "p")) and term not in best.terms]
+    if more:
+        found.append(
+            f"the terms {', '.join(more)} are left at 0: with them the lens foretells photos left out no better "
+            f"({richest.left_out_px:.2f} px rms, without them {best.left_out_px:.2f})"
+        )
+    if count < FEW_PHOTOS:
+        found.append(f"{count} photos are few: 15 to 30 leave less to chance")
+    return found

@@ -1,0 +1,225 @@
+"""What a result is worth without ground truth, and the gate that a bad one does not pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS
+from worker.calibration.finish.uncertainty import Deviation
+from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.visibility import SeenLines
+
+TOLERANCE_PX = 3.0
+"""How far from its edge a line still counts as explained, in pixels of a 4K frame."""
+AROUND_PITCH_M = 1.0
+MARKING = 0.5
+"""Probability from which a pixel counts as a marking."""
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Limits a result has to keep to replace the stored poses. Pixels are those of a 4K frame."""
+
+    least_iou: float = 0.45
+    iou_loss: float = 0.03
+    largest_residual_px: float = 2.0
+    largest_sigma_deg: float = 0.2
+    largest_sigma_m: float = 0.5
+    largest_rotation_deg: float = 8.0
+    largest_shift_m: float = 1.5
+    largest_stitch_error_px: float = 1.5
+    highest_ridge_m: float = 3.0
+
+
+@dataclass(frozen=True)
+class Sigma:
+    """One standard deviation of a pose: of the rotation's angle in degrees, of the position in metres."""
+
+    rotation_deg: float
+    position_m: float
+
+    @classmethod
+    def from_covariance(cls, covariance: Array) -> Sigma:
+        """From (6, 6) of (rotation rad, position m): root of the summed variances of each three."""
+        variances = np.diag(covariance)
+        return cls(float(np.degrees(np.sqrt(variances[:3].sum()))), float(np.sqrt(variances[3:].sum())))
+
+
+@dataclass(frozen=True)
+class Movement:
+    """From the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in pixels."""
+
+    rotation_deg: float
+    position_m: float
+    pixels: float
+
+    @classmethod
+    def between(cls, pitch: Field, before: Camera, after: Camera) -> Movement:
+        """How far a camera moved."""
+        lines = pitch.line_points().position
+        was = before.project(lines)
+        shift = np.linalg.norm(after.project(lines) - was, axis=1)[inside(was, before.intrinsics.size)]
+        shift = shift[np.isfinite(shift)]
+        return cls(
+            float(rotation_angles_deg(before.pose.rotation, after.pose.rotation)),
+            float(np.linalg.norm(after.pose.position - before.pose.position)),
+            float(shift.mean()) if len(shift) else 0.0,
+        )
+
+
+@dataclass(frozen=True)
+class CameraQuality:
+    """What the gate looks at, of one camera."""
+
+    camera: Camera
+    iou: float
+    iou_before: float
+    residual_px: float | None
+    sigma: Sigma | None
+    repeatability: Sigma | None
+    moved: Movement
+
+
+def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> float:
+    """IoU in 0..1 of the markings expected by the pose and those in the segmentation (H, W), as lengths of line.
+
+    A line is thinner than any honest tolerance, so a plain IoU of pixels would measure paint and blur. Here a piece of
+    expected line is found when the segmentation has a marking within `TOLERANCE_PX` of it; segmentation on the pitch
+    that lies beside every expected line counts as as much line as it could have been. A line thinner than a pixel
+    covers only a part of it, and has that part of the weight and of the response that is asked for.
+    """
+    seen = SeenLines.from_camera(pitch.line_points(), camera)
+    coverage = np.minimum(seen.width_px, 1.0)
+    weight = seen.length_px * coverage
+    expected = float(weight.sum())
+    if expected == 0:
+        return 0.0
+    tolerance = max(TOLERANCE_PX * camera.intrinsics.relative_size, 1.0)
+    found = float(weight[_strongest(response, tolerance)[_rounded(seen.pixel)] > MARKING * coverage].sum())
+    marked = (response > MARKING).astype(np.uint8)
+    explained = _band(seen, camera.intrinsics.size, tolerance)
+    area_explained = np.count_nonzero(marked & explained)
+    area_beside = np.count_nonzero(marked & _pitch_area(pitch, camera) & ~explained)
+    beside = area_beside * found / area_explained if area_explained else float(area_beside)
+    return found / (expected + beside)
+
+
+def believable(deviations: Sequence[Deviation], qualities: Sequence[CameraQuality], gate: Gate) -> list[Deviation]:
+    """Those deviations that were read off cameras which see the pitch where they expect it."""
+    lost = {quality.camera.id for quality in qualities if quality.iou < gate.least_iou}
+    return [d for d in deviations if (not lost if d.camera is None else d.camera not in lost)]
+
+
+def ridge_rejection(pitch: Field, gate: Gate) -> str | None:
+    """Why a pitch whose ridge was found along with the poses cannot be one; None when it can."""
+    height = 0.0 if pitch.ridge is None else float(pitch.ridge[0, 2])
+    if 0 <= height <= gate.highest_ridge_m:
+        return None
+    return (
+        f"the lines fit best with a ridge at {height:.3f} m, and a pitch has one between 0 and "
+        f"{gate.highest_ridge_m:.0f} m; calibrate without fit_ridge"
+    )
+
+
+def rejection(
+    qualities: Sequence[CameraQuality],
+    in_common: Sequence[tuple[Camera, Camera]],
+    stitch_error_px: float | None,
+    gate: Gate,
+) -> str | None:
+    """Why a result must not replace the stored poses, naming each camera and what to do; None when it may.
+
+    `in_common`: the pairs of cameras whose views should register; `stitch_error_px` is None when they do not.
+    """
+    reasons = [(quality.camera.id, _camera_rejection(quality, gate)) for quality in qualities]
+    bad = [f"camera {name}: {reason}" for name, reason in reasons if reason is not None]
+    if bad:
+        return "; ".join(bad)
+    if in_common and stitch_error_px is None:
+        pairs = ", ".join(f"{first.id} and {second.id}" for first, second in in_common)
+        return f"the views of {pairs} should show the same markings but cannot be brought together; look at the preview"
+    if stitch_error_px is not None and stitch_error_px > gate.largest_stitch_error_px:
+        return (
+            f"the cameras do not fit each other: stitch error {stitch_error_px:.2f} px, at most "
+            f"{gate.largest_stitch_error_px} allowed; look at the preview, and check intrinsics and ridge"
+        )
+    return None
+
+
+def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
+    scale = quality.camera.intrinsics.relative_size
+    moved = quality.moved
+    if quality.iou < gate.least_iou:
+        return (
+            f"the markings in the frame do not fit this pitch (IoU {quality.iou:.2f}, at least {gate.least_iou}); "
+            "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
+        )
+    if quality.residual_px is None or quality.repeatability is None:
+        return f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?"
+    if quality.residual_px > gate.largest_residual_px * scale:
+        return (
+            f"lines are {quality.residual_px:.1f} px from where the pose puts them, at most "
+            f"{gate.largest_residual_px * scale:.1f} allowed; check intrinsics and the field's measures"
+        )
+    sigma = quality.repeatability
+    if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
+        return (
+            f"the visible lines do not determine the pose (sigma {sigma.rotation_deg:.2f} degrees, "
+            f"{sigma.position_m:.2f} m)"
+        )
+    if moved.rotation_deg > gate.largest_rotation_deg or moved.position_m > gate.largest_shift_m:
+        return (
+            f"turned by {moved.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
+            f"{moved.position_m:.2f} m (at most {gate.largest_shift_m}); if somebody moved the camera, store a new "
+            "first pose"
+        )
+    if quality.iou < quality.iou_before - gate.iou_loss:
+        return f"the stored pose fits the frame better (IoU {quality.iou_before:.2f}, new {quality.iou:.2f})"
+    return None
+
+
+def _strongest(response: NDArray[np.float32], distance: float) -> NDArray[np.float32]:
+    """The largest response (H, W) within `distance` of each pixel."""
+    size = 2 * round(distance) + 1
+    around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return np.asarray(cv2.dilate(response, around), dtype=np.float32)
+
+
+def _rounded(pixels: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    x, y = np.rint(pixels).astype(np.intp).T
+    return y, x
+
+
+def _band(seen: SeenLines, size: tuple[int, int], tolerance: float) -> NDArray[np.uint8]:
+    """1 where a pixel is on an expected line or within `tolerance` of one."""
+    band = np.zeros((size[1], size[0]), dtype=np.uint8)
+    along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1) * seen.length_px[:, None] * 0.6
+    thickness = np.rint(seen.width_px + 2 * tolerance).astype(int)
+    starts, ends = (np.rint(16 * (seen.pixel + sign * along)).astype(int) for sign in (-1, 1))
+    for start, end, thick in zip(starts.tolist(), ends.tolist(), thickness.tolist(), strict=True):
+        cv2.line(band, start, end, 1, min(max(thick, 1), 255), shift=4)
+    return band
+
+
+def _pitch_area(pitch: Field, camera: Camera) -> NDArray[np.uint8]:
+    """1 inside the pitch and `AROUND_PITCH_M` around it, at an eighth of the picture's detail."""
+    coarse = camera.intrinsics.scaled(0.125)
+    width, height = coarse.size
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    rays = Camera(camera.id, coarse, camera.pose).rays(np.stack([x, y], axis=-1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = -camera.pose.position[2] / rays[..., 2]
+        ground = camera.pose.position[:2] + distance[..., None] * rays[..., :2]
+        on_pitch = (
+            (distance > 0)
+            & (np.abs(ground[..., 0]) < pitch.length / 2 + AROUND_PITCH_M)
+            & (np.abs(ground[..., 1]) < pitch.width / 2 + AROUND_PITCH_M)
+        )
+    full = cv2.resize(on_pitch.astype(np.uint8), camera.intrinsics.size, interpolation=cv2.INTER_NEAREST)
+    return np.asarray(full, dtype=np.uint8)

@@ -1,0 +1,378 @@
+"""How far apart two cameras put the same markings: the paper's stitch error, measured without ground truth.
+
+The line responses of both cameras are laid onto the pitch (bird's-eye) and registered: a coarse search that bridges
+metres, then Gauss-Newton, finer and finer, on small turns and moves of both cameras that bring their markings onto each
+other. Those, and no free warp, because a circle and a line through its centre do not tell a shift along the line from
+the fanning out that a tilted camera makes; with the form that a turn or a move can have, they do.
+
+Unit: 1 px = 10 cm on the pitch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.draw.stitching import ground_grid, ground_view
+from worker.calibration.scene.camera import Array, Camera, cross_matrices, inside
+from worker.calibration.scene.field import Field
+
+Response = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+# A response seen from above, on a square grid of the pitch: values, and where the camera sees it.
+View = tuple[Response, Mask]
+Sight = tuple[Camera, Response]
+
+PIXEL_M = 0.1
+
+COARSE_STEP_M, COARSE_HALF_M, COARSE_BLUR_M = 0.2, 18.0, 0.4
+# How far apart two views may be to be found.
+REACH_M = 8.0
+# Shifts that leave less than this part of the common region are not judged.
+LEAST_COMMON = 0.3
+# Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
+SHIFT_PENALTY = 0.05
+# Views that are nearer than this where they should be need no other guess.
+NEAR_M = 0.5
+
+# Sampled finely, so that no edge of a line falls between two samples; once blurred, every second sample will do.
+FINE_STEP_M, FINE_HALF_M, FINE_STRIDE = 0.05, 12.0, 2
+# What is expected of a camera that is out of place: the paper's Start errors.
+EXPECTED_TURN_RAD, EXPECTED_MOVE_M = 0.02, 0.16
+# Blur in metres, number of steps, and the part of what is expected that is expected at least. Coarse to fine; the last
+# blur is about what a far camera smears: with less, the smear of two cameras that face each other would show as a
+# displacement. What is expected shrinks with the displacement found: cameras that agree at the centre are not
+# suspected of turns and moves that happen to cancel there.
+FINE_STAGES = ((0.8, 5, 1.0), (0.4, 5, 0.3), (0.2, 4, 0.1), (0.2, 4, 0.01))
+# A difference of this part of a line's response counts as half an outlier.
+OUTLIER = 0.5
+# Grass, where neither view shows more than this, is left out.
+LEAST_RESPONSE = 0.05
+# Responses differ by this much through sampling alone.
+SAMPLING_NOISE = 0.005
+# A direction in which the markings leave the displacement looser than this is one along which they can slide.
+LOOSE_M = 0.1
+
+# Below these the views show nothing in common.
+LEAST_SUPPORT_M = 4.0
+LEAST_CORRELATION = 0.3
+# As much line across a direction holds the views in it.
+HOLDING_M = 8.0
+# What a metre of line is expected to say about where it is.
+EXPECTED_NOISE_M = 0.05
+
+
+@dataclass(frozen=True)
+class Registration:
+    """The second camera's markings relative to the first's: `dx_px`, `dy_px` along the world's axes, pixels of 10 cm.
+
+    Where the common markings are all parallel, only the displacement across them. `support`: metres of marking that
+    both views show on top of each other once registered. `pair`: the ids of the cameras.
+    """
+
+    dx_px: float
+    dy_px: float
+    support: float
+    pair: tuple[str, str]
+
+    @property
+    def error_px(self) -> float:
+        """How far apart the two views are."""
+        return float(np.hypot(self.dx_px, self.dy_px))
+
+
+def stitch_error_px(pitch: Field, cameras: Sequence[Camera], responses: Mapping[str, Response]) -> float | None:
+    """The worst disagreement of any two cameras around the pitch centre, 1 px = 10 cm.
+
+    None if no two cameras have markings in common, or if those of two that have (`pairs_in_common`) do not register.
+    `responses[camera.id]`: float32 (height, width), probability 0..1 of a marking in each pixel of the raw frame.
+    """
+    found = [
+        register_pair(pitch, first, second, responses[first.id], responses[second.id])
+        for first, second in pairs_in_common(pitch, cameras)
+    ]
+    errors = [pair.error_px for pair in found if pair is not None]
+    return max(errors) if errors and len(errors) == len(found) else None
+
+
+def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camera, Camera]]:
+    """The pairs of cameras that, by their poses, see enough of the same markings to be compared."""
+    return [
+        (first, second)
+        for first, second in combinations(cameras, 2)
+        if (centre := _reference_point(pitch, first, second)) is not None
+        and _directions_in_common(pitch, first, second, centre) > 0
+    ]
+
+
+def register_pair(
+    pitch: Field, first: Camera, second: Camera, first_response: Response, second_response: Response
+) -> Registration | None:
+    """Register the bird's-eye views of two cameras around the pitch centre, or the markings in common nearest to it.
+
+    Responses as in `stitch_error_px`. None if the cameras show no markings in common, or show them too far apart.
+    """
+    centre = _reference_point(pitch, first, second)
+    if centre is None:
+        return None
+    sights = ((first, first_response), (second, second_response))
+    held = _directions_in_common(pitch, first, second, centre)
+    fits = [_fit(pitch, sights, middle, shift, held) for middle, shift in _guesses(pitch, sights, centre)]
+    best = max(fits, key=lambda fit: fit.support * fit.correlation, default=None)
+    if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
+        return None
+    # A halfway line fits itself wherever it is slid to. Where a circle should have held it, that is no registration.
+    if best.told < held:
+        return None
+    dx, dy = best.displacement / PIXEL_M
+    return Registration(float(dx), float(dy), best.support, (first.id, second.id))
+
+
+def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
+    """The pitch centre (2,) if both cameras see it, else the middle of the common markings around the nearest one."""
+    points = np.concatenate([pitch.lift(np.zeros((1, 2))), pitch.line_points(0.5).position])
+    seen = np.all([inside(camera.project(points), camera.intrinsics.size) for camera in (first, second)], axis=0)
+    if not seen.any():
+        return None
+    if seen[0]:
+        return np.zeros(2)
+    common: Array = points[seen, :2]
+    nearest = common[np.argmin(np.linalg.norm(common, axis=1))]
+    return np.asarray(common[np.linalg.norm(common - nearest, axis=1) < FINE_HALF_M].mean(axis=0))
+
+
+def _directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
+    """In how many directions, 0 to 2, the markings that both cameras should see around a point (2,) can hold a view.
+
+    There must be enough line across a direction, and it must not be so far aside that a turn and a move of a camera
+    which cancel there still shift the point: a court whose centre has no circle is held along its centre line by
+    nothing but a side line 10 m away.
+    """
+    lines = pitch.line_points(0.5)
+    seen = np.all(
+        [inside(camera.project(lines.position), camera.intrinsics.size) for camera in (first, second)], axis=0
+    )
+    near = np.abs(lines.position[:, :2] - centre).max(axis=1) < FINE_HALF_M
+    common = lines[seen & near]
+    across = common.normal[:, :2]
+    enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > HOLDING_M
+    slope = (across[:, :, None] * _forms_of_both(first, second, common.position)).sum(axis=1)
+    information = lines.spacing / EXPECTED_NOISE_M**2 * slope.T @ slope
+    at_centre = _forms_of_both(first, second, pitch.lift(centre))
+    covariance = at_centre @ np.linalg.inv(information + np.eye(len(information))) @ at_centre.T
+    held = np.linalg.eigvalsh(covariance) < LOOSE_M**2
+    return int(min(np.count_nonzero(enough), np.count_nonzero(held)))
+
+
+def _guesses(pitch: Field, sights: Sequence[Sight], centre: Array) -> list[tuple[Array, Array]]:
+    """Where to measure (2,), and how far apart (2,) the views may be there: as they should be, and as they look."""
+    grid = _square(centre, COARSE_HALF_M, COARSE_STEP_M)
+    views = [ground_view(pitch, camera, response, grid) for camera, response in sights]
+    shift = _coarse_shift(views[0], views[1], pitch.line_width)
+    if shift is None:
+        return []
+    # Where the cameras put the markings of the centre, roughly: the displacement is measured there and not beside it.
+    template = _template(pitch, centre)
+    placed = [put for put in (_coarse_shift(template, view, pitch.line_width) for view in views) if put is not None]
+    middle = centre + np.mean(placed or [np.zeros(2)], axis=0)
+    guesses = [(centre, np.zeros(2)), (middle, shift)]
+    return guesses if np.hypot(*(middle - centre)) + np.hypot(*shift) > NEAR_M else guesses[:1]
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """`displacement` (2,) m in the directions that are told, metres of marking in common, and how alike they are."""
+
+    displacement: Array
+    told: int
+    support: float
+    correlation: float
+
+
+def _fit(pitch: Field, sights: Sequence[Sight], middle: Array, shift: Array, held: int) -> _Fit:
+    """The displacement of the views in the `middle`, from a guess that is right to a metre or so.
+
+    In at most as many directions as the markings should hold: along a short arc of a circle, which tells a little of
+    both, the second is mostly noise.
+    """
+    on_surface = pitch.lift(middle)
+    at_middle = _forms_of_both(sights[0][0], sights[1][0], on_surface)
+    # The most likely turns and moves that make the shift.
+    start = at_middle.T @ np.linalg.solve(at_middle @ at_middle.T, shift)
+    grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
+    views, forms = [], []
+    for (camera, response), moves in zip(sights, (start[:6], start[6:]), strict=True):
+        surface = pitch.lift(grid)
+        views.append(ground_view(pitch, camera, response, grid + _displacement(camera, surface, moves)))
+        forms.append(_forms(camera, surface[::FINE_STRIDE, ::FINE_STRIDE]))
+    fine = _fine_moves(views[0], views[1], np.concatenate(forms, axis=-1), at_middle, start, pitch.line_width)
+
+    variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
+    told = directions[:, variance < LOOSE_M**2][:, :held]
+    displacement = told @ told.T @ at_middle @ fine.moves
+    return _Fit(displacement, told.shape[1], fine.common_area_m2 / pitch.line_width, fine.correlation)
+
+
+def _square(middle: Array, half_m: float, step_m: float) -> Array:
+    count = round(half_m / step_m)
+    return ground_grid(count, count, step_m) + middle
+
+
+def _template(pitch: Field, centre: Array) -> View:
+    """The markings as they should be, on the coarse grid."""
+    points = pitch.line_points(COARSE_STEP_M / 4)
+    count = round(COARSE_HALF_M / COARSE_STEP_M)
+    edges = COARSE_STEP_M * (np.arange(-count, count + 2) - 0.5)
+    x, y = (points.position[:, :2] - centre).T
+    area, _, _ = np.histogram2d(y, x, (edges, edges), weights=points.width * points.spacing)
+    values = area[::-1] / COARSE_STEP_M**2
+    return values.astype(np.float32), np.ones(values.shape, bool)
+
+
+def _coarse_shift(first: View, second: View, line_width: float) -> Array | None:
+    """Shift (2,) in metres, world axes, of the second view relative to the first with the highest correlation."""
+    a_seen, b_seen = first[1], second[1]
+    a, b = (_smooth(view, COARSE_BLUR_M, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
+    reach = round(REACH_M / COARSE_STEP_M)
+    # Over what both see at each shift (masked normalised correlation after Padfield, 2012).
+    plane = cv2.getOptimalDFTSize(2 * a.shape[0])
+    fa, fb, fa2, fb2, fas, fbs = (np.fft.rfft2(p, (plane, plane)) for p in (a, b, a * a, b * b, a_seen, b_seen))
+
+    def correlate(p: NDArray[np.complex128], q: NDArray[np.complex128]) -> Array:
+        full = np.fft.fftshift(np.fft.irfft2(np.conj(p) * q, (plane, plane)))
+        return full[plane // 2 - reach : plane // 2 + reach + 1, plane // 2 - reach : plane // 2 + reach + 1]
+
+    common = np.maximum(correlate(fas, fbs), 1.0)
+    sum_a, sum_b = correlate(fa, fbs), correlate(fas, fb)
+    var_a = correlate(fa2, fbs) - sum_a**2 / common
+    var_b = correlate(fas, fb2) - sum_b**2 / common
+    covariance = correlate(fa, fb) - sum_a * sum_b / common
+    judged = (common > LEAST_COMMON * common.max()) & (np.minimum(var_a, var_b) > 1e-3)
+    if not judged.any():
+        return None
+    correlation = covariance[judged] / np.sqrt(var_a[judged] * var_b[judged])
+    shifts = ground_grid(reach, reach, COARSE_STEP_M)[judged]
+    best = np.argmax(correlation - SHIFT_PENALTY * np.linalg.norm(shifts, axis=1) / REACH_M)
+    return np.asarray(shifts[best])
+
+
+def _forms(camera: Camera, points: Array) -> Array:
+    """How points (..., 3) of the pitch move, (..., 2, 6) metres, in the view of a camera that believes a wrong pose.
+
+    One column per expected turn about and move along each axis of the world.
+    """
+    ray = points - camera.pose.position
+    turned = -EXPECTED_TURN_RAD * cross_matrices(ray)
+    moved = np.broadcast_to(EXPECTED_MOVE_M * np.eye(3), turned.shape)
+    change = np.concatenate([turned, moved], axis=-1)
+    # The changed ray, back to where it meets the surface.
+    return np.asarray(change[..., :2, :] - ray[..., :2, None] * change[..., 2:, :] / ray[..., 2, None, None])
+
+
+def _forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
+    """How points (..., 3) of the pitch move in the second view relative to the first, (..., 2, 12)."""
+    return np.concatenate([-_forms(first, points), _forms(second, points)], axis=-1)
+
+
+def _displacement(camera: Camera, points: Array, moves: Array) -> Array:
+    """How points (..., 3) move, (..., 2) metres, by given `moves` (6,): `_forms` times those, without the forms."""
+    ray = points - camera.pose.position
+    change = EXPECTED_MOVE_M * moves[3:] - EXPECTED_TURN_RAD * np.cross(ray, moves[:3])
+    return np.asarray(change[..., :2] - ray[..., :2] * (change[..., 2:] / ray[..., 2:]))
+
+
+@dataclass(frozen=True)
+class _Fine:
+    """`moves` (12,) of both cameras, in expected turns and moves, and what then coincides.
+
+    `covariance` (12, 12): how loose the markings leave the moves of cameras of which no more is known than is expected.
+    """
+
+    moves: Array
+    covariance: Array
+    common_area_m2: float
+    correlation: float
+
+
+def _fine_moves(first: View, second: View, forms: Array, at_middle: Array, start: Array, line_width: float) -> _Fine:
+    """Gauss-Newton on the moves (12,) of both cameras.
+
+    `forms` (n, n, 2, 12): what they do to every `FINE_STRIDE`th point of each view; `at_middle` (2, 12): what they do
+    to the displacement in the middle. The views are sampled where `start` puts them.
+    """
+    a_seen, b_seen = first[1].astype(np.float32), second[1].astype(np.float32)
+    step_m = FINE_STRIDE * FINE_STEP_M
+    expected = np.linalg.inv(at_middle @ at_middle.T)
+    # As plain matrices, which multiply ten times faster.
+    forms_a, forms_b = (forms[..., its].reshape(-1, 6) for its in (slice(6), slice(6, 12)))
+    offsets = forms.shape[:3]
+    moves = start
+    for blur, steps, least in FINE_STAGES:
+        smooth_a, smooth_b = (_smooth(view, blur, FINE_STEP_M, line_width) for view in (first, second))
+        for _ in range(steps):
+            offset_a = (forms_a @ (moves - start)[:6]).reshape(offsets)
+            offset_b = (forms_b @ (moves - start)[6:]).reshape(offsets)
+            warped_a, warped_b = _warp(smooth_a, offset_a), _warp(smooth_b, offset_b)
+            valid = (_warp(a_seen, offset_a) == 1) & (_warp(b_seen, offset_b) == 1)
+            pull, information = _normal_equations(warped_a, warped_b, valid, forms, step_m, blur)
+            found = at_middle @ moves
+            prior = 1 / max(float(found @ expected @ found), least**2)
+            moves = moves + np.linalg.solve(information + prior * np.eye(len(moves)), pull - prior * moves)
+    covariance = np.asarray(np.linalg.inv(information + np.eye(len(moves))), float)
+    common = np.minimum(warped_a, warped_b)[valid].sum(dtype=float) * step_m**2
+    return _Fine(moves, covariance, float(common), _correlation(warped_a[valid], warped_b[valid]))
+
+
+def _normal_equations(
+    a: Response, b: Response, valid: Mask, forms: Array, step_m: float, blur: float
+) -> tuple[Array, Array]:
+    """What the difference of two views says about the moves: pull (12,) and information (12, 12)."""
+    active = valid & (a + b > LEAST_RESPONSE)
+    down, right = np.gradient(a + b)
+    gradient = np.stack([right[active], -down[active]], axis=-1).astype(float) / (2 * step_m)
+    slope = np.einsum("md,mdj->mj", gradient, forms[active])
+    slope[:, :6] *= -1
+    residual = (a - b)[active].astype(float)
+    # What only one view has, players for one, must not pull (Geman and McClure's weight); lines still apart must.
+    scale = OUTLIER * float(np.quantile(np.maximum(a, b)[active], 0.9)) if len(residual) else 1.0
+    weight = 1 / (1 + (residual / scale) ** 2) ** 2
+    # The blur makes neighbours alike: this many pixels count as one.
+    alike = 4 * np.pi * (blur / step_m) ** 2
+    noise = SAMPLING_NOISE**2 + (weight * residual**2).sum() / max(weight.sum(), 1.0)
+    weighted = slope * (weight / (noise * alike))[:, None]
+    # einsum rather than matrix products, so that the number of threads cannot change a digit.
+    return np.einsum("mi,m->i", weighted, residual), np.einsum("mi,mj->ij", weighted, slope)
+
+
+def _smooth(view: View, blur_m: float, step_m: float, line_width: float) -> Response:
+    """A view blurred over what the camera sees, and no brighter than a line of the width then is.
+
+    Lines stay as they are; players and lettering, wider than a line, cannot outweigh them.
+    """
+    values, seen = (
+        cv2.GaussianBlur(part.astype(np.float32), (0, 0), blur_m / step_m) for part in (view[0] * view[1], view[1])
+    )
+    brightest = 1.1 * line_width / (np.sqrt(2 * np.pi) * blur_m)
+    return np.asarray(np.minimum(values / np.maximum(seen, 1e-3), brightest), np.float32)
+
+
+def _warp(view: Response, offset: Array) -> Response:
+    """A view on the fine grid, sampled at every `FINE_STRIDE`th point moved by `offset` (n, n, 2) metres."""
+    rows, columns = FINE_STRIDE * np.indices(offset.shape[:2], np.float32)
+    move = (offset / FINE_STEP_M).astype(np.float32)
+    sampled = cv2.remap(view, columns + move[..., 0], rows - move[..., 1], cv2.INTER_LINEAR, borderValue=0.0)
+    return np.asarray(sampled, np.float32)
+
+
+def _correlation(a: Response, b: Response) -> float:
+    """Normalised correlation of two sets of values, 0 where there is nothing to correlate."""
+    if not a.size:
+        return 0.0
+    a, b = a - a.mean(dtype=float), b - b.mean(dtype=float)
+    power = (a * a).sum(dtype=float) * (b * b).sum(dtype=float)
+    return float((a * b).sum(dtype=float) / np.sqrt(power)) if power > 0 else 0.0

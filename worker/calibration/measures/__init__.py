@@ -1,0 +1,1 @@
+"""The measures of a pitch, from the lines that its cameras see."""

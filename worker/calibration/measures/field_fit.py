@@ -1,0 +1,223 @@
+"""The measures of a pitch from the lines that cameras see: length, width, and how its ridge runs.
+
+Poses, measures and the swells of the ground are found together, as in every calibration. What lines, lenses and ground
+leave open is said as a sigma, and a measure that they leave about as open as it was is not touched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, cast
+
+import numpy as np
+
+from worker.calibration.calibrate import (
+    METHODS,
+    CameraResult,
+    Clock,
+    Journey,
+    Options,
+    Progress,
+    Segment,
+    camera_result,
+    qualities_of,
+    require_markings_in_view,
+    segment_all,
+)
+from worker.calibration.finish.refinement import SEARCH_PX, Refined, Sight, refine
+from worker.calibration.finish.uncertainty import Determined
+from worker.calibration.judge.quality import Gate, rejection, ridge_rejection
+from worker.calibration.judge.registration import pairs_in_common, stitch_error_px
+from worker.calibration.measures.ridge import RidgeTrials, try_ridges
+from worker.calibration.scene.camera import Camera, Frame
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.parameters import FieldParameter, LensParameter, Parameter, free_field
+from worker.calibration.search.search import Strategy, search
+from worker.calibration.see.line_measurement import brightness_of
+from worker.calibration.see.sampling import median
+
+FIRST_SEARCH_PX = (40.0, 24.0)
+"""A pitch whose measures are guesses has its lines farther from where they are expected than one that is known."""
+TOLD = 0.25
+"""A measure is known when the lines leave this part of what was open, or less."""
+UNTOUCHED = 0.9
+"""Where they leave this part, no line that it moves was measured."""
+SURE_DIP = 2.0
+"""A ridge that is lower than the corners by this many sigma is no measurement of a flat pitch."""
+WORDS = {
+    "length_m": "the pitch's length",
+    "width_m": "the pitch's width",
+    "ridge_height_m": "the ridge's height",
+    "focal_length_px": "the focal length",
+    "principal_point_x_px": "the principal point (x)",
+    "principal_point_y_px": "the principal point (y)",
+    "k1": "the first radial coefficient",
+}
+
+
+MeasureName = Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measure of the pitch, metres: as it was `given` and as the lines have it (`value`), with `sigma`.
+
+    `open_m`: a standard deviation of what it might have been before. `known`: whether the lines tell it; if not,
+    `value` is worth nothing, the fitted pitch keeps what was given, and `detail` says why.
+    """
+
+    name: MeasureName
+    given: float
+    value: float
+    sigma: float
+    open_m: float
+    known: bool
+    detail: str
+
+
+@dataclass(frozen=True)
+class FieldFit:
+    """A pitch with the measures that the lines tell, and the cameras as they stand around it.
+
+    `rejected_because`: why the frames are not to be trusted with it; None when they are.
+    """
+
+    pitch: Field
+    cameras: Sequence[CameraResult]
+    measures: Sequence[Measure]
+    rejected_because: str | None
+    stitch_error_px: float | None
+    timings_s: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the pitch may replace the one given."""
+        return self.rejected_because is None
+
+
+def fit_field(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    frames: Mapping[str, Sequence[Frame]],
+    segment: Segment,
+    seed: int,
+    report: Callable[[Progress], None] = lambda _: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> FieldFit:
+    """Fit length, width and ridge of a pitch to its lines in the frames of several cameras.
+
+    Arguments, errors and determinism as of `calibrate`. Where the pitch has no ridge, one with hips of 45° is tried.
+    """
+    clock, journey = Clock(), Journey(report, stop)
+    require_markings_in_view(pitch, cameras)
+    with clock.measuring("segmentation"):
+        responses = segment_all(pitch, cameras, frames, segment, journey)
+    options = Options(seed=seed)
+    with clock.measuring("evolution"):
+        strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
+        levels, rng = METHODS["esc"].levels, np.random.default_rng(seed)
+        found = search(pitch, cameras, responses, levels, strategy, rng, journey.evolution(options.generations))
+    with clock.measuring("refinement"):
+        journey.at("refinement", 0.0)
+        brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
+        sight = Sight(brightness, responses)
+        refined, measures = fit_measures(pitch, found.cameras, sight, options.stitch_weight)
+    with clock.measuring("quality"):
+        journey.at("refinement", 0.9)
+        by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
+        stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
+        qualities = qualities_of(pitch, cameras, refined, responses)
+        journey.at("refinement", 1.0)
+    gate = Gate()
+    rejected = (
+        rejection(qualities, pairs_in_common(refined.pitch, refined.cameras), stitch, gate)
+        or ridge_rejection(refined.pitch, gate)
+        or _implausible(refined.pitch)
+    )
+    return FieldFit(refined.pitch, [camera_result(q) for q in qualities], measures, rejected, stitch, clock.seconds)
+
+
+def fit_measures(
+    pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float
+) -> tuple[Refined, list[Measure]]:
+    """The finish on the pitch with those measures that the lines tell; and what they tell of every measure."""
+    free = free_field(pitch)
+    everything = refine(pitch, cameras, sight, stitch_weight, free, (*FIRST_SEARCH_PX, *SEARCH_PX))
+    trials = try_ridges(everything, free, sight, stitch_weight)
+    measures = [
+        _measure(pitch, everything.pitch, parameter, found, trials, cameras)
+        for parameter, found in zip(free, everything.found, strict=True)
+    ]
+    ridge = _ridge_length(pitch, trials)
+    settled, still_free = _settled(pitch, everything.pitch, free, measures, ridge)
+    final = refine(settled, everything.cameras, sight, stitch_weight, still_free)
+    told = [
+        replace(measure, value=parameter.read(final.pitch)) if measure.known else measure
+        for measure, parameter in zip(measures, free, strict=True)
+    ]
+    return final, [*told, ridge]
+
+
+def _measure(
+    given: Field,
+    fitted: Field,
+    parameter: FieldParameter,
+    found: Determined,
+    trials: RidgeTrials,
+    cameras: Sequence[Camera],
+) -> Measure:
+    sigma = float(np.hypot(found.sigma, trials.spread(parameter.read)))
+    left = sigma / parameter.expected
+    known = left <= TOLD
+    detail = ""
+    if left > UNTOUCHED:
+        detail = "no line that depends on it is in view"
+    elif not known:
+        detail = f"the lines in view leave {left:.0%} of what was open"
+        if found.entangled is not None:
+            other, correlation = found.entangled
+            detail += f"; it cannot be told apart from {_named(other, cameras)} (correlation {correlation:+.2f})"
+    name = cast(MeasureName, parameter.name)
+    return Measure(name, parameter.read(given), parameter.read(fitted), sigma, parameter.expected, known, detail)
+
+
+def _ridge_length(given: Field, trials: RidgeTrials) -> Measure:
+    open_m = float(given.length / np.sqrt(12))
+    shortest, longest = trials.alike
+    known = bool(trials.sigma <= TOLD * open_m)
+    detail = "" if known else f"the lines fit alike with a ridge of any length from {shortest:.0f} to {longest:.0f} m"
+    return Measure("ridge_length_m", given.ridge_length, trials.best, trials.sigma, open_m, known, detail)
+
+
+def _settled(
+    given: Field, fitted: Field, free: Sequence[FieldParameter], measures: Sequence[Measure], ridge: Measure
+) -> tuple[Field, list[FieldParameter]]:
+    """The given pitch with the measures that are known, and which of them are found along with poses."""
+    pitch, still_free = given, []
+    for parameter, measure in zip(free, measures, strict=True):
+        # What lies below the corners by no more than chance is a flat pitch.
+        flat = parameter.name == "ridge_height_m" and -SURE_DIP * measure.sigma < measure.value <= 0
+        if flat:
+            pitch = pitch.flat()
+        elif measure.known:
+            pitch = parameter.write(pitch, parameter.read(fitted))
+            still_free.append(parameter)
+    return (pitch.with_ridge_length(ridge.value) if ridge.known else pitch), still_free
+
+
+def _named(parameter: Parameter, cameras: Sequence[Camera]) -> str:
+    words = WORDS[parameter.name]
+    return f"{words} of camera {cameras[parameter.camera].id}" if isinstance(parameter, LensParameter) else words
+
+
+def _implausible(pitch: Field) -> str | None:
+    """Why a fitted pitch cannot be one."""
+    for what, value in (("length", pitch.length), ("width", pitch.width)):
+        extent = pitch.template.size.get(what)
+        if extent is not None and not extent.least <= value <= extent.most:
+            return (
+                f"the lines fit best with a {what} of {value:.1f} m, and a pitch has {extent.least:.0f} to "
+                f"{extent.most:.0f} m; is it the right pitch, and are the poses near?"
+            )
+    return None

@@ -1,0 +1,86 @@
+"""The ground as it really is: heights above the model that the finish finds along with the poses.
+
+A pitch swells by centimetres, over metres, and from a low camera that moves a far line by decimetres. All lines on a
+swell move alike, in all cameras, so no number of measurements averages it out: it has to be an unknown of its own.
+Heights are a Gaussian process with a Matérn covariance (Rasmussen and Williams, 2006, section 4.2), held at the nodes
+of a grid and bilinear between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.scene.camera import Array
+from worker.calibration.scene.field import LinePoints
+
+NODE_M = 7.0
+CORRELATION_M = 10.0
+UNEVEN_M = 0.015
+"""Standard deviation of the heights of an ordinary pitch."""
+MOST_UNEVEN_M = 0.02
+"""More than that is not taken for a swell: a ground that may do anything explains any pose."""
+EVEN_M, EVEN_NODES = 0.004, 2.0
+"""How even a pitch is thought to be before it is seen, and how many nodes of evidence that is worth."""
+NUGGET = 1e-6
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Nodes under the markings, K of them.
+
+    `node` (N, 4) and `share` (N, 4): between which nodes each line point lies, and what it takes of each;
+    `precision` (K, K): the inverse covariance of heights that have a standard deviation of 1.
+    """
+
+    node: NDArray[np.intp]
+    share: Array
+    precision: Array
+
+    @classmethod
+    def under(cls, lines: LinePoints) -> Ground:
+        """The ground that carries some line points."""
+        at = lines.position[:, :2] / NODE_M
+        low = np.floor(at).astype(int)
+        right, up = (at - low).T
+        corners = np.stack([low, low + [1, 0], low + [0, 1], low + [1, 1]], axis=1)
+        share = np.stack([(1 - right) * (1 - up), right * (1 - up), (1 - right) * up, right * up], axis=1)
+        nodes, node = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+        apart = np.sqrt(3) * NODE_M * np.linalg.norm(nodes[:, None] - nodes[None], axis=-1) / CORRELATION_M
+        covariance = (1 + apart) * np.exp(-apart) + NUGGET * np.eye(len(nodes))
+        return cls(node.reshape(-1, 4), share, np.linalg.inv(covariance))
+
+    def __len__(self) -> int:
+        return len(self.precision)
+
+    def under_points(self, heights: Array, point: NDArray[np.intp]) -> Array:
+        """Heights (M,) under line points (M,), from those of the nodes (K,)."""
+        return np.asarray(np.sum(self.share[point] * heights[self.node[point]], axis=1))
+
+    def gathered(self, point: NDArray[np.intp], values: Array) -> Array:
+        """Sums (K, C) of values (M, C) of line points (M,) by node, each as far as it belongs to it."""
+        sums = np.empty((len(self), values.shape[1]))
+        node = self.node[point].ravel()
+        for column, of_points in enumerate(values.T):
+            sums[:, column] = np.bincount(node, (self.share[point] * of_points[:, None]).ravel(), len(self))
+        return sums
+
+    def gathered_twice(self, point: NDArray[np.intp], values: Array) -> Array:
+        """Sums (K, K) of values (M,) of line points (M,) by the pairs of nodes they lie between."""
+        node, share = self.node[point], self.share[point]
+        pair = node[:, :, None] * len(self) + node[:, None, :]
+        both = share[:, :, None] * share[:, None, :] * values[:, None, None]
+        sums = np.bincount(pair.ravel(), both.ravel(), len(self) ** 2)
+        return np.asarray(sums.reshape(len(self), len(self)), dtype=float)
+
+    def unevenness(self, heights: Array, covariance: Array, believed: float) -> float:
+        """The standard deviation that heights (K,) speak for, known to a covariance (K, K) under a `believed` one.
+
+        MacKay's evidence update (Bayesian Interpolation, 1992): what the data determined counts, the rest does not.
+        """
+        determined = len(self) - np.sum(self.precision * covariance) / believed**2
+        power = heights @ self.precision @ heights
+        uneven = np.sqrt((power + EVEN_NODES * EVEN_M**2) / (max(determined, 0.0) + EVEN_NODES))
+        return float(uneven)

@@ -1,0 +1,165 @@
+"""Numbers that a calibration takes for known and that may be wrong: those of each lens, and of the field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from worker.calibration.scene.camera import Array, Camera, Intrinsics
+from worker.calibration.scene.field import Field, LinePoints
+
+FIELD_STEP_M = 1e-3
+FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
+"""How far off what is left free may be: heat changes a focal length by a thousandth, a crown is up to half a metre."""
+FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
+"""Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
+
+
+@dataclass(frozen=True)
+class LensParameter:
+    """A number of the lens of camera number `camera`. `expected`: how far off it is after a good calibration."""
+
+    camera: int
+    name: str
+    expected: float
+    step: float
+    change: Callable[[Intrinsics, float], Intrinsics]
+
+    def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
+        """Cameras and pitch with this number changed."""
+        changed = list(cameras)
+        changed[self.camera] = self.changed(changed[self.camera], by)
+        return changed, pitch
+
+    def changed(self, camera: Camera, by: float) -> Camera:
+        """The camera with this number changed."""
+        return replace(camera, intrinsics=self.change(camera.intrinsics, by))
+
+
+@dataclass(frozen=True)
+class FieldParameter:
+    """A measure of the field, metres. `expected`: how far off one that was taken with care is; `read` and `write`: of a
+    pitch, and one with another; `shift` (N, 3): how a pitch's line points move, metres per metre.
+    """
+
+    name: str
+    expected: float
+    read: Callable[[Field], float]
+    write: Callable[[Field, float], Field]
+    shift: Array
+
+    @classmethod
+    def of(
+        cls,
+        pitch: Field,
+        name: str,
+        expected: float,
+        read: Callable[[Field], float],
+        write: Callable[[Field, float], Field],
+    ) -> FieldParameter:
+        """A measure of this pitch."""
+        return cls(name, expected, read, write, np.empty((0, 3))).around(pitch, pitch.line_points())
+
+    def around(self, pitch: Field, lines: LinePoints) -> FieldParameter:
+        """The same measure as it moves `lines` of a pitch that has been changed since."""
+        changed = {step: self.write(pitch, self.read(pitch) + step) for step in (FIELD_STEP_M, 0.0, -FIELD_STEP_M)}
+        # On the brink of one more dash, the other side has as many.
+        ahead, *_, behind = (step for step, one in changed.items() if one.painted_like(lines))
+        moved = changed[ahead].same_line_points(lines).position - changed[behind].same_line_points(lines).position
+        return replace(self, shift=moved / (ahead - behind))
+
+    def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
+        """Cameras and pitch with this measure changed, as far as it can be."""
+        return list(cameras), self.write(pitch, self.read(pitch) + by)
+
+
+Parameter = LensParameter | FieldParameter
+
+
+def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
+    """What a board's photos leave uncertain of each lens, for a 4K frame: a pixel of its centre, and a little more."""
+    found: list[Parameter] = []
+    for number, camera in enumerate(cameras):
+        lens = camera.intrinsics
+        focal, pixel = float(lens.matrix[0, 0]), lens.relative_size
+        found += [
+            LensParameter(number, "focal_length_px", 3e-4 * focal, 1e-5 * focal, _longer),
+            LensParameter(number, "principal_point_x_px", pixel, 0.01, lambda one, by: _centred(one, by, 0.0)),
+            LensParameter(number, "principal_point_y_px", pixel, 0.01, lambda one, by: _centred(one, 0.0, by)),
+            LensParameter(number, "k1", 5e-4, 1e-5, _bent),
+        ]
+    return found
+
+
+def field_parameters(pitch: Field) -> list[Parameter]:
+    """What is measured once when a venue is set up."""
+    return [
+        _ridge_height(pitch, 0.02),
+        _length(pitch, 0.03),
+        _width(pitch, 0.03),
+    ]
+
+
+def free_focal_lengths(cameras: Sequence[Camera]) -> list[Parameter]:
+    """The focal length of each camera, to be found along with its pose."""
+    lengths = [p for p in lens_parameters(cameras) if p.name == "focal_length_px"]
+    return [
+        replace(p, expected=FREE_FOCAL_LENGTH * float(camera.intrinsics.matrix[0, 0]))
+        for p, camera in zip(lengths, cameras, strict=True)
+    ]
+
+
+def free_ridge(pitch: Field) -> list[Parameter]:
+    """The height of the ridge, to be found along with the poses."""
+    return [_ridge_height(pitch, FREE_RIDGE_M)]
+
+
+def free_field(pitch: Field) -> list[FieldParameter]:
+    """Length, width and height of a field of which next to nothing is known."""
+    return [_length(pitch, FREE_LENGTH_M), _width(pitch, FREE_WIDTH_M), _ridge_height(pitch, FREE_RIDGE_M)]
+
+
+def _ridge_height(pitch: Field, expected: float) -> FieldParameter:
+    return FieldParameter.of(
+        pitch,
+        "ridge_height_m",
+        expected,
+        lambda one: one.ridge_height,
+        lambda one, now: one.raised(now - one.ridge_height),
+    )
+
+
+def _length(pitch: Field, expected: float) -> FieldParameter:
+    """Of the pitch; its ridge keeps its own."""
+    return FieldParameter.of(
+        pitch, "length_m", expected, lambda one: one.length, lambda one, now: replace(one, length=now)
+    )
+
+
+def _width(pitch: Field, expected: float) -> FieldParameter:
+    return FieldParameter.of(
+        pitch, "width_m", expected, lambda one: one.width, lambda one, now: replace(one, width=now)
+    )
+
+
+def _longer(lens: Intrinsics, by: float) -> Intrinsics:
+    """Another focal length; the ratio of the sides of a pixel stays."""
+    matrix = lens.matrix.copy()
+    matrix[[0, 1], [0, 1]] *= 1 + by / matrix[0, 0]
+    return replace(lens, matrix=matrix)
+
+
+def _centred(lens: Intrinsics, right: float, down: float) -> Intrinsics:
+    matrix = lens.matrix.copy()
+    matrix[:2, 2] += (right, down)
+    return replace(lens, matrix=matrix)
+
+
+def _bent(lens: Intrinsics, by: float) -> Intrinsics:
+    """Another first radial coefficient."""
+    distortion = np.zeros(max(len(lens.distortion), 4))
+    distortion[: len(lens.distortion)] = lens.distortion
+    distortion[0] += by
+    return replace(lens, distortion=distortion)

@@ -1,0 +1,1 @@
+"""From frames to evidence: which pixels are lines, and where exactly these run."""
