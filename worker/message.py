@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel
 
-from service.schemas import FieldResult, IntrinsicsResult, JobError, LocateResult, Progress, Result
+from service.wire.schemas import FieldResult, IntrinsicsResult, JobError, LocateResult, Progress, Result
 
 
 class Message(BaseModel):

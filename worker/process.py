@@ -23,15 +23,15 @@ from typing import IO, TypeVar
 import structlog
 from pydantic import ValidationError
 
-from service import lifeline, tracing
-from service.disk import Disk
-from service.intake import Intake
-from service.problems import KINDS, first_line, type_of
+from service import lifeline
+from service.intake.snapshots import Snapshots
+from service.intake.submit import Intake
+from service.intake.unattended import Unattended
+from service.observe import tracing
+from service.observe.disk import Disk
 from service.queue import Queue, WorkerQueue
 from service.queue import migrate as migrate_queue
-from service.schemas import JobError, Progress
 from service.settings import Settings
-from service.snapshots import Snapshots
 from service.store.blobs import Blobs
 from service.store.deliveries import Deliveries
 from service.store.engine import AWAY, connect, migrate
@@ -40,13 +40,14 @@ from service.store.jobs import Jobs, Task
 from service.store.schedules import Schedules
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.unattended import Unattended
-from worker import retention
-from worker.alarms import Alarms
-from worker.callbacks import Callbacks
+from service.wire.problems import KINDS, first_line, type_of
+from service.wire.schemas import JobError, Progress
+from worker.duties import retention
+from worker.duties.alarms import Alarms
+from worker.duties.callbacks import Callbacks
+from worker.duties.retention import Retention
+from worker.duties.scheduled import Scheduled
 from worker.message import Message
-from worker.retention import Retention
-from worker.scheduled import Scheduled
 from worker.spans import Spans
 
 BEAT_S = 2.0

@@ -9,9 +9,9 @@ from typing import Self
 from opentelemetry import trace
 from opentelemetry.trace import Span, SpanKind, StatusCode
 
-from service import tracing
-from service.schemas import IntrinsicsResult
+from service.observe import tracing
 from service.store.jobs import Task
+from service.wire.schemas import IntrinsicsResult
 from worker.message import Message
 
 # Before a job's program says how far it is: it starts, fetches and decodes the frames.

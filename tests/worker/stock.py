@@ -5,7 +5,6 @@ from pathlib import Path
 
 import sqlalchemy as sa
 
-from service.schemas import AlarmEvent, CameraResult, JobError, Moved, Options, Pose, Provenance, Result, Venue, VenueIn
 from service.settings import Settings
 from service.store import tables
 from service.store.blobs import Blobs
@@ -16,6 +15,18 @@ from service.store.ids import new_id
 from service.store.jobs import Jobs, Submission, picture_folder
 from service.store.venues import Venues
 from service.store.workers import Workers
+from service.wire.schemas import (
+    AlarmEvent,
+    CameraResult,
+    JobError,
+    Moved,
+    Options,
+    Pose,
+    Provenance,
+    Result,
+    Venue,
+    VenueIn,
+)
 from tests.e2e.running import venue
 from tests.homes import files
 

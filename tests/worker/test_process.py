@@ -3,9 +3,9 @@ import time
 
 import pytest
 
-from service.schemas import VENUE_EXAMPLE, Options, VenueIn
 from service.settings import Settings
 from service.store.jobs import Task
+from service.wire.schemas import VENUE_EXAMPLE, Options, VenueIn
 from worker import process
 
 TASK = Task("job", "token", VenueIn.model_validate(VENUE_EXAMPLE).stored(), Options(), {})

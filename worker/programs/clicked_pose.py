@@ -1,6 +1,7 @@
 """The first pose of a camera while its points are being clicked, in a process of its own: JSON in, JSON out.
 
-`python -m worker.clickedpose`. What comes is a `service.clicking.ClickedCamera`, what leaves a `ClickedPose`.
+`python -m worker.programs.clicked_pose`. What comes is a `service.api.clicking.ClickedCamera`, what leaves a
+`ClickedPose`.
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ import time
 from math import isfinite
 
 from service import lifeline
-from service.clicking import ClickedCamera, ClickedPose, Polyline
-from worker.calibration.camera import Camera, inside
-from worker.calibration.field import Field
-from worker.calibration.stitching import outline
-from worker.locatejob import clicks_of, pose_of, result_of
-from worker.outcome import Failure, lens_of, pitch_of
+from service.api.clicking import ClickedCamera, ClickedPose, Polyline
+from worker.calibration.draw.stitching import outline
+from worker.calibration.scene.camera import Camera, inside
+from worker.calibration.scene.field import Field
+from worker.jobs.locate import clicks_of, pose_of, result_of
+from worker.jobs.wire import Failure, lens_of, pitch_of
 
 # A line is drawn as far as this beside the picture, in widths of it: what is further out is not worth drawing.
 BESIDE = 0.25

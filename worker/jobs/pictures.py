@@ -10,12 +10,12 @@ import numpy as np
 import structlog
 from numpy.typing import NDArray
 
-from worker.calibration import layers, stitching
 from worker.calibration.calibrate import Calibration, Segment
-from worker.calibration.camera import Camera
-from worker.calibration.field import Field
-from worker.calibration.segmentation import Region
-from worker.outcome import Picture, jpeg, png
+from worker.calibration.draw import layers, stitching
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.field import Field
+from worker.calibration.see.segmentation import Region
+from worker.jobs.wire import Picture, jpeg, png
 
 # Of the frames that layers are laid over: a wide screen. The overlays have the size of the frames.
 FRAME_WIDTH, PREVIEW_WIDTH = 1920, 1920

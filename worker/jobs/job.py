@@ -1,6 +1,6 @@
 """One job, in a process of its own: load, compute what its kind asks for, draw, hand back.
 
-`python -m worker.job JOB_ID RUN_TOKEN` prints a line of JSON for each step of progress and one for the end, a
+`python -m worker.jobs.job JOB_ID RUN_TOKEN` prints a line of JSON for each step of progress and one for the end, a
 `worker.message.Message` each. It writes no row: its parent does.
 """
 
@@ -15,9 +15,15 @@ from importlib.metadata import version
 import cv2
 import structlog
 
-from service import lifeline, logs, schemas
-from service.problems import first_line
-from service.schemas import (
+from service import lifeline
+from service.observe import logs
+from service.settings import Settings
+from service.store.blobs import AWAY, Blobs
+from service.store.engine import connect
+from service.store.jobs import Jobs, Task, picture_file, picture_folder
+from service.wire import schemas
+from service.wire.problems import first_line
+from service.wire.schemas import (
     FieldOptions,
     FieldResult,
     IntrinsicsOptions,
@@ -29,16 +35,12 @@ from service.schemas import (
     Result,
     Venue,
 )
-from service.settings import Settings
-from service.store.blobs import AWAY, Blobs
-from service.store.engine import connect
-from service.store.jobs import Jobs, Task, picture_file, picture_folder
-from worker import fieldjob, lensjob, locatejob
 from worker.calibration import calibrate as engine
 from worker.calibration.calibrate import CalibrationError, calibrate
-from worker.calibration.quality import Gate
-from worker.message import Message
-from worker.outcome import (
+from worker.calibration.judge.quality import Gate
+from worker.jobs import field, intrinsics, locate
+from worker.jobs.pictures import Remembering, draw
+from worker.jobs.wire import (
     PREVIEW_FRACTION,
     Failure,
     Outcome,
@@ -51,7 +53,7 @@ from worker.outcome import (
     wire_lens,
     wire_progress,
 )
-from worker.pictures import Remembering, draw
+from worker.message import Message
 
 BEHIND_THE_OTHERS = 10
 """Niceness: answers of the API and heartbeats of the worker on the same machine go before the computation."""
@@ -86,14 +88,14 @@ def _compute(
     cv2.setNumThreads(settings.threads)
     match task.options:
         case IntrinsicsOptions() as options:
-            return lensjob.solve({name: photo for name, (photo,) in files.items()}, options, report)
+            return intrinsics.solve({name: photo for name, (photo,) in files.items()}, options, report)
         case LocateOptions() as options:
             assert task.venue is not None
             ((camera, frames),) = files.items()
-            return locatejob.solve(task.venue, camera, options, next(iter(frames), None), report)
+            return locate.solve(task.venue, camera, options, next(iter(frames), None), report)
         case FieldOptions() as options:
             assert task.venue is not None
-            return fieldjob.solve(task.venue, files, options, settings, report)
+            return field.solve(task.venue, files, options, settings, report)
         case options:
             assert task.venue is not None
             return solve(task.venue, files, options, settings, report)

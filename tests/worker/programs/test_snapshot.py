@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from service.problems import Problem
-from service.schemas import VenueIn
+from service.intake.snapshots import Snapshots
 from service.settings import Settings
-from service.snapshots import Snapshots
+from service.wire.problems import Problem
+from service.wire.schemas import VenueIn
 from tests.e2e.running import venue
 
 SIZE = (64, 48)

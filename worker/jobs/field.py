@@ -10,14 +10,14 @@ import cv2
 import structlog
 
 from fields.template import Extent
-from service.schemas import FieldOfPlay, FieldOptions, FieldResult, MeasureResult, Progress, Provenance, Venue
 from service.settings import Settings
-from worker.calibration import stitching
+from service.wire.schemas import FieldOfPlay, FieldOptions, FieldResult, MeasureResult, Progress, Provenance, Venue
 from worker.calibration.calibrate import CalibrationError
-from worker.calibration.camera import Camera
-from worker.calibration.field import Field
-from worker.calibration.fieldfit import FieldFit, Measure, fit_field
-from worker.outcome import (
+from worker.calibration.draw import stitching
+from worker.calibration.measures.field_fit import FieldFit, Measure, fit_field
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.field import Field
+from worker.jobs.wire import (
     PREVIEW_FRACTION,
     Failure,
     Outcome,

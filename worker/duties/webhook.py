@@ -16,8 +16,8 @@ from datetime import datetime
 
 import httpx
 
-from service.callbacks import is_public
-from worker import outgoing
+from service.wire.callbacks import is_public
+from worker.duties import outgoing
 
 # From the first connection to the answer.
 TIMEOUT_S = 10.0

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from service.clicking import ClickedCamera
-from service.schemas import ClickedPoint
+from service.api.clicking import ClickedCamera
+from service.wire.schemas import ClickedPoint
 from tests.pages.newcomer import VENUE, points_to_click, true_camera
-from worker.clickedpose import answer
+from worker.programs.clicked_pose import answer
 
 
 def clicked(points):

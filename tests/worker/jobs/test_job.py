@@ -7,15 +7,15 @@ import cv2
 import numpy as np
 import pytest
 
-from service.schemas import Options, VenueIn
 from service.settings import Settings
 from service.store.jobs import picture_file
+from service.wire.schemas import Options, VenueIn
 from tests.worker.stock import Stock
-from worker import job, outcome, pictures
 from worker.calibration import calibrate as engine
-from worker.calibration.camera import Pose
-from worker.calibration.diagnosis import Suspicion
-from worker.calibration.quality import Sigma
+from worker.calibration.finish.diagnosis import Suspicion
+from worker.calibration.judge.quality import Sigma
+from worker.calibration.scene.camera import Pose
+from worker.jobs import job, pictures, wire
 from worker.message import Message
 
 SIZE = (320, 180)
@@ -82,7 +82,7 @@ def asked(monkeypatch):
             return np.full(frame.shape[:2], 255, np.uint8)
 
     monkeypatch.setattr(job, "calibrate", calibrate)
-    monkeypatch.setattr(outcome, "Segmenter", Segmenter)
+    monkeypatch.setattr(wire, "Segmenter", Segmenter)
     return asked
 
 
@@ -208,7 +208,7 @@ def test_frames_that_the_store_does_not_hand_out_fail_the_job_in_its_words(tmp_p
     task = home.jobs.begin(home.submitted("v"))
     shutil.rmtree(tmp_path / "blobs/frames")
     (tmp_path / "blobs/frames").write_bytes(b"no folder")
-    program = [sys.executable, "-m", "worker.job", task.job_id, task.run_token]
+    program = [sys.executable, "-m", "worker.jobs.job", task.job_id, task.run_token]
     ended = subprocess.run(program, env=os.environ | {"ESC_DATA": str(tmp_path)}, capture_output=True, timeout=60)
     error = Message.model_validate_json(ended.stdout).error
     assert (error.type, error.camera) == ("/problems/job-crashed", "left")

@@ -11,13 +11,13 @@ from threading import Barrier
 import pytest
 import sqlalchemy as sa
 
-from service.schemas import Alarms
 from service.settings import Settings
+from service.wire.schemas import Alarms
 from tests.homes import in_both_homes
 from tests.worker.receiver import Dripping, Endless, NulSaying, Receiver, Silent
 from tests.worker.stock import Stock, anyway
-from worker import webhook
-from worker.callbacks import ATTEMPT, Callbacks
+from worker.duties import webhook
+from worker.duties.callbacks import ATTEMPT, Callbacks
 
 SECRET, OTHER_SECRET = ("whsec_" + b64encode(bytes([n]) * 32).decode() for n in (7, 8))
 LOCAL = {"webhook_secret": SECRET, "callback_allow_http": True, "callback_allow_private": True}

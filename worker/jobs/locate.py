@@ -9,14 +9,14 @@ from importlib.metadata import version
 import numpy as np
 
 from fields.landmarks import UnknownLandmark
-from service import schemas
-from service.schemas import ClickedPoint, LocateOptions, LocateResult, LocateSigma, PointResult, Progress, Venue
-from worker.calibration.camera import Array, Intrinsics
-from worker.calibration.field import Field
-from worker.calibration.firstpose import FirstPose, LensGain, NoPose, first_pose
-from worker.calibration.inspection import clicks_picture
-from worker.calibration.pointfit import Clicks
-from worker.outcome import Failure, Outcome, decoded_frame, jpeg, lens_of, number, pitch_of, wire_lens, wire_pose
+from service.wire import schemas
+from service.wire.schemas import ClickedPoint, LocateOptions, LocateResult, LocateSigma, PointResult, Progress, Venue
+from worker.calibration.draw.inspection import clicks_picture
+from worker.calibration.first.first_pose import FirstPose, LensGain, NoPose, first_pose
+from worker.calibration.first.point_fit import Clicks
+from worker.calibration.scene.camera import Array, Intrinsics
+from worker.calibration.scene.field import Field
+from worker.jobs.wire import Failure, Outcome, decoded_frame, jpeg, lens_of, number, pitch_of, wire_lens, wire_pose
 
 
 def solve(

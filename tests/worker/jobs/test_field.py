@@ -2,10 +2,10 @@
 
 import pytest
 
-from service.schemas import FieldOptions, VenueIn
 from service.settings import Settings
-from worker.fieldjob import solve
-from worker.outcome import Failure
+from service.wire.schemas import FieldOptions, VenueIn
+from worker.jobs.field import solve
+from worker.jobs.wire import Failure
 
 
 def refusal(tmp_path, template, length_m, width_m):

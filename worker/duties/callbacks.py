@@ -10,11 +10,11 @@ from datetime import datetime, timedelta
 import httpx
 import structlog
 
-from service.schemas import JobEvent
 from service.settings import Settings
 from service.store.deliveries import Deliveries, Delivery
 from service.store.jobs import Jobs
-from worker import webhook
+from service.wire.schemas import JobEvent
+from worker.duties import webhook
 
 LOOK_S = 1.0
 # Receivers that hang hold up others only when there are as many of them.

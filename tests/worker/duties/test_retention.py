@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock
-from worker.retention import FAILURES, TRY_AGAIN_AFTER, Retention
+from worker.duties.retention import FAILURES, TRY_AGAIN_AFTER, Retention
 
 pytestmark = in_both_homes
 NOW = datetime(2026, 11, 21, 10, tzinfo=UTC)
@@ -98,7 +98,7 @@ def test_frames_of_an_upload_that_became_no_job_go_after_their_grace(stock, rete
 
 
 def test_a_round_is_bounded_and_says_that_there_is_more(stock, retention, monkeypatch):
-    monkeypatch.setattr("worker.retention.BATCH", 2)
+    monkeypatch.setattr("worker.duties.retention.BATCH", 2)
     newest_first = [stock.ended("a", ago(days=3 + n), accepted=None) for n in range(3)]
     assert retention.round(NOW)
     assert stock.files() == {f"frames/{newest_first[0]}"}

@@ -8,12 +8,12 @@ from importlib.metadata import version
 
 import cv2
 
-from service import schemas
-from service.schemas import CoverageResult, IntrinsicsOptions, IntrinsicsResult, LensTrial, PhotoResult, Progress
-from worker.calibration.boards import Board, Charuco, find_board, other_size
-from worker.calibration.inspection import coverage_picture
-from worker.calibration.lenscalibration import LensCalibration, NoLens, Photo, calibrate_lens
-from worker.outcome import Failure, Outcome, Picture, decoded, jpeg, number, wire_lens
+from service.wire import schemas
+from service.wire.schemas import CoverageResult, IntrinsicsOptions, IntrinsicsResult, LensTrial, PhotoResult, Progress
+from worker.calibration.draw.inspection import coverage_picture
+from worker.calibration.first.boards import Board, Charuco, find_board, other_size
+from worker.calibration.first.lens_calibration import LensCalibration, NoLens, Photo, calibrate_lens
+from worker.jobs.wire import Failure, Outcome, Picture, decoded, jpeg, number, wire_lens
 
 DETECTION_FRACTION = 0.8
 

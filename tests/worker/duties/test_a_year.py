@@ -8,15 +8,15 @@ import cv2
 import numpy as np
 import pytest
 
-from service import motion
-from service.schemas import Alarms as Rules
-from service.schemas import VenueIn
-from tests.calibration.synthetic import CROWNED, camera, moved, paint_frame
+from service.wire import motion
+from service.wire.schemas import Alarms as Rules
+from service.wire.schemas import VenueIn
+from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame
 from tests.worker.stock import Stock, anyway
-from worker import job
-from worker.alarms import Alarms
-from worker.calibration.camera import Camera, Intrinsics
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Camera, Intrinsics
+from worker.calibration.scene.field import Field
+from worker.duties.alarms import Alarms
+from worker.jobs import job
 
 SIZE, FOCAL, LENS = (640, 360), 400.0, (-0.12, 0.02, 0.0, 0.0, 0.0)
 OTHER_PITCH = Field(92.0, 50.0)

@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from service import schemas
-from service.problems import KINDS, type_of
-from service.schemas import (
+from service.settings import Settings
+from service.wire import schemas
+from service.wire.problems import KINDS, type_of
+from service.wire.schemas import (
     CameraResult,
     FieldResult,
     IntrinsicsResult,
@@ -23,12 +24,11 @@ from service.schemas import (
     Result,
     Sigma,
 )
-from service.settings import Settings
 from worker.calibration import calibrate as engine
-from worker.calibration import quality
-from worker.calibration.camera import LENSES, Camera, Intrinsics, Pose
-from worker.calibration.field import Field
-from worker.calibration.segmentation import ProviderMissing, Segmenter
+from worker.calibration.judge import quality
+from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
+from worker.calibration.scene.field import Field
+from worker.calibration.see.segmentation import ProviderMissing, Segmenter
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90

@@ -12,7 +12,7 @@ from datetime import datetime, timedelta
 
 import structlog
 
-from service.disk import Disk
+from service.observe.disk import Disk
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.expiry import Expiry

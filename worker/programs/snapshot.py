@@ -1,7 +1,7 @@
 """Frames from the sources of cameras, in a process of its own that may be killed when it takes too long.
 
-`python -m worker.snapshot` reads a `SourceTask` on its standard input, puts what it gets into the folder, each file by
-the name of its camera, and prints a `SourceAnswer` per camera as it comes.
+`python -m worker.programs.snapshot` reads a `SourceTask` on its standard input, puts what it gets into the folder, each
+file by the name of its camera, and prints a `SourceAnswer` per camera as it comes.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from urllib.parse import unquote
 import httpx
 import structlog
 
-from service import lifeline, sources
-from service.snapshots import SourceAnswer, SourceTask
-from worker import outgoing
+from service import lifeline
+from service.intake import sources
+from service.intake.snapshots import SourceAnswer, SourceTask
+from worker.duties import outgoing
 
 # The first frames of a stream may be put together from halves.
 FRAMES_PASSED_BY = 5

@@ -1,7 +1,7 @@
 """The ST maps of one camera, in a process of its own: JSON on standard input, a zip of two EXR files on its output.
 
-`python -m worker.stmap top-left|bottom-left`. Red and green say where to sample, 0..1; green counts from the bottom for
-Nuke and Flame and from the top for Unreal.
+`python -m worker.programs.stmap top-left|bottom-left`. Red and green say where to sample, 0..1; green counts from the
+bottom for Nuke and Flame and from the top for Unreal.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from service import lifeline
 from service.formats.archive import archive
-from service.schemas import Camera
-from worker.calibration.stmaps import StMap, distorting, undistorting
-from worker.outcome import lens_of
+from service.wire.schemas import Camera
+from worker.calibration.draw.st_maps import StMap, distorting, undistorting
+from worker.jobs.wire import lens_of
 
 
 def main(origin: str) -> None:

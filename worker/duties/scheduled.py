@@ -7,14 +7,14 @@ from datetime import UTC, timedelta
 
 import structlog
 
-from service.disk import Disk
-from service.intake import REFUSALS, Enqueue
-from service.problems import Problem
-from service.schemas import Options
+from service.intake.submit import REFUSALS, Enqueue
+from service.intake.unattended import Unattended
+from service.observe.disk import Disk
 from service.store.jobs import Origin
 from service.store.schedules import Firing, Schedules
 from service.store.venues import Venues
-from service.unattended import Unattended
+from service.wire.problems import Problem
+from service.wire.schemas import Options
 
 LOOK_S = 1.0
 # As many venues have their frames fetched at the same time.

@@ -1,0 +1,1 @@
+"""The program that computes one job, and the kinds of jobs."""

@@ -1,0 +1,1 @@
+"""Programs that the service asks for something at once, without a job."""
