@@ -11,20 +11,22 @@ import structlog
 from fastapi import FastAPI, Request
 from starlette.responses import Response
 
-from service import problems
-from service.access import QUIET, Access
-from service.auth import Gate
-from service.bodylimit import BodyLimit
-from service.context import Context
-from service.conventions import Conventions
-from service.disk import Disk
-from service.intake import Intake
-from service.metrics import Metrics
+from service.api.access import QUIET, Access
+from service.api.auth import Gate
+from service.api.body_limit import BodyLimit
+from service.api.context import Context
+from service.api.conventions import Conventions
+from service.api.shared_reads import SharedReads
+from service.api.watch import Watch
+from service.intake.snapshots import Snapshots
+from service.intake.submit import Intake
+from service.intake.unattended import Unattended
+from service.observe.disk import Disk
+from service.observe.metrics import Metrics
+from service.observe.readiness import Readiness
 from service.pages import ROUTERS as PAGES
-from service.problems import Problem
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
-from service.readiness import Readiness
 from service.routes import (
     again,
     calibrate,
@@ -40,22 +42,20 @@ from service.routes import (
     venues,
 )
 from service.settings import Settings
-from service.sharedreads import SharedReads
-from service.snapshots import Snapshots
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.blobs import Blobs
-from service.store.ends import Ends
+from service.store.counts.ends import Ends
+from service.store.counts.figures import look
 from service.store.engine import AWAY as DATABASE_AWAY
 from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
-from service.store.figures import look
 from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.sessions import Sessions
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.unattended import Unattended
-from service.watch import Watch
+from service.wire import problems
+from service.wire.problems import Problem
 
 # A client waits, and can come again.
 BLOB_PATIENCE_S = 10.0

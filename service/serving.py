@@ -18,9 +18,10 @@ import structlog
 import uvicorn
 from fastapi import FastAPI
 
-from service import lifeline, tracing
+from service import lifeline
+from service.api.connection import Connection, let_go_of_the_slow
 from service.app import create_app
-from service.connection import Connection, let_go_of_the_slow
+from service.observe import tracing
 from service.settings import Settings
 from service.store.keys import Keys
 

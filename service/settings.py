@@ -77,7 +77,8 @@ class Settings(BaseSettings):
     )
     source_timeout_s: float = Field(15, gt=0, le=120, description="For the frames of a venue, all cameras at once.")
     source_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.snapshot"], description="What fetches frames, beside API and worker."
+        [sys.executable, "-P", "-m", "worker.programs.snapshot"],
+        description="What fetches frames, beside API and worker.",
     )
 
     # Poses in other formats.
@@ -86,10 +87,11 @@ class Settings(BaseSettings):
         description="What FreeD packets carry as X, Y, height, pan, tilt, roll: `y -x z -pan+90 tilt roll`.",
     )
     map_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.stmap"], description="What computes ST maps; called with their origin."
+        [sys.executable, "-P", "-m", "worker.programs.stmap"],
+        description="What computes ST maps; called with their origin.",
     )
     pose_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.clickedpose"],
+        [sys.executable, "-P", "-m", "worker.programs.clicked_pose"],
         description="What finds a first pose while its points are being clicked.",
     )
 
@@ -102,7 +104,7 @@ class Settings(BaseSettings):
     threads: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="Per job.")
     job_timeout_s: float = Field(600, gt=0, description="For jobs that name no limit of their own.")
     job_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.job"],
+        [sys.executable, "-P", "-m", "worker.jobs.job"],
         description="What computes one job; called with the job's id and the token of the attempt.",
     )
     takeover_after_s: float = Field(10, gt=2, description="Silence after which another worker takes a job over.")

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 from service.formats.lens import Shot, product, transposed
 from service.formats.opentrackio import AHEAD_IS_Y, pan_tilt_roll
-from service.problems import Problem
+from service.wire.problems import Problem
 
 STEPS_PER_DEGREE = 32768
 STEPS_PER_METRE = 64_000

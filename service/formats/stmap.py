@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
+from service.api.programs import OneAtATime
 from service.formats.lens import Shot
-from service.programs import OneAtATime
 
 # A 4K lens takes 10 s of one core, and its maps 100 MB.
 _maps = OneAtATime("set of ST maps", longest_s=60, again_s=10, patience_s=0)

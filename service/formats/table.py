@@ -10,9 +10,9 @@ from typing import Protocol
 from service.formats import colmap, freed, opencv, opentrackio, plain, soccernet, stmap
 from service.formats.archive import archive
 from service.formats.lens import Shot
-from service.problems import Problem
-from service.schemas import FormatName
 from service.settings import Settings
+from service.wire.problems import Problem
+from service.wire.schemas import FormatName
 
 JSON, ZIP = "application/json", "application/zip"
 

@@ -10,10 +10,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 
-from service import etags
-from service.problems import Problem
+from service.api import etags
 from service.routes.documented import FOR_ALL
 from service.routes.guarded import Guarded
+from service.wire.problems import Problem
 
 FILES = Path(__file__).parent / "static"
 FOR_A_YEAR = "public, max-age=31536000, immutable"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from service.context import InContext, VenueIdPath
+from service.api.context import InContext, VenueIdPath
 from service.pages.shown import Page, page
 from service.routes.documented import needs
 from service.routes.venues import no_such_venue

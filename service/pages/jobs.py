@@ -6,12 +6,12 @@ from typing import Annotated, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.context import InContext, JobIdPath
+from service.api.context import InContext, JobIdPath
 from service.pages.shown import Page, page
 from service.pages.venues import holds
-from service.problems import Problem
 from service.routes.documented import needs
-from service.schemas import ID_PATTERN, JOB_ID_PATTERN, FormatName, Kind, Status
+from service.wire.problems import Problem
+from service.wire.schemas import ID_PATTERN, JOB_ID_PATTERN, FormatName, Kind, Status
 
 PER_PAGE = 50
 # In their order; other kinds of jobs have others.

@@ -9,12 +9,12 @@ from fastapi import APIRouter, Request, Response
 
 from fields.shapes import Arc, Line, Point, Shape
 from fields.template import NAMES
-from service.clicking import ClickedCamera, ClickedPose, clicked_pose
-from service.context import InContext
+from service.api.clicking import ClickedCamera, ClickedPose, clicked_pose
+from service.api.context import InContext
 from service.pages.shown import Page, page
 from service.routes.documented import needs
 from service.routes.guarded import Guarded
-from service.schemas import FieldOfPlay, LensModel
+from service.wire.schemas import FieldOfPlay, LensModel
 
 ARC_STEP_RAD = math.radians(4)
 router = APIRouter(route_class=Page, include_in_schema=False)

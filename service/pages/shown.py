@@ -14,14 +14,14 @@ from fastapi.exceptions import RequestValidationError
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.responses import HTMLResponse, RedirectResponse
 
-from service.auth import COOKIE, SCOPES, page_token
+from service.api.auth import COOKIE, SCOPES, page_token
 from service.pages import words
 from service.pages.assets import address
-from service.problems import KINDS, Problem
 from service.routes.guarded import Guarded
-from service.schemas import Scope
 from service.store.engine import AWAY
 from service.store.keys import Key
+from service.wire.problems import KINDS, Problem
+from service.wire.schemas import Scope
 
 SIGN_IN = "/ui/sign-in"
 # Scripts, styles and pictures are files of this service; nothing inline, nobody frames it.

@@ -9,12 +9,12 @@ from urllib.parse import parse_qs, urlsplit
 from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
 
-from service.auth import COOKIE
-from service.context import InContext
+from service.api.auth import COOKIE
+from service.api.context import InContext
 from service.pages.shown import HEADERS, SIGN_IN, Page, local, page
-from service.problems import KINDS, Problem
 from service.routes.documented import FOR_ALL
 from service.routes.guarded import Guarded
+from service.wire.problems import KINDS, Problem
 
 LONGEST_FORM = 8192
 router = APIRouter(route_class=Page, include_in_schema=False)

@@ -7,15 +7,15 @@ from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.context import Context, InContext, VenueIdPath
+from service.api.context import Context, InContext, VenueIdPath
 from service.pages.shown import Page, page
 from service.pages.sparkline import Sparkline, sparkline
 from service.routes.documented import needs
 from service.routes.guarded import Guarded
 from service.routes.venues import no_such_venue
-from service.schemas import ID_PATTERN, Alarm, FormatName, Job, Revision, Venue
-from service.store.ends import Ended
+from service.store.counts.ends import Ended
 from service.store.revisions import TAKEN
+from service.wire.schemas import ID_PATTERN, Alarm, FormatName, Job, Revision, Venue
 
 PER_PAGE = 50
 IN_SPARKLINE = 40

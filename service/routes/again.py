@@ -8,16 +8,16 @@ from io import BytesIO
 from fastapi import APIRouter, Request, Response
 from starlette.datastructures import UploadFile
 
-from service.context import Context, InContext
-from service.problems import Problem
+from service.api.context import Context, InContext
 from service.routes import uploads
 from service.routes.documented import headers, needs, problems
 from service.routes.guarded import Guarded
 from service.routes.jobs import Existing, job_answer
 from service.routes.venues import no_such_venue
-from service.schemas import Job, Venue
 from service.store.ids import new_id
 from service.store.jobs import Submission, frame_folder
+from service.wire.problems import Problem
+from service.wire.schemas import Job, Venue
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 

@@ -9,17 +9,17 @@ from fastapi import APIRouter, Header, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
-from service import callbacks
-from service.context import Context, InContext, VenueIdPath
-from service.intake import REFUSALS
+from service.api.context import Context, InContext, VenueIdPath
+from service.intake.submit import REFUSALS
 from service.routes import uploads
 from service.routes.documented import frames_upload, headers, needs, problems
 from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.routes.venues import no_such_venue
-from service.schemas import Job, Options, Venue
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
+from service.wire import callbacks
+from service.wire.schemas import Job, Options, Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 

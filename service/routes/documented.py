@@ -8,8 +8,8 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
-from service.problems import MEDIA_TYPE
-from service.schemas import (
+from service.wire.problems import MEDIA_TYPE
+from service.wire.schemas import (
     OPTIONS_PART,
     AlarmEvent,
     FieldOptions,

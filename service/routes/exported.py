@@ -9,13 +9,13 @@ from typing import Annotated, Any
 
 from fastapi import Header, Query, Response
 
-from service import etags
-from service.context import Context
+from service.api import etags
+from service.api.context import Context
 from service.formats.lens import Shot
 from service.formats.table import formats
-from service.problems import Problem
 from service.routes.documented import headers
-from service.schemas import ID_PATTERN, FormatName, Venue
+from service.wire.problems import Problem
+from service.wire.schemas import ID_PATTERN, FormatName, Venue
 
 BINARY = {"schema": {"type": "string", "format": "binary"}}
 # Of `responses=`: what a document can be.

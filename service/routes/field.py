@@ -10,16 +10,16 @@ from fastapi import APIRouter, Header, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
-from service import callbacks
-from service.context import Context, InContext, VenueIdPath
+from service.api.context import Context, InContext, VenueIdPath
 from service.routes import uploads
 from service.routes.calibrate import expecting
 from service.routes.documented import frames_upload, headers, needs, problems
 from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
-from service.schemas import FieldOptions, Job, Venue
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
+from service.wire import callbacks
+from service.wire.schemas import FieldOptions, Job, Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 

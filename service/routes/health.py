@@ -8,11 +8,11 @@ from fastapi import APIRouter, Path, Response
 from prometheus_client import generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
-from service.context import InContext
-from service.problems import KINDS, Problem, type_of
+from service.api.context import InContext
 from service.routes.documented import FOR_ALL, needs, problems
 from service.routes.guarded import Guarded
-from service.schemas import Health
+from service.wire.problems import KINDS, Problem, type_of
+from service.wire.schemas import Health
 
 router = APIRouter(tags=["health"], route_class=Guarded)
 

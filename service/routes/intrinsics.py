@@ -10,17 +10,17 @@ from fastapi import APIRouter, Header, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
-from service import callbacks
-from service import frames as border
-from service.context import Context, InContext
-from service.problems import Problem
+from service.api.context import Context, InContext
+from service.intake import images as border
 from service.routes import uploads
 from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
-from service.schemas import OPTIONS_PART, PHOTOS_PART, IntrinsicsOptions, Job
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission, frame_folder
+from service.wire import callbacks
+from service.wire.problems import Problem
+from service.wire.schemas import OPTIONS_PART, PHOTOS_PART, IntrinsicsOptions, Job
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 

@@ -11,17 +11,17 @@ from fastapi import APIRouter, Depends, Header, HTTPException, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from service import etags
-from service.context import Context, InContext, JobIdPath
-from service.problems import Problem
+from service.api import etags
+from service.api.context import Context, InContext, JobIdPath
 from service.routes.documented import headers, needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
 from service.routes.venues import revision_unfit
-from service.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Job, Jobs, Status
 from service.store.engine import AWAY
 from service.store.jobs import MovedOn, NoPoses, State
 from service.store.revisions import RevisionUnfit
+from service.wire.problems import Problem
+from service.wire.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Job, Jobs, Status
 
 log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)

@@ -9,18 +9,18 @@ from fastapi import APIRouter, Header, Path, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
-from service import callbacks
-from service import frames as border
-from service.context import Context, InContext, VenueIdPath
-from service.problems import Problem
+from service.api.context import Context, InContext, VenueIdPath
+from service.intake import images as border
 from service.routes import uploads
 from service.routes.calibrate import expecting
 from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
-from service.schemas import ID_PATTERN, OPEN, OPTIONS_PART, Camera, Job, LocateOptions, Venue
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
+from service.wire import callbacks
+from service.wire.problems import Problem
+from service.wire.schemas import ID_PATTERN, OPEN, OPTIONS_PART, Camera, Job, LocateOptions, Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 

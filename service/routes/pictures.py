@@ -6,13 +6,13 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
 
-from service.context import Context, InContext
-from service.problems import Problem
+from service.api.context import Context, InContext
 from service.routes.documented import needs, problems
 from service.routes.guarded import Guarded
 from service.routes.jobs import Existing
-from service.schemas import ID_PATTERN, Job
 from service.store.jobs import Pictures, picture_file
+from service.wire.problems import Problem
+from service.wire.schemas import ID_PATTERN, Job
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 

@@ -6,13 +6,13 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
 
-from service.context import InContext, VenueIdPath
-from service.frames import PNG_START
-from service.problems import Problem
+from service.api.context import InContext, VenueIdPath
+from service.intake.images import PNG_START
 from service.routes.documented import needs, problems
 from service.routes.guarded import Guarded
 from service.routes.venues import no_such_venue
-from service.schemas import ID_PATTERN
+from service.wire.problems import Problem
+from service.wire.schemas import ID_PATTERN
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
 BINARY = {"schema": {"type": "string", "format": "binary"}}

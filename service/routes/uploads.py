@@ -12,14 +12,12 @@ from fastapi import Request
 from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 
-from service import frames as border
-from service import intake
-from service.context import Context
-from service.intake import REFUSALS, Enqueue, Refusal
-from service.problems import Problem, invalid
+from service.api.context import Context
+from service.intake import images as border
+from service.intake import submit
+from service.intake.submit import REFUSALS, Enqueue, Refusal
 from service.routes.jobs import RETRY_AFTER_S
 from service.routes.venues import no_such_venue
-from service.schemas import OPTIONS_PART, Job, Venue
 from service.settings import Settings
 from service.store.jobs import (
     KeyReused,
@@ -29,6 +27,8 @@ from service.store.jobs import (
     VenueGone,
     VenueReplaced,
 )
+from service.wire.problems import Problem, invalid
+from service.wire.schemas import OPTIONS_PART, Job, Venue
 
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
 KEY_DESCRIPTION = "The same key and the same content are the same job, for as long as that job is kept."
@@ -128,7 +128,7 @@ def enqueue_upload(
 
 def frame_paths(job_id: str, files: Mapping[str, Sequence[UploadFile]]) -> dict[str, list[str]]:
     """Where the frames of a job will lie, by camera."""
-    return intake.frame_paths(job_id, {camera: len(several) for camera, several in files.items()})
+    return submit.frame_paths(job_id, {camera: len(several) for camera, several in files.items()})
 
 
 def in_words(refusal: Refusal, venue_id: str, settings: Settings) -> Problem:

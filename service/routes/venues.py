@@ -6,14 +6,16 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Response
 
-from service import callbacks, etags, sources
-from service.context import InContext, VenueIdPath
-from service.problems import Problem
+from service.api import etags
+from service.api.context import InContext, VenueIdPath
+from service.intake import sources
 from service.routes.documented import headers, needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
-from service.schemas import ID_PATTERN, FormatName, History, Restore, Venue, VenueHealth, VenueIn, Venues
 from service.store.revisions import NoSuchRevision, RevisionUnfit
+from service.wire import callbacks
+from service.wire.problems import Problem
+from service.wire.schemas import ID_PATTERN, FormatName, History, Restore, Venue, VenueHealth, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 

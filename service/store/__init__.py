@@ -1,0 +1,1 @@
+"""What is kept: the database with all SQL, and the files."""

@@ -10,7 +10,14 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas import (
+from service.store import tables
+from service.store.counts import tallies
+from service.store.counts.figures import note
+from service.store.deliveries import add_alarm_delivery
+from service.store.engine import clock, reading
+from service.store.revisions import TAKEN, first_revision_at, newest_revision
+from service.store.schedules import schedule_of
+from service.wire.schemas import (
     Alarm,
     AlarmEvent,
     AlarmRule,
@@ -21,12 +28,6 @@ from service.schemas import (
     VenueAlarm,
     VenueHealth,
 )
-from service.store import tables, tallies
-from service.store.deliveries import add_alarm_delivery
-from service.store.engine import clock, reading
-from service.store.figures import note
-from service.store.revisions import TAKEN, first_revision_at, newest_revision
-from service.store.schedules import schedule_of
 
 BEGUN = "alarms_begun"
 # Rule and camera, which is empty where the alarm is of the whole venue.

@@ -12,10 +12,11 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas import AlarmEvent, CallbackState
-from service.store import tables, tallies
+from service.store import tables
+from service.store.counts import tallies
 from service.store.engine import clock, reading, serialise, writing
 from service.store.ids import new_id
+from service.wire.schemas import AlarmEvent, CallbackState
 
 CALLBACKS = "callbacks"
 LONGEST_ERROR = 500

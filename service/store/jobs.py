@@ -17,7 +17,16 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas import (
+from service.store import tables
+from service.store.alarms import settle_alarms
+from service.store.counts import tallies
+from service.store.counts.figures import note_quality, note_unaccepted
+from service.store.counts.outcomes import End
+from service.store.deliveries import add_delivery, delivery_of
+from service.store.engine import clock, reading, serialise, writing
+from service.store.revisions import TAKEN, add_revision, newest_revision, revision_of_job
+from service.store.venues import find_venue, put_back, save_venue, venue_lock
+from service.wire.schemas import (
     OPEN,
     Cause,
     FieldOptions,
@@ -36,14 +45,6 @@ from service.schemas import (
     Status,
     Venue,
 )
-from service.store import tables, tallies
-from service.store.alarms import settle_alarms
-from service.store.deliveries import add_delivery, delivery_of
-from service.store.engine import clock, reading, serialise, writing
-from service.store.figures import note_quality, note_unaccepted
-from service.store.outcomes import End
-from service.store.revisions import TAKEN, add_revision, newest_revision, revision_of_job
-from service.store.venues import find_venue, put_back, save_venue, venue_lock
 
 PRIORITIES = {"live": 1, "routine": 100}
 # Pictures to be laid over others.

@@ -10,9 +10,9 @@ from datetime import UTC, datetime
 
 import sqlalchemy as sa
 
-from service.schemas import Scope
 from service.store.engine import reading, serialise, writing
 from service.store.tables import api_keys
+from service.wire.schemas import Scope
 
 PREFIX = "esc_"
 k = api_keys.c

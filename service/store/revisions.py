@@ -11,11 +11,11 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service import motion
-from service.schemas import Camera, Cause, Movement, PosedCamera, Revision, RevisionCamera, Venue
 from service.store import tables
+from service.store.counts.figures import note
 from service.store.engine import clock
-from service.store.figures import note
+from service.wire import motion
+from service.wire.schemas import Camera, Cause, Movement, PosedCamera, Revision, RevisionCamera, Venue
 
 r = tables.revisions.c
 # Whose poses hold, or held.

@@ -11,10 +11,10 @@ from datetime import datetime
 
 import sqlalchemy as sa
 
-from service.schedule import next_time
-from service.schemas import ScheduleState, Venue
 from service.store import tables
 from service.store.engine import clock, reading, serialise, writing
+from service.wire.schedule import next_time
+from service.wire.schemas import ScheduleState, Venue
 
 LONGEST_ERROR = 500
 s = tables.schedules.c

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import sqlalchemy as sa
 
-from service.schemas import Revision, Venue, VenueHealth
 from service.store import tables
 from service.store.alarms import forget_alarms, health_of, settle_alarms, venues_with_alarms_due
+from service.store.counts.figures import forget_quality, note_restored
 from service.store.engine import clock, reading, serialise, writing
-from service.store.figures import forget_quality, note_restored
 from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
 from service.store.schedules import forget_schedule, plan
+from service.wire.schemas import Revision, Venue, VenueHealth
 
 
 class Venues:

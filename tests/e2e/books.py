@@ -9,9 +9,9 @@ from urllib.parse import unquote, urlparse
 
 import sqlalchemy as sa
 
-from service.schemas import OPEN
 from service.store import tables
 from service.store.jobs import picture_folder
+from service.wire.schemas import OPEN
 from tests.e2e.running import Service, wait_for
 from tests.homes import files
 

@@ -6,7 +6,11 @@ import sys
 import time
 
 from service import lifeline
-from service.schemas import (
+from service.settings import Settings
+from service.store.blobs import Blobs
+from service.store.engine import connect
+from service.store.jobs import Jobs, picture_folder
+from service.wire.schemas import (
     CameraResult,
     FieldResult,
     JobError,
@@ -17,10 +21,6 @@ from service.schemas import (
     Provenance,
     Result,
 )
-from service.settings import Settings
-from service.store.blobs import Blobs
-from service.store.engine import connect
-from service.store.jobs import Jobs, picture_folder
 from worker.message import Message
 
 JPEG = b"\xff\xd8\xff\xd9"

@@ -12,8 +12,8 @@ import httpx
 import pytest
 from fastapi.routing import iter_route_contexts
 
+from service.api.auth import BELIEVED_FOR_S
 from service.app import create_app
-from service.auth import BELIEVED_FOR_S
 from service.pages.shown import SIGN_IN, Page
 from service.routes.guarded import Guarded
 from service.settings import Settings

@@ -8,16 +8,16 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.calibration.test_firstpose import CAMERA, LENS, SIZE, clicks
-from tests.calibration.test_lenscalibration import BOARD, PINHOLE, corners_seen, photograph, places
 from tests.e2e.running import Service, png
+from tests.worker.calibration.first.test_first_pose import CAMERA, LENS, SIZE, clicks
+from tests.worker.calibration.first.test_lens_calibration import BOARD, PINHOLE, corners_seen, photograph, places
 
 WAIT = {"wait": 60}
 
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory):
-    program = json.dumps([sys.executable, "-m", "worker.job"])
+    program = json.dumps([sys.executable, "-m", "worker.jobs.job"])
     running = Service(tmp_path_factory.mktemp("esc"), ESC_JOB_PROGRAM=program, ESC_MAX_PHOTOS="8").ready()
     yield running
     assert running.stop() == 0

@@ -17,7 +17,7 @@ from service.store import tables
 from tests.e2e.running import wait_for
 from tests.homes import in_both_homes
 from tests.worker.receiver import Receiver
-from worker import webhook
+from worker.duties import webhook
 
 SECRET = "whsec_" + b64encode(bytes(32)).decode()
 LOCAL = {"ESC_WEBHOOK_SECRET": SECRET, "ESC_CALLBACK_ALLOW_HTTP": "true", "ESC_CALLBACK_ALLOW_PRIVATE": "true"}

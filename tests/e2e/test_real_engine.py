@@ -11,8 +11,8 @@ import pytest
 from models.training.render import Conditions, render_frame
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.e2e.running import Service
-from worker.calibration.camera import Camera, Intrinsics, Pose, rotation_angles_deg
-from worker.calibration.field import Field
+from worker.calibration.scene.camera import Camera, Intrinsics, Pose, rotation_angles_deg
+from worker.calibration.scene.field import Field
 
 SIZE = (1280, 720)
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
@@ -67,7 +67,7 @@ def venue(name: str, right_turn=TURNED) -> dict:
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory):
-    program = json.dumps([sys.executable, "-m", "worker.job"])
+    program = json.dumps([sys.executable, "-m", "worker.jobs.job"])
     running = Service(
         tmp_path_factory.mktemp("esc"), ESC_MODEL=str(MODEL_BESIDE_THE_CODE), ESC_JOB_PROGRAM=program
     ).ready()

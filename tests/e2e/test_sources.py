@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import sqlalchemy as sa
 
-from service.snapshots import STARTING_S
+from service.intake.snapshots import STARTING_S
 from service.store import tables
 from tests.e2e.cameras import NetworkCamera
 from tests.e2e.running import Service, png, upload, venue, wait_for

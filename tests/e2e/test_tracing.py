@@ -18,7 +18,7 @@ PARENT = "00f067aa0ba902b7"
 LIGHT = """
 import sys
 import service.app, service.serving, worker.process
-from service import tracing
+from service.observe import tracing
 tracing.configure("esc", "here")
 tracing.flush()
 loaded = [name for name in sys.modules if name.startswith(("opentelemetry.sdk", "opentelemetry.exporter"))]

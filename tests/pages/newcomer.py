@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Page, expect
 
-from service.schemas import Pose, VenueIn
+from service.wire.schemas import Pose, VenueIn
 from tests import demo
-from worker.calibration.camera import Camera
-from worker.outcome import camera_of, pitch_of
+from worker.calibration.scene.camera import Camera
+from worker.jobs.wire import camera_of, pitch_of
 
 DEMO = Path(demo.__file__).parent
 VENUE = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).stored()

@@ -4,9 +4,9 @@ from datetime import UTC, datetime, timedelta
 
 import sqlalchemy as sa
 
-from service.schemas import Moved, Options, Venue, VenueIn
 from service.store import tables
 from service.store.ids import new_id
+from service.wire.schemas import Moved, Options, Venue, VenueIn
 from tests.e2e import running
 from tests.worker.stock import result
 

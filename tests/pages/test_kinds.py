@@ -5,7 +5,9 @@ from datetime import UTC, datetime
 import pytest
 import sqlalchemy as sa
 
-from service.schemas import (
+from service.store import tables
+from service.store.ids import new_id
+from service.wire.schemas import (
     Board,
     ClickedPoint,
     CoverageResult,
@@ -17,8 +19,6 @@ from service.schemas import (
     PointResult,
     VenueIn,
 )
-from service.store import tables
-from service.store.ids import new_id
 from tests.e2e.running import venue
 
 CAMERA = VenueIn.model_validate(venue("kinds")).stored().cameras[0]

@@ -8,13 +8,13 @@ import pytest
 
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
-from service.schemas import CameraResult, JobError, Moved, Options, Pose, Provenance, Result, VenueIn
 from service.store import jobs as store
 from service.store.engine import connect, migrate
 from service.store.ids import new_id
 from service.store.jobs import Jobs, QueueFull, Submission
 from service.store.venues import Venues
 from service.store.workers import Workers
+from service.wire.schemas import CameraResult, JobError, Moved, Options, Pose, Provenance, Result, VenueIn
 from tests.e2e.running import venue
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock

@@ -1,0 +1,227 @@
+"""Who may call, what, and how often: API keys, their scopes and their limits.
+
+A program sends its key with each request. A person signs in with one: from then on the browser sends a cookie, and with
+what changes something the token that only our own pages can read (a page of another site could have the cookie sent
+along, were it not for SameSite as well).
+
+A key that was found is believed for a few seconds without another look at the database, so that polling costs a hash
+and two look-ups in memory. That is how long a removed key still opens the door, in each API process; what is being
+answered then (a long poll, a stream of events) is answered to its end. Reading never writes: uses are remembered and
+written down once a minute.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import hmac
+import ipaddress
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import get_args
+
+import structlog
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import HTTPConnection
+
+from service.api import origins
+from service.api.rate_limit import Buckets
+from service.settings import Settings
+from service.store.keys import Key, Keys, hash_of
+from service.store.sessions import Sessions
+from service.wire.problems import Problem
+from service.wire.schemas import Scope
+
+BELIEVED_FOR_S = 5.0
+COOKIE, TOKEN_HEADER = "esc_session", "X-CSRF-Token"
+USES_WRITTEN_EVERY_S = 60.0
+# Unknown keys from one address: so many at once, then one every so many seconds.
+GUESSES = 10
+GUESS_EVERY_S = 6.0
+SCOPES: tuple[Scope, ...] = get_args(Scope)
+log = structlog.get_logger()
+
+
+@dataclass(frozen=True)
+class _Believed:
+    key: Key
+    until: float
+
+
+class Gate:
+    """Lets requests pass or says why not."""
+
+    def __init__(
+        self, keys: Keys, sessions: Sessions, settings: Settings, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._keys = keys
+        self._sessions = sessions
+        self._settings = settings
+        self._clock = clock
+        self._off = settings.auth == "off"
+        # Once on it stays on: who exchanges the only key must not leave the door open in between.
+        self._on = settings.listens_beyond_this_machine
+        self._look_for_keys_at = -math.inf
+        self._believed: dict[str, _Believed] = {}
+        self._signed_in: dict[str, _Believed] = {}
+        self._uses: dict[str, datetime] = {}
+        self._requests = Buckets(settings.rate_per_s, settings.rate_burst, clock=clock)
+        self._guesses = Buckets(1 / GUESS_EVERY_S, GUESSES, clock=clock)
+
+    async def admit(self, request: HTTPConnection, needed: Scope) -> Key | None:
+        """The caller's key, None where none is asked for; otherwise raises the problem that says why not."""
+        if not await self.asks_for_keys():
+            origins.check(request, self._settings)
+            return None
+        key = await self._key(request)
+        # Every line that the request leaves in the log.
+        structlog.contextvars.bind_contextvars(key=key.name)
+        self._count(key)
+        if SCOPES.index(key.scope) < SCOPES.index(needed):
+            raise Problem(
+                "scope-too-small",
+                f"This needs a key of scope {needed}; {key.name} has {key.scope}.",
+                headers={"WWW-Authenticate": f'Bearer error="insufficient_scope", scope="{needed}"'},
+                expected=needed,
+                got=key.scope,
+            )
+        return key
+
+    async def sign_in(self, request: HTTPConnection, given: str) -> str:
+        """Begin a session with a key; returns what its cookie says."""
+        key = await self._of_bearer(given, _address(request))
+        return await run_in_threadpool(self._sessions.begin, key, timedelta(hours=self._settings.session_hours))
+
+    async def sign_out(self, request: HTTPConnection) -> None:
+        """End the session of a request, if it has one."""
+        hash_ = hash_of(request.cookies.get(COOKIE, ""))
+        self._signed_in.pop(hash_, None)
+        await run_in_threadpool(self._sessions.end, hash_)
+
+    async def run(self) -> None:
+        """Write uses down, for as long as the service runs."""
+        while True:
+            await asyncio.sleep(USES_WRITTEN_EVERY_S)
+            await self.write_uses()
+
+    async def write_uses(self) -> None:
+        """Write down which keys were used since the last time."""
+        uses, self._uses = self._uses, {}
+        if not uses:
+            return
+        try:
+            await run_in_threadpool(self._keys.note_uses, uses)
+        except Exception:  # the database is away for a moment: the next time will do
+            log.warning("cannot write down when keys were used", exc_info=True)
+            self._uses = uses | self._uses
+
+    async def asks_for_keys(self) -> bool:
+        """Whether callers need a key."""
+        if self._off:
+            return False
+        now = self._clock()
+        if not self._on and now >= self._look_for_keys_at:
+            self._on = await run_in_threadpool(self._keys.any)
+            self._look_for_keys_at = now + BELIEVED_FOR_S
+        return self._on
+
+    async def _key(self, request: HTTPConnection) -> Key:
+        """The caller's key, as RFC 6750 has it sent and refused, or that of their session."""
+        scheme, _, given = request.headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer" and given:
+            return await self._of_bearer(given, _address(request))
+        if COOKIE in request.cookies:
+            return await self._of_session(request, request.cookies[COOKIE])
+        raise Problem(
+            "key-missing",
+            "Send one as `Authorization: Bearer esc_...`; `esc key add` on the machine of the service makes one.",
+            headers={"WWW-Authenticate": "Bearer"},
+        )
+
+    async def _of_bearer(self, given: str, address: str) -> Key:
+        hash_ = hash_of(given.strip())
+        believed = self._believed.get(hash_)
+        if believed is None:
+            key = await self._find_new(hash_, address)
+        elif believed.until <= self._clock():
+            key = await self._find(hash_, address)
+        else:
+            key = believed.key
+        return _in_time(key)
+
+    async def _of_session(self, request: HTTPConnection, token: str) -> Key:
+        changes = request.scope["method"] not in origins.READING
+        if changes and not hmac.compare_digest(
+            request.headers.get(TOKEN_HEADER, "").encode(), page_token(token).encode()
+        ):
+            raise Problem("token-missing", f"Load the page again: it sends {TOKEN_HEADER} with what it changes.")
+        hash_ = hash_of(token)
+        believed = self._signed_in.get(hash_)
+        if believed is not None and self._clock() < believed.until:
+            return _in_time(believed.key)
+        until = self._clock() + BELIEVED_FOR_S
+        key = await run_in_threadpool(self._sessions.key_of, hash_)
+        if key is None:
+            self._signed_in.pop(hash_, None)
+            raise Problem("session-over", "Sign in again.", headers={"WWW-Authenticate": "Bearer"})
+        self._signed_in[hash_] = _Believed(key, until)
+        return _in_time(key)
+
+    async def _find_new(self, hash_: str, address: str) -> Key:
+        """As `_find`, but not too often. Keys seen before are not held up by what others try from their address."""
+        wait_s = self._guesses.wait_s(address)
+        if wait_s:
+            raise Problem("too-many-unknown-keys", "See that the key is right, then try again.", headers=_later(wait_s))
+        return await self._find(hash_, address)
+
+    async def _find(self, hash_: str, address: str) -> Key:
+        until = self._clock() + BELIEVED_FOR_S
+        key = await run_in_threadpool(self._keys.find, hash_)
+        if key is None:
+            self._believed.pop(hash_, None)
+            self._guesses.take(address)
+            log.warning("unknown key", address=address)
+            raise _refused(
+                "key-unknown", "It was removed, or is of another service; `esc key list` names those of this."
+            )
+        self._believed[hash_] = _Believed(key, until)
+        return key
+
+    def _count(self, key: Key) -> None:
+        wait_s = self._requests.wait_s(key.hash)
+        if wait_s:
+            raise Problem("rate-limited", "Ask less often, or wait in GET /jobs/{id}?wait=60.", headers=_later(wait_s))
+        self._requests.take(key.hash)
+        self._uses[key.hash] = datetime.now(UTC)
+
+
+def page_token(session_token: str) -> str:
+    """What a page of this session sends with everything that it changes."""
+    return hashlib.sha256(f"page of {session_token}".encode()).hexdigest()
+
+
+def _in_time(key: Key) -> Key:
+    if key.expired:
+        raise _refused("key-expired", f"{key.name} was good until {key.expires_at:%Y-%m-%d %H:%M} UTC.")
+    return key
+
+
+def _refused(kind: str, detail: str) -> Problem:
+    return Problem(kind, detail, headers={"WWW-Authenticate": 'Bearer error="invalid_token"'})
+
+
+def _later(wait_s: float) -> dict[str, str]:
+    return {"Retry-After": str(math.ceil(wait_s))}
+
+
+def _address(request: HTTPConnection) -> str:
+    """Where a request comes from; of IPv6 the network of 64 bits, which is what one customer has."""
+    host = request.client.host if request.client else ""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host
+    return str(ipaddress.ip_network((address, 64), strict=False)) if address.version == 6 else host

@@ -1,0 +1,47 @@
+"""Asking a program of the worker's for something at once: what needs NumPy, and no job."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import threading
+from collections.abc import Mapping, Sequence
+
+import structlog
+
+from service import lifeline
+from service.wire.problems import Problem
+
+log = structlog.get_logger()
+
+
+class OneAtATime:
+    """Runs of a program, one after the other; whoever comes meanwhile waits a little, then is told to come again."""
+
+    def __init__(self, what: str, longest_s: float, again_s: int, patience_s: float) -> None:
+        self._what, self._longest_s, self._again_s, self._patience_s = what, longest_s, again_s, patience_s
+        self._turn = threading.Lock()
+
+    def run(self, command: Sequence[str], environment: Mapping[str, str], given: bytes) -> bytes:
+        """What the program writes to its standard output for what it is `given` on its input."""
+        if not self._turn.acquire(timeout=self._patience_s):
+            raise Problem(
+                "unavailable", f"Another {self._what} is being made.", headers={"Retry-After": str(self._again_s)}
+            )
+        try:
+            done = subprocess.run(
+                command,
+                input=given,
+                env={**os.environ, **environment, **lifeline.for_child()},
+                capture_output=True,
+                timeout=self._longest_s,
+                check=True,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise Problem("unavailable", f"The {self._what} was not done after {self._longest_s:g} s.") from error
+        except subprocess.CalledProcessError as error:
+            log.error("a program failed", program=self._what, stderr=error.stderr.decode(errors="replace")[-2000:])
+            raise
+        finally:
+            self._turn.release()
+        return done.stdout

@@ -1,0 +1,1 @@
+"""`esc`: the command line."""

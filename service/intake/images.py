@@ -1,0 +1,181 @@
+"""Is this upload a whole picture of the right size? Answered from its bytes, before anything decodes it.
+
+JPEG: ITU-T T.81, annex B. PNG: ISO/IEC 15948, clause 5. Decoders are lenient where a calibration must not be: OpenCV
+fills the missing part of a truncated JPEG with grey and says nothing. Sizes are read here and not by a package: those
+turn them by the EXIF orientation, and what the calibration sees is not turned.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from service.settings import Settings
+from service.wire.problems import Problem
+from service.wire.schemas import Camera, Venue
+
+JPEG_START = b"\xff\xd8\xff"
+PNG_START = b"\x89PNG\r\n\x1a\n"
+# A marker inside entropy-coded data: FF and neither a stuffed 00, nor a restart (D0 to D7), nor a fill byte FF.
+JPEG_MARKER = re.compile(rb"\xff([^\x00\xd0-\xd7\xff])")
+JPEG_END, JPEG_SCAN = 0xD9, 0xDA
+# Start of frame, of all processes; C4, C8 and CC are something else.
+JPEG_FRAMES = set(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+
+
+def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -> None:
+    """Every camera of the venue has frames, not too many, and no other camera has."""
+    ids = [camera.id for camera in venue.cameras]
+    for name in counts:
+        if name not in ids:
+            raise Problem(
+                "unknown-camera",
+                f"Venue {venue.id} has the cameras {', '.join(ids)}; name each file part by its camera.",
+                camera=name[:64],
+                expected=ids,
+            )
+    for camera in ids:
+        if not counts.get(camera):
+            raise Problem("missing-camera", f"Send at least one frame of camera {camera}.", camera=camera, expected=ids)
+        if counts[camera] > settings.max_frames_per_camera:
+            raise Problem(
+                "too-many-frames",
+                f"Send at most {settings.max_frames_per_camera} frames of camera {camera}.",
+                camera=camera,
+                expected=settings.max_frames_per_camera,
+                got=counts[camera],
+            )
+
+
+def check(camera: Camera, data: bytes, settings: Settings) -> None:
+    """One frame: an entire JPEG or PNG of the camera's size."""
+    size = _size_of_whole_picture(f"camera {camera.id}", data, settings, camera=camera.id)
+    wanted = camera.image_size
+    if size != wanted:
+        raise Problem(
+            "frame-size",
+            f"Send camera {camera.id} in {wanted[0]}x{wanted[1]} pixels, the size of its intrinsics.",
+            camera=camera.id,
+            expected=wanted,
+            got=size,
+        )
+
+
+def check_photo(name: str, data: bytes, settings: Settings) -> None:
+    """One photo of a board: an entire JPEG or PNG of any size."""
+    _size_of_whole_picture(f"photo {name}", data, settings, photo=name)
+
+
+def _size_of_whole_picture(subject: str, data: bytes, settings: Settings, **parts: Any) -> list[int]:
+    """Width and height of a picture that is all there; `subject` and `parts` name it in a problem."""
+    if not data:
+        raise Problem("empty-frame", f"The file of {subject} is empty; was it still being written?", **parts)
+    if len(data) > settings.max_frame_mb * 1e6:
+        raise Problem(
+            "frame-too-large",
+            f"Send {subject} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
+            **parts,
+        )
+    if not data.startswith((JPEG_START, PNG_START)):
+        raise Problem("not-an-image", f"Send {subject} as JPEG or PNG.", **parts)
+    try:
+        outline = _jpeg(data) if data.startswith(JPEG_START) else _png(data)
+    except (struct.error, IndexError, ValueError):
+        raise Problem("broken-image", f"The file of {subject} is damaged; grab it again.", **parts) from None
+    width, height = outline.size
+    if width * height > settings.max_frame_pixels:
+        raise Problem(
+            "too-many-pixels",
+            f"The picture of {subject} has {width}x{height} pixels; {settings.max_frame_pixels} are allowed.",
+            **parts,
+            expected=settings.max_frame_pixels,
+            got=outline.size,
+        )
+    if not outline.whole:
+        raise Problem(
+            "truncated-image",
+            f"The file of {subject} ends before its picture does; was it still being written?",
+            **parts,
+        )
+    return outline.size
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What a file says about its picture: `size` (width, height) as stored, and whether the file goes to its end.
+
+    As stored: an orientation that the camera notes in its EXIF data turns nothing, here and when it is decoded.
+    """
+
+    size: list[int]
+    whole: bool
+
+
+def _jpeg(data: bytes) -> Outline:
+    """Walk the segments to the end-of-image marker; whatever follows it is the camera's business."""
+    position, size = 2, None
+    for position, marker in _jpeg_segments(data):
+        if marker in JPEG_FRAMES:
+            if size is not None:
+                raise ValueError("two frame headers")
+            height, width = struct.unpack_from(">HH", data, position + 5)
+            size = [width, height]
+        if marker == JPEG_SCAN and size is None:
+            raise ValueError("a scan of no frame")
+    if not size or min(size) < 1:
+        raise ValueError("no size")
+    return Outline(size, data[position : position + 2] == b"\xff\xd9")
+
+
+def _jpeg_segments(data: bytes) -> Iterator[tuple[int, int]]:
+    """Position and code of each marker, up to end-of-image after a scan or to the end of the data."""
+    position, scanned = 2, False
+    while position + 2 <= len(data):
+        if data[position] != 0xFF:
+            raise ValueError("no marker where one must be")
+        marker = data[position + 1]
+        if marker == 0xFF:
+            position += 1
+            continue
+        yield position, marker
+        if marker == JPEG_END:
+            if not scanned:
+                raise ValueError("no picture")
+            return
+        if position + 4 > len(data):
+            return
+        position += 2 + struct.unpack_from(">H", data, position + 2)[0]
+        if marker == JPEG_SCAN:
+            scanned = True
+            following = JPEG_MARKER.search(data, position)
+            if following is None:
+                return
+            position = following.start()
+
+
+def _png(data: bytes) -> Outline:
+    """Walk the chunks to IEND, each with a right checksum."""
+    width, height = struct.unpack_from(">II", data, len(PNG_START) + 8)
+    if data[12:16] != b"IHDR" or min(width, height) < 1:
+        raise ValueError("no size")
+    kinds = list(_png_chunks(data))
+    return Outline([width, height], b"IDAT" in kinds and kinds[-1] == b"IEND")
+
+
+def _png_chunks(data: bytes) -> Iterator[bytes]:
+    position = len(PNG_START)
+    while position + 12 <= len(data):
+        length, kind = struct.unpack_from(">I4s", data, position)
+        end = position + 8 + length
+        if end + 4 > len(data):
+            return
+        if zlib.crc32(data[position + 4 : end]) != struct.unpack_from(">I", data, end)[0]:
+            raise ValueError("wrong checksum")
+        yield kind
+        if kind == b"IEND":
+            return
+        position = end + 4

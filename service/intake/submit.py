@@ -1,0 +1,78 @@
+"""The way of frames into the service: stored, then a job, or the job that they already are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from datetime import timedelta
+from typing import BinaryIO
+
+import sqlalchemy as sa
+
+from service.settings import Settings
+from service.store.blobs import Blobs
+from service.store.expiry import Expiry
+from service.store.jobs import (
+    Jobs,
+    KeyReused,
+    QueueFull,
+    Submission,
+    VenueBusy,
+    VenueGone,
+    VenueReplaced,
+    frame_folder,
+)
+from service.wire.schemas import Job
+
+# Longer than any upload takes from its first stored frame to its job.
+UPLOAD_GRACE = timedelta(hours=1)
+Enqueue = Callable[[sa.Connection, str, int], None]
+Refusal = KeyReused | VenueBusy | VenueGone | VenueReplaced | QueueFull
+REFUSALS = (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull)
+
+
+class Intake:
+    """Makes jobs of submissions."""
+
+    def __init__(self, settings: Settings, jobs: Jobs, expiry: Expiry, blobs: Blobs) -> None:
+        self._settings = settings
+        self._jobs = jobs
+        self._expiry = expiry
+        self._blobs = blobs
+
+    def take(
+        self, submission: Submission, files: Mapping[str, Sequence[BinaryIO]], enqueue: Enqueue
+    ) -> tuple[Job, bool]:
+        """Store the files of a checked submission and make it a job, or find the job it already is; says if it is new.
+
+        Raises one of `REFUSALS`.
+        """
+        venue_id = None if submission.venue is None else submission.venue.id
+        try:
+            known = self._jobs.same_as(venue_id, submission.idempotency_key, submission.content_hash, submission.kind)
+            if known is not None:
+                return known, False
+            # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
+            self._expiry.expect_upload(submission.job_id, UPLOAD_GRACE)
+            self._store(submission, files)
+            job, new = self._jobs.submit(submission, self._settings.queue_limit, enqueue)
+        except REFUSALS:
+            self._blobs.delete_under(frame_folder(submission.job_id))
+            raise
+        if not new:
+            self._blobs.delete_under(frame_folder(submission.job_id))
+        # After any other error the frames stay: whether the transaction was committed is then not known.
+        return job, new
+
+    def _store(self, submission: Submission, files: Mapping[str, Sequence[BinaryIO]]) -> None:
+        for name, several in files.items():
+            for path, file in zip(submission.frames[name], several, strict=True):
+                file.seek(0)
+                self._blobs.put(path, file.read())
+
+
+def frame_paths(job_id: str, counts: Mapping[str, int]) -> dict[str, list[str]]:
+    """Where the frames of a job will lie, by camera."""
+    return {
+        camera: [f"{frame_folder(job_id)}/{camera}/{number}" for number in range(count)]
+        for camera, count in counts.items()
+    }

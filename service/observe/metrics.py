@@ -1,0 +1,198 @@
+"""What Prometheus reads.
+
+Requests are counted by the process that answers them. All else is read from the database at the moment it is asked for,
+so it is the same whichever API process is asked, however many workers there are and however often they were restarted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from importlib.metadata import version
+from typing import get_args
+
+import structlog
+from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, InfoMetricFamily
+from prometheus_client.metrics_core import Metric
+from prometheus_client.registry import Collector
+
+from service.observe.disk import Disk
+from service.store.alarms import BEGUN
+from service.store.counts.figures import Figures, VenueQuality, WorkerSeen
+from service.store.counts.outcomes import ENDED, OTHER_OUTCOMES, OTHERS_ENDED, OUTCOMES, RESTARTS, STAGES
+from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Buckets, Key
+from service.store.deliveries import CALLBACKS
+from service.store.engine import AWAY
+from service.store.jobs import PRIORITIES
+from service.wire.schemas import AlarmRule
+
+log = structlog.get_logger()
+
+
+class Metrics:
+    """The figures of one API process and, through `look`, those of the service."""
+
+    def __init__(self, look: Callable[[], Figures], disk: Disk, silence_s: float) -> None:
+        self.registry = CollectorRegistry()
+        self.requests = Counter(
+            "esc_http_requests", "Requests answered.", ["method", "route", "status"], registry=self.registry
+        )
+        self.seconds = Histogram(
+            "esc_http_request_duration_seconds",
+            "Time to answer; a route that ends in ?wait holds its answer.",
+            ["method", "route"],
+            registry=self.registry,
+        )
+        ProcessCollector(registry=self.registry)
+        self.registry.register(_Stored(look, disk, silence_s))
+
+
+class _Stored(Collector):
+    def __init__(self, look: Callable[[], Figures], disk: Disk, silence_s: float) -> None:
+        self._look = look
+        self._disk = disk
+        self._silence_s = silence_s
+
+    def describe(self) -> Iterator[Metric]:
+        """Nothing: registering must not read the database."""
+        yield from ()
+
+    def collect(self) -> Iterator[Metric]:
+        """Read the database, and how full the disk is; what cannot be read is missing, the rest is told."""
+        yield InfoMetricFamily("esc_build", "The version.", {"version": version("esc-calibration")})
+        yield from self._room()
+        try:
+            figures = self._look()
+        except AWAY:
+            log.warning("no figures for Prometheus", exc_info=True)
+            yield _gauge("esc_database_up", "Whether the database answers.", 0)
+            return
+        yield _gauge("esc_database_up", "Whether the database answers.", 1)
+        yield from _queue(figures)
+        yield from _jobs(figures.tallies)
+        yield from _venues(figures.venues)
+        yield from _alarms(figures)
+        yield from _workers(figures.workers, self._silence_s)
+        yield from _callbacks(figures)
+
+    def _room(self) -> Iterator[Metric]:
+        try:
+            free = self._disk.free_bytes()
+        except OSError:
+            log.warning("cannot read how full the disk is", exc_info=True)
+            return
+        if free is not None:
+            yield _gauge("esc_disk_free_bytes", "Free where database and files grow.", free)
+            yield _gauge("esc_disk_needed_bytes", "With less free, uploads are refused.", self._disk.least_bytes)
+
+
+def _queue(figures: Figures) -> Iterator[Metric]:
+    jobs = GaugeMetricFamily("esc_queue_jobs", "Jobs that wait.", labels=["priority"])
+    oldest = GaugeMetricFamily(
+        "esc_queue_oldest_age_seconds", "How long the oldest of them has waited.", labels=["priority"]
+    )
+    for name, number in PRIORITIES.items():
+        waiting = figures.queue.get(number)
+        jobs.add_metric([name], waiting.jobs if waiting else 0)
+        oldest.add_metric([name], waiting.oldest_s if waiting else 0)
+    yield jobs
+    yield oldest
+    yield _gauge("esc_jobs_running", "Jobs that are being computed.", figures.running)
+
+
+def _jobs(tallies: Mapping[Key, float]) -> Iterator[Metric]:
+    ended = CounterMetricFamily("esc_jobs_ended", "Calibrations by their end.", labels=["status", "verdict", "error"])
+    for outcome in OUTCOMES:
+        ended.add_metric(outcome, tallies.get((ENDED, outcome), 0))
+    yield ended
+    others = CounterMetricFamily(
+        "esc_other_jobs_ended", "Jobs of other kinds than calibrations by their end.", labels=["kind", "status"]
+    )
+    for other in OTHER_OUTCOMES:
+        others.add_metric(other, tallies.get((OTHERS_ENDED, other), 0))
+    yield others
+    restarts = tallies.get((RESTARTS, ()), 0)
+    yield CounterMetricFamily(
+        "esc_job_restarts", "Attempts after a job's first: its worker died or was stopped.", value=restarts
+    )
+    yield _histogram("esc_job_wait_seconds", "Of calibrations, from submission to the first attempt.", WAIT, tallies)
+    yield _histogram(
+        "esc_job_duration_seconds", "Of calibrations, from the first attempt to the end.", DURATION, tallies
+    )
+    stages = HistogramMetricFamily("esc_job_stage_duration_seconds", "Of jobs with a result.", labels=["stage"])
+    for stage in STAGES:
+        stages.add_metric([stage], *STAGE.read(tallies, stage))
+    yield stages
+    yield _histogram(
+        "esc_job_stitch_error_pixels", "Of the poses that were found; 1 px is 10 cm.", STITCH_ERROR, tallies
+    )
+
+
+def _venues(venues: list[VenueQuality]) -> Iterator[Metric]:
+    """Those with the worst stitch errors: how many at most is a setting."""
+    stitch = GaugeMetricFamily(
+        "esc_venue_stitch_error_pixels", "Of the poses that hold, by the last result; 1 px is 10 cm.", labels=["venue"]
+    )
+    moved = GaugeMetricFamily(
+        "esc_venue_moved_pixels", "How far the last result found its worst camera moved.", labels=["venue"]
+    )
+    accepted = GaugeMetricFamily(
+        "esc_venue_accepted_timestamp_seconds", "When poses were last accepted.", labels=["venue"]
+    )
+    drift = GaugeMetricFamily(
+        "esc_venue_drift_pixels", "How far its worst camera is from where it was put.", labels=["venue"]
+    )
+    for venue in venues:
+        if venue.drift_px is not None:
+            drift.add_metric([venue.venue], venue.drift_px)
+        if venue.stitch_error_px is not None:
+            stitch.add_metric([venue.venue], venue.stitch_error_px)
+        if venue.moved_px is not None:
+            moved.add_metric([venue.venue], venue.moved_px)
+        if venue.accepted_at is not None:
+            accepted.add_metric([venue.venue], venue.accepted_at.timestamp())
+    yield from (stitch, moved, drift, accepted)
+
+
+def _alarms(figures: Figures) -> Iterator[Metric]:
+    ringing = GaugeMetricFamily("esc_alarms", "Alarms of venues and cameras that ring.", labels=["rule"])
+    begun = CounterMetricFamily("esc_alarms_begun", "Alarms that began to ring.", labels=["rule"])
+    for rule in get_args(AlarmRule):
+        ringing.add_metric([rule], figures.alarms.get(rule, 0))
+        begun.add_metric([rule], figures.tallies.get((BEGUN, (rule,)), 0))
+    of_venues = GaugeMetricFamily("esc_venue_alarm", "1 for what rings, the longest first.", labels=["venue", "rule"])
+    for alarm in figures.ringing:
+        of_venues.add_metric([alarm.venue, alarm.rule], 1)
+    yield from (ringing, begun, of_venues)
+
+
+def _workers(workers: list[WorkerSeen], silence_s: float) -> Iterator[Metric]:
+    alive = [worker for worker in workers if worker.silent_s <= silence_s]
+    yield _gauge("esc_workers", "Workers that gave a sign of life.", len(alive))
+    up = GaugeMetricFamily(
+        "esc_worker_up", "Whether it gave one, until another takes its jobs over.", labels=["worker"]
+    )
+    age = GaugeMetricFamily("esc_worker_heartbeat_age_seconds", "Since its last one.", labels=["worker"])
+    model = InfoMetricFamily("esc_worker_model", "Its network; empty: missing.", labels=["worker"])
+    for worker in workers:
+        up.add_metric([worker.name], float(worker in alive))
+        age.add_metric([worker.name], worker.silent_s)
+        model.add_metric([worker.name], {"sha256": worker.model_sha256 or ""})
+    yield from (up, age, model)
+
+
+def _callbacks(figures: Figures) -> Iterator[Metric]:
+    yield _gauge("esc_callbacks_waiting", "Callbacks that are due or will be tried again.", figures.callbacks_waiting)
+    told = CounterMetricFamily("esc_callbacks", "Callbacks that will not be tried again.", labels=["outcome"])
+    for outcome in ("delivered", "given-up"):
+        told.add_metric([outcome], figures.tallies.get((CALLBACKS, (outcome,)), 0))
+    yield told
+
+
+def _gauge(name: str, meaning: str, value: float) -> Metric:
+    return GaugeMetricFamily(name, meaning, value=value)
+
+
+def _histogram(name: str, meaning: str, buckets: Buckets, tallies: Mapping[Key, float]) -> Metric:
+    cumulative, total = buckets.read(tallies)
+    return HistogramMetricFamily(name, meaning, buckets=cumulative, sum_value=total)

@@ -1,0 +1,1 @@
+"""What the database counts and sums up for whoever watches the service."""

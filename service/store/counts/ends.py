@@ -1,0 +1,93 @@
+"""How the calibrations of a venue ended, one after the other: what a page or a chart shows of hundreds of jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+from service.store import tables
+from service.store.engine import reading
+from service.wire.schemas import OPEN, Moved, Status
+
+j = tables.jobs.c
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The end of a calibration; what needs a result is None, or empty, without one.
+
+    `accepted`: the gate's verdict. `moved` by camera, from the pose that was stored to the one that was found.
+    """
+
+    job: str
+    status: Status
+    finished_at: datetime
+    accepted: bool | None
+    rejected_because: str | None
+    error: str | None
+    stitch_error_px: float | None
+    stitch_error_before_px: float | None
+    stitch_error_limit_px: float | None
+    moved: dict[str, Moved]
+    dry_run: bool
+
+    @property
+    def moved_px(self) -> float | None:
+        """Of the camera that moved most."""
+        return max((moved.pixels for moved in self.moved.values() if moved.pixels is not None), default=None)
+
+
+class Ends:
+    """The ends of calibrations in the database."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def of(self, venue: str, limit: int) -> list[Ended]:
+        """The last `limit` calibrations of a venue that have ended, newest first."""
+        query = (
+            sa.select(j.id, j.status, j.finished_at, j.result, j.error, j.options)
+            .where(j.venue == venue, j.kind == "calibration", j.finished_at.is_not(None))
+            .order_by(j.id.desc())
+            .limit(limit)
+        )
+        with reading(self._engine) as connection:
+            return [_ended(row) for row in connection.execute(query)]
+
+    def newest_result(self, venue: str) -> str | None:
+        """The job of a venue's newest calibration that has a result, accepted or not."""
+        query = (
+            sa.select(j.id)
+            .where(j.venue == venue, j.kind == "calibration", j.result.is_not(None))
+            .order_by(j.id.desc())
+            .limit(1)
+        )
+        with reading(self._engine) as connection:
+            return connection.scalar(query)
+
+    def active(self, venues: Collection[str]) -> dict[str, str]:
+        """The calibration that waits or runs now, by venue."""
+        query = sa.select(j.venue, j.id).where(j.status.in_(OPEN), j.kind == "calibration", j.venue.in_(venues))
+        with reading(self._engine) as connection:
+            return {row.venue: row.id for row in connection.execute(query)}
+
+
+def _ended(row: Any) -> Ended:
+    result = row.result or {}
+    return Ended(
+        job=row.id,
+        status=row.status,
+        finished_at=row.finished_at,
+        accepted=result.get("accepted"),
+        rejected_because=result.get("rejected_because"),
+        error=(row.error or {}).get("detail"),
+        stitch_error_px=result.get("stitch_error_px"),
+        stitch_error_before_px=result.get("stitch_error_before_px"),
+        stitch_error_limit_px=result.get("stitch_error_limit_px"),
+        moved={camera["id"]: Moved.model_construct(**camera["moved"]) for camera in result.get("cameras", [])},
+        dry_run=row.options["dry_run"],
+    )

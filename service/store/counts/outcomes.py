@@ -1,0 +1,93 @@
+"""What the end of a job adds to the tallies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import get_args
+
+from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Amounts, total
+from service.wire.problems import KINDS, type_of
+from service.wire.schemas import FieldResult, IntrinsicsResult, JobError, Kind, LocateResult, Result, Status
+
+# As in `timings_s` of a result.
+STAGES = ("decode", "segmentation", "evolution", "refinement", "quality", "preview")
+# What can end a job. A program of jobs may say something else: that is `other`.
+ERRORS = (
+    "broken-image",
+    "frame-size",
+    "no-markings-in-view",
+    "model-missing",
+    "provider-missing",
+    "job-timeout",
+    "job-crashed",
+    "job-abandoned",
+    "other",
+)
+# Status, verdict of the gate, kind of the error: every way to end.
+OUTCOMES = (
+    ("succeeded", "accepted", ""),
+    ("succeeded", "rejected", ""),
+    ("cancelled", "", ""),
+    *(("failed", "", error) for error in ERRORS),
+)
+ENDED = "jobs_ended"
+# Of other kinds than calibrations: the kind and the status.
+OTHERS_ENDED = "other_jobs_ended"
+OTHER_OUTCOMES = tuple(
+    (kind, status)
+    for kind in get_args(Kind)
+    if kind != "calibration"
+    for status in ("succeeded", "failed", "cancelled")
+)
+RESTARTS = "job_restarts"
+
+
+@dataclass(frozen=True)
+class End:
+    """How a job ended, and when it was what."""
+
+    kind: Kind
+    status: Status
+    result: Result | IntrinsicsResult | LocateResult | FieldResult | None
+    error: JobError | None
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime
+    attempts: int
+
+    def tallies(self) -> Amounts:
+        """What it adds."""
+        restarts: Amounts = {} if self.started_at is None else {(RESTARTS, ()): self.attempts - 1}
+        if self.kind != "calibration":
+            return total([{(OTHERS_ENDED, (self.kind, self.status)): 1}, restarts, *self._stages()])
+        return total([{(ENDED, self._outcome()): 1}, restarts, *self._course(), *self._stages(), *self._quality()])
+
+    def _outcome(self) -> tuple[str, str, str]:
+        verdict = ""
+        if isinstance(self.result, Result):
+            verdict = "accepted" if self.result.accepted else "rejected"
+        return self.status, verdict, "" if self.error is None else _kind(self.error)
+
+    def _course(self) -> list[Amounts]:
+        if self.started_at is None:
+            return []
+        # A clock can be set back, and another server can take over from the database's.
+        waited = WAIT.of(max(0.0, (self.started_at - self.created_at).total_seconds()))
+        took = DURATION.of(max(0.0, (self.finished_at - self.started_at).total_seconds()))
+        return [waited, took]
+
+    def _stages(self) -> list[Amounts]:
+        if self.result is None:
+            return []
+        timings = self.result.timings_s
+        return [STAGE.of(timings[stage], stage) for stage in STAGES if stage in timings]
+
+    def _quality(self) -> list[Amounts]:
+        if not isinstance(self.result, Result) or self.result.stitch_error_px is None:
+            return []
+        return [STITCH_ERROR.of(self.result.stitch_error_px)]
+
+
+def _kind(error: JobError) -> str:
+    return next((kind for kind in ERRORS if kind in KINDS and error.type == type_of(kind)), "other")

@@ -1,0 +1,1 @@
+"""What crosses HTTP and files: models, problems, schedules, and what is computed of them alone."""

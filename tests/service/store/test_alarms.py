@@ -1,0 +1,143 @@
+"""Alarms of venues: each begins once and is over once, in both homes."""
+
+from service.store.counts.figures import look
+from service.wire.schemas import Alarms as Rules
+from service.wire.schemas import JobError
+from tests.homes import in_both_homes
+from tests.worker.stock import anyway
+from worker.duties.alarms import Alarms
+
+URL = "https://example.com/alarms"
+ERROR = JobError(type="/problems/no-markings-in-view", title="", detail="")
+
+
+def watched(stock, **rules):
+    venue = stock.venue("v")
+    stock.venues.put(venue.model_copy(update={"alarms": Rules(callback_url=URL, **rules)}), anyway)
+
+
+def told(stock):
+    return [(event.data.rule, event.type.removeprefix("alarm.")) for event in stock.alarms_told()]
+
+
+def rings(stock):
+    return [(alarm.rule, alarm.camera) for alarm in stock.venues.health("v").alarms]
+
+
+def failed(stock, **options):
+    task = stock.jobs.begin(stock.submitted("v", **options))
+    stock.jobs.fail(task, ERROR)
+
+
+@in_both_homes
+def test_a_venue_without_rules_is_ok_whatever_happens(stock):
+    stock.venue("v")
+    for _ in range(3):
+        stock.calibrated("v", accepted=False)
+    health = stock.venues.health("v")
+    assert (health.state, health.alarms, health.rejected_in_a_row) == ("ok", [], 3)
+    assert stock.venues.health("nowhere") is None
+
+
+@in_both_homes
+def test_rejections_in_a_row_ring_once_and_an_accepted_calibration_ends_it(stock):
+    watched(stock, rejected_in_a_row=3)
+    stock.calibrated("v", accepted=False)
+    failed(stock)
+    stock.calibrated("v", accepted=False, dry_run=True)
+    failed(stock, dry_run=True)
+    assert (rings(stock), stock.venues.health("v").rejected_in_a_row) == ([], 2)
+    for _ in range(3):
+        stock.calibrated("v", accepted=False)
+    (alarm,) = stock.venues.health("v").alarms
+    assert alarm.why == "The last 5 calibrations were rejected or failed."
+    assert told(stock) == [("rejected-in-a-row", "began")]
+    stock.calibrated("v")
+    assert rings(stock) == []
+    assert told(stock) == [("rejected-in-a-row", "began"), ("rejected-in-a-row", "ended")]
+
+
+@in_both_homes
+def test_taking_a_rejected_result_by_hand_ends_the_row(stock):
+    watched(stock, rejected_in_a_row=1)
+    job = stock.calibrated("v", accepted=False)
+    assert rings(stock) == [("rejected-in-a-row", None)]
+    stock.jobs.accept(job)
+    assert rings(stock) == []
+
+
+@in_both_homes
+def test_a_camera_that_moved_far_rings_until_it_moves_less(stock):
+    watched(stock, moved_since_last_px=0.001)
+    stock.calibrated("v")
+    assert rings(stock) == [("moved-since-last", "left"), ("moved-since-last", "right")]
+    why = stock.venues.health("v").alarms[0].why
+    assert why.startswith("Camera left moved by 0.0 px (0.00 degrees, 0.001 m)")
+    # Somebody put it there, which is no movement.
+    stock.moved_by_hand("v", -3.0)
+    assert rings(stock) == []
+    assert told(stock) == [("moved-since-last", "began")] * 2 + [("moved-since-last", "ended")] * 2
+
+
+@in_both_homes
+def test_drift_adds_up_until_it_rings_and_restoring_ends_it(stock):
+    stock.venue("v")
+    stock.calibrated("v")
+    step = stock.venues.health("v").cameras[0].drift.pixels
+    watched(stock, moved_since_first_px=2.5 * step)
+    for rung in (False, True, True):
+        stock.calibrated("v")
+        assert bool(rings(stock)) == rung
+    assert told(stock) == [("moved-since-first", "began")] * 2
+    stock.venues.restore("v", 2, anyway)
+    assert rings(stock) == []
+    assert told(stock)[2:] == [("moved-since-first", "ended")] * 2
+
+
+@in_both_homes
+def test_what_was_not_calibrated_for_long_rings_without_anything_happening(stock):
+    watched(stock, not_calibrated_for_h=24)
+    duty = Alarms(stock.venues)
+    duty.look()
+    assert rings(stock) == []
+    stock.time_passes(hours=25)
+    for _ in range(2):
+        assert duty.look() > 0
+    assert (rings(stock), told(stock)) == ([("not-calibrated", None)], [("not-calibrated", "began")])
+    stock.calibrated("v")
+    assert told(stock)[1:] == [("not-calibrated", "ended")]
+    stock.time_passes(hours=25)
+    duty.look()
+    assert told(stock)[2:] == [("not-calibrated", "began")]
+
+
+@in_both_homes
+def test_a_rule_that_is_taken_away_ends_its_alarm(stock):
+    watched(stock, rejected_in_a_row=1)
+    stock.calibrated("v", accepted=False)
+    watched(stock, rejected_in_a_row=2)
+    assert (rings(stock), told(stock)[-1]) == ([], ("rejected-in-a-row", "ended"))
+
+
+@in_both_homes
+def test_alarms_go_with_their_venue(stock):
+    watched(stock, rejected_in_a_row=1)
+    stock.calibrated("v", accepted=False)
+    stock.venues.delete("v", lambda *_: None)
+    stock.venue("v")
+    assert (rings(stock), stock.venues.health("v").rejected_in_a_row) == ([], 0)
+
+
+@in_both_homes
+def test_what_rings_is_told_to_whoever_watches_and_only_so_much_of_it(stock):
+    watched(stock, rejected_in_a_row=1, moved_since_last_px=0.001)
+    stock.calibrated("v")
+    stock.calibrated("v", accepted=False)
+    seen = look(stock.engine, 10)
+    assert seen.alarms == {"moved-since-last": 2, "rejected-in-a-row": 1}
+    assert [(ringing.venue, ringing.rule) for ringing in seen.ringing] == [
+        ("v", "moved-since-last"),
+        ("v", "rejected-in-a-row"),
+    ]
+    assert seen.venues[0].drift_px == stock.venues.health("v").cameras[0].drift.pixels
+    assert len(look(stock.engine, 1).ringing) == 1

@@ -1,0 +1,186 @@
+"""The history of a venue, and the ways back, in both homes."""
+
+import pytest
+
+from service.store.jobs import MovedOn, NoPoses
+from service.store.revisions import NoSuchRevision, RevisionUnfit
+from service.wire.schemas import FieldOfPlay, Intrinsics
+from tests.homes import in_both_homes
+from tests.worker.stock import anyway, result
+
+
+def told(stock):
+    return [(r.revision, r.cause, r.job, r.restored_from) for r in stock.venues.history("v", None, 100)]
+
+
+def standing(stock):
+    return round(stock.venues.get("v").cameras[0].pose.position[0], 6)
+
+
+@in_both_homes
+def test_every_change_of_the_poses_is_a_revision_with_its_cause(stock):
+    stock.venue("v")
+    job = stock.calibrated("v")
+    stock.calibrated("v", accepted=False)
+    stock.calibrated("v", dry_run=True)
+    stock.moved_by_hand("v", -3.0)
+    stock.venues.restore("v", 1, anyway)
+    assert told(stock) == [
+        (4, "restored", None, 1),
+        (3, "put", None, None),
+        (2, "calibrated", job, None),
+        (1, "put", None, None),
+    ]
+    newest, before = stock.venues.history("v", None, 2)
+    assert (newest.at >= before.at, stock.venues.history("v", 3, 1)[0].revision) == (True, 2)
+    assert stock.venues.history("v", 3, 1)[0].stitch_error_px == 0.2
+
+
+@in_both_homes
+def test_a_put_that_moves_nothing_is_no_revision(stock):
+    venue = stock.venue("v")
+    stock.venues.put(venue.model_copy(update={"name": "renamed"}), anyway)
+    stock.venues.put(venue.model_copy(update={"field": FieldOfPlay(length_m=104, width_m=68)}), anyway)
+    assert told(stock) == [(1, "put", None, None)]
+
+
+@in_both_homes
+def test_drift_is_counted_from_where_each_camera_was_put(stock):
+    stock.venue("v")
+    for _ in range(3):
+        stock.calibrated("v")
+    left, right = stock.venues.history("v", None, 1)[0].cameras
+    assert (left.moved.position_m, left.drift.position_m) == (pytest.approx(0.001), pytest.approx(0.003))
+    assert left.drift.pixels == pytest.approx(3 * left.moved.pixels, rel=0.01)
+    assert (left.drift_since, right.drift_since) == (1, 1)
+    stock.moved_by_hand("v", -3.0)
+    stock.calibrated("v")
+    left, right = stock.venues.history("v", None, 1)[0].cameras
+    assert (left.drift_since, left.drift.position_m) == (5, pytest.approx(0.001))
+    assert (right.drift_since, right.drift.position_m) == (1, pytest.approx(0.004))
+
+
+@in_both_homes
+def test_an_older_revision_holds_again_with_its_lenses_and_its_ridge(stock):
+    stock.venue("v")
+    longer = Intrinsics(matrix=[[61, 0, 32], [0, 61, 24], [0, 0, 1]], distortion=[])
+    before = stock.venues.get("v")
+    ridge = [[-10.0, 0.0, 0.2], [10.0, 0.0, 0.2]]
+    crowned = before.model_copy(update={"field": before.field.model_copy(update={"ridge": ridge})})
+    stock.venues.put(crowned, anyway)
+    stock.moved_by_hand("v", -3.0, intrinsics=longer)
+    stock.venues.restore("v", 1, anyway)
+    assert stock.venues.get("v") == before
+    stock.venues.restore("v", 3, anyway)
+    assert (stock.venues.get("v").cameras[0].intrinsics, stock.venues.get("v").field.ridge) == (longer, ridge)
+    # What is restored drifts from where the restored one was put.
+    assert [camera.drift_since for camera in stock.venues.history("v", None, 1)[0].cameras] == [3, 1]
+
+
+@in_both_homes
+def test_what_holds_anyway_is_not_restored(stock):
+    stock.venue("v")
+    stock.venues.restore("v", 1, anyway)
+    assert told(stock) == [(1, "put", None, None)]
+
+
+@in_both_homes
+def test_a_revision_that_does_not_fit_is_refused(stock):
+    venue = stock.venue("v")
+    crown = venue.field.model_copy(update={"ridge": [[-50.0, 0.0, 0.2], [50.0, 0.0, 0.2]]})
+    stock.venues.put(venue.model_copy(update={"field": crown}), anyway)
+    small = FieldOfPlay(length_m=91, width_m=68)
+    stock.venues.put(venue.model_copy(update={"field": small}), anyway)
+    with pytest.raises(RevisionUnfit, match="ridge"):
+        stock.venues.restore("v", 2, anyway)
+    stock.venues.put(venue.model_copy(update={"cameras": venue.cameras[:1]}), anyway)
+    with pytest.raises(RevisionUnfit, match=r"left \(64x48\), right \(64x48\), and the venue now has left \(64x48\)"):
+        stock.venues.restore("v", 1, anyway)
+    with pytest.raises(NoSuchRevision):
+        stock.venues.restore("v", 9, anyway)
+
+
+@in_both_homes
+def test_a_venue_that_is_made_again_has_a_history_of_its_own(stock):
+    stock.venue("v")
+    stock.moved_by_hand("v", -3.0)
+    stock.venues.delete("v", lambda *_: None)
+    stock.venue("v")
+    assert told(stock) == [(1, "put", None, None)]
+
+
+# By hand
+
+
+@in_both_homes
+@pytest.mark.parametrize("how", [{"accepted": False}, {"dry_run": True}])
+def test_a_result_that_did_not_move_the_venue_can_be_taken_by_hand(stock, how):
+    stock.venue("v")
+    job = stock.calibrated("v", **how)
+    assert (standing(stock), stock.jobs.get(job).venue_revision) == (-1.0, None)
+    for _ in range(2):
+        stock.jobs.accept(job)
+    assert (standing(stock), stock.jobs.get(job).venue_revision) == (-0.999, 2)
+    assert told(stock) == [(2, "accepted", job, None), (1, "put", None, None)]
+
+
+@in_both_homes
+def test_what_was_taken_can_be_given_back_and_taken_again(stock):
+    stock.venue("v")
+    job = stock.calibrated("v")
+    for _ in range(2):
+        stock.jobs.reject(job)
+    assert (standing(stock), told(stock)[0]) == (-1.0, (3, "restored", job, 1))
+    stock.jobs.accept(job)
+    assert (standing(stock), told(stock)[0]) == (-0.999, (4, "accepted", job, None))
+    stock.jobs.reject(job)
+    assert (standing(stock), told(stock)[0]) == (-1.0, (5, "restored", job, 3))
+
+
+@in_both_homes
+def test_nothing_by_hand_undoes_what_came_later(stock):
+    stock.venue("v")
+    refused, taken = stock.calibrated("v", accepted=False), stock.calibrated("v")
+    with pytest.raises(MovedOn) as moved:
+        stock.jobs.accept(refused)
+    assert moved.value.newest.revision == 2
+    stock.moved_by_hand("v", -3.0)
+    for decide in (stock.jobs.accept, stock.jobs.reject):
+        with pytest.raises(MovedOn):
+            decide(taken)
+    assert standing(stock) == -3.0
+
+
+@in_both_homes
+def test_giving_back_what_never_held_changes_nothing(stock):
+    stock.venue("v")
+    stock.jobs.reject(stock.calibrated("v", accepted=False))
+    assert told(stock) == [(1, "put", None, None)]
+
+
+@in_both_homes
+def test_a_job_without_poses_has_none_to_take(stock):
+    stock.venue("v")
+    waiting = stock.submitted("v")
+    for decide in (stock.jobs.accept, stock.jobs.reject):
+        with pytest.raises(NoPoses):
+            decide(waiting)
+
+
+@in_both_homes
+def test_poses_that_were_found_for_another_venue_are_not_taken(stock):
+    venue = stock.venue("v")
+    job = stock.calibrated("v", accepted=False)
+    stock.venues.put(venue.model_copy(update={"field": FieldOfPlay(length_m=104, width_m=68)}), anyway)
+    with pytest.raises(MovedOn):
+        stock.jobs.accept(job)
+
+
+@in_both_homes
+def test_what_is_decided_while_a_job_runs_is_not_undone_by_its_result(stock):
+    stock.venue("v")
+    first = stock.calibrated("v")
+    running = stock.jobs.begin(stock.submitted("v"))
+    stock.jobs.reject(first)
+    stock.jobs.finish(running, result(running.venue, True), [])
+    assert (standing(stock), stock.jobs.get(running.job_id).result.accepted) == (-1.0, False)

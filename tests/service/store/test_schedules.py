@@ -1,0 +1,105 @@
+"""Schedules of venues in both homes: fired once, by one worker, whatever happens to workers."""
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from service.store.schedules import Schedules
+from service.wire.schedule import NoSchedule, next_time
+from service.wire.schemas import Schedule
+from tests.homes import in_both_homes
+from tests.worker.stock import anyway
+
+NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
+LEASE = timedelta(minutes=10)
+
+
+def at(text: str) -> datetime:
+    return datetime.fromisoformat(text).replace(tzinfo=UTC)
+
+
+@pytest.mark.parametrize(
+    ("cron", "zone", "after", "expected"),
+    [
+        ("*/15 * * * *", "UTC", "2026-11-21T12:00", "2026-11-21T12:15"),
+        ("0 3 * * *", "Europe/Berlin", "2026-11-21T12:00", "2026-11-22T02:00"),
+        ("0 3 * * *", "Asia/Tokyo", "2026-11-21T12:00", "2026-11-21T18:00"),
+        ("0 9 * * sat", "UTC", "2026-11-21T12:00", "2026-11-28T09:00"),
+        # Summer begins in Berlin: there is no half past two.
+        ("30 2 * * *", "Europe/Berlin", "2026-03-28T12:00", "2026-03-29T01:00"),
+        ("30 2 * * *", "Europe/Berlin", "2026-03-29T01:00", "2026-03-30T00:30"),
+    ],
+)
+def test_a_schedule_fires_by_the_clock_on_the_wall(cron, zone, after, expected):
+    assert next_time(cron, zone, at(after)) == at(expected)
+
+
+@pytest.mark.parametrize(
+    ("cron", "zone"),
+    [
+        ("0 0 30 2 *", "UTC"),
+        ("61 * * * *", "UTC"),
+        ("* * * * * *", "UTC"),
+        ("x", "UTC"),
+        ("* * * * *", "../etc/passwd"),
+    ],
+)
+def test_what_never_fires_is_no_schedule(cron, zone):
+    with pytest.raises(NoSchedule):
+        next_time(cron, zone, NOON)
+
+
+@pytest.fixture
+def schedules(stock):
+    return Schedules(stock.engine)
+
+
+def put(stock, cron="*/15 * * * *"):
+    schedule = None if cron is None else Schedule(cron=cron)
+    stock.venues.put(stock.venue("v").model_copy(update={"schedule": schedule}), anyway)
+    return stock.venues.health("v").schedule
+
+
+@in_both_homes
+def test_a_time_that_came_fires_once(stock, schedules):
+    due = put(stock).next_at
+    assert schedules.fire(due - timedelta(seconds=1), due, 10) == []
+    (firing,) = schedules.fire(due, due + LEASE, 10)
+    assert (firing.venue_id, firing.due_at) == ("v", due)
+    # Another worker.
+    assert schedules.fire(due, due + LEASE, 10) == []
+    schedules.done(firing, due, None, "the camera is away")
+    state = stock.venues.health("v").schedule
+    assert (state.next_at, state.last_error) == (due + timedelta(minutes=15), "the camera is away")
+    assert schedules.fire(due, due + LEASE, 10) == []
+
+
+@in_both_homes
+def test_times_that_were_missed_fire_once(stock, schedules):
+    due = put(stock).next_at
+    late = due + timedelta(hours=5, minutes=1)
+    (firing,) = schedules.fire(late, late + LEASE, 10)
+    schedules.done(firing, late, None, None)
+    assert schedules.fire(late, late + LEASE, 10) == []
+    assert stock.venues.health("v").schedule.next_at == due + timedelta(hours=5, minutes=15)
+
+
+@in_both_homes
+def test_what_a_worker_died_over_is_fired_again_for_the_same_time(stock, schedules):
+    due = put(stock).next_at
+    (first,) = schedules.fire(due, due + LEASE, 10)
+    (again,) = schedules.fire(due + LEASE, due + 2 * LEASE, 10)
+    assert again == first
+
+
+@in_both_homes
+def test_a_schedule_that_is_changed_or_taken_away_fires_no_more(stock, schedules):
+    due = put(stock).next_at
+    (firing,) = schedules.fire(due, due + LEASE, 10)
+    changed = put(stock, "0 3 * * *")
+    schedules.done(firing, due, None, "too late")
+    assert stock.venues.health("v").schedule == changed
+    # Put again as it is, it goes on where it was.
+    assert put(stock, "0 3 * * *") == changed
+    assert put(stock, None) is None
+    assert schedules.fire(due + timedelta(days=9), due + timedelta(days=9), 10) == []

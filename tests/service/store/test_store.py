@@ -1,0 +1,146 @@
+import socket
+import time
+
+import obstore
+import pytest
+import sqlalchemy as sa
+from obstore.exceptions import BaseError
+from obstore.store import from_url
+
+from service.store import tables
+from service.store.blobs import Blobs
+from service.store.engine import migrate
+from service.store.ids import new_id
+from service.store.jobs import Jobs
+from service.store.venues import Venues
+from service.store.workers import Workers
+from service.wire.schemas import VENUE_EXAMPLE, Intrinsics, VenueIn
+from tests.homes import in_both_homes, on_servers
+from tests.worker.stock import Stock, result
+
+
+@in_both_homes
+def test_the_migrations_make_the_tables_that_the_code_knows(engine):
+    found = sa.MetaData()
+    found.reflect(engine)
+    for name, table in tables.metadata.tables.items():
+        assert {c.name: (c.type.compile(engine.dialect), c.nullable) for c in found.tables[name].columns} == {
+            c.name: (c.type.compile(engine.dialect), c.nullable) for c in table.columns
+        }
+        assert {index.name for index in found.tables[name].indexes} == {index.name for index in table.indexes}
+
+
+@in_both_homes
+def test_migrating_twice_changes_nothing(engine):
+    migrate(engine)
+
+
+@in_both_homes
+def test_a_refused_put_changes_nothing(engine):
+    venues = Venues(engine)
+
+    def refuse(_):
+        raise PermissionError
+
+    with pytest.raises(PermissionError):
+        venues.put(VenueIn.model_validate(VENUE_EXAMPLE).stored(), refuse)
+    assert venues.get("tsukuba") is None
+
+
+def test_job_ids_sort_by_time():
+    ids = [new_id() for _ in range(3)]
+    assert all(len(one) == 26 for one in ids)
+    assert ids[0][:8] == ids[2][:8]
+
+
+@in_both_homes
+def test_jobs_that_are_not_there_are_none(engine):
+    jobs = Jobs(engine)
+    assert jobs.get(new_id()) is None
+    assert jobs.begin(new_id()) is None
+    assert jobs.states([new_id()]) == {}
+
+
+@in_both_homes
+def test_a_silent_worker_is_noticed_and_may_come_back(engine):
+    workers = Workers(engine)
+    workers.enter("w", None)
+    assert [worker.name for worker in workers.alive(5)] == ["w"]
+    assert workers.silent(0) == ["w"]
+    workers.leave("w", 5)
+    assert workers.beat("w")
+    workers.leave("w", 0)
+    assert not workers.beat("w")
+
+
+@in_both_homes
+def test_blobs_are_kept_and_removed_by_folder(home, tmp_path):
+    blobs = Blobs(home.blob_url(tmp_path / "a folder"))
+    blobs.put("frames/a/left/0", b"1")
+    blobs.put("frames/ab/left/0", b"2")
+    blobs.delete_under("frames/a")
+    assert blobs.get("frames/a/left/0") is None
+    assert blobs.get("frames/ab/left/0") == b"2"
+    blobs.check()
+
+
+def test_what_a_killed_process_left_of_a_blob_goes_with_its_folder(tmp_path):
+    blobs = Blobs((tmp_path / "blobs").as_uri())
+    blobs.put("frames/a/left/0", b"1")
+    # Written under this name until it is whole; the store's own list does not show it.
+    (tmp_path / "blobs/frames/a/left/1#1").write_bytes(b"half")
+    blobs.delete_under("frames/a")
+    assert not (tmp_path / "blobs/frames/a").exists()
+    blobs.delete_under("frames/a")
+
+
+@on_servers
+def test_a_large_blob_goes_to_a_bucket_in_one_piece(home, tmp_path):
+    # In several, those of a killed process would lie there for ever and be paid for.
+    url = home.blob_url(tmp_path)
+    Blobs(url).put("frames/a/left/0", bytes(20_000_000))
+    assert "-" not in obstore.head(from_url(url), "frames/a/left/0")["e_tag"]
+
+
+def test_a_blob_reaches_the_disk_with_every_folder_on_the_way_to_it(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr("service.store.blobs._sync", synced.append)
+    Blobs((tmp_path / "blobs").as_uri()).put("frames/a/left/0", b"1")
+    ways = ("frames/a/left/0", "frames/a/left", "frames/a", "frames", "")
+    assert synced == [tmp_path / "blobs" / way for way in ways]
+
+
+def gives_up_in_time(monkeypatch, address):
+    """Whether a bucket at an address is asked for about as long as a patience of a second allows."""
+    settings = {"ENDPOINT_URL": address, "ALLOW_HTTP": "true", "ACCESS_KEY_ID": "k", "SECRET_ACCESS_KEY": "s"}
+    for name, value in settings.items():
+        monkeypatch.setenv(f"AWS_{name}", value)
+    begun = time.monotonic()
+    with pytest.raises(BaseError):
+        Blobs("s3://bucket", patience_s=1).put("frames/a/left/0", b"1")
+    return 1 < time.monotonic() - begun < 10
+
+
+def test_a_bucket_that_does_not_answer_is_asked_for_as_long_as_its_caller_is_patient(monkeypatch):
+    assert gives_up_in_time(monkeypatch, "http://127.0.0.1:1")
+
+
+def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(tmp_path):
+    stock = Stock(tmp_path)
+    job_id = stock.submitted("v")
+    assert stock.jobs.posed(job_id) is None
+    task = stock.jobs.begin(job_id)
+    left, right = task.venue.cameras
+    longer = Intrinsics(matrix=[[61, 0, 32], [0, 61, 24], [0, 0, 1]], distortion=[])
+    found = result(task.venue, False)
+    cameras = [found.cameras[0].model_copy(update={"intrinsics": longer}), *found.cameras[1:]]
+    stock.jobs.finish(task, found.model_copy(update={"cameras": cameras}), [])
+    posed = stock.jobs.posed(job_id)
+    assert [camera.intrinsics for camera in posed.cameras] == [longer, right.intrinsics]
+    assert posed.cameras[0].pose == cameras[0].pose
+    assert stock.venues.get("v").cameras[0] == left
+
+
+def test_a_bucket_that_takes_a_request_and_says_nothing_is_not_waited_for_any_longer(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        assert gives_up_in_time(monkeypatch, "http://{}:{}".format(*silent.getsockname()))

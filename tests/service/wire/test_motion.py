@@ -1,0 +1,80 @@
+"""What the service says a camera moved, against the engine and OpenCV."""
+
+import cv2
+import numpy as np
+import pytest
+
+from service.wire import motion
+from service.wire.schemas import FieldOfPlay, Intrinsics, Pose, PosedCamera
+from worker.calibration.judge.quality import Movement
+from worker.jobs.wire import camera_of, pitch_of
+
+FIELD = FieldOfPlay(length_m=105, width_m=68)
+LENSES = {
+    "none": [],
+    "barrel": [-0.3402, 0.1042, 0, 0, 0],
+    "tangential": [-0.2, 0.05, 0.002, -0.003, 0.01],
+    "rational": [0.1, -0.02, 0.001, 0.001, 0.003, 0.4, -0.03, 0.002],
+    "thin prism": [-0.2, 0.05, 0.001, 0.001, 0, 0, 0, 0, 0.004, -0.002, 0.003, 0.001],
+    "tilted": [-0.2, 0.05, 0.001, 0.001, 0, 0, 0, 0, 0, 0, 0, 0, 0.03, -0.02],
+    "fisheye": [0.02, -0.003, 0.001, -0.0002],
+}
+
+
+def camera(lens="barrel", turned=(0, 0, 0), by=(0, 0, 0)) -> PosedCamera:
+    rotation, position = np.array([1.675, 0.372, -0.462]) + turned, np.array([-1.48, -49.49, 7.84]) + by
+    return PosedCamera(
+        id="left",
+        image_size=[3072, 1728],
+        intrinsics=Intrinsics(
+            model="fisheye" if lens == "fisheye" else "opencv",
+            matrix=[[2122.4, 0, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
+            distortion=LENSES[lens],
+        ),
+        pose=Pose.at(rotation.tolist(), position.tolist()),
+    )
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_points_of_the_pitch_are_where_opencv_has_them(lens):
+    shot = camera(lens)
+    points = np.array([[x, y, 0.0] for x in (-30, -10, 0) for y in (-20, 0, 30)])
+    pose, (matrix, distortion) = shot.pose, (np.array(shot.intrinsics.matrix), np.array(shot.intrinsics.distortion))
+    project = cv2.fisheye.projectPoints if lens == "fisheye" else cv2.projectPoints
+    arguments = (points[:, None], np.array(pose.rotation), np.array(pose.translation), matrix, distortion)
+    pixels, _ = project(*arguments)
+    projection = motion._Projection(shot)
+    found = [projection.pixel((x, y)) for x, y, _ in points]
+    np.testing.assert_allclose(found, pixels.reshape(-1, 2), atol=1e-6)
+
+
+@pytest.mark.parametrize("lens", ["none", "barrel", "fisheye"])
+@pytest.mark.parametrize(
+    ("turned", "by"), [((0.001, 0, 0), (0, 0, 0)), ((0.004, -0.006, 0.002), (0.05, 0.1, -0.02)), ((0, 0, 0), (0, 0, 0))]
+)
+def test_a_movement_is_what_the_engine_calls_one(lens, turned, by):
+    before, after = camera(lens), camera(lens, turned, by)
+    told = motion.moved(FIELD, before, after)
+    expected = Movement.between(pitch_of(FIELD), camera_of(before), camera_of(after))
+    assert told.rotation_deg == pytest.approx(expected.rotation_deg, abs=1e-9)
+    assert told.position_m == pytest.approx(expected.position_m)
+    # Other points of the same lines.
+    assert told.pixels == pytest.approx(expected.pixels, rel=0.03, abs=1e-9)
+
+
+def test_what_cannot_be_compared_in_pixels_is_not():
+    there = camera()
+    sky = camera(turned=(-1.5, 0, 0))
+    assert motion.moved(FIELD, sky, there).pixels is None
+    small = there.model_copy(update={"image_size": [1536, 864]})
+    assert motion.moved(FIELD, small, there).pixels is None
+
+
+def test_a_point_that_a_lens_formula_folds_back_into_the_picture_is_not_in_view():
+    # k1 alone turns back where r is 1 / sqrt(3 * 0.34), 44 degrees from the axis.
+    shot = camera().model_copy(
+        update={"intrinsics": Intrinsics(matrix=camera().intrinsics.matrix, distortion=[-0.34, 0, 0, 0])}
+    )
+    projection = motion._Projection(shot)
+    assert projection.pixel((40.0, -49.0)) is None
+    assert projection.pixel((-20.0, 0.0)) is not None

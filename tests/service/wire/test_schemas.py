@@ -1,0 +1,219 @@
+import json
+import math
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from fields.landmarks import find
+from fields.shapes import Line, Spot
+from fields.template import NAMES, load
+from service.wire.schemas import VENUE_EXAMPLE, FieldOfPlay, Intrinsics, Options, Pose, PoseIn, VenueIn
+
+
+def test_the_documented_venue_is_one():
+    assert VenueIn.model_validate(VENUE_EXAMPLE).stored().cameras[0].id == "left"
+
+
+@pytest.mark.parametrize("rotation", [[0, 0, 0], [1.675, 0.372, -0.462], [0, 0, 3.14], [-9, 2, 1]])
+def test_translation_and_position_agree_with_opencv(rotation):
+    position = np.array([-1.48, -49.49, 7.84])
+    pose = Pose.of(PoseIn(rotation=rotation, position=position.tolist()))
+    matrix, _ = cv2.Rodrigues(np.array(rotation, dtype=float))
+    np.testing.assert_allclose(pose.translation, -matrix @ position, atol=1e-12)
+    back = Pose.of(PoseIn(rotation=rotation, translation=pose.translation))
+    np.testing.assert_allclose(back.position, position, atol=1e-12)
+
+
+def test_a_pose_needs_exactly_one_place():
+    for places in ({}, {"position": [0, 0, 1], "translation": [0, 0, 1]}):
+        with pytest.raises(ValidationError, match="exactly one"):
+            PoseIn(rotation=[0, 0, 0], **places)
+
+
+@pytest.mark.parametrize("length", [0, 4, 5, 8, 12, 14])
+def test_the_distortions_of_opencv_are_taken(length):
+    document = VENUE_EXAMPLE | {"cameras": [dict(VENUE_EXAMPLE["cameras"][0])]}
+    matrix = VENUE_EXAMPLE["cameras"][0]["intrinsics"]["matrix"]
+    document["cameras"][0]["intrinsics"] = {"matrix": matrix, "distortion": [0.01] * length}
+    assert len(VenueIn.model_validate(document).cameras[0].intrinsics.distortion) == length
+
+
+@pytest.mark.parametrize(("length", "taken"), [(0, True), (4, True), (5, False)])
+def test_a_fisheye_has_no_distortion_or_four_numbers(length, taken):
+    matrix = VENUE_EXAMPLE["cameras"][0]["intrinsics"]["matrix"]
+    document = {"model": "fisheye", "matrix": matrix, "distortion": [0.01] * length}
+    if taken:
+        assert len(Intrinsics.model_validate(document).distortion) == length
+    else:
+        with pytest.raises(ValidationError, match="must have 0 or 4 numbers with the model fisheye"):
+            Intrinsics.model_validate(document)
+
+
+def test_a_matrix_of_another_resolution_is_noticed():
+    document = VENUE_EXAMPLE | {"cameras": [VENUE_EXAMPLE["cameras"][0] | {"image_size": [640, 360]}]}
+    with pytest.raises(ValidationError, match="does not belong to an image of 640x360"):
+        VenueIn.model_validate(document)
+
+
+@pytest.mark.parametrize("place", ["position", "translation"])
+@pytest.mark.parametrize("height", [0.0, -7.84])
+def test_a_camera_under_the_pitch_is_named(place, height):
+    pose = Pose.at([1.675, 0.372, -0.462], [-1.48, -49.49, height - 1e-9])
+    camera = VENUE_EXAMPLE["cameras"][0] | {"pose": pose.model_dump(include={"rotation", place})}
+    document = VENUE_EXAMPLE | {"cameras": [camera]}
+    with pytest.raises(ValidationError, match=r"camera left stands at .* z points up, .* above the pitch"):
+        VenueIn.model_validate(document)
+
+
+def test_cameras_have_names_of_their_own():
+    document = VENUE_EXAMPLE | {"cameras": VENUE_EXAMPLE["cameras"] * 2}
+    with pytest.raises(ValidationError, match="same id"):
+        VenueIn.model_validate(document)
+
+
+def test_options_have_the_documented_defaults():
+    assert Options().model_dump(exclude_none=True) == {
+        "preset": "esc",
+        "generations": 100,
+        "parents": 64,
+        "offspring": 128,
+        "stitch_weight": 0.5,
+        "flat": False,
+        "fit_focal_length": False,
+        "fit_ridge": False,
+        "dry_run": False,
+        "priority": "routine",
+    }
+
+
+def test_what_only_the_finish_finds_needs_the_preset_that_has_one():
+    assert Options(fit_focal_length=True, fit_ridge=True).fit_ridge
+    for wrong in ({"preset": "paper", "fit_ridge": True}, {"flat": True, "fit_ridge": True}):
+        with pytest.raises(ValidationError, match="fit_ridge"):
+            Options.model_validate(wrong)
+
+
+# The field
+
+
+OWN = {
+    "template": {
+        "markings": [
+            {"name": "side", "line": [[-10, -5], [10, -5]]},
+            {"name": "bow", "arc": {"centre": [0, 0], "start": [3, 0], "end": [0, 3]}, "width_m": 0.1},
+            {"name": "ring", "circle": {"centre": [5, 0], "radius_m": 2}},
+            {"name": "dot", "spot": {"centre": [0, 0], "diameter_m": 0.2}},
+        ],
+        "points": {"corner": [-10, -5]},
+    },
+    "length_m": 20,
+    "width_m": 10,
+    "line_width_m": 0.05,
+}
+
+
+def own(*markings, **more):
+    return OWN | {"template": {"markings": list(markings)}} | more
+
+
+def test_a_field_is_a_football_pitch_unless_said():
+    field = FieldOfPlay(length_m=100, width_m=64)
+    assert (field.template, field.line_width_m, field.ridge) == ("football", 0.12, None)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_template_brings_its_size(name):
+    field = FieldOfPlay(template=name)
+    size = load(name).size
+    assert (field.length_m, field.width_m) == (size["length"].default, size["width"].default)
+    assert field.plan.markings(field.size)
+
+
+def test_sizes_need_not_be_given_but_are_always_told():
+    assert FieldOfPlay.model_json_schema()["required"] == []
+    assert FieldOfPlay.model_json_schema()["properties"]["template"]["oneOf"][0]["enum"] == list(NAMES)
+    assert FieldOfPlay(template="futsal").model_dump(mode="json")["length_m"] == 40
+
+
+def test_markings_of_ones_own_take_the_place_of_a_template():
+    field = FieldOfPlay.model_validate(OWN)
+    side, bow, ring, dot = field.plan.markings(field.size)
+    assert side == Line("side", ((-10, -5), (10, -5)), 0.05)
+    assert (bow.radius, bow.start, bow.end, bow.width) == (3, 0, pytest.approx(math.pi / 2), 0.1)
+    assert (ring.radius, ring.end) == (2, 2 * math.pi)
+    assert dot == Spot("dot", (0, 0), 0.2)
+    assert field.plan.places(field.size) == {"corner": (-10, -5)}
+
+
+def test_a_field_is_stored_and_read_as_it_was():
+    field = FieldOfPlay.model_validate(OWN)
+    assert FieldOfPlay.model_validate(field.model_dump(mode="json")) == field
+    assert FieldOfPlay.model_validate(field.model_dump(mode="json", exclude_none=True)) == field
+
+
+@pytest.mark.parametrize(
+    ("field", "where", "message"),
+    [
+        ({"template": "curling"}, ("template", "name"), "curling is none of the templates basketball, football"),
+        ({"length_m": 59}, ("length_m",), "football: 60 to 130 m, not 59"),
+        ({"template": "basketball", "line_width_m": 0.3}, ("line_width_m",), "basketball: 0.02 to 0.12 m, not 0.3"),
+        ({"template": "handball", "width_m": 13}, ("width_m",), "handball: 17 to 22 m, not 13"),
+        ({"template": "rugby-union", "measures_m": {"in_goal": 40}}, ("measures_m",), "in_goal: 5 to 22 m, not 40"),
+        ({"template": "rugby-union", "measures_m": {"goal": 8}}, ("measures_m",), "leaves open: in_goal"),
+        ({"measures_m": {"in_goal": 8}}, ("measures_m",), "leaves open: nothing"),
+        ({"template": OWN["template"]}, ("length_m",), "Field required"),
+        (own({"name": "a"}), ("template", "layout", "markings", 0), "exactly one of line, arc, circle and spot"),
+        (
+            own({"name": "a", "line": [[0, 0], [0, 0]]}),
+            ("template", "layout", "markings", 0),
+            "the same point twice in a row",
+        ),
+        (
+            own({"name": "a", "arc": {"centre": [0, 0], "start": [3, 0], "end": [0, 4]}}),
+            ("template", "layout", "markings", 0, "arc"),
+            "start is 3.00 m from the centre, end 4.00 m",
+        ),
+        (own({"name": "a", "line": [[0, 0], [20, 10]]}), (), "a leaves the 20 x 10 m of the field, whose centre is"),
+        (
+            own({"name": "a", "circle": {"centre": [0, 0], "radius_m": 7}}),
+            (),
+            "a leaves the 20 x 10 m of the field, whose centre is the origin",
+        ),
+        (own(), ("template", "layout", "markings"), "at least 1 item"),
+    ],
+)
+def test_a_field_that_is_none_is_refused_and_the_place_named(field, where, message):
+    with pytest.raises(ValidationError) as refused:
+        FieldOfPlay.model_validate(field)
+    first = refused.value.errors()[0]
+    assert first["loc"] == where
+    assert message in first["msg"]
+
+
+def test_the_documented_fields_are_fields():
+    document = (Path(__file__).parents[3] / "docs" / "fields.md").read_text()
+    examples = re.findall(r"```json\n(.*?)```", document, re.DOTALL)
+    assert len(examples) == 2
+    for example in examples:
+        field = FieldOfPlay.model_validate(json.loads(example)["field"])
+        assert field.plan.markings(field.size)
+
+
+def test_the_names_in_the_document_are_found():
+    document = (Path(__file__).parents[3] / "docs" / "fields.md").read_text()
+    listed = re.findall(r"^- (.*)$", document, re.MULTILINE)
+    names = [name for line in listed for name in re.findall(r"`([^`]*)`", line)]
+    assert len(names) > 10
+    field = FieldOfPlay()
+    for name in names:
+        assert find(name, field.plan, field.size)
+
+
+def test_the_corner_is_not_the_origin():
+    from_the_corner = own({"name": "halfway", "line": [[10, 0], [10, 10]]})
+    with pytest.raises(ValidationError, match="whose centre is the origin"):
+        FieldOfPlay.model_validate(from_the_corner)
