@@ -59,12 +59,15 @@ def _block(before: int, after: int, leak: float) -> nn.Sequential:
     return nn.Sequential(*layers)
 
 
-def focal_loss(logits: Tensor, target: Tensor, gamma: float = 1.0, marked: float = 3.0) -> Tensor:
-    """Focal loss for soft targets (both (N, 1, H, W)): cross entropy weighted by |target - probability|^gamma.
+def focal_loss(
+    logits: Tensor, target: Tensor, gamma: float = 1.0, marked: float = 3.0, asked: Tensor | None = None
+) -> Tensor:
+    """Focal loss for soft targets (all (N, 1, H, W)): cross entropy weighted by |target - probability|^gamma.
 
     Per marked pixel of the batch. A pixel has its least loss where probability and target agree, so the output stays a
-    share; `marked` is the weight of a fully marked pixel, for the few there are.
+    share; `marked` is the weight of a fully marked pixel, for the few there are. `asked`: a weight of each pixel.
     """
     entropy = nn.functional.binary_cross_entropy_with_logits(logits, target, reduction="none")
     miss = (target - torch.sigmoid(logits)).abs() ** gamma
-    return ((1 + (marked - 1) * target) * miss * entropy).sum() / target.sum().clamp(min=100.0)
+    weight = (1 + (marked - 1) * target) * (1 if asked is None else asked)
+    return (weight * miss * entropy).sum() / target.sum().clamp(min=100.0)

@@ -28,6 +28,8 @@ from models.training.cache import SHARD_CROPS, Crops, start_workers
 from models.training.export import export
 from models.training.network import LEAK, UNet, focal_loss
 from models.training.quantise import quantise
+from models.training.served import load_served
+from models.training.stream import Batch, Stream
 
 EPOCH_STEPS = 100
 WARM_UP_EPOCHS = 2
@@ -50,16 +52,19 @@ def main() -> None:
     options.run.mkdir(parents=True, exist_ok=True)
     folder = options.crops or options.run / "crops"
     workers = start_workers(folder, options.seed, options.workers, options.shards)
-    crops = Crops(folder, np.random.default_rng([options.seed, 1]))
-    while crops.refresh() < 4 * SHARD_CROPS:
+    crops = Crops(folder, np.random.default_rng([options.seed, 1, int(time.time())]))
+    pitches = round(options.pitches * options.batch)
+    while pitches and crops.refresh() < SHARD_CROPS:
         time.sleep(1)
+    seed = int(time.time())
+    stream = Stream(crops, options.batch - pitches, pitches, options.size, seed, options.workers)
     training = Training(device, Budget(60 * options.minutes, options.steps), options.leak, options.gamma)
     checkpoint = options.run / "checkpoint.pt"
     if checkpoint.exists():
         training.load(checkpoint)
     elif options.start:
-        training.load_weights(options.start)
-    train(training, crops, options, checkpoint)
+        training.load_weights(options.start, torch.from_numpy(stream.next().pictures))
+    train(training, stream, options, checkpoint)
     for worker in workers:
         worker.terminate()
     if training.done >= 1 and not options.no_export:
@@ -101,14 +106,16 @@ class Training:
         warm = min(1.0, (self.step + 1) / (WARM_UP_EPOCHS * EPOCH_STEPS))
         return LEARNING_RATE * warm * LAST_RATE**self.done
 
-    def learn(self, pictures: Tensor, targets: Tensor) -> float:
+    def learn(self, batch: Batch) -> float:
         """One step; the loss."""
         for group in self.optimiser.param_groups:
             group["lr"] = self.learning_rate()
-        pictures = pictures.to(self.device, memory_format=torch.channels_last)
-        with torch.autocast(self.device.type, torch.bfloat16):
+        pictures = torch.from_numpy(batch.pictures).to(self.device, memory_format=torch.channels_last)
+        targets, asked = (torch.from_numpy(plane).to(self.device) for plane in (batch.targets, batch.asked))
+        # On processors single precision is a quarter faster than bfloat16.
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.device.type != "cpu"):
             logits = self.network(pictures)
-        loss = focal_loss(logits.float(), targets.to(self.device), self.gamma)
+        loss = focal_loss(logits.float(), targets, self.gamma, asked=asked)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
@@ -147,14 +154,21 @@ class Training:
         self.average.load_state_dict(state["average"])
         self.optimiser.load_state_dict(state["optimiser"])
 
-    def load_weights(self, path: Path) -> None:
-        """Start a new schedule from the averaged weights of another run."""
+    def load_weights(self, path: Path, pictures: Tensor) -> None:
+        """Start a new schedule from the averaged weights of another run, or from a served model.
+
+        `pictures` (N, 3, S, S): what a served model's batch normalisation is set by.
+        """
+        if path.suffix == ".onnx":
+            load_served(self.network, path, pictures.to(self.device))
+            self.average.load_state_dict(self.network.state_dict())
+            return
         state = torch.load(path, map_location=self.device, weights_only=True)
         self.network.load_state_dict(state["average"])
         self.average.load_state_dict(state["average"])
 
 
-def train(training: Training, crops: Crops, options: argparse.Namespace, checkpoint: Path) -> None:
+def train(training: Training, stream: Stream, options: argparse.Namespace, checkpoint: Path) -> None:
     """Steps until the time is up, a checkpoint every few minutes, a line in the log every epoch."""
     training.network.train()
     saved = before = time.monotonic()
@@ -164,14 +178,13 @@ def train(training: Training, crops: Crops, options: argparse.Namespace, checkpo
     stopped = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stopped.set())
     while training.done < 1 and not stopped.is_set():
-        pictures, targets = crops.batch(options.batch, options.size)
-        losses.append(training.learn(torch.from_numpy(pictures), torch.from_numpy(targets)))
+        losses.append(training.learn(stream.next()))
         now = time.monotonic()
         training.elapsed_s += now - before
         before = now
         progress.update(100 * training.done - progress.n)
         if training.step % EPOCH_STEPS == 0:
-            line = {"step": training.step, "loss": float(np.mean(losses)), "crops": crops.refresh()}
+            line = {"step": training.step, "loss": float(np.mean(losses)), "crops": stream.crops.refresh()}
             progress.set_postfix(line)
             log.write(json.dumps({**line, "elapsed_s": training.elapsed_s, "rate": training.learning_rate()}) + "\n")
             log.flush()
@@ -191,6 +204,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--minutes", type=float, default=120.0, help="budget of the whole schedule")
     parser.add_argument("--batch", type=int, default=6)
     parser.add_argument("--size", type=int, default=224, help="pixels of a crop, a multiple of 32")
+    parser.add_argument("--pitches", type=float, default=0.34, help="share of rendered pitches; the rest are courts")
     parser.add_argument("--workers", type=int, default=1, help="processes that render")
     parser.add_argument("--shards", type=int, default=400, help=f"of {SHARD_CROPS} crops per worker")
     parser.add_argument("--threads", type=int, default=2)
@@ -198,7 +212,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--gamma", type=float, default=1.0, help="of the focal loss; 0 is cross entropy")
     parser.add_argument("--leak", type=float, default=LEAK, help="slope of LeakyReLU below 0; 0 is ReLU")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--start", type=Path, help="checkpoint whose weights to start from")
+    parser.add_argument("--start", type=Path, help="checkpoint, or served model, to start from")
     parser.add_argument("--threshold", type=float, default=0.37, help="probability that the exported model calls 0.5")
     parser.add_argument("--no-export", action="store_true")
     return parser.parse_args()
