@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fields.measures import value
-from fields.shapes import Arc, Line, Spot
+from fields.shapes import Arc, Line, Spot, dashes
 from fields.template import NAMES, Template, load
 
 every = pytest.mark.parametrize("name", NAMES)
@@ -174,10 +174,12 @@ def test_the_field_of_play_of_rugby_lies_between_its_in_goals():
 
 
 def test_dashes_are_whole_and_one_is_in_the_middle():
-    dashes = Line("line", ((0.0, 0.0), (10.0, 0.0)), 0.1).dashes(1.0, 2.0)
-    assert [dash.points for dash in dashes] == [((1.5, 0), (2.5, 0)), ((4.5, 0), (5.5, 0)), ((7.5, 0), (8.5, 0))]
-    quarter = Arc("arc", (0.0, 0.0), 2.0, 0.0, math.pi / 2, 0.1).dashes(0.5, 0.5)
-    assert [(dash.start + dash.end) / 2 * 2 for dash in quarter] == pytest.approx([math.pi / 2 + n for n in (-1, 0, 1)])
+    line = Line("line", ((0.0, 0.0), (10.0, 0.0)), 0.1)
+    pieces = line.pieces(dashes(line.length, 1.0, 2.0))
+    assert [dash.points for dash in pieces] == [((1.5, 0), (2.5, 0)), ((4.5, 0), (5.5, 0)), ((7.5, 0), (8.5, 0))]
+    quarter = Arc("arc", (0.0, 0.0), 2.0, 0.0, math.pi / 2, 0.1)
+    around = quarter.pieces(dashes(quarter.length, 0.5, 0.5))
+    assert [(dash.start + dash.end) / 2 * 2 for dash in around] == pytest.approx([math.pi / 2 + n for n in (-1, 0, 1)])
 
 
 @given(st.floats(-4, 4), st.floats(0.01, 2 * math.pi))
@@ -198,3 +200,26 @@ def test_measures_are_sums_and_products():
 def test_a_marking_of_no_shape_is_named():
     with pytest.raises(ValueError, match="blob is neither a line, an arc, a circle nor a spot"):
         Template(marking=[{"name": "blob", "blob": 1}]).markings({"line": 0.1})
+
+
+def test_markings_are_white_unless_they_have_a_colour_and_keep_it_at_both_ends_and_in_dashes():
+    line = {"line": [[-3, 0], [-1, 0]], "dash": {"paint": 0.2, "gap": 0.3}}
+    plan = Template(
+        marking=[{"name": "plain", "spot": {"centre": [0, 0], "diameter": 0.2}}],
+        end=[{"name": "{end} red", "colour": "red", **line}],
+    )
+    plain, *ends = plan.markings({"line": 0.05})
+    assert plain.colour == "white"
+    assert {shape.colour for shape in ends} == {"red"}
+    assert len(ends) == 6
+
+
+def test_a_row_repeats_a_marking_and_a_row_of_rows_the_row():
+    tick = {
+        "name": "tick",
+        "line": [[0, 0], [0, 1]],
+        "rows": [{"step": [10, 0], "count": 2}, {"step": [1, 0], "count": 3}],
+    }
+    ticks = Template(marking=[tick]).markings({"line": 0.05})
+    assert [shape.points[0][0] for shape in ticks] == [0, 1, 2, 10, 11, 12]
+    assert [shape.name for shape in ticks[2:4]] == ["tick, 1, 3", "tick, 2, 1"]
