@@ -7,7 +7,8 @@ that follow from it, and then
   `line` through points, an `arc` counter-clockwise around `centre` from the direction of `start` to that of `end`, with
   the distance of `start` as radius, a `circle` or a `spot`; a line and an arc may have a `dash` of `paint` and `gap`.
   A `colour` is white unless given, and `rows` say that a marking is there again and again: each a `step` along x and
-  along y and a `count`, rows of rows where there are several;
+  along y and a `count`, rows of rows where there are several. A line of no length is not painted: so may a measure
+  leave one out;
 - `[points]` and `[end_points]`: names that people use for points, at nominal places, the outer edges of lines where the
   law measures to them. A name with `{distance}` stands for all points at that many metres.
 
@@ -106,6 +107,8 @@ def _at(end: str, shape: Shape) -> Shape:
 
 def _shapes(entry: Mapping[str, Any], known: Mapping[str, float], nominal: Mapping[str, float]) -> list[Shape]:
     shape = _whole(entry, known)
+    if not isinstance(shape, Spot) and shape.length == 0:
+        return []
     if "dash" not in entry or isinstance(shape, Spot):
         return _rows(shape, entry.get("rows", ()), known)
     usual = _whole(entry, nominal)
