@@ -173,7 +173,11 @@ def test_a_colour_that_is_none_is_refused(colour):
 @pytest.mark.parametrize(
     ("field", "where", "message"),
     [
-        ({"template": "curling"}, ("template", "name"), "curling is none of the templates american-football, basketball"),
+        (
+            {"template": "curling"},
+            ("template", "name"),
+            "curling is none of the templates american-football, basketball",
+        ),
         ({"length_m": 59}, ("length_m",), "football: 60 to 130 m, not 59"),
         ({"template": "basketball", "line_width_m": 0.3}, ("line_width_m",), "basketball: 0.02 to 0.12 m, not 0.3"),
         ({"template": "handball", "width_m": 13}, ("width_m",), "handball: 17 to 22 m, not 13"),

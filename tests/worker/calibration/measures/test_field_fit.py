@@ -80,8 +80,10 @@ def test_a_handball_court_that_is_narrower_than_said_is_found_though_it_has_fewe
     truth = Field(39.8, 19.6, 0.05, template=load("handball"))
     given = Field(40.0, 20.0, 0.05, template=load("handball"))
     assert len(truth.markings()) < len(given.markings())
-    corners = [camera(f"c{x}{y}", (x * 12.0, y * 14.0, 7.0), (x * 9.0, 0.0), focal=800.0) for x in (-1, 1) for y in (-1, 1)]
-    refined, measures = fitted(truth, corners, given)
+    opposite = [
+        camera(name, (x, y, 7.0), (0.5 * x, 0.0), focal=600.0) for name, x, y in (("a", -9.0, -15.0), ("b", 9.0, 15.0))
+    ]
+    refined, measures = fitted(truth, opposite, given)
     assert refined.pitch.length == pytest.approx(39.8, abs=0.02)
     assert refined.pitch.width == pytest.approx(19.6, abs=0.02)
     assert measures["width_m"].known
