@@ -203,6 +203,8 @@ def _settled(
         elif measure.known:
             pitch = parameter.write(pitch, parameter.read(fitted))
             still_free.append(parameter)
+    # Near the truth now, its broken lines can have the dashes that are painted.
+    pitch = pitch.dashed_anew()
     return (pitch.with_ridge_length(ridge.value) if ridge.known else pitch), still_free
 
 
