@@ -33,7 +33,7 @@ class Gate:
 
     least_agreement: float = 0.6
     agreement_loss: float = 0.05
-    largest_residual_px: float = 2.0
+    largest_residual_px: float = 2.8
     residual_floor_px: float = 1.8
     largest_sigma_deg: float = 0.2
     largest_sigma_m: float = 0.5
@@ -167,8 +167,8 @@ def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
     moved, seen = quality.moved, quality.evidence
     if seen.agreement < gate.least_agreement:
         return (
-            f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is seen where it should "
-            f"be, at least {gate.least_share(seen):.0%} are needed and {seen.by_chance:.0%} would be seen anywhere; "
+            f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it ought "
+            f"to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen anywhere); "
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
         )
     if quality.residual_px is None or quality.repeatability is None:
