@@ -80,7 +80,7 @@ def create_app(settings: Settings) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.context = context
-    app.add_middleware(BodyLimit, largest=int(settings.max_body_mb * 1e6))
+    app.add_middleware(BodyLimit, largest_form=int(settings.max_body_mb * 1e6))
     app.add_middleware(Access, metrics=context.metrics)
     app.add_middleware(Conventions)
     documented.document_callback(app)
