@@ -16,12 +16,12 @@ from service.api.access import QUIET, Access
 from service.api.auth import Gate
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
-from service.api.conventions import Conventions
+from service.api.http_defaults import HttpDefaults
 from service.api.shared_reads import SharedReads
 from service.api.watch import Watch
+from service.intake.from_sources import FromSources
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake
-from service.intake.unattended import Unattended
 from service.observe.disk import Disk
 from service.observe.metrics import Metrics
 from service.observe.readiness import Readiness
@@ -82,7 +82,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.context = context
     app.add_middleware(BodyLimit, largest_form=int(settings.max_body_mb * 1e6))
     app.add_middleware(Access, metrics=context.metrics)
-    app.add_middleware(Conventions)
+    app.add_middleware(HttpDefaults)
     documented.document_callback(app)
     documented.document_alarms(app)
     problems.install(app)
@@ -122,7 +122,7 @@ def open_context(settings: Settings) -> Context:
         gate=Gate(keys, Sessions(engine), settings),
         snapshots=snapshots,
         intake=intake,
-        unattended=Unattended(venues_, jobs_, snapshots, intake),
+        from_sources=FromSources(venues_, jobs_, snapshots, intake),
     )
 
 
