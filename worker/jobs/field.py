@@ -9,7 +9,6 @@ from importlib.metadata import version
 import cv2
 import structlog
 
-from fields.template import Extent
 from service.settings import Settings
 from service.wire.field import FieldOfPlay
 from service.wire.job import Progress
@@ -48,7 +47,6 @@ def solve(
     report: Callable[[Progress], None],
 ) -> Outcome[FieldResult]:
     """The measures of a venue's pitch from the files of its cameras, with or without a server around it."""
-    _require_lines_that_stay(venue.field)
     segmenter = segmenter_of(settings)
     cv2.setNumThreads(settings.threads)
     begun = time.perf_counter()
@@ -72,21 +70,6 @@ def solve(
         options=options.model_dump(mode="json", exclude={"callback_url"}),
     )
     return Outcome(_result(venue.field, found, timings, provenance), pictures)
-
-
-def _require_lines_that_stay(field: FieldOfPlay) -> None:
-    """Refuse a field whose broken lines have other dashes when it is wider: no point of one is a point of the other."""
-    for measure, now in (("length", field.length_m), ("width", field.width_m)):
-        extent = field.plan.size.get(measure, Extent(now, 0.9 * now, 1.1 * now))
-        painted = {
-            len(field.plan.markings(field.size | {measure: there})) for there in (extent.least, now, extent.most)
-        }
-        if len(painted) > 1:
-            raise Failure(
-                "no-field-fit",
-                f"Its broken lines have more dashes with another {measure}, so none can be followed while it is "
-                "fitted: measure this field with a tape.",
-            )
 
 
 def _draw(
