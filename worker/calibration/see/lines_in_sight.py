@@ -39,16 +39,19 @@ AGREED_PX = 2.5
 """How far apart two neighbours on one line may find it."""
 STANDS_OUT = 1.6
 """A line is so much stronger than what chance finds beside it."""
-LOCALLY = 1.2
-SQUARE_PX = 120
-SATURATION = 20.0
-MOST_TRIED = 120
-HALF_SURE = 10.0
+LOCALLY, SQUARE_PX = 1.3, 120
+"""...and than it finds in this square of the picture, by so much: nets, patterns and lettering are streaks as well."""
 ROLLS_RAD = (-0.03, 0.0, 0.03)
+"""Turns about the middle that are tried with each shift."""
+MOST_TRIED = 120
+"""So many of the places on lines are enough to find the shift."""
+SATURATION, HALF_SURE = 20.0, 10.0
+"""A streak of more contrast than the first counts no more, one of the second is half a line."""
 FAR_COSTS = 0.05
-SETTLING_STEPS = 2
-ROBUST_STEPS = 4
+"""Of two shifts that are as good, the nearer one is taken."""
+SETTLING_STEPS, ROBUST_STEPS = 2, 4
 HELD = 20.0
+"""How much evidence a movement needs, so that a handful of lines does not turn the picture."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +69,13 @@ class LinesInSight:
 
 def look_for_lines(grey: Grey, lines: SeenLines, reach_px: float) -> LinesInSight:
     """Look for `lines` in a picture (H, W) that may be shifted by `reach_px` each way."""
+    if len(lines) == 0:
+        return LinesInSight(np.empty((0, 2)), np.empty(0, dtype=bool), np.empty(0))
     streaks = _Streaks.of(grey)
-    at = lines.pixel + _common_shift(streaks, lines, reach_px)
+    at: Array = lines.pixel + _common_shift(streaks, lines, reach_px)
     for _ in range(SETTLING_STEPS):
         offset, contrast, found = _match(streaks, lines, at)
-        at = at + _movement(at, lines.normal, offset, found * np.minimum(contrast, SATURATION))
+        at = at + _movement(at, lines.normal, offset, np.where(found, np.minimum(contrast, SATURATION), 0.0))
     _, contrast, found = _match(streaks, lines, at)
     return LinesInSight(at, found, contrast)
 
@@ -101,7 +106,9 @@ def _movement(at: Array, normal: Array, offset: Array, weight: Array) -> Array:
     middle = at - at.mean(axis=0)
     size = max(float(np.abs(middle).max()), 1.0)
     turn = np.stack([-middle[:, 1], middle[:, 0]], axis=1) / size
-    moves = np.stack([np.broadcast_to([1.0, 0.0], at.shape), np.broadcast_to([0.0, 1.0], at.shape), turn, middle / size])
+    moves = np.stack(
+        [np.broadcast_to([1.0, 0.0], at.shape), np.broadcast_to([0.0, 1.0], at.shape), turn, middle / size]
+    )
     across = np.einsum("kni,ni->nk", moves, normal)
     for _ in range(ROBUST_STEPS):
         system = (across * weight[:, None]).T @ across + HELD * np.diag([1.0, 1.0, 1.0, 3.0])
@@ -127,7 +134,7 @@ def _common_shift(streaks: _Streaks, lines: SeenLines, reach_px: float) -> Array
     for roll in ROLLS_RAD:
         evidence = wide.read(few, (few.pixel + _turned(few.pixel, lines.pixel, roll))[:, None] + shifts)
         scores.append((evidence / (evidence + HALF_SURE)).mean(axis=0) - far)
-    roll, best = np.unravel_index(np.argmax(scores), np.shape(scores))
+    roll, best = divmod(int(np.argmax(scores)), len(shifts))
     return shifts[best] + _turned(lines.pixel, lines.pixel, ROLLS_RAD[roll])
 
 
@@ -147,8 +154,10 @@ class _Streaks:
     def of(cls, grey: Grey) -> _Streaks:
         levels = []
         for level in range(LEVELS):
-            small = grey if level == 0 else cv2.resize(
-                grey, None, fx=0.5**level, fy=0.5**level, interpolation=cv2.INTER_AREA
+            small = (
+                grey
+                if level == 0
+                else cv2.resize(grey, None, fx=0.5**level, fy=0.5**level, interpolation=cv2.INTER_AREA)
             )
             levels.append(_streaks(np.asarray(small)))
         return cls(tuple(levels))
@@ -170,9 +179,7 @@ class _Streaks:
             if len(chosen) == 0:
                 continue
             _, height, width = planes.shape
-            column, row = (
-                np.floor((pixels[chosen, :, axis] + 0.5) / 2**number).astype(np.int32) for axis in (0, 1)
-            )
+            column, row = (np.floor((pixels[chosen, :, axis] + 0.5) / 2**number).astype(np.int32) for axis in (0, 1))
             inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
             here = planes[direction[chosen], np.where(inside, row, 0), np.where(inside, column, 0)]
             values[chosen] = np.where(inside, here, 0)
@@ -184,15 +191,14 @@ def _streaks(grey: Grey) -> NDArray[np.uint8]:
     border = BESIDE_PX + ALONG_PX + 2
     height, width = grey.shape
     result = np.empty((DIRECTIONS, height, width), np.uint8)
-    smooth = cv2.GaussianBlur(grey, (3, 3), 0)
+    padded = np.pad(cv2.GaussianBlur(grey, (3, 3), 0), border, mode="edge").astype(np.uint8)
     for number in range(DIRECTIONS):
         angle = np.pi * number / DIRECTIONS
         normal = np.array([np.cos(angle), np.sin(angle)])
         along = np.rint(ALONG_PX * np.array([-normal[1], normal[0]])).astype(int)
         across = np.rint(BESIDE_PX * normal).astype(int)
-        padded = cv2.copyMakeBorder(smooth, *[border] * 4, cv2.BORDER_REPLICATE)
         both = cv2.addWeighted(_moved(padded, along, ALONG_PX), 0.5, _moved(padded, -along, ALONG_PX), 0.5, 0)
-        line = cv2.addWeighted(both, 2 / 3, _moved(padded, 0 * along, ALONG_PX), 1 / 3, 0)
+        line = np.asarray(cv2.addWeighted(both, 2 / 3, _moved(padded, 0 * along, ALONG_PX), 1 / 3, 0), dtype=np.uint8)
         inner, one, other = (_moved(line, side * across, BESIDE_PX + 2) for side in (0, 1, -1))
         bright = cv2.min(cv2.subtract(inner, one), cv2.subtract(inner, other))
         dark = cv2.min(cv2.subtract(one, inner), cv2.subtract(other, inner))

@@ -48,8 +48,8 @@ def _steep_places(small: NDArray[np.uint8], where: NDArray[np.bool_]) -> tuple[A
     steep = cv2.magnitude(right, down) * where
     cell = STEEPEST_OF_A_CELL_PX
     rows, columns = small.shape[0] // cell, small.shape[1] // cell
-    blocks = steep[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).swapaxes(1, 2)
-    blocks = blocks.reshape(rows * columns, -1)
+    squares = steep[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).swapaxes(1, 2)
+    blocks = squares.reshape(rows * columns, -1)
     best = blocks.argmax(axis=1)
     strongest = np.argsort(-blocks[np.arange(len(blocks)), best])[:MOST_EDGES]
     row = strongest // columns * cell + best[strongest] // cell
@@ -78,7 +78,11 @@ def _profiles(frame: Frame, pixel: Array, direction: Array, step: float) -> Arra
 def _edges(profiles: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Of the steepest rise in profiles (N, S): its standard deviation in steps, its height, whether it ends inside."""
     slope = np.diff(profiles, axis=1)
-    slope = (np.pad(slope, ((0, 0), (1, 1)), mode="edge")[:, :-2] + 2 * slope + np.pad(slope, ((0, 0), (1, 1)), mode="edge")[:, 2:]) / 4
+    slope = (
+        np.pad(slope, ((0, 0), (1, 1)), mode="edge")[:, :-2]
+        + 2 * slope
+        + np.pad(slope, ((0, 0), (1, 1)), mode="edge")[:, 2:]
+    ) / 4
     steepest = slope.argmax(axis=1)
     peak = slope.max(axis=1)
     row = np.arange(len(slope))

@@ -33,21 +33,25 @@ REACH_RAD = 0.1
 """A stored pose may be off by so much."""
 NARROWEST_PX = 0.5
 """Lines that are narrower in the reduced picture are not asked for, unless there are hardly others."""
-FEWEST_PLACES = 20
 SPACING_PX = 8.0
-FEWEST_CELLS = 12
+"""Between two places on a line that are looked at."""
+FEWEST_PLACES, FEWEST_CELLS = 20, 12
+"""On lines, and of the field: fewer say nothing."""
 
 FINEST_PX, COARSEST_PX = 1.5, 31
 """Structure is what lies between: coarser than noise, finer than shading."""
-NEIGHBOURS_CELLS = 2.0
-BELIEVED = 0.3
+NEAR_CELLS, FAR_CELLS = 2.0, 6.0
+"""How far around a cell its lines are counted, and farther where it has none; standard deviations."""
+PRIOR_PLACES = 1.0
+"""So many places in a surrounding weigh as much as what is known from farther around."""
 NOISE_ROWS = 16
+"""Every so many rows of the frame the noise is measured."""
 
-LOST = 0.3
-"""Lines are lost where less than this share of them is found."""
+LOST, MOSTLY = 0.3, 0.5
+"""Lines are lost where less than the first share of them is found, a place where more than the second of it is lost."""
 LEAST_SPOILED = 0.2
 """A view is usable while less than this share of the visible field is dark, fogged or under snow..."""
-LEAST_HIDDEN = 0.3
+LEAST_HIDDEN = 0.25
 """...or is hidden by something that cannot be told so surely."""
 BLIND = 0.12
 """...or, where the sun blinds, is blown out: the veil around it takes the rest."""
@@ -57,25 +61,26 @@ LEAST_LIGHT_OVER_NOISE = 2.0
 DIM = 60.0
 """...and noise hides the lines only of a field darker than this."""
 BLOWN_OUT = 245
+"""A pixel is blown out whose darkest channel is brighter."""
 PALE = 0.15
 """Saturation under which a place may be fog or snow..."""
-FOG_IS_BRIGHTER = 70.0
-SNOW_IS_BRIGHTER = 165.0
+FOG_IS_BRIGHTER, SNOW_IS_BRIGHTER, SURELY_SNOW = 70.0, 165.0, 230.0
+"""...fog lifts the black, snow is bright, and fog is never white..."""
 FLAT, NEARLY_FLAT = 2.0, 4.0
-"""Grey levels by which a place varies that shows nothing, or little of what is there; fallen snow varies more."""
+"""...by grey levels by which a place varies that shows nothing, or little of what is there; fallen snow varies more."""
 MOST_BLUR_PX = 3.5
 """In pixels of a frame of 1920 columns; sharp lenses show 0.3 to 1.7."""
+SOFT_PX = 1.2
+"""Sharper edges are in focus; also of 1920 columns, as the next but one."""
 BLUR_OF_USUAL = 3.0
 LEAST_UNUSUAL_BLUR_PX = 2.2
 """More than so many times what this camera usually shows is out of focus as well, unless it is still sharp."""
 NO_LINES, GOOD_LINES = 0.12, 0.5
 """Share of the places on lines that chance finds, and that a view surely has when it sees lines."""
-OTHER_TINT = 0.06
-OTHER_LIGHT = 3.5
-OTHER_STRUCTURE = 3.0
-"""What stands in front differs so from the ground that is seen: in a channel's share, in light, in structure. A hard
-shadow has the ground's tint and seldom less than a third of its light."""
-PLAIN, PATTERNED = 1.5, 8.0
+OTHER_TINT, OTHER_LIGHT, OTHER_STRUCTURE, OTHER_BLUR = 0.06, 3.5, 2.5, 2.5
+"""What stands in front differs so from the ground that is seen: in a channel's share, in light, in structure, in
+sharpness. A hard shadow has the ground's tint and seldom less than a third of its light."""
+PLAIN, PATTERNED = 1.5, 5.0
 """Structure below which nothing is a ground, and above which nothing is one that is smeared so."""
 
 
@@ -128,12 +133,12 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: ViewFigures | Non
     sight = look_for_lines(grey, lines, REACH_RAD * float(reduced.intrinsics.matrix[0, 0]))
     lost = ground.field & _lost(sight, ground)
     noise = _noise(frame, ground.field)
-    blur = edge_blur_px(frame, grey, _enlarged(ground.field, small.shape[:2]))
-    spoiled = _spoiled(cells, lost, noise)
-    figures = _figures(cells, ground.field, sight, lost, spoiled, noise, blur)
+    sharpness = _Sharpness.of(frame, grey, ground.field, lost)
+    spoiled = _spoiled(cells, ground.field, lost, noise)
+    figures = _figures(cells, ground.field, sight, lost, spoiled, noise, sharpness.of_all)
     if len(lines) < FEWEST_PLACES or ground.field.sum() < FEWEST_CELLS:
         return ViewCondition(True, None, None, "Too little of the field is in view to judge the frame.", figures)
-    cause, part = _cause(cells, ground.field, lost, spoiled, figures, usual, camera.intrinsics.relative_size)
+    cause, part = _cause(cells, ground.field, lost, spoiled, sharpness, figures, usual)
     if cause is None:
         return ViewCondition(True, None, None, "The field can be seen.", figures)
     where = ground.name_of(part)
@@ -145,9 +150,9 @@ def _cause(
     field: Mask,
     lost: Mask,
     spoiled: dict[str, Mask],
+    sharpness: _Sharpness,
     figures: ViewFigures,
     usual: ViewFigures | None,
-    relative_size: float,
 ) -> tuple[Cause | None, Mask]:
     """The likeliest cause, and the cells it took; the surest causes first."""
     enough = LEAST_SPOILED * field.sum()
@@ -161,35 +166,33 @@ def _cause(
         return "blinded", spoiled["blown_out"] | (pale & lost)
     if pale.sum() >= max(enough, lost.sum() / 2):
         return ("fogged" if spoiled["veiled"].sum() >= spoiled["white"].sum() else "snow"), pale
-    smeared = _is_out_of_focus(figures.blur_px, usual, relative_size)
-    if figures.hidden >= LEAST_HIDDEN and _is_blocked(cells, field, lost, smeared, figures, usual):
+    smeared = sharpness.is_lost(usual)
+    if figures.hidden >= LEAST_HIDDEN and _is_blocked(cells, field, lost, sharpness, smeared, figures, usual):
         return "blocked", lost
     return ("out-of-focus", field) if smeared else (None, lost)
 
 
-def _is_out_of_focus(blur_px: float | None, usual: ViewFigures | None, relative_size: float) -> bool:
-    if blur_px is None:
-        return False
-    # The limits are in pixels of a frame of 1920 columns.
-    size = 2 * relative_size
-    unusual = usual is not None and usual.blur_px is not None and blur_px > BLUR_OF_USUAL * usual.blur_px
-    return blur_px > (LEAST_UNUSUAL_BLUR_PX if unusual else MOST_BLUR_PX) * size
-
-
 def _is_blocked(
-    cells: _Cells, field: Mask, lost: Mask, smeared: bool, figures: ViewFigures, usual: ViewFigures | None
+    cells: _Cells,
+    field: Mask,
+    lost: Mask,
+    sharpness: _Sharpness,
+    smeared: bool,
+    figures: ViewFigures,
+    usual: ViewFigures | None,
 ) -> bool:
     """Whether the cells without lines are no ground: other than the ground beside them, or like none."""
     clear = field & ~lost
     if clear.sum() >= FEWEST_CELLS:
-        return _differ(cells, lost, clear)
+        return sharpness.differs or _differ(cells, lost, clear)
     structure = np.median(cells.structure[lost])
-    if structure < PLAIN or figures.blur_px is None:
+    if sharpness.of_all is None or (structure < PLAIN and not smeared):
         return True
     # Right before the lens things are out of focus; of a field out of focus no such contrast is left.
-    if smeared:
-        return bool(structure > PATTERNED)
-    return usual is not None and usual.lines_found > GOOD_LINES and figures.lines_found < NO_LINES
+    if structure > PATTERNED and sharpness.of_all > SOFT_PX * sharpness.size:
+        return True
+    seen_before = usual is not None and usual.lines_found > GOOD_LINES
+    return seen_before and figures.lines_found < NO_LINES and not smeared
 
 
 def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:
@@ -200,15 +203,23 @@ def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:
     return bool(tint > OTHER_TINT or light > np.log(OTHER_LIGHT) or structure > np.log(OTHER_STRUCTURE))
 
 
-def _spoiled(cells: _Cells, lost: Mask, noise: float) -> dict[str, Mask]:
-    """Which of the cells without lines show what, by the names of `ViewFigures`; no cell is of two kinds."""
+def _spoiled(cells: _Cells, field: Mask, lost: Mask, noise: float) -> dict[str, Mask]:
+    """Which of the field's cells show what, by the names of `ViewFigures`, wherever that goes with lost lines."""
     dim = cells.brightest < min(max(LEAST_LIGHT, LEAST_LIGHT_OVER_NOISE * noise), DIM)
     blown = cells.blown > 0.5
     pale = (cells.saturation < PALE) & (cells.darkest > FOG_IS_BRIGHTER) & ~blown
-    white = pale & (cells.structure > FLAT) & (cells.brightest > SNOW_IS_BRIGHTER)
+    rough = (cells.structure > FLAT) & (cells.brightest > SNOW_IS_BRIGHTER)
+    white = pale & (rough | (cells.brightest > SURELY_SNOW))
     veiled = pale & (cells.structure < NEARLY_FLAT) & ~white
     kinds = {"dark": dim, "blown_out": blown, "veiled": veiled, "white": white}
-    return {name: kind & lost for name, kind in kinds.items()}
+    return {name: _without_lines(kind & field, lost) for name, kind in kinds.items()}
+
+
+def _without_lines(kind: Mask, lost: Mask) -> Mask:
+    """The connected places of some cells that are mostly without lines; a place next to a line may be spoiled too."""
+    count, place = cv2.connectedComponents(kind.astype(np.uint8), connectivity=4)
+    all_of, lost_of = (np.bincount(place.ravel(), part.ravel(), count) for part in (kind, lost & kind))
+    return (MOSTLY * all_of < lost_of)[place] & kind
 
 
 def _figures(
@@ -240,15 +251,18 @@ def _expected_lines(pitch: Field, camera: Camera) -> SeenLines:
 
 
 def _lost(sight: LinesInSight, ground: _Ground) -> Mask:
-    """Cells (h, w) in whose surroundings hardly any expected line is found; far from all lines, as in the whole."""
+    """Cells (h, w) in whose surroundings hardly any expected line is found; far from all lines, as farther around."""
     columns, rows = ground.size
     at = np.clip((sight.pixel / ground.cell_px).astype(int), 0, [columns - 1, rows - 1])
     expected, found = np.zeros((2, rows, columns))
     np.add.at(expected, (at[:, 1], at[:, 0]), 1.0)
     np.add.at(found, (at[:, 1], at[:, 0]), sight.found.astype(float))
-    expected, found = (cv2.GaussianBlur(plane, (0, 0), NEIGHBOURS_CELLS) for plane in (expected, found))
-    whole = float(sight.found.mean()) if len(sight.found) else 0.0
-    return np.asarray(found + BELIEVED * whole < LOST * (expected + BELIEVED))
+    believed = np.full((rows, columns), float(sight.found.mean()) if len(sight.found) else 0.0)
+    for reach in (FAR_CELLS, NEAR_CELLS):
+        here, there = (cv2.GaussianBlur(plane, (0, 0), reach) for plane in (expected, found))
+        held = PRIOR_PLACES / reach**2
+        believed = (there + held * believed) / (here + held)
+    return np.asarray(believed < LOST)
 
 
 def _noise(frame: Frame, field: Mask) -> float:
@@ -353,6 +367,44 @@ class _Ground:
 
 def _overlap(one: Mask, other: Mask) -> float:
     return float((one & other).sum() / max((one | other).sum(), 1))
+
+
+@dataclass(frozen=True)
+class _Sharpness:
+    """Blur of edges in px of the frame, None without edges: of all the field, where lines are found and where not.
+
+    `size`: of the frame relative to one of 1920 columns, which the limits are for.
+    """
+
+    of_all: float | None
+    of_clear: float | None
+    of_lost: float | None
+    size: float
+
+    @classmethod
+    def of(cls, frame: Frame, grey: NDArray[np.uint8], field: Mask, lost: Mask) -> _Sharpness:
+        """Of a frame and its reduced grey picture, with the cells of the field and those without lines."""
+        clear = field & ~lost
+        of_all, of_clear, of_lost = (
+            edge_blur_px(frame, grey, _enlarged(part, grey.shape)) if part.sum() >= FEWEST_CELLS else None
+            for part in (field, clear, lost)
+        )
+        return cls(of_all, of_clear, of_lost, frame.shape[1] / 1920)
+
+    def is_lost(self, usual: ViewFigures | None) -> bool:
+        """Whether the whole field is out of focus."""
+        if self.of_all is None:
+            return False
+        blur = self.of_all if self.of_clear is None else min(self.of_all, self.of_clear)
+        unusual = usual is not None and usual.blur_px is not None and blur > BLUR_OF_USUAL * usual.blur_px
+        return blur > (LEAST_UNUSUAL_BLUR_PX if unusual else MOST_BLUR_PX) * self.size
+
+    @property
+    def differs(self) -> bool:
+        """Whether what has no lines is smeared, or has no edges, and the rest is sharp."""
+        if self.of_clear is None or self.of_clear > SOFT_PX * self.size:
+            return False
+        return self.of_lost is not None and self.of_lost > OTHER_BLUR * self.of_clear
 
 
 @dataclass(frozen=True)
