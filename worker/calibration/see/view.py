@@ -77,10 +77,10 @@ LEAST_UNUSUAL_BLUR_PX = 2.2
 """More than so many times what this camera usually shows is out of focus as well, unless it is still sharp."""
 NO_LINES, GOOD_LINES = 0.12, 0.5
 """Share of the places on lines that chance finds, and that a view surely has when it sees lines."""
-OTHER_TINT, OTHER_LIGHT, OTHER_STRUCTURE, OTHER_BLUR = 0.06, 3.5, 2.5, 2.5
+OTHER_TINT, OTHER_LIGHT, OTHER_STRUCTURE, OTHER_BLUR = 0.06, 3.5, 2.5, 1.5
 """What stands in front differs so from the ground that is seen: in a channel's share, in light, in structure, in
 sharpness. A hard shadow has the ground's tint and seldom less than a third of its light."""
-PLAIN, PATTERNED = 1.5, 5.0
+PLAIN, PATTERNED = 0.7, 5.0
 """Structure below which nothing is a ground, and above which nothing is one that is smeared so."""
 
 
@@ -183,9 +183,11 @@ def _is_blocked(
 ) -> bool:
     """Whether the cells without lines are no ground: other than the ground beside them, or like none."""
     clear = field & ~lost
-    if clear.sum() >= FEWEST_CELLS:
-        return sharpness.differs or _differ(cells, lost, clear)
     structure = np.median(cells.structure[lost])
+    if clear.sum() >= FEWEST_CELLS:
+        # A shadow differs as well, but what lies in it is as sharp as the rest.
+        near = sharpness.of_lost is None or structure < PLAIN or sharpness.differs
+        return near and _differ(cells, lost, clear)
     if sharpness.of_all is None or (structure < PLAIN and not smeared):
         return True
     # Right before the lens things are out of focus; of a field out of focus no such contrast is left.
@@ -401,10 +403,10 @@ class _Sharpness:
 
     @property
     def differs(self) -> bool:
-        """Whether what has no lines is smeared, or has no edges, and the rest is sharp."""
-        if self.of_clear is None or self.of_clear > SOFT_PX * self.size:
+        """Whether what has no lines is smeared more than the rest."""
+        if self.of_clear is None or self.of_lost is None:
             return False
-        return self.of_lost is not None and self.of_lost > OTHER_BLUR * self.of_clear
+        return self.of_lost > max(OTHER_BLUR * self.of_clear, LEAST_UNUSUAL_BLUR_PX * self.size)
 
 
 @dataclass(frozen=True)

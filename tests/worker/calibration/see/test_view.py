@@ -86,7 +86,7 @@ def test_a_little_out_of_focus_is_usable(fair):
 
 
 def test_what_is_soft_for_one_camera_is_usual_for_another(fair):
-    soft = spoiling.defocused(fair, 3.4)
+    soft = spoiling.defocused(fair, 2.0)
     of_sharp, of_soft = (look_at(frame, PITCH, STORED).figures for frame in (fair, soft))
     assert look_at(soft, PITCH, STORED).usable
     assert look_at(soft, PITCH, STORED, usual=of_soft).usable
