@@ -156,11 +156,10 @@ def _cause(
 ) -> tuple[Cause | None, Mask]:
     """The likeliest cause, and the cells it took; the surest causes first."""
     enough = LEAST_SPOILED * field.sum()
-    lit = field & ~spoiled["dark"]
-    if spoiled["dark"].sum() >= enough:
-        # What is black beside a field that is lit is an object.
-        lamp = lit.sum() >= FEWEST_CELLS and np.median(cells.brightest[lit]) > DIM
-        return ("blocked" if lamp else "dark"), spoiled["dark"]
+    lit = field & ~spoiled["dark"] & (cells.brightest > DIM)
+    # What is black beside a field that is lit is an object, or a shadow.
+    if spoiled["dark"].sum() >= enough and lit.sum() < FEWEST_CELLS:
+        return "dark", spoiled["dark"]
     pale = spoiled["veiled"] | spoiled["white"]
     if figures.blown_out >= BLIND and spoiled["blown_out"].sum() >= lost.sum() / 4:
         return "blinded", spoiled["blown_out"] | (pale & lost)
@@ -183,6 +182,8 @@ def _is_blocked(
 ) -> bool:
     """Whether the cells without lines are no ground: other than the ground beside them, or like none."""
     clear = field & ~lost
+    if lost.sum() < FEWEST_CELLS:
+        return False
     structure = np.median(cells.structure[lost])
     if clear.sum() >= FEWEST_CELLS:
         # A shadow differs as well, but what lies in it is as sharp as the rest.
@@ -373,7 +374,8 @@ def _overlap(one: Mask, other: Mask) -> float:
 
 @dataclass(frozen=True)
 class _Sharpness:
-    """Blur of edges in px of the frame, None without edges: of all the field, where lines are found and where not.
+    """Blur of edges in px of the frame, None without edges: of all the field, where lines are found and where
+    they are not, both None unless there is enough of either.
 
     `size`: of the frame relative to one of 1920 columns, which the limits are for.
     """
@@ -387,10 +389,10 @@ class _Sharpness:
     def of(cls, frame: Frame, grey: NDArray[np.uint8], field: Mask, lost: Mask) -> _Sharpness:
         """Of a frame and its reduced grey picture, with the cells of the field and those without lines."""
         clear = field & ~lost
-        of_all, of_clear, of_lost = (
-            edge_blur_px(frame, grey, _enlarged(part, grey.shape)) if part.sum() >= FEWEST_CELLS else None
-            for part in (field, clear, lost)
-        )
+        of_all = edge_blur_px(frame, grey, _enlarged(field, grey.shape))
+        if min(clear.sum(), lost.sum()) < FEWEST_CELLS:
+            return cls(of_all, None, None, frame.shape[1] / 1920)
+        of_clear, of_lost = (edge_blur_px(frame, grey, _enlarged(part, grey.shape)) for part in (clear, lost))
         return cls(of_all, of_clear, of_lost, frame.shape[1] / 1920)
 
     def is_lost(self, usual: ViewFigures | None) -> bool:
