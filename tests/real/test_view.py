@@ -5,8 +5,8 @@ import json
 import cv2
 import numpy as np
 import pytest
-
 from service.wire.schemas import Camera, FieldOfPlay
+
 from tests.real.pair import FOLDER
 from tests.worker.calibration.see import spoiling
 from worker.calibration.see.view import look_at

@@ -95,6 +95,7 @@ def refine(
         uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
         # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
         uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
+        here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
         if here.farthest_from(before) < SETTLED_M:
             break
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
