@@ -19,6 +19,15 @@ class Sigma(Wire):
     position_m: float
 
 
+class View(Wire):
+    """Whether a camera's frame could be used, and what is wrong with it if not."""
+
+    usable: bool
+    cause: Literal["dark", "fogged", "blinded", "snow", "out-of-focus", "blocked"] | None = None
+    where: str | None = Field(None, description="Which part of the visible field.")
+    detail: str
+
+
 class CameraResult(Wire):
     """One camera's answer."""
 
@@ -31,7 +40,12 @@ class CameraResult(Wire):
     )
     moved: Moved
     iou: float | None
+    found: float | None = Field(
+        None, description="Share 0..1 of the visible markings' length that is seen where the pose puts it."
+    )
+    by_chance: float | None = Field(None, description="Share 0..1 of that length that would be seen anywhere.")
     residual_px: float | None
+    view: View | None = None
 
 
 class Provenance(Wire):

@@ -16,7 +16,7 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Moved
 from service.wire.job import JobError, Progress
 from service.wire.problems import KINDS, type_of
-from service.wire.results import AnyResult, CameraResult, Sigma
+from service.wire.results import AnyResult, CameraResult, Sigma, View
 from worker.calibration import calibrate as engine
 from worker.calibration.judge import quality
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
@@ -153,6 +153,11 @@ def wire_camera(camera: engine.CameraResult, lens: geometry.Intrinsics | None = 
             pixels=number(camera.moved.pixels),
         ),
         iou=number(camera.iou),
+        found=number(camera.found),
+        by_chance=number(camera.by_chance),
+        view=View(
+            usable=camera.view.usable, cause=camera.view.cause, where=camera.view.where, detail=camera.view.words
+        ),
         residual_px=number(camera.residual_px),
     )
 

@@ -15,6 +15,7 @@ from worker.calibration.scene.camera import Array, Camera, inside, rotation_angl
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.evidence import Evidence
+from worker.calibration.see.view import ViewCondition
 
 TOLERANCE_PX = 3.0
 """How far from its edge a line still counts as explained, in pixels of a 4K frame."""
@@ -88,6 +89,7 @@ class CameraQuality:
     """What the gate looks at, of one camera."""
 
     camera: Camera
+    view: ViewCondition
     iou: float
     evidence: Evidence
     evidence_before: Evidence
@@ -164,6 +166,8 @@ def rejection(
 
 
 def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
+    if not quality.view.usable:
+        return quality.view.words
     moved, seen = quality.moved, quality.evidence
     if seen.agreement < gate.least_agreement:
         return (

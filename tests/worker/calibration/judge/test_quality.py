@@ -1,6 +1,6 @@
 """Quality without ground truth, and the gate."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
@@ -9,6 +9,7 @@ import pytest
 from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings
 from worker.calibration.judge.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
 from worker.calibration.see.evidence import Evidence
+from worker.calibration.see.view import ViewCondition, ViewFigures
 
 
 @cache
@@ -27,9 +28,15 @@ def seen(share: float, by_chance: float = 0.2) -> Evidence:
     return Evidence(pieces, np.zeros(100, int), np.ones(100), found, np.full(100, by_chance))
 
 
+FIGURES = ViewFigures(*[0.5] * len(fields(ViewFigures)))
+IN_VIEW = ViewCondition(True, None, None, "The field can be seen.", FIGURES)
+FOGGED = ViewCondition(False, "fogged", "far half", "Fogged (far half): most likely fog.", FIGURES)
+
+
 def good():
     return CameraQuality(
         scene()[0],
+        IN_VIEW,
         0.9,
         seen(0.95),
         seen(0.3),
@@ -85,6 +92,7 @@ def test_a_good_result_passes_the_gate():
             {"evidence": seen(0.4)},
             "40% of their length is where it ought to be, at least 68% are needed (20% is seen anywhere)",
         ),
+        ({"view": FOGGED, "evidence": seen(0.1)}, "Fogged (far half)"),
         ({"residual_px": None}, "fewer than 30 points"),
         ({"repeatability": None}, "fewer than 30 points"),
         ({"residual_px": 9.0}, "px from where the pose puts them"),
