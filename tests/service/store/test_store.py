@@ -3,13 +3,10 @@ import time
 
 import obstore
 import pytest
-import sqlalchemy as sa
 from obstore.exceptions import BaseError
 from obstore.store import from_url
 
-from service.store import tables
 from service.store.blobs import Blobs
-from service.store.engine import migrate
 from service.store.ids import new_id
 from service.store.jobs import Jobs
 from service.store.venues import Venues
@@ -17,22 +14,6 @@ from service.store.workers import Workers
 from service.wire.schemas import VENUE_EXAMPLE, Intrinsics, VenueIn
 from tests.homes import in_both_homes, on_servers
 from tests.worker.stock import Stock, result
-
-
-@in_both_homes
-def test_the_migrations_make_the_tables_that_the_code_knows(engine):
-    found = sa.MetaData()
-    found.reflect(engine)
-    for name, table in tables.metadata.tables.items():
-        assert {c.name: (c.type.compile(engine.dialect), c.nullable) for c in found.tables[name].columns} == {
-            c.name: (c.type.compile(engine.dialect), c.nullable) for c in table.columns
-        }
-        assert {index.name for index in found.tables[name].indexes} == {index.name for index in table.indexes}
-
-
-@in_both_homes
-def test_migrating_twice_changes_nothing(engine):
-    migrate(engine)
 
 
 @in_both_homes
