@@ -11,6 +11,7 @@ import structlog
 from fastapi import FastAPI, Request
 from starlette.responses import Response
 
+from service.api import problems
 from service.api.access import QUIET, Access
 from service.api.auth import Gate
 from service.api.body_limit import BodyLimit
@@ -54,7 +55,6 @@ from service.store.keys import Keys
 from service.store.sessions import Sessions
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.wire import problems
 from service.wire.problems import Problem
 
 # A client waits, and can come again.
@@ -145,7 +145,7 @@ def _answer_outages(app: FastAPI) -> None:
 
     async def away(_: Request, error: Exception) -> Response:
         log.error("storage is away", exc_info=error)
-        return Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}).response()
+        return problems.answer(Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}))
 
     for error in (*DATABASE_AWAY, *BLOBS_AWAY):
         app.add_exception_handler(error, away)

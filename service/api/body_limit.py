@@ -11,6 +11,7 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.api.problems import answer
 from service.wire.problems import Problem
 
 
@@ -30,12 +31,12 @@ class BodyLimit:
         if headers.get("content-encoding", "identity").lower() != "identity":
             # A few bytes can be gigabytes, and frames do not shrink by it anyway.
             packed = Problem("encoded-body", "Send it as it is.", headers={"Accept-Encoding": "identity"})
-            await packed.response()(scope, receive, send)
+            await answer(packed)(scope, receive, send)
             return
         announced = headers.get("content-length", "0")
         if announced.isdecimal() and int(announced[:20]) > self._largest:
             refusal = Problem("body-too-large", f"{self._largest} bytes are allowed; send fewer or smaller frames.")
-            await refusal.response()(scope, receive, send)
+            await answer(refusal)(scope, receive, send)
             return
         arrived = 0
 
