@@ -40,8 +40,8 @@ from service.store.jobs import Jobs, Task
 from service.store.schedules import Schedules
 from service.store.venues import Venues
 from service.store.workers import Workers
+from service.wire.job import JobError, Progress
 from service.wire.problems import KINDS, first_line, type_of
-from service.wire.schemas import JobError, Progress
 from worker.duties import retention
 from worker.duties.alarms import Alarms
 from worker.duties.callbacks import Callbacks

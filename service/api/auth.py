@@ -32,8 +32,8 @@ from service.api.rate_limit import Buckets
 from service.settings import Settings
 from service.store.keys import Key, Keys, hash_of
 from service.store.sessions import Sessions
+from service.wire.base import Scope
 from service.wire.problems import Problem
-from service.wire.schemas import Scope
 
 BELIEVED_FOR_S = 5.0
 COOKIE, TOKEN_HEADER = "esc_session", "X-CSRF-Token"

@@ -26,7 +26,7 @@ from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.wire.schemas import ID_PATTERN, JOB_ID_PATTERN
+from service.wire.base import ID_PATTERN, JOB_ID_PATTERN
 
 
 @dataclass(frozen=True)

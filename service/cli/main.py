@@ -27,30 +27,13 @@ from service.client import Client, Refused
 from service.intake.images import PNG_START
 from service.observe import logs
 from service.settings import Settings
-from service.wire.schemas import (
-    ID_PATTERN,
-    CameraIn,
-    ClickedPoints,
-    FieldOptions,
-    FieldResult,
-    FormatName,
-    IntrinsicsOptions,
-    IntrinsicsResult,
-    Job,
-    JobError,
-    LensFile,
-    LensModel,
-    LocateResult,
-    Moved,
-    Options,
-    PoseIn,
-    Result,
-    Scope,
-    Site,
-    Venue,
-    VenueIn,
-)
-from service.wire.schemas import Progress as Step
+from service.wire.base import ID_PATTERN, FormatName, Scope
+from service.wire.geometry import LensFile, LensModel, Moved, PoseIn
+from service.wire.job import Job, JobError
+from service.wire.job import Progress as Step
+from service.wire.options import ClickedPoints, FieldOptions, IntrinsicsOptions, Options
+from service.wire.results import FieldResult, IntrinsicsResult, LocateResult, Result
+from service.wire.venue import CameraIn, Site, Venue, VenueIn
 
 if TYPE_CHECKING:
     from service.store.keys import Keys

@@ -16,17 +16,11 @@ from typing import Any, TypeVar
 
 import httpx
 
-from service.wire.schemas import (
-    OPTIONS_PART,
-    FormatName,
-    History,
-    Job,
-    Revision,
-    Venue,
-    VenueHealth,
-    VenueIn,
-    Venues,
-)
+from service.wire.base import OPTIONS_PART, FormatName
+from service.wire.health import VenueHealth
+from service.wire.history import History, Revision
+from service.wire.job import Job
+from service.wire.venue import Venue, VenueIn, Venues
 
 # How long a service may be away from somebody who follows a job: a restart, a database that comes back.
 PATIENCE_S = 60.0

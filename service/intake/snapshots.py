@@ -15,8 +15,9 @@ from pydantic import BaseModel, ValidationError
 from service import lifeline
 from service.intake import images as border
 from service.settings import Settings
+from service.wire.addresses import HIDDEN
 from service.wire.problems import Problem
-from service.wire.schemas import HIDDEN, Camera
+from service.wire.venue import Camera
 
 # Beyond the time that the sources have: to start, and to encode.
 STARTING_S = 10.0

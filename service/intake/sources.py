@@ -7,8 +7,9 @@ from collections.abc import Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 from urllib.parse import urlsplit
 
+from service.wire.addresses import HIDDEN
 from service.wire.problems import Problem
-from service.wire.schemas import HIDDEN, Camera, Venue
+from service.wire.venue import Camera, Venue
 
 
 def credentials_of(

@@ -20,8 +20,8 @@ from service.pages.assets import address
 from service.routes.guarded import Guarded
 from service.store.engine import AWAY
 from service.store.keys import Key
+from service.wire.base import Scope
 from service.wire.problems import KINDS, Problem
-from service.wire.schemas import Scope
 
 SIGN_IN = "/ui/sign-in"
 # Scripts, styles and pictures are files of this service; nothing inline, nobody frames it.

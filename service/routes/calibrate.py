@@ -19,7 +19,9 @@ from service.routes.venues import no_such_venue
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
 from service.wire import callbacks
-from service.wire.schemas import Job, Options, Venue
+from service.wire.job import Job
+from service.wire.options import Options
+from service.wire.venue import Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 

@@ -19,7 +19,9 @@ from service.routes.jobs import job_answer
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
 from service.wire import callbacks
-from service.wire.schemas import FieldOptions, Job, Venue
+from service.wire.job import Job
+from service.wire.options import FieldOptions
+from service.wire.venue import Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 

@@ -9,7 +9,7 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
 from service.routes.documented import KEY_SCHEME, problems
-from service.wire.schemas import Scope
+from service.wire.base import Scope
 
 
 class Guarded(APIRoute):

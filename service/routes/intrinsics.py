@@ -19,8 +19,10 @@ from service.routes.jobs import job_answer
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission, frame_folder
 from service.wire import callbacks
+from service.wire.base import OPTIONS_PART, PHOTOS_PART
+from service.wire.job import Job
+from service.wire.options import IntrinsicsOptions
 from service.wire.problems import Problem
-from service.wire.schemas import OPTIONS_PART, PHOTOS_PART, IntrinsicsOptions, Job
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 

@@ -19,8 +19,11 @@ from service.routes.jobs import LONGEST_WAIT_S, job_answer
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
 from service.wire import callbacks
+from service.wire.base import ID_PATTERN, OPTIONS_PART
+from service.wire.job import OPEN, Job
+from service.wire.options import LocateOptions
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN, OPEN, OPTIONS_PART, Camera, Job, LocateOptions, Venue
+from service.wire.venue import Camera, Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 

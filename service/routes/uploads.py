@@ -28,8 +28,10 @@ from service.store.jobs import (
     VenueGone,
     VenueReplaced,
 )
+from service.wire.base import OPTIONS_PART
+from service.wire.job import Job
 from service.wire.problems import Problem
-from service.wire.schemas import OPTIONS_PART, Job, Venue
+from service.wire.venue import Venue
 
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
 KEY_DESCRIPTION = "The same key and the same content are the same job, for as long as that job is kept."

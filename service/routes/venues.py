@@ -14,8 +14,11 @@ from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 from service.wire import callbacks
+from service.wire.base import ID_PATTERN, FormatName
+from service.wire.health import VenueHealth
+from service.wire.history import History, Restore
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN, FormatName, History, Restore, Venue, VenueHealth, VenueIn, Venues
+from service.wire.venue import Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 

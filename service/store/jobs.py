@@ -26,32 +26,17 @@ from service.store.deliveries import add_delivery, delivery_of
 from service.store.engine import clock, reading, serialise, writing
 from service.store.revisions import TAKEN, add_revision, newest_revision, revision_of_job
 from service.store.venues import find_venue, put_back, save_venue, venue_lock
-from service.wire.schemas import (
-    OPEN,
-    Cause,
-    FieldOptions,
-    FieldResult,
-    IntrinsicsOptions,
-    IntrinsicsResult,
-    Job,
-    JobError,
-    Kind,
-    LocateOptions,
-    LocateResult,
-    Options,
-    Progress,
-    Result,
-    Revision,
-    Status,
-    Venue,
-)
+from service.wire.history import Cause, Revision
+from service.wire.job import OPEN, Job, JobError, Kind, Progress, Status
+from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.wire.results import AnyResult, Result
+from service.wire.venue import Venue
 
 PRIORITIES = {"live": 1, "routine": 100}
 # Pictures to be laid over others.
 LAYERS = ("seam", "stored", "new", "mask")
 DONE = Progress(stage="preview", fraction=1.0)
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
-AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult
 OPTIONS: dict[Kind, type[AnyOptions]] = {
     "calibration": Options,
     "intrinsics": IntrinsicsOptions,

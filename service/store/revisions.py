@@ -15,7 +15,9 @@ from service.store import tables
 from service.store.counts.figures import note
 from service.store.engine import clock
 from service.wire import motion
-from service.wire.schemas import Camera, Cause, Movement, PosedCamera, Revision, RevisionCamera, Venue
+from service.wire.geometry import Movement, PosedCamera
+from service.wire.history import Cause, Revision, RevisionCamera
+from service.wire.venue import Camera, Venue
 
 r = tables.revisions.c
 # Whose poses hold, or held.

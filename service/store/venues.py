@@ -12,7 +12,9 @@ from service.store.counts.figures import forget_quality, note_restored
 from service.store.engine import clock, reading, serialise, writing
 from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
 from service.store.schedules import forget_schedule, plan
-from service.wire.schemas import Revision, Venue, VenueHealth
+from service.wire.health import VenueHealth
+from service.wire.history import Revision
+from service.wire.venue import Venue
 
 
 class Venues:

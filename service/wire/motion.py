@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from fields.shapes import Arc, Line, Point, Shape
-from service.wire.schemas import FieldOfPlay, Intrinsics, Moved, PosedCamera, rotated
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Intrinsics, Moved, PosedCamera, rotated
 
 # Of all markings together; as many more as there are markings.
 POINTS = 150

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import BaseModel, ConfigDict
+
 MEDIA_TYPE = "application/problem+json"
 
 
@@ -127,3 +129,29 @@ class Problem(Exception):  # noqa: N818  (the term of RFC 9457)
             "detail": self.detail,
             **self.parts,
         }
+
+
+class ProblemDetails(BaseModel):
+    """RFC 9457. Beside these members a problem carries the part that is wrong: camera, expected, got, job, errors."""
+
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={
+            "examples": [
+                {
+                    "type": "/problems/frame-size",
+                    "title": "The frame does not have the size of the camera",
+                    "status": 422,
+                    "detail": "Send camera left in 3840x2160 pixels, the size of its intrinsics.",
+                    "camera": "left",
+                    "expected": [3840, 2160],
+                    "got": [1920, 1080],
+                }
+            ]
+        },
+    )
+
+    type: str
+    title: str
+    status: int
+    detail: str

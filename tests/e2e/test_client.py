@@ -7,7 +7,7 @@ import httpx
 import pytest
 
 from service.client import AsyncClient, Client, Refused
-from service.wire.schemas import VenueIn
+from service.wire.venue import VenueIn
 from tests.e2e.running import png, venue, wait_for
 
 

@@ -13,8 +13,8 @@ from service.observe.disk import Disk
 from service.store.jobs import Origin
 from service.store.schedules import Firing, Schedules
 from service.store.venues import Venues
+from service.wire.options import Options
 from service.wire.problems import Problem
-from service.wire.schemas import Options
 
 LOOK_S = 1.0
 # As many venues have their frames fetched at the same time.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from service import lifeline
 from service.formats.archive import archive
-from service.wire.schemas import Camera
+from service.wire.venue import Camera
 from worker.calibration.draw.st_maps import StMap, distorting, undistorting
 from worker.jobs.wire import lens_of
 

@@ -11,8 +11,9 @@ import pytest
 from service.formats.lens import Shot
 from service.formats.table import formats
 from service.settings import Settings
+from service.wire.geometry import Intrinsics
 from service.wire.problems import Problem
-from service.wire.schemas import Camera, Intrinsics
+from service.wire.venue import Camera
 from tests.service.formats.cameras import ALL_OF_OPENCV_8, RADIAL, WITH_TILT, shot
 
 SIZE = (192, 108)

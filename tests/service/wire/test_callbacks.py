@@ -5,8 +5,8 @@ from pydantic import ValidationError
 
 from service.settings import Settings
 from service.wire import callbacks
+from service.wire.options import Options
 from service.wire.problems import Problem
-from service.wire.schemas import Options
 
 SECRET = "whsec_" + b64encode(bytes(32)).decode()
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from service.wire import motion
-from service.wire.schemas import FieldOfPlay, Intrinsics, Pose, PosedCamera
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Intrinsics, Pose, PosedCamera
 from worker.calibration.judge.quality import Movement
 from worker.jobs.wire import camera_of, pitch_of
 

@@ -11,7 +11,10 @@ from pydantic import ValidationError
 from fields.landmarks import find
 from fields.shapes import Line, Spot
 from fields.template import NAMES, load
-from service.wire.schemas import VENUE_EXAMPLE, FieldOfPlay, Intrinsics, Options, Pose, PoseIn, VenueIn
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Intrinsics, Pose, PoseIn
+from service.wire.options import Options
+from service.wire.venue import VENUE_EXAMPLE, VenueIn
 
 
 def test_the_documented_venue_is_one():

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from service.wire import motion
-from service.wire.schemas import Alarms as Rules
-from service.wire.schemas import VenueIn
+from service.wire.health import Alarms as Rules
+from service.wire.venue import VenueIn
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame
 from tests.worker.stock import Stock, anyway
 from worker.calibration.scene.camera import Camera, Intrinsics

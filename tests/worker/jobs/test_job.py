@@ -9,7 +9,8 @@ import pytest
 
 from service.settings import Settings
 from service.store.jobs import picture_file
-from service.wire.schemas import Options, VenueIn
+from service.wire.options import Options
+from service.wire.venue import VenueIn
 from tests.worker.stock import Stock
 from worker.calibration import calibrate as engine
 from worker.calibration.finish.diagnosis import Suspicion
