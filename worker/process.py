@@ -24,25 +24,15 @@ import structlog
 from pydantic import ValidationError
 
 from service import lifeline
-from service.intake.snapshots import Snapshots
-from service.intake.submit import Intake
-from service.intake.unattended import Unattended
+from service.home import open_home
 from service.observe import tracing
-from service.observe.disk import Disk
-from service.queue import Queue, WorkerQueue
-from service.queue import migrate as migrate_queue
+from service.queue import WorkerQueue
 from service.settings import Settings
-from service.store.blobs import Blobs
-from service.store.deliveries import Deliveries
-from service.store.engine import AWAY, connect, migrate
-from service.store.expiry import Expiry
-from service.store.jobs import Jobs, Task
-from service.store.schedules import Schedules
-from service.store.venues import Venues
-from service.store.workers import Workers
+from service.store.engine import AWAY
+from service.store.jobs.attempts import Attempts
+from service.store.jobs.task import Task
 from service.wire.job import JobError, Progress
 from service.wire.problems import KINDS, first_line, type_of
-from worker.duties import retention
 from worker.duties.alarms import Alarms
 from worker.duties.callbacks import Callbacks
 from worker.duties.retention import Retention
@@ -96,24 +86,15 @@ class Worker:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        engine = connect(settings.home_database_url)
-        migrate(engine)
-        migrate_queue(settings.home_database_url)
-        self._jobs = Jobs(engine)
-        self._workers = Workers(engine)
+        home = open_home(settings)
+        self._attempts, self._workers = home.attempts, home.workers
         self._queue = WorkerQueue(
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt
         )
-        blobs = Blobs(settings.home_blob_url, retention.PATIENCE_S)
-        self._retention = Retention(settings, Expiry(engine), blobs, self._workers, self._queue.forget)
-        deliveries = Deliveries(engine)
-        self._callbacks = Callbacks(settings, deliveries, self._jobs, deliveries.now)
-        venues, expiry = Venues(engine), Expiry(engine)
-        self._alarms = Alarms(venues)
-        intake = Intake(settings, self._jobs, expiry, blobs)
-        unattended = Unattended(venues, self._jobs, Snapshots(settings), intake)
-        enqueue = Queue(settings.home_database_url).enqueue
-        self._scheduled = Scheduled(Schedules(engine), venues, unattended, Disk(settings), enqueue)
+        self._retention = Retention(settings, home.expiry, home.blobs, home.workers, self._queue.forget)
+        self._callbacks = Callbacks(settings, home.deliveries, home.jobs, home.deliveries.now)
+        self._alarms = Alarms(home.venues)
+        self._scheduled = Scheduled(home.schedules, home.venues, home.unattended, home.disk, home.queue.enqueue)
 
     def start(self) -> None:
         """Show up and take jobs."""
@@ -157,17 +138,17 @@ class Worker:
                 self._workers.leave(name, silence)
 
     def _reconcile(self) -> None:
-        silent = self._jobs.unchanged_for(self._settings.takeover_after_s)
+        silent = self._attempts.unchanged_for(self._settings.takeover_after_s)
         given_up = self._queue.given_up(silent) if silent else {}
         for job_id, why in given_up.items():
             # A slow job may have ended while the queue was asked.
-            if self._jobs.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log.")):
+            if self._attempts.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log.")):
                 log.error("job given up", job=job_id, why=why)
 
     def _attempt(self, job_id: str) -> None:
         """One attempt of a job, from its beginning to a state that is written down."""
         begun = time.monotonic()
-        task = _insist(lambda: self._jobs.begin(job_id), begun + OUTAGE_S)
+        task = _insist(lambda: self._attempts.begin(job_id), begun + OUTAGE_S)
         if task is None:
             return
         limit_s = task.options.timeout_s or self._settings.job_timeout_s
@@ -180,12 +161,12 @@ class Worker:
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
                 crashed = _error("job-crashed", f"The attempt broke off: {first_line(error)}")
-                _insist(lambda: self._jobs.fail(task, crashed), time.monotonic() + OUTAGE_S)
+                _insist(lambda: self._attempts.fail(task, crashed), time.monotonic() + OUTAGE_S)
             log.info("job ends", seconds=round(time.monotonic() - begun, 2))
 
     def _compute(self, task: Task, limit_s: float, spans: Spans) -> Message | None:
         """The last word about the job; None if it was taken away."""
-        deadline, shown, hold = time.monotonic() + limit_s, 0.0, Hold(self._jobs, task)
+        deadline, shown, hold = time.monotonic() + limit_s, 0.0, Hold(self._attempts, task)
         with Child(self._settings, task) as child:
             for message in child.messages():
                 if message is None and hold.lost():
@@ -206,22 +187,22 @@ class Worker:
 
     def _show(self, task: Task, progress: Progress) -> None:
         with suppress(*AWAY):
-            self._jobs.report(task, progress)
+            self._attempts.report(task, progress)
 
     def _write_down(self, task: Task, end: Message | None) -> None:
         if end is None:
             log.info("job taken away")
         elif end.result is not None:
-            self._jobs.finish(task, end.result, end.pictures)
+            self._attempts.finish(task, end.result, end.pictures)
         elif end.error is not None:
-            self._jobs.fail(task, end.error)
+            self._attempts.fail(task, end.error)
 
 
 class Hold:
     """An attempt's hold on its job: looked at often, and now and then renewed, which costs the database a write."""
 
-    def __init__(self, jobs: Jobs, task: Task) -> None:
-        self._jobs = jobs
+    def __init__(self, attempts: Attempts, task: Task) -> None:
+        self._attempts = attempts
         self._task = task
         self._renewed = time.monotonic()
 
@@ -229,9 +210,9 @@ class Hold:
         """Whether the job went to a cancellation or to another attempt; while the database is away, nobody can say."""
         try:
             if time.monotonic() - self._renewed < BEAT_S:
-                return not self._jobs.holds(self._task)
+                return not self._attempts.holds(self._task)
             self._renewed = time.monotonic()
-            return not self._jobs.keep(self._task)
+            return not self._attempts.keep(self._task)
         except AWAY:
             log.warning("cannot give a sign of life", exc_info=True)
             return False

@@ -187,7 +187,7 @@ def run(
         err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")
     # Before NumPy is loaded, which the next line does.
     os.environ |= settings.native_environment
-    from service.store.jobs import picture_file
+    from service.store.jobs.files import picture_file
     from worker.jobs import job
 
     stored = _checked(VenueIn, venue.read_text(), str(venue)).stored()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from io import BytesIO
 
 from fastapi import APIRouter, Request, Response
@@ -15,7 +14,8 @@ from service.routes.guarded import Guarded
 from service.routes.jobs import Existing, job_answer
 from service.routes.venues import no_such_venue
 from service.store.ids import new_id
-from service.store.jobs import Submission, frame_folder
+from service.store.jobs.files import frame_folder
+from service.store.jobs.submission import Submission
 from service.wire.job import Job
 from service.wire.problems import Problem
 from service.wire.venue import Venue
@@ -37,7 +37,7 @@ router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 def submit_again(job: Existing, request: Request, context: InContext) -> Response:
     """Submit what a job was made of again, with its options, as long as its frames are kept."""
     uploads.require_room(context)
-    before = context.jobs.submission(job.id)
+    before = context.submissions.of(job.id)
     if before is None:
         raise _gone(context, job)
     if before.venue is not None:
@@ -53,7 +53,8 @@ def _renewed(before: Submission, request: Request) -> Submission:
     job_id = new_id()
     old, new = frame_folder(before.job_id), frame_folder(job_id)
     frames = {name: [new + path.removeprefix(old) for path in paths] for name, paths in before.frames.items()}
-    return replace(before, job_id=job_id, frames=frames, idempotency_key=None, origin=request.state.origin)
+    renewed = {"job_id": job_id, "frames": frames, "idempotency_key": None, "origin": request.state.origin}
+    return before.model_copy(update=renewed)
 
 
 def _require_the_same(context: Context, then: Venue) -> None:

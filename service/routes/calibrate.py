@@ -17,7 +17,8 @@ from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.routes.venues import no_such_venue
 from service.store.ids import new_id
-from service.store.jobs import Origin, Submission
+from service.store.jobs.submission import Submission
+from service.store.jobs.task import Origin
 from service.wire import callbacks
 from service.wire.job import Job
 from service.wire.options import Options
@@ -82,7 +83,15 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
     job_id = new_id()
     seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
     paths = uploads.frame_paths(job_id, files)
-    submission = Submission(job_id, venue, seeded, content_hash, idempotency_key, paths, origin=origin)
+    submission = Submission(
+        job_id=job_id,
+        venue=venue,
+        options=seeded,
+        frames=paths,
+        origin=origin,
+        content_hash=content_hash,
+        idempotency_key=idempotency_key,
+    )
     job, new = uploads.enqueue_upload(context, submission, files, context.queue.enqueue)
     return job_answer(job, status=202 if new else 200)
 

@@ -17,7 +17,8 @@ from service.routes.documented import frames_upload, headers, needs, problems
 from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.store.ids import new_id
-from service.store.jobs import Origin, Submission
+from service.store.jobs.submission import Submission
+from service.store.jobs.task import Origin
 from service.wire import callbacks
 from service.wire.job import Job
 from service.wire.options import FieldOptions
@@ -66,6 +67,15 @@ def _submit(context: Context, venue: Venue, form: FormData, idempotency_key: str
     job_id = new_id()
     seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
     paths = uploads.frame_paths(job_id, files)
-    submission = Submission(job_id, venue, seeded, sent, idempotency_key, paths, "field", origin)
+    submission = Submission(
+        job_id=job_id,
+        kind="field",
+        venue=venue,
+        options=seeded,
+        frames=paths,
+        origin=origin,
+        content_hash=sent,
+        idempotency_key=idempotency_key,
+    )
     job, new = uploads.enqueue_upload(context, submission, files, context.queue.enqueue)
     return job_answer(job, status=202 if new else 200)

@@ -17,7 +17,9 @@ from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.store.ids import new_id
-from service.store.jobs import Origin, Submission, frame_folder
+from service.store.jobs.files import frame_folder
+from service.store.jobs.submission import Submission
+from service.store.jobs.task import Origin
 from service.wire import callbacks
 from service.wire.base import OPTIONS_PART, PHOTOS_PART
 from service.wire.job import Job
@@ -88,7 +90,16 @@ def _submit(context: Context, form: FormData, idempotency_key: str | None, origi
     job_id = new_id()
     # A file may be called anything.
     paths = {name: [f"{frame_folder(job_id)}/photos/{number}"] for number, name in enumerate(files)}
-    submission = Submission(job_id, None, options, sent.hexdigest(), idempotency_key, paths, "intrinsics", origin)
+    submission = Submission(
+        job_id=job_id,
+        kind="intrinsics",
+        venue=None,
+        options=options,
+        frames=paths,
+        origin=origin,
+        content_hash=sent.hexdigest(),
+        idempotency_key=idempotency_key,
+    )
     job, new = uploads.enqueue_upload(context, submission, files, context.queue.enqueue)
     return job_answer(job, status=202 if new else 200)
 

@@ -18,7 +18,8 @@ from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
 from service.routes.venues import revision_unfit
 from service.store.engine import AWAY
-from service.store.jobs import MovedOn, NoPoses, State
+from service.store.jobs.decisions import MovedOn, NoPoses
+from service.store.jobs.reading import State
 from service.store.revisions import RevisionUnfit
 from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
 from service.wire.job import OPEN, Job, Jobs, Status
@@ -94,7 +95,7 @@ async def get_job(
 @router.post("/{job_id}/cancel", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404))
 def cancel_job(job: Existing, context: InContext) -> Response:
     """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
-    context.jobs.cancel(job.id)
+    context.decisions.cancel(job.id)
     return job_answer(context.jobs.get(job.id) or job)
 
 
@@ -104,7 +105,7 @@ def accept_job(job: Existing, context: InContext) -> Response:
 
     Only while the venue is as the calibration found it.
     """
-    return _decided(context, job, context.jobs.accept)
+    return _decided(context, job, context.decisions.accept)
 
 
 @router.post("/{job_id}/reject", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))
@@ -113,7 +114,7 @@ def reject_job(job: Existing, context: InContext) -> Response:
 
     Only while they are the last that came; to go back further, `POST /venues/{id}/restore`.
     """
-    return _decided(context, job, context.jobs.reject)
+    return _decided(context, job, context.decisions.reject)
 
 
 def _decided(context: Context, job: Job, decide: Callable[[str], None]) -> Response:

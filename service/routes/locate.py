@@ -17,7 +17,8 @@ from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
 from service.store.ids import new_id
-from service.store.jobs import Origin, Submission
+from service.store.jobs.submission import Submission
+from service.store.jobs.task import Origin
 from service.wire import callbacks
 from service.wire.base import ID_PATTERN, OPTIONS_PART
 from service.wire.job import OPEN, Job
@@ -101,7 +102,16 @@ def _submit(
         sent.update(hashlib.sha256(data).digest())
     job_id = new_id()
     paths = uploads.frame_paths(job_id, files)
-    submission = Submission(job_id, venue, options, sent.hexdigest(), idempotency_key, paths, "locate", origin)
+    submission = Submission(
+        job_id=job_id,
+        kind="locate",
+        venue=venue,
+        options=options,
+        frames=paths,
+        origin=origin,
+        content_hash=sent.hexdigest(),
+        idempotency_key=idempotency_key,
+    )
     return uploads.enqueue_upload(context, submission, files, context.queue.enqueue_light)
 
 

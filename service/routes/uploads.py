@@ -20,7 +20,7 @@ from service.intake.submit import REFUSALS, Enqueue, Refusal
 from service.routes.jobs import RETRY_AFTER_S
 from service.routes.venues import no_such_venue
 from service.settings import Settings
-from service.store.jobs import (
+from service.store.jobs.submission import (
     KeyReused,
     QueueFull,
     Submission,

@@ -13,7 +13,7 @@ from service.store.engine import clock, reading, serialise, writing
 from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
 from service.store.schedules import forget_schedule, plan
 from service.wire.health import VenueHealth
-from service.wire.history import Revision
+from service.wire.history import Cause, Revision
 from service.wire.venue import Venue
 
 
@@ -135,6 +135,13 @@ def save_venue(connection: sa.Connection, venue: Venue) -> None:
     replaced = connection.execute(sa.update(table).where(table.c.id == venue.id).values(**values))
     if replaced.rowcount == 0:
         connection.execute(sa.insert(table).values(id=venue.id, **values))
+
+
+def let_hold(connection: sa.Connection, venue: Venue, cause: Cause, job_id: str, stitch_error_px: float | None) -> None:
+    """Let a venue be as a calibration found it, inside the caller's serialised transaction."""
+    save_venue(connection, venue)
+    add_revision(connection, venue, cause, job_id, stitch_error_px=stitch_error_px)
+    settle_alarms(connection, venue)
 
 
 def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job: str | None = None) -> Venue:

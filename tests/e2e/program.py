@@ -9,7 +9,8 @@ from service import lifeline
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.engine import connect
-from service.store.jobs import Jobs, picture_folder
+from service.store.jobs.attempts import Attempts
+from service.store.jobs.files import picture_folder
 from service.wire.geometry import Moved, Pose
 from service.wire.job import JobError, Progress
 from service.wire.results import CameraResult, FieldResult, MeasureResult, Provenance, Result
@@ -30,7 +31,7 @@ def say(**message):
 def main(job_id: str, run_token: str) -> None:
     lifeline.end_with_parent()
     settings = Settings()
-    task = Jobs(connect(settings.home_database_url)).task(job_id, run_token)
+    task = Attempts(connect(settings.home_database_url)).task(job_id, run_token)
     behaviour, _, seconds = task.venue.name.partition(" ")
     with (settings.data / "begun").open("a") as begun:
         begun.write(f"{job_id} {os.getpid()}\n")

@@ -4,12 +4,13 @@ import time
 import pytest
 
 from service.settings import Settings
-from service.store.jobs import Task
+from service.store.jobs.task import Task
 from service.wire.options import Options
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
 from worker import process
 
-TASK = Task("job", "token", VenueIn.model_validate(VENUE_EXAMPLE).stored(), Options(), {})
+VENUE = VenueIn.model_validate(VENUE_EXAMPLE).stored()
+TASK = Task(job_id="job", run_token="token", venue=VENUE, options=Options(), frames={})
 
 
 def child(tmp_path, program):

@@ -12,7 +12,7 @@ import structlog
 
 from service.settings import Settings
 from service.store.deliveries import Deliveries, Delivery
-from service.store.jobs import Jobs
+from service.store.jobs.reading import Jobs
 from service.wire.job import JobEvent
 from worker.duties import webhook
 

@@ -20,7 +20,9 @@ from service.observe import logs
 from service.settings import Settings
 from service.store.blobs import AWAY, Blobs
 from service.store.engine import connect
-from service.store.jobs import Jobs, Task, picture_file, picture_folder
+from service.store.jobs.attempts import Attempts
+from service.store.jobs.files import picture_file, picture_folder
+from service.store.jobs.task import Task
 from service.wire.job import Progress
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
 from service.wire.problems import first_line
@@ -58,7 +60,7 @@ def main(job_id: str, run_token: str) -> None:
     settings = Settings()
     logs.configure(settings)
     structlog.contextvars.bind_contextvars(job=job_id)
-    task = Jobs(connect(settings.home_database_url)).task(job_id, run_token)
+    task = Attempts(connect(settings.home_database_url)).task(job_id, run_token)
     if task is None:
         return
     structlog.contextvars.bind_contextvars(**task.origin.names())

@@ -11,17 +11,12 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
 from service.store import tables
+from service.store.counts.endings import ENDED
 from service.store.counts.figures import VenueQuality, look
-from service.store.counts.outcomes import ENDED
-from service.store.deliveries import Deliveries
 from service.store.engine import MIGRATIONS, SCHEMA_TABLE, UnsupportedDatabase, connect, migrate, writing
-from service.store.expiry import Expiry
 from service.store.ids import new_id
-from service.store.jobs import Jobs, Submission
-from service.store.keys import Keys
-from service.store.sessions import Sessions
-from service.store.venues import Venues
-from service.store.workers import Workers
+from service.store.jobs.submission import Submission
+from service.store.stores import open_stores
 from service.wire.options import Board, IntrinsicsOptions, LocateOptions, Options
 from service.wire.results import Result
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
@@ -119,11 +114,12 @@ ROWS = {
 
 
 @pytest.fixture
-def old(home, tmp_path):
-    """Make a database as a release of that revision left it."""
-    engine = connect(home.database_url(tmp_path))
+def upgraded(home, tmp_path):
+    """Bring up to date what a release of that revision left."""
+    url = home.database_url(tmp_path)
+    engine = connect(url)
 
-    def old(revision):
+    def upgraded(revision):
         with writing(engine) as connection:
             config = Config()
             config.set_main_option("script_location", str(MIGRATIONS))
@@ -133,10 +129,14 @@ def old(home, tmp_path):
             then.reflect(connection)
             for name in then.tables.keys() & ROWS.keys():
                 insert_what_it_has_columns_for(connection, then.tables[name], ROWS[name])
-        return engine
+        engine.dispose()
+        stores.append(open_stores(url))
+        return stores[-1]
 
-    yield old
-    engine.dispose()
+    stores = []
+    yield upgraded
+    for opened in stores:
+        opened.engine.dispose()
 
 
 def insert_what_it_has_columns_for(connection, table, rows):
@@ -146,10 +146,9 @@ def insert_what_it_has_columns_for(connection, table, rows):
 
 @in_both_homes
 @pytest.mark.parametrize("revision", sorted(REVISIONS))
-def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
-    engine = old(revision)
-    migrate(engine)
-    venues, jobs = Venues(engine), Jobs(engine)
+def test_what_an_older_release_stored_is_there_after_the_upgrade(upgraded, revision):
+    stores = upgraded(revision)
+    venues, jobs = stores.venues, stores.jobs
     assert venues.get(VENUE.id) == VENUE
     put, held = reversed(venues.history(VENUE.id, None, 10))
     assert (put.revision, put.cause, put.job, put.cameras[0].pose) == (1, "put", None, FIRST_POSE)
@@ -158,63 +157,70 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     done = jobs.get(DONE)
     assert (done.status, done.created_at, done.finished_at) == ("succeeded", NOON, NOON)
     assert done.result == Result.model_validate(RESULT)
-    assert jobs.same_as(VENUE.id, "k", "c" * 64).id == DONE
+    assert stores.submissions.same_as(VENUE.id, "k", "c" * 64).id == DONE
     assert jobs.get(WAITING).queue_position == 1
-    task = jobs.begin(WAITING)
+    task = stores.attempts.begin(WAITING)
     assert (task.venue, task.options.seed, task.frames) == (VENUE, 7, FRAMES)
     assert task.origin.request_id == "van-3"
-    assert Workers(engine).silent(0) == ["w"]
-    (key,) = Keys(engine).all()
+    assert stores.workers.silent(0) == ["w"]
+    (key,) = stores.keys.all()
     assert (key.name, key.scope, key.last_used_at) == ("cron", "calibrate", NOON)
-    assert Sessions(engine).key_of("1" * 64) == key
-    assert Expiry(engine).leftovers(NOON, 10) == ["frames/lost"]
-    (due,) = Deliveries(engine).attempt(NOON, NOON, 10)
+    assert stores.sessions.key_of("1" * 64) == key
+    assert stores.expiry.leftovers(NOON, 10) == ["frames/lost"]
+    (due,) = stores.deliveries.attempt(NOON, NOON, 10)
     assert (due.id, due.attempt, jobs.get(DONE).callback.last_error) == (DONE, 2, "timed out")
     health = venues.health(VENUE.id)
     assert [alarm.why for alarm in health.alarms] == ["No poses."]
     assert (health.revision, health.rejected_in_a_row, health.schedule.last_job) == (2, 0, DONE)
     assert venues.credentials(VENUE.id) == {"left": "user:secret"}
-    seen = look(engine, 10)
+    seen = look(stores.engine, 10)
     assert seen.tallies == {(ENDED, ("succeeded", "accepted", "")): 3}
     assert seen.venues == [VenueQuality(VENUE.id, 0.2, 2.0, NOON)]
 
 
 @in_both_homes
 @pytest.mark.parametrize("revision", sorted(REVISIONS))
-def test_an_upgraded_database_takes_new_rows(old, revision):
-    engine = old(revision)
-    migrate(engine)
+def test_an_upgraded_database_takes_new_rows(upgraded, revision):
+    stores = upgraded(revision)
     lens = Submission(
-        new_id(),
-        None,
-        IntrinsicsOptions(board=Board(columns=9, rows=6, square_m=0.03)),
-        "l",
-        None,
-        {},
-        "intrinsics",
+        job_id=new_id(),
+        kind="intrinsics",
+        venue=None,
+        options=IntrinsicsOptions(board=Board(columns=9, rows=6, square_m=0.03)),
+        frames={},
+        content_hash="l",
+        idempotency_key=None,
     )
     points = [{"world": [x, y], "pixel": [0, 0]} for x in (0, 1) for y in (0, 1)]
     clicks = LocateOptions.model_validate({"points": points})
     # A venue with an active calibration takes any number of first poses.
-    place = Submission(new_id(), VENUE, clicks, "p", None, {"left": []}, "locate")
+    place = Submission(
+        job_id=new_id(),
+        kind="locate",
+        venue=VENUE,
+        options=clicks,
+        frames={"left": []},
+        content_hash="p",
+        idempotency_key=None,
+    )
     for submission in (lens, place):
-        job, new = Jobs(engine).submit(submission, 100, lambda *_: None)
+        job, new = stores.submissions.submit(submission, 100, lambda *_: None)
         assert (new, job.kind, job.queue_position) == (True, submission.kind, 2 if submission is lens else 1)
-        task = Jobs(engine).begin(job.id)
+        task = stores.attempts.begin(job.id)
         assert (task.venue, task.options) == (submission.venue, submission.options)
     # Numbers go on where those of the old rows ended.
     moved = VENUE.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
-    Venues(engine).put(VENUE.with_poses({"left": moved}), lambda _: None)
-    held = Venues(engine).history(VENUE.id, None, 10)
+    stores.venues.put(VENUE.with_poses({"left": moved}), lambda _: None)
+    held = stores.venues.history(VENUE.id, None, 10)
     assert [(revision.revision, revision.cause) for revision in held] == [(3, "put"), (2, "calibrated"), (1, "put")]
     # What was never measured is not made up; what comes now is.
     assert [revision.cameras[0].moved is None for revision in held] == [False, True, True]
-    Venues(engine).restore(VENUE.id, 1, lambda _: None)
-    assert Venues(engine).get(VENUE.id).cameras[0].pose == FIRST_POSE
-    key = Keys(engine).add("guest", "read", NOON + timedelta(days=36500))
+    stores.venues.restore(VENUE.id, 1, lambda _: None)
+    assert stores.venues.get(VENUE.id).cameras[0].pose == FIRST_POSE
+    key = stores.keys.add("guest", "read", NOON + timedelta(days=36500))
     assert key.startswith("esc_")
-    assert Expiry(engine).expire_frames(NOON + timedelta(days=2), NOON, 10) == 1
-    assert f"frames/{DONE}" in Expiry(engine).leftovers(NOON, 10)
+    assert stores.expiry.expire_frames(NOON + timedelta(days=2), NOON, 10) == 1
+    assert f"frames/{DONE}" in stores.expiry.leftovers(NOON, 10)
 
 
 @in_both_homes

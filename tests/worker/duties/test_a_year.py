@@ -99,10 +99,10 @@ class Year:
     def day(self, called: str, frames: Frames) -> bool:
         """A calibration; says whether its poses were taken, which must then be right."""
         files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
-        task = self.home.jobs.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
+        task = self.home.attempts.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
         before = self.home.venues.get("v")
         found = job.solve(task.venue, files, task.options, self.home.settings, lambda _: None)
-        self.home.jobs.finish(task, found.result, [])
+        self.home.attempts.finish(task, found.result, [])
         now = self.home.venues.get("v")
         if not found.result.accepted:
             self.rejected[called] = found.result.rejected_because

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from service.settings import Settings
-from service.store.jobs import picture_file
+from service.store.jobs.files import picture_file
 from service.wire.options import Options
 from service.wire.venue import VenueIn
 from tests.worker.stock import Stock
@@ -206,7 +206,7 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, set
 
 def test_frames_that_the_store_does_not_hand_out_fail_the_job_in_its_words(tmp_path):
     home = Stock(tmp_path)
-    task = home.jobs.begin(home.submitted("v"))
+    task = home.attempts.begin(home.submitted("v"))
     shutil.rmtree(tmp_path / "blobs/frames")
     (tmp_path / "blobs/frames").write_bytes(b"no folder")
     program = [sys.executable, "-m", "worker.jobs.job", task.job_id, task.run_token]
