@@ -235,7 +235,9 @@ def fit_field(
     if not result.accepted:
         err.print(f"Rejected: {result.rejected_because}")
         raise typer.Exit(REJECTED)
-    output.write_text(stored.with_field(result).sent().model_dump_json(indent=2, exclude_none=True) + "\n")
+    fitted = stored.with_poses({camera.id: camera.pose for camera in result.cameras})
+    fitted = fitted.model_copy(update={"field": result.field})
+    output.write_text(fitted.sent().model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
 @app.command()

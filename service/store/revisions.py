@@ -15,6 +15,7 @@ from service.store import tables
 from service.store.counts.figures import note
 from service.store.engine import clock
 from service.wire import motion
+from service.wire.field import FieldOfPlay
 from service.wire.geometry import Movement, PosedCamera
 from service.wire.history import Cause, Revision, RevisionCamera
 from service.wire.venue import Camera, Venue
@@ -101,7 +102,7 @@ def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venu
     if then != now:
         raise RevisionUnfit(f"It has the cameras {_in_words(then)}, and the venue now has {_in_words(now)}.")
     try:
-        return venue.with_state(cameras, row.ridge), _revision(row)
+        return _with_state(venue, cameras, row.ridge), _revision(row)
     except ValueError:
         raise RevisionUnfit("Its ridge is none of the pitch that the venue now has.") from None
 
@@ -109,6 +110,17 @@ def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venu
 def forget_revisions(connection: sa.Connection, venue_id: str) -> None:
     """The venue is gone."""
     connection.execute(sa.delete(tables.revisions).where(r.venue == venue_id))
+
+
+def _with_state(venue: Venue, cameras: list[PosedCamera], ridge: list[list[float]] | None) -> Venue:
+    """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
+    then = {camera.id: camera for camera in cameras}
+    back = [
+        camera.model_copy(update={"pose": then[camera.id].pose, "intrinsics": then[camera.id].intrinsics})
+        for camera in venue.cameras
+    ]
+    field = FieldOfPlay.model_validate(venue.field.model_dump() | {"ridge": ridge})
+    return venue.model_copy(update={"cameras": back, "field": field})
 
 
 def _movements(

@@ -14,6 +14,7 @@ from service.store.revisions import add_revision, forget_revisions, revisions_of
 from service.store.schedules import forget_schedule, plan
 from service.wire.health import VenueHealth
 from service.wire.history import Cause, Revision
+from service.wire.results import Result
 from service.wire.venue import Venue
 
 
@@ -137,11 +138,27 @@ def save_venue(connection: sa.Connection, venue: Venue) -> None:
         connection.execute(sa.insert(table).values(id=venue.id, **values))
 
 
-def let_hold(connection: sa.Connection, venue: Venue, cause: Cause, job_id: str, stitch_error_px: float | None) -> None:
+def let_hold(connection: sa.Connection, venue: Venue, result: Result, cause: Cause, job_id: str) -> None:
     """Let a venue be as a calibration found it, inside the caller's serialised transaction."""
-    save_venue(connection, venue)
-    add_revision(connection, venue, cause, job_id, stitch_error_px=stitch_error_px)
-    settle_alarms(connection, venue)
+    found = with_result(venue, result)
+    save_venue(connection, found)
+    add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
+    settle_alarms(connection, found)
+
+
+def with_result(venue: Venue, result: Result) -> Venue:
+    """The same venue as an accepted calibration found it: poses, and the lenses and the ridge they belong to."""
+    found = {camera.id: camera for camera in result.cameras}
+    cameras = [
+        camera.model_copy(
+            update={"pose": found[camera.id].pose, "intrinsics": found[camera.id].intrinsics or camera.intrinsics}
+        )
+        if camera.id in found
+        else camera
+        for camera in venue.cameras
+    ]
+    field = venue.field if result.ridge is None else venue.field.model_copy(update={"ridge": result.ridge})
+    return venue.model_copy(update={"cameras": cameras, "field": field})
 
 
 def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job: str | None = None) -> Venue:

@@ -16,6 +16,8 @@ from service.wire.base import OPTIONS_PART, Id, Number, Whole, Wire
 LensModel = Literal["opencv", "fisheye"]
 DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
 LARGEST_SIDE = 16384
+# A position and a translation that are less apart say the same: more is not lost by writing them down.
+AGREEING_M = 1e-6
 Metres = Annotated[Number, Field(ge=-2000, le=2000)]
 Radians = Annotated[Number, Field(ge=-10, le=10)]
 Position = Annotated[list[Metres], Field(min_length=3, max_length=3)]
@@ -25,7 +27,7 @@ Side = Annotated[Whole, Field(ge=32, le=LARGEST_SIDE)]
 
 
 class PoseIn(Wire):
-    """Where a camera stands and looks: `rotation` and exactly one of `position` and `translation`."""
+    """Where a camera stands and looks: `rotation` with `position`, `translation`, or both where they agree."""
 
     rotation: Rotation = Field(description="Rodrigues vector, rad, world to camera.")
     position: Position | None = Field(None, description="Camera centre in the world, m.")
@@ -33,8 +35,14 @@ class PoseIn(Wire):
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
-        if (self.position is None) == (self.translation is None):
-            raise ValueError("give exactly one of position and translation")
+        if self.position is None and self.translation is None:
+            raise ValueError("give position or translation")
+        if self.position is not None and self.translation is not None:
+            apart = math.dist(Pose.at(self.rotation, self.position).translation, self.translation)
+            if apart > AGREEING_M:
+                raise ValueError(
+                    f"translation is {apart:.3g} m from -R·position: leave out the one that is not meant to hold"
+                )
         return self
 
 
@@ -53,16 +61,13 @@ class Pose(Wire):
 
     @classmethod
     def of(cls, pose: PoseIn) -> Pose:
-        """From a pose as it was sent."""
-        if pose.position is not None:
+        """From a pose as it was sent, which stays to the last digit what it was when it was read."""
+        if pose.translation is None:
+            assert pose.position is not None
             return cls.at(pose.rotation, pose.position)
-        assert pose.translation is not None
         backwards = rotated([-component for component in pose.rotation], pose.translation)
-        return cls(
-            rotation=pose.rotation,
-            position=[-component for component in backwards],
-            translation=pose.translation,
-        )
+        position = pose.position or [-component for component in backwards]
+        return cls(rotation=pose.rotation, position=position, translation=pose.translation)
 
 
 def rotated(rotation: list[float], vector: list[float]) -> list[float]:

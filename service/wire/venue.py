@@ -11,7 +11,6 @@ from service.wire.base import Id, Name, Wire
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Pose, PosedCamera, PoseIn, UnposedCamera
 from service.wire.health import Alarms
-from service.wire.results import FieldResult, Result
 from service.wire.schedule import Schedule
 
 
@@ -149,52 +148,10 @@ class Venue(_Place):
         cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
         return self.model_copy(update={"cameras": cameras})
 
-    def with_result(self, result: Result) -> Venue:
-        """The same venue as an accepted calibration found it: poses, and the lenses and the ridge they belong to."""
-        found = {camera.id: camera for camera in result.cameras}
-        cameras = [
-            camera.model_copy(
-                update={
-                    "pose": found[camera.id].pose,
-                    "intrinsics": found[camera.id].intrinsics or camera.intrinsics,
-                }
-            )
-            if camera.id in found
-            else camera
-            for camera in self.cameras
-        ]
-        field = self.field if result.ridge is None else self.field.model_copy(update={"ridge": result.ridge})
-        return self.model_copy(update={"cameras": cameras, "field": field})
-
-    def with_field(self, result: FieldResult) -> Venue:
-        """The same venue as an accepted field fit found it: the pitch, and the poses around it."""
-        poses = {camera.id: camera.pose for camera in result.cameras}
-        return self.with_poses(poses).model_copy(update={"field": result.field})
-
     def sent(self) -> VenueIn:
         """The venue as one sends it."""
-        cameras = [
-            CameraIn(
-                id=c.id,
-                image_size=c.image_size,
-                intrinsics=c.intrinsics,
-                pose=PoseIn(rotation=c.pose.rotation, position=c.pose.position),
-                source=c.source,
-            )
-            for c in self.cameras
-        ]
-        given = {"alarms": self.alarms, "schedule": self.schedule}
-        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras, **given)
-
-    def with_state(self, cameras: list[PosedCamera], ridge: list[list[float]] | None) -> Venue:
-        """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
-        then = {camera.id: camera for camera in cameras}
-        back = [
-            camera.model_copy(update={"pose": then[camera.id].pose, "intrinsics": then[camera.id].intrinsics})
-            for camera in self.cameras
-        ]
-        field = FieldOfPlay.model_validate(self.field.model_dump() | {"ridge": ridge})
-        return self.model_copy(update={"cameras": back, "field": field})
+        once = {"cameras": {"__all__": {"pose": {"translation"}}}}
+        return VenueIn.model_validate(self.model_dump(exclude=once))
 
     def stands_like(self, other: Venue) -> bool:
         """Whether the cameras of both are the same and stand alike, with the ridge that their poses belong to."""

@@ -155,7 +155,7 @@ def _move_poses(connection: sa.Connection, task: Task, result: Result) -> Result
     moves = result.accepted and not task.options.dry_run
     note_quality(connection, task.venue.id, result, clock(connection), moved=moves)
     if moves:
-        let_hold(connection, now_stored.with_result(result), "calibrated", task.job_id, result.stitch_error_px)
+        let_hold(connection, now_stored, result, "calibrated", task.job_id)
     elif not task.options.dry_run:
         _miss(connection, now_stored)
     return result

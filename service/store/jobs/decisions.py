@@ -54,7 +54,7 @@ class Decisions:
             if now_stored is None or not now_stored.calibrates_like(began_with):
                 raise MovedOn(newest)
             note_quality(connection, began_with.id, result, clock(connection), moved=True)
-            let_hold(connection, now_stored.with_result(result), "accepted", job_id, result.stitch_error_px)
+            let_hold(connection, now_stored, result, "accepted", job_id)
             _touch(connection, job_id)
 
     def reject(self, job_id: str) -> None:

@@ -13,6 +13,7 @@ from service.store.deliveries import delivery_of
 from service.store.engine import reading
 from service.store.jobs.files import picture_file, picture_folder
 from service.store.revisions import revision_of_job
+from service.store.venues import with_result
 from service.wire.job import Job, Status
 from service.wire.results import Result
 from service.wire.venue import Venue
@@ -85,7 +86,7 @@ class Jobs:
         """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
         with reading(self._engine) as connection:
             found = found_poses(connection, job_id)
-        return None if found is None else found[0].with_result(found[1])
+        return None if found is None else with_result(*found)
 
     def check(self) -> None:
         """Raise unless the database answers, and has them."""
