@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import io
-import secrets
 
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Enqueue, Intake, frame_paths
 from service.store.ids import new_id
 from service.store.jobs.submission import Submission, Submissions
-from service.store.jobs.task import Origin
+from service.store.jobs.task import Origin, seeded
 from service.store.venues import Venues
 from service.wire.job import Job
 from service.wire.options import Options
@@ -40,12 +39,11 @@ class Unattended:
             return known, False
         frames = self._snapshots.take(venue.cameras, self._venues.credentials(venue.id))
         job_id = new_id()
-        seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
         paths = frame_paths(job_id, dict.fromkeys(frames, 1))
         submission = Submission(
             job_id=job_id,
             venue=venue,
-            options=seeded,
+            options=seeded(options),
             frames=paths,
             origin=origin,
             content_hash=sent,

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from io import BytesIO
+from typing import BinaryIO
 
 from fastapi import APIRouter, Request, Response
-from starlette.datastructures import UploadFile
 
 from service.api.context import Context, InContext
-from service.routes import uploads
+from service.routes import forms, submissions
 from service.routes.documented import headers, needs, problems
 from service.routes.guarded import Guarded
-from service.routes.jobs import Existing, job_answer
+from service.routes.jobs import Existing
 from service.routes.venues import no_such_venue
 from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
@@ -36,17 +36,14 @@ router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 )
 def submit_again(job: Existing, request: Request, context: InContext) -> Response:
     """Submit what a job was made of again, with its options, as long as its frames are kept."""
-    uploads.require_room(context)
+    forms.require_room(context)
     before = context.submissions.of(job.id)
     if before is None:
         raise _gone(context, job)
     if before.venue is not None:
         _require_the_same(context, before.venue)
     files = {name: [_read(context, job, path) for path in paths] for name, paths in before.frames.items()}
-    submission = _renewed(before, request)
-    enqueue = context.queue.enqueue_light if job.kind == "locate" else context.queue.enqueue
-    again, new = uploads.enqueue_upload(context, submission, files, enqueue)
-    return job_answer(again, status=202 if new else 200)
+    return submissions.answer(*submissions.enqueued(context, _renewed(before, request), files))
 
 
 def _renewed(before: Submission, request: Request) -> Submission:
@@ -66,11 +63,11 @@ def _require_the_same(context: Context, then: Venue) -> None:
         raise Problem("venue-replaced", "Its pitch, cameras or lenses were changed since; send new frames.")
 
 
-def _read(context: Context, job: Job, path: str) -> UploadFile:
+def _read(context: Context, job: Job, path: str) -> BinaryIO:
     data = context.blobs.get(path)
     if data is None:
         raise _gone(context, job)
-    return UploadFile(BytesIO(data))
+    return BytesIO(data)
 
 
 def _gone(context: Context, job: Job) -> Problem:

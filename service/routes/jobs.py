@@ -11,11 +11,11 @@ from fastapi import APIRouter, Depends, Header, HTTPException, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from service.api import etags
 from service.api.context import Context, InContext, JobIdPath
-from service.routes.documented import headers, needs, problems
+from service.routes.documented import needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
+from service.routes.tagged import TAGGED, IfNoneMatch, unless_known
 from service.routes.venues import revision_unfit
 from service.store.engine import AWAY
 from service.store.jobs.decisions import MovedOn, NoPoses
@@ -37,15 +37,12 @@ EVENT_AT_LEAST_EVERY_S = 10
 def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
     """The one form a job leaves in: body, ETag, Location of a new one, Retry-After while it is open."""
     body = job.model_dump_json().encode()
-    tag = etags.of(body)
-    headers = {"ETag": etags.quoted(tag), "Cache-Control": "no-cache"}
+    answer = unless_known(body, if_none_match, lambda: Response(body, status, media_type="application/json"))
     if job.open:
-        headers["Retry-After"] = str(RETRY_AFTER_S)
-    if if_none_match is not None and etags.names(if_none_match, tag):
-        return Response(status_code=304, headers=headers)
-    if status == 202:
-        headers["Location"] = job.links["self"]
-    return Response(body, status, headers, "application/json")
+        answer.headers["Retry-After"] = str(RETRY_AFTER_S)
+    if answer.status_code == HTTPStatus.ACCEPTED:
+        answer.headers["Location"] = job.links["self"]
+    return answer
 
 
 async def _existing(job_id: JobIdPath, context: InContext) -> Job:
@@ -77,13 +74,13 @@ def list_jobs(
     "/{job_id}",
     openapi_extra=needs("read"),
     response_model=Job,
-    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
+    responses=TAGGED | problems(404),
 )
 async def get_job(
     job: Existing,
     context: InContext,
     wait: Annotated[float, Query(ge=0, allow_inf_nan=False, description="Seconds, at most 60 are waited.")] = 0,
-    if_none_match: Annotated[str | None, Header()] = None,
+    if_none_match: IfNoneMatch = None,
 ) -> Response:
     """A job in whatever state. With `wait` the answer is held until the job ends."""
     if wait and job.open:
@@ -181,7 +178,7 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
     "/{job_id}/poses",
     openapi_extra=needs("read"),
     response_class=Response,
-    responses={**DOCUMENTS, 200: DOCUMENTS[200] | headers("ETag"), **problems(404)},
+    responses=DOCUMENTS | problems(404),
 )
 def job_poses(
     job: Existing,

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.intake import images as border
-from service.routes import uploads
-from service.routes.calibrate import expecting
+from service.routes import forms, submissions
 from service.routes.documented import headers, needs, problems, reference
 from service.routes.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
-from service.store.ids import new_id
-from service.store.jobs.submission import Submission
+from service.routes.submissions import IdempotencyKey, Sent
 from service.store.jobs.task import Origin
-from service.wire import callbacks
 from service.wire.base import ID_PATTERN, OPTIONS_PART
 from service.wire.job import OPEN, Job
 from service.wire.options import LocateOptions
@@ -67,17 +62,15 @@ async def locate(
     wait: Annotated[
         float, Query(ge=0, allow_inf_nan=False, description="Seconds that the answer is held, at most 60.")
     ] = 0,
-    idempotency_key: Annotated[
-        str | None, Header(pattern=uploads.KEY_PATTERN, description=uploads.KEY_DESCRIPTION)
-    ] = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Find the first pose of a camera from points of the pitch and their pixels. The stored pose stays as it is.
 
     The job takes about a second and waits for no calibration; with `wait` the answer is its end.
     """
-    uploads.require_form(request)
-    stored = await run_in_threadpool(expecting, context, venue_id)
-    async with uploads.form_of(request, 1) as form:
+    forms.require_form(request)
+    stored = await run_in_threadpool(forms.expecting, context, venue_id)
+    async with forms.form_of(request, 1) as form:
         origin = request.state.origin
         job, new = await run_in_threadpool(_submit, context, stored, camera, form, idempotency_key, origin)
     if wait and job.open:
@@ -91,28 +84,10 @@ def _submit(
     context: Context, venue: Venue, camera_id: str, form: FormData, idempotency_key: str | None, origin: Origin
 ) -> tuple[Job, bool]:
     camera = _camera(venue, camera_id)
-    options = uploads.options_of(form, LocateOptions)
-    if options.callback_url is not None:
-        callbacks.check(options.callback_url, context.settings)
+    options = forms.options_of(form, LocateOptions, context.settings)
     files = {camera_id: _frame(camera, form)}
-    sent = hashlib.sha256(f"locate {camera_id} {options.model_dump_json()}".encode())
-    for frame in files[camera_id]:
-        data = frame.file.read()
-        border.check(camera, data, context.settings)
-        sent.update(hashlib.sha256(data).digest())
-    job_id = new_id()
-    paths = uploads.frame_paths(job_id, files)
-    submission = Submission(
-        job_id=job_id,
-        kind="locate",
-        venue=venue,
-        options=options,
-        frames=paths,
-        origin=origin,
-        content_hash=sent.hexdigest(),
-        idempotency_key=idempotency_key,
-    )
-    return uploads.enqueue_upload(context, submission, files, context.queue.enqueue_light)
+    check = submissions.of_cameras([camera], context.settings)
+    return submissions.take(context, Sent("locate", venue, options, files, check, idempotency_key, origin))
 
 
 def _camera(venue: Venue, camera_id: str) -> Camera:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,13 @@ OPTIONS: dict[Kind, type[AnyOptions]] = {
     "locate": LocateOptions,
     "field": FieldOptions,
 }
+
+
+def seeded(options: AnyOptions) -> AnyOptions:
+    """The options with a seed where one can be chosen and was not, so that a job can be computed again alike."""
+    if not isinstance(options, Options | FieldOptions) or options.seed is not None:
+        return options
+    return options.model_copy(update={"seed": secrets.randbelow(2**31)})
 
 
 @dataclass(frozen=True)
