@@ -10,20 +10,16 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
-import selectors
 import signal
-import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, TypeVar
 
 import structlog
-from pydantic import ValidationError
 
-from service import lifeline
 from service.home import open_home
 from service.observe import tracing
 from service.queue import WorkerQueue
@@ -33,34 +29,26 @@ from service.store.jobs.attempts import Attempts
 from service.store.jobs.task import Task
 from service.wire.job import JobError, Progress
 from service.wire.problems import KINDS, first_line, type_of
+from worker.child import Child
 from worker.duties.alarms import Alarms
-from worker.duties.callbacks import Callbacks
+from worker.duties.delivering import Delivering
 from worker.duties.retention import Retention
 from worker.duties.scheduled import Scheduled
 from worker.message import Message
 from worker.spans import Spans
 
 BEAT_S = 2.0
-# Twice as often as a cancellation needs to reach the child.
-LOOK_S = 0.5
 PROGRESS_S = 0.25
 # How long the database may be away, beyond the time the job has anyway, before its end is lost.
 OUTAGE_S = 60.0
 TRY_AGAIN_S = 1.0
 PUT_OFF_S = 10.0
-LONGEST_LINE = 16 * 1024 * 1024
-# For a process that has closed its output.
-ENDING_S = 10.0
 Answer = TypeVar("Answer")
 log = structlog.get_logger()
 
 
 class AlreadyRunning(Exception):  # noqa: N818
     """A worker of this name runs on this machine."""
-
-
-class NoMessage(Exception):  # noqa: N818
-    """What a child writes is not what a program of jobs writes."""
 
 
 def run(settings: Settings) -> None:
@@ -92,7 +80,7 @@ class Worker:
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt
         )
         self._retention = Retention(settings, home.expiry, home.blobs, home.workers, self._queue.forget)
-        self._callbacks = Callbacks(settings, home.deliveries, home.jobs, home.deliveries.now)
+        self._delivering = Delivering(settings, home.deliveries, home.jobs, home.deliveries.now)
         self._alarms = Alarms(home.venues)
         self._scheduled = Scheduled(home.schedules, home.venues, home.unattended, home.disk, home.queue.enqueue)
 
@@ -107,7 +95,7 @@ class Worker:
         Beside that, in threads of their own, tidy up, tell who asked for it of the ends of jobs and of alarms, see
         which alarms have come of time that has passed, and submit what schedules ask for.
         """
-        for look in (self._retention.look, self._callbacks.look, self._alarms.look, self._scheduled.look):
+        for look in (self._retention.look, self._delivering.look, self._alarms.look, self._scheduled.look):
             threading.Thread(target=_again_and_again, args=(look, stop), daemon=True).start()
         beaten, judging_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):
@@ -218,70 +206,10 @@ class Hold:
             return False
 
 
-class Child:
-    """The process that computes one job; killed when the `with` block is left."""
-
-    def __init__(self, settings: Settings, task: Task) -> None:
-        self._process = subprocess.Popen(
-            [*settings.job_program, task.job_id, task.run_token],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            env=os.environ | _as_environment(settings) | settings.native_environment | lifeline.for_child(),
-        )
-        assert self._process.stdout is not None
-        self._output: IO[bytes] = self._process.stdout
-
-    def __enter__(self) -> Child:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.wait()
-        self._output.close()
-
-    def messages(self) -> Iterator[Message | None]:
-        """What the child says until it ends, and None at least every `LOOK_S`."""
-        descriptor, pending, looked = self._output.fileno(), b"", time.monotonic()
-        with selectors.DefaultSelector() as selector:
-            selector.register(descriptor, selectors.EVENT_READ)
-            while True:
-                if selector.select(LOOK_S):
-                    chunk = os.read(descriptor, 65536)
-                    if not chunk:
-                        return
-                    *lines, pending = (pending + chunk).split(b"\n")
-                    if len(pending) > LONGEST_LINE:
-                        raise NoMessage(f"its program wrote a line of more than {LONGEST_LINE} bytes")
-                    yield from (message for line in lines if (message := _understood(line)))
-                if time.monotonic() - looked >= LOOK_S:
-                    looked = time.monotonic()
-                    yield None
-
-    def how_it_ended(self) -> str:
-        """For the job's error, after the output has ended."""
-        try:
-            code = self._process.wait(ENDING_S)
-        except subprocess.TimeoutExpired:
-            return "Its process closed its output and went on with no result; see the worker's log."
-        if code == -signal.SIGKILL:
-            return "Its process was killed, most likely for lack of memory."
-        if code < 0:
-            return f"Its process died of {signal.Signals(-code).name}; see the worker's log."
-        return f"Its process ended with code {code} and no result; see the worker's log."
-
-
 def model_sha256(path: Path) -> str:
     """The hash of the model file, as in `provenance`."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _understood(line: bytes) -> Message | None:
-    try:
-        return Message.model_validate_json(line)
-    except ValidationError:
-        log.warning("not understood", line=line[:500].decode(errors="replace"))
-        return None
 
 
 def _insist(write: Callable[[], Answer], until: float) -> Answer:
@@ -309,19 +237,6 @@ def _again_and_again(look: Callable[[], float], stop: threading.Event) -> None:
 
 def _error(kind: str, detail: str) -> JobError:
     return JobError(type=type_of(kind), title=KINDS[kind].title, detail=detail)
-
-
-def _as_environment(settings: Settings) -> dict[str, str]:
-    """What the child needs to find the same home, however this process was configured."""
-    return {
-        "ESC_DATA": str(settings.data.absolute()),
-        "ESC_DATABASE_URL": settings.home_database_url,
-        "ESC_BLOB_URL": settings.home_blob_url,
-        "ESC_MODEL": str(settings.model.absolute()),
-        "ESC_THREADS": str(settings.threads),
-        "ESC_LOG_FORMAT": settings.log_format,
-        "ESC_LOG_LEVEL": settings.log_level,
-    }
 
 
 def _only_one(settings: Settings) -> IO[bytes]:

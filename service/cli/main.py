@@ -188,14 +188,14 @@ def run(
     # Before NumPy is loaded, which the next line does.
     os.environ |= settings.native_environment
     from service.store.jobs.files import picture_file
-    from worker.jobs import job
+    from worker.jobs import calibration
 
     stored = _checked(VenueIn, venue.read_text(), str(venue)).stored()
     if chosen.seed is None:
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
     files = _checked_files(stored, frames, settings)
     with _failure_told(), _bar() as show:
-        outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
+        outcome = calibration.solve(stored, files, chosen, settings, lambda step: show(step, ""))
     output.mkdir(parents=True, exist_ok=True)
     (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
     for name, picture in outcome.pictures.items():

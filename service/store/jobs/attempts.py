@@ -53,13 +53,17 @@ class Attempts:
             )
             if connection.execute(begin).rowcount == 0:
                 return None
-            return _task(connection, job_id)
-
-    def task(self, job_id: str, run_token: str) -> Task | None:
-        """What to compute; None if the attempt has lost the job."""
-        with reading(self._engine) as connection:
-            task = _task(connection, job_id)
-            return task if task.run_token == run_token else None
+            row = connection.execute(ONE, {"job_id": job_id}).one()
+            return Task(
+                job_id=job_id,
+                kind=row.kind,
+                venue=row.venue_document,
+                options=row.options,
+                frames=row.frames,
+                origin=Origin(row.request_id, row.traceparent),
+                run_token=row.run_token,
+                attempt=row.attempt,
+            )
 
     def holds(self, task: Task) -> bool:
         """Whether the job is still this attempt's; False if it has lost it, to a cancellation or to another attempt."""
@@ -116,20 +120,6 @@ class Attempts:
         """End an open job that the queue has given up; False if it has ended meanwhile."""
         with writing(self._engine) as connection:
             return _fail(connection, job_id, still_open(job_id), error)
-
-
-def _task(connection: sa.Connection, job_id: str) -> Task:
-    row = connection.execute(ONE, {"job_id": job_id}).one()
-    return Task(
-        job_id=job_id,
-        kind=row.kind,
-        venue=row.venue_document,
-        options=row.options,
-        frames=row.frames,
-        origin=Origin(row.request_id, row.traceparent),
-        run_token=row.run_token,
-        attempt=row.attempt,
-    )
 
 
 def _fence(task: Task) -> Still:

@@ -69,3 +69,7 @@ class Task(Asked):
     # A worker that lost its job holds another one than the row.
     run_token: str
     attempt: int = 1
+
+    def without_addresses(self) -> Task:
+        """The same but for who is told of its end: to compute it nobody need know, and the address may be a secret."""
+        return self.model_copy(update={"options": self.options.model_copy(update={"callback_url": None})})

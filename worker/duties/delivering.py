@@ -30,7 +30,7 @@ GONE = 410
 log = structlog.get_logger()
 
 
-class Callbacks:
+class Delivering:
     """Sends what is due by the clock `now`."""
 
     def __init__(self, settings: Settings, deliveries: Deliveries, jobs: Jobs, now: Callable[[], datetime]) -> None:

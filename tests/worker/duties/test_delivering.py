@@ -17,7 +17,7 @@ from tests.homes import in_both_homes
 from tests.worker.receiver import Dripping, Endless, NulSaying, Receiver, Silent
 from tests.worker.stock import Stock, anyway
 from worker.duties import webhook
-from worker.duties.callbacks import ATTEMPT, Callbacks
+from worker.duties.delivering import ATTEMPT, Delivering
 
 SECRET, OTHER_SECRET = ("whsec_" + b64encode(bytes([n]) * 32).decode() for n in (7, 8))
 LOCAL = {"webhook_secret": SECRET, "callback_allow_http": True, "callback_allow_private": True}
@@ -68,8 +68,8 @@ def receiver():
         one.close()
 
 
-def callbacks(stock, clock) -> Callbacks:
-    return Callbacks(stock.settings, stock.deliveries, stock.jobs, clock)
+def callbacks(stock, clock) -> Delivering:
+    return Delivering(stock.settings, stock.deliveries, stock.jobs, clock)
 
 
 def ended(stock, url: str, **more) -> str:
