@@ -16,7 +16,7 @@ from service.api.access import QUIET, Access
 from service.api.auth import Gate
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
-from service.api.conventions import Conventions
+from service.api.http_defaults import HttpDefaults
 from service.api.shared_reads import SharedReads
 from service.api.watch import Watch
 from service.home import open_home
@@ -64,9 +64,9 @@ def create_app(settings: Settings) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.context = context
-    app.add_middleware(BodyLimit, largest=int(settings.max_body_mb * 1e6))
+    app.add_middleware(BodyLimit, largest_form=int(settings.max_body_mb * 1e6))
     app.add_middleware(Access, metrics=context.metrics)
-    app.add_middleware(Conventions)
+    app.add_middleware(HttpDefaults)
     documented.document_callback(app)
     documented.document_alarms(app)
     problems.install(app)

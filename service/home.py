@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from service import queue
+from service.intake.from_sources import FromSources
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake
-from service.intake.unattended import Unattended
 from service.observe.disk import Disk
 from service.queue import Queue
 from service.settings import Settings
@@ -28,7 +28,7 @@ class Home(Stores):
     queue: Queue
     snapshots: Snapshots
     intake: Intake
-    unattended: Unattended
+    from_sources: FromSources
 
     def close(self) -> None:
         """Let the database go."""
@@ -50,5 +50,5 @@ def open_home(settings: Settings) -> Home:
         queue=Queue(settings.home_database_url),
         snapshots=snapshots,
         intake=intake,
-        unattended=Unattended(stores.venues, stores.submissions, snapshots, intake),
+        from_sources=FromSources(stores.venues, stores.submissions, snapshots, intake),
     )

@@ -75,7 +75,7 @@ def _from_http(request: Request, error: HTTPException) -> Problem:
             allowed = ", ".join(sorted(_methods_at(request)))
             return Problem("method-not-allowed", f"Here work {allowed}.", headers={"Allow": allowed})
         case 413:
-            return Problem("body-too-large", "Send fewer or smaller frames.", headers=error.headers)
+            return Problem("body-too-large", str(error.detail), headers=error.headers)
         case _:
             return Problem("malformed-request", str(error.detail), headers=error.headers)
 

@@ -13,7 +13,7 @@ import structlog
 from pydantic import BaseModel, ValidationError
 
 from service import lifeline
-from service.intake import images as border
+from service.intake import images
 from service.settings import Settings
 from service.wire.addresses import HIDDEN
 from service.wire.problems import Problem
@@ -104,7 +104,7 @@ class Snapshots:
                 source=camera.source,
             )
         data = (folder / camera.id).read_bytes()
-        border.check(camera, data, self._settings)
+        images.check(camera, data, self._settings)
         return data
 
 

@@ -67,7 +67,7 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
 def fetch(context: Context, venue: Venue, options: Options, idempotency_key: str | None, origin: Origin) -> Response:
     """Make what the cameras of `venue` show now a job."""
     try:
-        job, new = context.unattended.calibrate(venue, options, idempotency_key, origin, context.queue.enqueue)
+        job, new = context.from_sources.calibrate(venue, options, idempotency_key, origin, context.queue.enqueue)
     except REFUSALS as refusal:
         raise submissions.in_words(refusal, venue.id, context.settings) from None
     return submissions.answer(job, new)

@@ -15,7 +15,7 @@ from service.api.problems import invalid
 from service.intake import images
 from service.routes.venues import no_such_venue
 from service.settings import Settings
-from service.wire import callbacks
+from service.wire import callback_urls
 from service.wire.base import OPTIONS_PART
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
 from service.wire.problems import Problem
@@ -87,7 +87,7 @@ def options_of(form: FormData, model: type[Chosen], settings: Settings) -> Chose
     except (ValueError, RecursionError):
         raise Problem("invalid-request", "The options part is not JSON.", errors=[]) from None
     if options.callback_url is not None:
-        callbacks.check(options.callback_url, settings)
+        callback_urls.check(options.callback_url, settings)
     return options
 
 

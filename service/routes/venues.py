@@ -14,7 +14,7 @@ from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
 from service.routes.tagged import TAGGED, IfNoneMatch, json, unless_known
 from service.store.revisions import NoSuchRevision, RevisionUnfit
-from service.wire import callbacks
+from service.wire import callback_urls
 from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
@@ -55,7 +55,7 @@ def put_venue(
     if venue.id != venue_id:
         raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
     if venue.alarms is not None and venue.alarms.callback_url is not None:
-        callbacks.check(venue.alarms.callback_url, context.settings)
+        callback_urls.check(venue.alarms.callback_url, context.settings)
 
     def allow(before: Venue | None) -> None:
         _require_match(if_match, before)

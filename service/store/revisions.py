@@ -14,7 +14,6 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.counts.figures import note
 from service.store.engine import clock
-from service.wire import motion
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Movement, PosedCamera
 from service.wire.history import Cause, Revision, RevisionCamera
@@ -143,8 +142,11 @@ def _movements(
 def _movement(
     venue: Venue, camera: Camera, last: PosedCamera | None, firsts: dict[str, PosedCamera], since: int
 ) -> Movement:
+    # Loads OpenCV, for which neither a command nor the start of a service waits.
+    from service.store.movement import moved
+
     def from_there(then: PosedCamera | None) -> Any:
-        return None if then is None else motion.moved(venue.field, then, camera)
+        return None if then is None else moved(venue.field, then, camera)
 
     return Movement(moved=from_there(last), drift=from_there(firsts.get(camera.id, camera)), drift_since=since)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Annotated
 from urllib.parse import urlsplit, urlunsplit
 
 from pydantic import AfterValidator, HttpUrl, StringConstraints
 
+IpAddress = IPv4Address | IPv6Address
 # Written as browsers understand it: 0x7f.1 is 127.0.0.1 from here on, for whoever looks at it.
 CallbackUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(lambda url: str(HttpUrl(url)))]
 # Stands where user and password were in a source that is shown.
@@ -27,6 +29,14 @@ def _is_a_source(url: str) -> str:
 
 
 SourceUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(_is_a_source)]
+
+
+def ip_of(host: str) -> IpAddress | None:
+    """The address that a host is written as; None: it is a name."""
+    try:
+        return ip_address(host)
+    except ValueError:
+        return None
 
 
 def without_credentials(url: str) -> tuple[str, str | None]:

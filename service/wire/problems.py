@@ -94,6 +94,7 @@ KINDS: dict[str, Kind] = {
     "job-abandoned": Kind(500, "The job was given up"),
     # The service.
     "disk-full": Kind(507, "The disk is nearly full"),
+    "extra-missing": Kind(503, "The service was installed without this"),
     "unavailable": Kind(503, "The service cannot answer right now"),
     "internal-error": Kind(500, "The service made a mistake"),
 }

@@ -16,7 +16,7 @@ from service.wire.options import Options
 from service.wire.venue import Venue
 
 
-class Unattended:
+class FromSources:
     """Fetches and submits."""
 
     def __init__(self, venues: Venues, submissions: Submissions, snapshots: Snapshots, intake: Intake) -> None:
