@@ -1,7 +1,6 @@
 """The process that computes one job: what it is given, what it says, and how it ended.
 
-It decodes files that strangers sent, in native code. So it gets the task and the way to the files, and of the
-environment only what is named here: no password of the database, no secret that callbacks are signed with.
+It decodes files that strangers sent. So it gets the task and the way to the files, and no database.
 """
 
 from __future__ import annotations
@@ -28,10 +27,8 @@ LOOK_S = 0.5
 LONGEST_LINE = 16 * 1024 * 1024
 # For a process that has closed its output.
 ENDING_S = 10.0
-# What the child inherits: the machine and its languages, the way to a bucket, and what the runtimes of networks read.
-INHERITED = {"PATH", "HOME", "USER", "TMPDIR", "TZ", "LANG"}
-INHERITED_FROM = ("LC_", "LD_", "PYTHON", "AWS_", "SSL_CERT_", "CUDA_", "NVIDIA_", "ORT_", "OPENVINO_")
-PROXIES = {"HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "NO_PROXY"}
+# The way to a bucket, which is in the environment alone.
+TO_THE_BUCKET = ("AWS_", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "NO_PROXY")
 log = structlog.get_logger()
 
 
@@ -51,7 +48,7 @@ class Child:
                 settings.job_program,
                 stdin=given,
                 stdout=subprocess.PIPE,
-                env=_inherited() | _as_environment(settings) | settings.native_environment | lifeline.for_child(),
+                env=lifeline.without_secrets(*TO_THE_BUCKET) | _as_environment(settings) | settings.native_environment,
             )
         assert self._process.stdout is not None
         self._output: IO[bytes] = self._process.stdout
@@ -101,14 +98,6 @@ def _understood(line: bytes) -> Message | None:
     except ValidationError:
         log.warning("not understood", line=line[:500].decode(errors="replace"))
         return None
-
-
-def _inherited() -> dict[str, str]:
-    return {
-        name: value
-        for name, value in os.environ.items()
-        if name in INHERITED or name.startswith(INHERITED_FROM) or name.upper() in PROXIES
-    }
 
 
 def _as_environment(settings: Settings) -> dict[str, str]:
