@@ -13,15 +13,9 @@ from starlette.responses import Response
 
 from service.api import problems
 from service.api.access import QUIET, Access
-from service.api.auth import Gate
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
-from service.api.shared_reads import SharedReads
-from service.api.watch import Watch
-from service.home import open_home
-from service.observe.metrics import Metrics
-from service.observe.readiness import Readiness
 from service.pages import ROUTERS as PAGES
 from service.routes import (
     again,
@@ -39,7 +33,6 @@ from service.routes import (
 )
 from service.settings import Settings
 from service.store.blobs import AWAY as BLOBS_AWAY
-from service.store.counts.figures import look
 from service.store.engine import AWAY as DATABASE_AWAY
 from service.wire.problems import Problem
 
@@ -48,7 +41,7 @@ log = structlog.get_logger()
 
 def create_app(settings: Settings) -> FastAPI:
     """The application; brings the database up to date first."""
-    context = open_context(settings)
+    context = Context(settings)
     app = documented.DocumentedApp(
         title="ESC",
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
@@ -76,20 +69,6 @@ def create_app(settings: Settings) -> FastAPI:
     for router in PAGES:
         app.include_router(router)
     return app
-
-
-def open_context(settings: Settings) -> Context:
-    """Open the home, and what answers from it."""
-    home = open_home(settings)
-    silence_s = settings.takeover_after_s
-    return Context(
-        **vars(home),
-        reads=SharedReads(home.jobs.get),
-        watch=Watch(home.jobs.states),
-        metrics=Metrics(lambda: look(home.engine, settings.metrics_venues), home.disk, silence_s),
-        readiness=Readiness(home.jobs, home.blobs, home.disk, home.workers, silence_s),
-        gate=Gate(home.keys, home.sessions, settings),
-    )
 
 
 @asynccontextmanager

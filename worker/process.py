@@ -20,7 +20,7 @@ from typing import IO, TypeVar
 
 import structlog
 
-from service.home import open_home
+from service.home import Home
 from service.observe import tracing
 from service.queue import WorkerQueue
 from service.settings import Settings
@@ -74,7 +74,7 @@ class Worker:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        home = open_home(settings)
+        home = Home(settings)
         self._attempts, self._workers = home.attempts, home.workers
         self._queue = WorkerQueue(
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt

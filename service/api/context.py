@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, cast
 
 from fastapi import Depends, Path, Request
@@ -13,18 +12,22 @@ from service.api.watch import Watch
 from service.home import Home
 from service.observe.metrics import Metrics
 from service.observe.readiness import Readiness
+from service.settings import Settings
+from service.store.counts.figures import look
 from service.wire.base import ID_PATTERN, JOB_ID_PATTERN
 
 
-@dataclass(frozen=True)
 class Context(Home):
-    """The home, and everything else that holds state."""
+    """The home, and what answers from it."""
 
-    reads: SharedReads
-    watch: Watch
-    metrics: Metrics
-    readiness: Readiness
-    gate: Gate
+    def __init__(self, settings: Settings) -> None:
+        super().__init__(settings)
+        silence_s = settings.takeover_after_s
+        self.reads = SharedReads(self.jobs.get)
+        self.watch = Watch(self.jobs.states)
+        self.metrics = Metrics(lambda: look(self.engine, settings.metrics_venues), self.disk, silence_s)
+        self.readiness = Readiness(self.jobs, self.blobs, self.disk, self.workers, silence_s)
+        self.gate = Gate(self.keys, self.sessions, settings)
 
 
 async def _context(request: Request) -> Context:

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request, Response
 
 from service.api.context import Context, InContext
 from service.routes import forms, submissions
-from service.routes.documented import headers, needs, problems
+from service.routes.documented import needs, problems, submitted
 from service.routes.guarded import Guarded
 from service.routes.jobs import Existing
 from service.routes.venues import no_such_venue
@@ -28,11 +28,7 @@ router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
     status_code=202,
     response_model=Job,
     openapi_extra=needs("calibrate"),
-    responses={
-        200: {"model": Job, "description": "It is being computed", **headers("ETag")},
-        202: headers("ETag", "Location", "Retry-After"),
-        **problems(404, 409, 410, 507),
-    },
+    responses=submitted("It is being computed") | problems(404, 409, 410, 507),
 )
 def submit_again(job: Existing, request: Request, context: InContext) -> Response:
     """Submit what a job was made of again, with its options, as long as its frames are kept."""

@@ -9,7 +9,7 @@ from starlette.datastructures import FormData
 from service.api.context import Context, InContext, VenueIdPath
 from service.intake.submit import REFUSALS
 from service.routes import forms, submissions
-from service.routes.documented import frames_upload, headers, needs, problems
+from service.routes.documented import frames_form, needs, problems, submitted
 from service.routes.guarded import Guarded
 from service.routes.submissions import IdempotencyKey, Sent
 from service.store.jobs.task import Origin
@@ -19,19 +19,13 @@ from service.wire.venue import Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
-UPLOAD = frames_upload(Options, required=False)
-
 
 @router.post(
     "/venues/{venue_id}/calibrate",
     status_code=202,
     response_model=Job,
-    responses={
-        200: {"model": Job, "description": "This content is already a job", **headers("ETag")},
-        202: headers("ETag", "Location", "Retry-After"),
-        **problems(400, 404, 408, 409, 413, 415, 422, 429, 502, 507),
-    },
-    openapi_extra=UPLOAD | needs("calibrate"),
+    responses=submitted() | problems(400, 404, 408, 409, 413, 415, 422, 429, 502, 507),
+    openapi_extra=frames_form(Options, required=False) | needs("calibrate"),
 )
 async def calibrate(
     venue_id: VenueIdPath,

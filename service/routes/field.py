@@ -8,7 +8,7 @@ from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext, VenueIdPath
 from service.routes import forms, submissions
-from service.routes.documented import frames_upload, headers, needs, problems
+from service.routes.documented import frames_form, needs, problems, submitted
 from service.routes.guarded import Guarded
 from service.routes.submissions import IdempotencyKey, Sent
 from service.store.jobs.task import Origin
@@ -23,12 +23,8 @@ router = APIRouter(tags=["jobs"], route_class=Guarded)
     "/venues/{venue_id}/field/fit",
     status_code=202,
     response_model=Job,
-    responses={
-        200: {"model": Job, "description": "This content is already a job", **headers("ETag")},
-        202: headers("ETag", "Location", "Retry-After"),
-        **problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
-    },
-    openapi_extra=frames_upload(FieldOptions) | needs("calibrate"),
+    responses=submitted() | problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
+    openapi_extra=frames_form(FieldOptions) | needs("calibrate"),
 )
 async def fit_field(
     venue_id: VenueIdPath,

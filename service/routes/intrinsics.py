@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import PurePath
-from typing import Any
 
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
@@ -12,7 +11,7 @@ from starlette.datastructures import FormData, UploadFile
 from service.api.context import Context, InContext
 from service.intake import images
 from service.routes import forms, submissions
-from service.routes.documented import headers, needs, problems, reference
+from service.routes.documented import FILE, form, needs, problems, submitted
 from service.routes.guarded import Guarded
 from service.routes.submissions import IdempotencyKey, Sent
 from service.store.jobs.task import Origin
@@ -24,38 +23,20 @@ from service.wire.problems import Problem
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
 LONGEST_NAME = 100
-UPLOAD: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "description": "JPEG or PNG photos of one board, all by one camera in one size, each a part "
-                    "`photos` with its file name.",
-                    "properties": {
-                        OPTIONS_PART: reference(IntrinsicsOptions),
-                        PHOTOS_PART: {"type": "array", "items": {"type": "string", "format": "binary"}},
-                    },
-                    "required": [OPTIONS_PART, PHOTOS_PART],
-                    "additionalProperties": False,
-                },
-                "encoding": {OPTIONS_PART: {"contentType": "application/json"}},
-            }
-        },
-    }
-}
+UPLOAD = form(
+    IntrinsicsOptions,
+    "JPEG or PNG photos of one board, all by one camera in one size, each a part `photos` with its file name.",
+    needed=[OPTIONS_PART, PHOTOS_PART],
+    parts={PHOTOS_PART: {"type": "array", "items": FILE}},
+    others=False,
+)
 
 
 @router.post(
     "/intrinsics",
     status_code=202,
     response_model=Job,
-    responses={
-        200: {"model": Job, "description": "This content is already a job", **headers("ETag")},
-        202: headers("ETag", "Location", "Retry-After"),
-        **problems(400, 408, 413, 415, 422, 429, 507),
-    },
+    responses=submitted() | problems(400, 408, 413, 415, 422, 429, 507),
     openapi_extra=UPLOAD | needs("calibrate"),
 )
 async def intrinsics(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
@@ -10,7 +10,7 @@ from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext, VenueIdPath
 from service.routes import forms, submissions
-from service.routes.documented import headers, needs, problems, reference
+from service.routes.documented import form, needs, problems, submitted
 from service.routes.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
 from service.routes.submissions import IdempotencyKey, Sent
@@ -23,35 +23,20 @@ from service.wire.venue import Camera, Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
-UPLOAD: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "description": "The points, and if you like the frame they were clicked in, its part named by the "
-                    "camera's id: then `points.jpg` shows them in it.",
-                    "properties": {OPTIONS_PART: reference(LocateOptions)},
-                    "required": [OPTIONS_PART],
-                    "additionalProperties": {"type": "string", "format": "binary"},
-                },
-                "encoding": {OPTIONS_PART: {"contentType": "application/json"}},
-            }
-        },
-    }
-}
+UPLOAD = form(
+    LocateOptions,
+    "The points, and if you like the frame they were clicked in, its part named by the camera's id: then `points.jpg` "
+    "shows them in it.",
+    needed=[OPTIONS_PART],
+)
 
 
 @router.post(
     "/venues/{venue_id}/cameras/{camera}/locate",
     status_code=202,
     response_model=Job,
-    responses={
-        200: {"model": Job, "description": "The job has ended, or this content is already a job", **headers("ETag")},
-        202: headers("ETag", "Location", "Retry-After"),
-        **problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
-    },
+    responses=submitted("The job has ended, or this content is already a job")
+    | problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
     openapi_extra=UPLOAD | needs("calibrate"),
 )
 async def locate(

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import sqlalchemy as sa
-
 from service.store.counts.past_calibrations import PastCalibrations
 from service.store.deliveries import Deliveries
 from service.store.engine import connect, migrate
@@ -21,41 +17,21 @@ from service.store.venues import Venues
 from service.store.workers import Workers
 
 
-@dataclass(frozen=True)
 class Stores:
-    """What is kept in a database, by what it is about."""
+    """What is kept in a database, which is brought up to date first, by what it is about."""
 
-    engine: sa.Engine
-    venues: Venues
-    schedules: Schedules
-    jobs: Jobs
-    submissions: Submissions
-    attempts: Attempts
-    decisions: Decisions
-    past_calibrations: PastCalibrations
-    deliveries: Deliveries
-    expiry: Expiry
-    workers: Workers
-    keys: Keys
-    sessions: Sessions
-
-
-def open_stores(url: str) -> Stores:
-    """Those of a database, which is brought up to date first."""
-    engine = connect(url)
-    migrate(engine)
-    return Stores(
-        engine=engine,
-        venues=Venues(engine),
-        schedules=Schedules(engine),
-        jobs=Jobs(engine),
-        submissions=Submissions(engine),
-        attempts=Attempts(engine),
-        decisions=Decisions(engine),
-        past_calibrations=PastCalibrations(engine),
-        deliveries=Deliveries(engine),
-        expiry=Expiry(engine),
-        workers=Workers(engine),
-        keys=Keys(engine),
-        sessions=Sessions(engine),
-    )
+    def __init__(self, url: str) -> None:
+        self.engine = engine = connect(url)
+        migrate(engine)
+        self.venues = Venues(engine)
+        self.schedules = Schedules(engine)
+        self.submissions = Submissions(engine)
+        self.jobs = Jobs(engine)
+        self.attempts = Attempts(engine)
+        self.decisions = Decisions(engine)
+        self.past_calibrations = PastCalibrations(engine)
+        self.deliveries = Deliveries(engine)
+        self.expiry = Expiry(engine)
+        self.workers = Workers(engine)
+        self.keys = Keys(engine)
+        self.sessions = Sessions(engine)

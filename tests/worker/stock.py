@@ -11,7 +11,7 @@ from service.store.blobs import Blobs
 from service.store.ids import new_id
 from service.store.jobs.files import picture_folder
 from service.store.jobs.submission import Submission
-from service.store.stores import Stores, open_stores
+from service.store.stores import Stores
 from service.wire.geometry import Moved, Pose
 from service.wire.health import AlarmEvent
 from service.wire.job import JobError
@@ -25,7 +25,7 @@ from tests.homes import files
 class Stock(Stores):
     def __init__(self, data: Path, **settings) -> None:
         self.settings = Settings(data=data, worker_name="w", **settings)
-        super().__init__(**vars(open_stores(self.settings.home_database_url)))
+        super().__init__(self.settings.home_database_url)
         self.blobs = Blobs(self.settings.home_blob_url)
         self.enqueued: list[str] = []
 

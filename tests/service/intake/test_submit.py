@@ -6,7 +6,7 @@ from io import BytesIO
 import pytest
 from starlette.datastructures import FormData, UploadFile
 
-from service.app import open_context
+from service.api.context import Context
 from service.intake import submit
 from service.routes import calibrate
 from service.settings import Settings
@@ -21,7 +21,7 @@ pytestmark = in_both_homes
 
 @pytest.fixture
 def context(home, tmp_path):
-    context = open_context(Settings(data=tmp_path, **home.settings(tmp_path)))
+    context = Context(Settings(data=tmp_path, **home.settings(tmp_path)))
     yield context
     context.close()
 

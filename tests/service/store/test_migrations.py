@@ -16,7 +16,7 @@ from service.store.counts.figures import VenueQuality, look
 from service.store.engine import MIGRATIONS, SCHEMA_TABLE, UnsupportedDatabase, connect, migrate, writing
 from service.store.ids import new_id
 from service.store.jobs.submission import Submission
-from service.store.stores import open_stores
+from service.store.stores import Stores
 from service.wire.options import Board, IntrinsicsOptions, LocateOptions, Options
 from service.wire.results import Result
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
@@ -130,7 +130,7 @@ def upgraded(home, tmp_path):
             for name in then.tables.keys() & ROWS.keys():
                 insert_what_it_has_columns_for(connection, then.tables[name], ROWS[name])
         engine.dispose()
-        stores.append(open_stores(url))
+        stores.append(Stores(url))
         return stores[-1]
 
     stores = []
