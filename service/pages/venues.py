@@ -12,7 +12,7 @@ from service.pages.shown import Page, page
 from service.pages.sparkline import Sparkline, sparkline
 from service.routes.documented import needs
 from service.routes.guarded import Guarded
-from service.routes.venues import no_such_venue
+from service.routes.venues import ExistingVenue
 from service.store.counts.past_calibrations import PastCalibration
 from service.store.revisions import TAKEN
 from service.wire.base import ID_PATTERN, FormatName
@@ -68,11 +68,9 @@ def _row(context: Context, venue: Venue, active: str | None) -> Row:
 
 
 @router.get("/ui/venues/{venue_id}", openapi_extra=needs("read"))
-def venue(venue_id: VenueIdPath, request: Request, context: InContext) -> Response:
+def venue(stored: ExistingVenue, request: Request, context: InContext) -> Response:
     """One venue: its last result in pictures and numbers, and how it came to it."""
-    stored = context.venues.get(venue_id)
-    if stored is None:
-        raise no_such_venue(venue_id)
+    venue_id = stored.id
     ends = context.past_calibrations.of(venue_id, IN_TABLE)
     newest = context.past_calibrations.newest_result(venue_id)
     job = context.jobs.get(newest) if newest else None

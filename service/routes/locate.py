@@ -14,6 +14,7 @@ from service.routes.documented import form, needs, problems, submitted
 from service.routes.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
 from service.routes.submissions import IdempotencyKey, Sent
+from service.routes.venues import camera_of
 from service.store.jobs.task import Origin
 from service.wire.base import ID_PATTERN, OPTIONS_PART
 from service.wire.job import OPEN, Job
@@ -68,21 +69,11 @@ async def locate(
 def _submit(
     context: Context, venue: Venue, camera_id: str, form: FormData, idempotency_key: str | None, origin: Origin
 ) -> tuple[Job, bool]:
-    camera = _camera(venue, camera_id)
+    camera = camera_of(venue, camera_id)
     options = forms.options_of(form, LocateOptions, context.settings)
     files = {camera_id: _frame(camera, form)}
     check = submissions.of_cameras([camera], context.settings)
     return submissions.take(context, Sent("locate", venue, options, files, check, idempotency_key, origin))
-
-
-def _camera(venue: Venue, camera_id: str) -> Camera:
-    for camera in venue.cameras:
-        if camera.id == camera_id:
-            return camera
-    ids = [camera.id for camera in venue.cameras]
-    raise Problem(
-        "no-such-camera", f"Venue {venue.id} has the cameras {', '.join(ids)}.", camera=camera_id, expected=ids
-    )
 
 
 def _frame(camera: Camera, form: FormData) -> list[UploadFile]:

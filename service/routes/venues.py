@@ -19,7 +19,7 @@ from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
 from service.wire.problems import Problem
-from service.wire.venue import Venue, VenueIn, Venues
+from service.wire.venue import Camera, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 
@@ -27,6 +27,27 @@ router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 def no_such_venue(venue_id: str) -> Problem:
     """The same answer wherever a venue is named."""
     return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
+
+
+def camera_of(venue: Venue, camera_id: str) -> Camera:
+    """One of its cameras."""
+    for camera in venue.cameras:
+        if camera.id == camera_id:
+            return camera
+    ids = [camera.id for camera in venue.cameras]
+    raise Problem(
+        "no-such-camera", f"Venue {venue.id} has the cameras {', '.join(ids)}.", camera=camera_id, expected=ids
+    )
+
+
+def _existing(venue_id: VenueIdPath, context: InContext) -> Venue:
+    venue = context.venues.get(venue_id)
+    if venue is None:
+        raise no_such_venue(venue_id)
+    return venue
+
+
+ExistingVenue = Annotated[Venue, Depends(_existing)]
 
 
 def revision_unfit(unfit: RevisionUnfit) -> Problem:
@@ -93,12 +114,9 @@ def list_venues(
     response_model=Venue,
     responses=TAGGED | problems(404),
 )
-def get_venue(venue_id: VenueIdPath, context: InContext, if_none_match: IfNoneMatch = None) -> Response:
+def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Response:
     """A venue with the poses that hold now."""
-    stored = context.venues.get(venue_id)
-    if stored is None:
-        raise no_such_venue(venue_id)
-    body = stored.model_dump_json().encode()
+    body = venue.model_dump_json().encode()
     return unless_known(body, if_none_match, json(body))
 
 
@@ -109,15 +127,12 @@ def get_venue(venue_id: VenueIdPath, context: InContext, if_none_match: IfNoneMa
     responses=DOCUMENTS | problems(404),
 )
 def venue_poses(
-    venue_id: VenueIdPath,
+    venue: ExistingVenue,
     context: InContext,
     wanted: Annotated[Wanted, Depends()],
     form: Annotated[FormatName, Query(alias="format")] = "json",
 ) -> Response:
     """The poses that hold now, in the format of another tool."""
-    venue = context.venues.get(venue_id)
-    if venue is None:
-        raise no_such_venue(venue_id)
     return exported(context, venue, venue.id, form, wanted)
 
 
@@ -128,16 +143,14 @@ def venue_poses(
     responses=TAGGED | problems(404),
 )
 def venue_history(
-    venue_id: VenueIdPath,
+    venue: ExistingVenue,
     context: InContext,
     limit: Annotated[int, Query(ge=1, le=1000)] = 50,
     cursor: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """Every change of the poses with its cause, newest first, in pages; how far each camera moved and has drifted."""
-    if context.venues.get(venue_id) is None:
-        raise no_such_venue(venue_id)
-    page = context.venues.history(venue_id, cursor, limit + 1)
+    page = context.venues.history(venue.id, cursor, limit + 1)
     more = len(page) > limit
     shown = History(revisions=page[:limit], next_cursor=page[limit - 1].revision if more else None)
     body = shown.model_dump_json().encode()

@@ -1,26 +1,29 @@
 """What several processes do to one home at the same moment."""
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
-from threading import Barrier, Thread
+from threading import Barrier, BrokenBarrierError, Thread
 
 import pytest
 
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
+from service.store.counts import tallies
 from service.store.engine import connect, migrate
 from service.store.ids import new_id
 from service.store.jobs import attempts
 from service.store.jobs.submission import QueueFull, Submission
 from service.store.workers import Workers
 from service.wire.geometry import Moved, Pose
+from service.wire.health import Alarms as Rules
 from service.wire.job import JobError
 from service.wire.options import Options
 from service.wire.results import CameraResult, Provenance, Result
 from service.wire.venue import VenueIn
 from tests.e2e.running import venue
-from tests.homes import in_both_homes
-from tests.worker.stock import Stock
+from tests.homes import in_both_homes, on_servers
+from tests.worker.stock import Stock, anyway, result
 
 LIMIT = 3
 SHIFTED = [0.0, -55.0, 9.0]
@@ -157,3 +160,28 @@ def test_workers_are_not_dead_because_the_clock_of_their_machine_is_wrong(server
         Workers(engine).enter("w", None)
     assert Workers(engine).silent(10) == []
     engine.dispose()
+
+
+@on_servers
+def test_a_job_that_is_rejected_and_one_that_fails_do_not_wait_for_each_other(stock, monkeypatch):
+    for name in ("v", "w"):
+        rules = Rules(rejected_in_a_row=1)
+        stock.venues.put(stored(name).model_copy(update={"alarms": rules}), anyway)
+    rejected, failed = (stock.attempts.begin(stock.submitted(name)) for name in ("v", "w"))
+    # Both count an alarm and an end; each has counted one of them before either counts the other.
+    add, counted = tallies.add, Barrier(2)
+
+    def add_slowly(connection, amounts):
+        add(connection, amounts)
+        with suppress(BrokenBarrierError):
+            counted.wait(1)
+
+    monkeypatch.setattr(tallies, "add", add_slowly)
+    error = JobError(type="/problems/job-crashed", title="", detail="")
+    with ThreadPoolExecutor(2) as both:
+        ends = [
+            both.submit(stock.attempts.finish, rejected, result(rejected.venue, False), []),
+            both.submit(stock.attempts.fail, failed, error),
+        ]
+    assert [end.exception() for end in ends] == [None, None]
+    assert [stock.jobs.get(task.job_id).status for task in (rejected, failed)] == ["succeeded", "failed"]
