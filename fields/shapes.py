@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 Point = tuple[float, float]
+
+WHITE = "white"
+COLOURS = (WHITE, "yellow", "black", "blue", "red", "green", "orange")
+COLOUR_PATTERN = rf"^({'|'.join(COLOURS)}|#[0-9a-fA-F]{{6}})$"
+"""Of paint: one of `COLOURS`, or `#rrggbb`."""
 
 
 @dataclass(frozen=True)
@@ -16,6 +22,7 @@ class Line:
     name: str
     points: tuple[Point, ...]
     width: float
+    colour: str = WHITE
 
     @property
     def reach(self) -> Point:
@@ -24,19 +31,28 @@ class Line:
 
     def mirrored(self) -> Line:
         """The same at the other end."""
-        return Line(self.name, tuple(map(_other_end, self.points)), self.width)
+        return replace(self, points=tuple(map(_other_end, self.points)))
 
-    def dashes(self, paint: float, gap: float) -> list[Line]:
-        """Whole dashes from the middle outwards, of a line of two points."""
+    def shifted(self, by: Point) -> Line:
+        """The same so far away."""
+        return replace(self, points=tuple(_shifted(point, by) for point in self.points))
+
+    @property
+    def length(self) -> float:
+        """Along it."""
+        return sum(math.dist(*piece) for piece in pairwise(self.points))
+
+    def pieces(self, shares: Iterable[tuple[float, float]]) -> list[Line]:
+        """Dashes of a line of two points, each between two shares of its length."""
         (x1, y1), (x2, y2) = self.points
-        length = math.dist(*self.points)
 
-        def at(distance: float) -> Point:
-            share = distance / length
+        def at(share: float) -> Point:
             return x1 + share * (x2 - x1), y1 + share * (y2 - y1)
 
-        pieces = _pieces(length, paint, gap)
-        return [Line(f"{self.name}, dash {n}", (at(a), at(b)), self.width) for n, (a, b) in enumerate(pieces, start=1)]
+        return [
+            replace(self, name=f"{self.name}, dash {n}", points=(at(a), at(b)))
+            for n, (a, b) in enumerate(shares, start=1)
+        ]
 
 
 @dataclass(frozen=True)
@@ -49,6 +65,7 @@ class Arc:
     start: float
     end: float
     width: float
+    colour: str = WHITE
 
     @property
     def reach(self) -> Point:
@@ -61,17 +78,23 @@ class Arc:
 
     def mirrored(self) -> Arc:
         """The same at the other end."""
-        return Arc(
-            self.name, _other_end(self.centre), self.radius, math.pi - self.end, math.pi - self.start, self.width
-        )
+        return replace(self, centre=_other_end(self.centre), start=math.pi - self.end, end=math.pi - self.start)
 
-    def dashes(self, paint: float, gap: float) -> list[Arc]:
-        """Whole dashes from the middle outwards."""
-        pieces = _pieces((self.end - self.start) * self.radius, paint, gap)
-        angles = [(self.start + a / self.radius, self.start + b / self.radius) for a, b in pieces]
+    def shifted(self, by: Point) -> Arc:
+        """The same so far away."""
+        return replace(self, centre=_shifted(self.centre, by))
+
+    @property
+    def length(self) -> float:
+        """Along it."""
+        return (self.end - self.start) * self.radius
+
+    def pieces(self, shares: Iterable[tuple[float, float]]) -> list[Arc]:
+        """Dashes, each between two shares of its length."""
+        span = self.end - self.start
         return [
-            Arc(f"{self.name}, dash {n}", self.centre, self.radius, *between, self.width)
-            for n, between in enumerate(angles, start=1)
+            replace(self, name=f"{self.name}, dash {n}", start=self.start + a * span, end=self.start + b * span)
+            for n, (a, b) in enumerate(shares, start=1)
         ]
 
 
@@ -82,6 +105,7 @@ class Spot:
     name: str
     centre: Point
     diameter: float
+    colour: str = WHITE
 
     @property
     def reach(self) -> Point:
@@ -90,10 +114,21 @@ class Spot:
 
     def mirrored(self) -> Spot:
         """The same at the other end."""
-        return Spot(self.name, _other_end(self.centre), self.diameter)
+        return replace(self, centre=_other_end(self.centre))
+
+    def shifted(self, by: Point) -> Spot:
+        """The same so far away."""
+        return replace(self, centre=_shifted(self.centre, by))
 
 
 Shape = Line | Arc | Spot
+
+
+def dashes(length: float, paint: float, gap: float) -> list[tuple[float, float]]:
+    """Whole dashes from the middle of a length outwards: where each begins and ends, as shares of the length."""
+    beside = math.floor((length / 2 - paint / 2) / (paint + gap))
+    middles = [length / 2 + n * (paint + gap) for n in range(-beside, beside + 1)]
+    return [((middle - paint / 2) / length, (middle + paint / 2) / length) for middle in middles]
 
 
 def _reach(points: Iterable[Point]) -> Point:
@@ -105,7 +140,5 @@ def _other_end(point: Point) -> Point:
     return -point[0], point[1]
 
 
-def _pieces(length: float, paint: float, gap: float) -> list[tuple[float, float]]:
-    beside = math.floor((length / 2 - paint / 2) / (paint + gap))
-    middles = [length / 2 + n * (paint + gap) for n in range(-beside, beside + 1)]
-    return [(middle - paint / 2, middle + paint / 2) for middle in middles]
+def _shifted(point: Point, by: Point) -> Point:
+    return point[0] + by[0], point[1] + by[1]

@@ -5,7 +5,10 @@ that follow from it, and then
 
 - `[[marking]]`, once, and `[[end]]`, at the left end (x < 0) and mirrored at the right one, `{end}` in its name: each a
   `line` through points, an `arc` counter-clockwise around `centre` from the direction of `start` to that of `end`, with
-  the distance of `start` as radius, a `circle` or a `spot`; a line and an arc may have a `dash` of `paint` and `gap`;
+  the distance of `start` as radius, a `circle` or a `spot`; a line and an arc may have a `dash` of `paint` and `gap`.
+  A `colour` is white unless given, and `rows` say that a marking is there again and again: each a `step` along x and
+  along y and a `count`, rows of rows where there are several. A line of no length is not painted: so may a measure
+  leave one out;
 - `[points]` and `[end_points]`: names that people use for points, at nominal places, the outer edges of lines where the
   law measures to them. A name with `{distance}` stands for all points at that many metres.
 
@@ -23,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from fields.measures import value
-from fields.shapes import Arc, Line, Point, Shape, Spot
+from fields.shapes import WHITE, Arc, Line, Point, Shape, Spot, dashes
 
 FILES = Path(__file__).parent
 NAMES = tuple(sorted(path.stem for path in FILES.glob("*.toml")))
@@ -59,14 +62,18 @@ class Template:
             known[name] = value(expression, known)
         return known
 
-    def markings(self, size: Mapping[str, float]) -> list[Shape]:
-        """All that is painted: what there is once, then the left end, then the right one."""
+    def markings(self, size: Mapping[str, float], dashed: Mapping[str, float] | None = None) -> list[Shape]:
+        """All that is painted: what there is once, then the left end, then the right one.
+
+        `dashed`: a size near this one whose dashes these are, stretched: as many, and each the same one.
+        """
         known = self.known(size)
-        once, left = ([_shape(entry, known) for entry in entries] for entries in (self.marking, self.end))
-        shapes = [shape for dashes in once for shape in dashes]
-        for end in ("left", "right"):
-            shapes += [_at(end, shape) for dashes in left for shape in dashes]
-        return shapes
+        nominal = known if dashed is None else self.known(dashed)
+        once, left = (
+            [shape for entry in entries for shape in _shapes(entry, known, nominal)]
+            for entries in (self.marking, self.end)
+        )
+        return [*once, *(_at(end, shape) for end in ("left", "right") for shape in left)]
 
     def places(self, size: Mapping[str, float]) -> dict[str, Point]:
         """Where each named point is, but for those with `{distance}`."""
@@ -98,31 +105,47 @@ def _at(end: str, shape: Shape) -> Shape:
     return replace(shape if end == "left" else shape.mirrored(), name=shape.name.replace(END, end))
 
 
-def _shape(entry: Mapping[str, Any], known: Mapping[str, float]) -> list[Shape]:
+def _shapes(entry: Mapping[str, Any], known: Mapping[str, float], nominal: Mapping[str, float]) -> list[Shape]:
     shape = _whole(entry, known)
+    if not isinstance(shape, Spot) and shape.length == 0:
+        return []
     if "dash" not in entry or isinstance(shape, Spot):
+        return _rows(shape, entry.get("rows", ()), known)
+    usual = _whole(entry, nominal)
+    assert not isinstance(usual, Spot)
+    paint, gap = (value(entry["dash"][part], nominal) for part in ("paint", "gap"))
+    return [*shape.pieces(dashes(usual.length, paint, gap))]
+
+
+def _rows(shape: Shape, rows: Sequence[Mapping[str, Any]], known: Mapping[str, float]) -> list[Shape]:
+    if not rows:
         return [shape]
-    return [*shape.dashes(*(value(entry["dash"][part], known) for part in ("paint", "gap")))]
+    row, *further = rows
+    x, y = _point(row["step"], known)
+    again = [replace(shape.shifted((n * x, n * y)), name=f"{shape.name}, {n + 1}") for n in range(row["count"])]
+    return [one for each in again for one in _rows(each, further, known)]
 
 
 def _whole(entry: Mapping[str, Any], known: Mapping[str, float]) -> Shape:
-    name, width = entry["name"], value(entry.get("width", "line"), known)
+    name, width, colour = entry["name"], value(entry.get("width", "line"), known), entry.get("colour", WHITE)
     match entry:
         case {"line": points}:
-            return Line(name, tuple(_point(point, known) for point in points), width)
+            return Line(name, tuple(_point(point, known) for point in points), width, colour)
         case {"arc": {"centre": centre, "start": start, "end": end}}:
-            return _arc(name, _point(centre, known), _point(start, known), _point(end, known), width)
+            return _arc(name, _point(centre, known), _point(start, known), _point(end, known), width, colour)
         case {"circle": {"centre": centre, "radius": radius}}:
-            return Arc(name, _point(centre, known), value(radius, known), 0.0, 2 * math.pi, width)
+            return Arc(name, _point(centre, known), value(radius, known), 0.0, 2 * math.pi, width, colour)
         case {"spot": {"centre": centre, "diameter": diameter}}:
-            return Spot(name, _point(centre, known), value(diameter, known))
+            return Spot(name, _point(centre, known), value(diameter, known), colour)
         case _:
             raise ValueError(f"{name} is neither a line, an arc, a circle nor a spot")
 
 
-def _arc(name: str, centre: Point, start: Point, end: Point, width: float) -> Arc:
+def _arc(name: str, centre: Point, start: Point, end: Point, width: float, colour: str) -> Arc:
     first, last = (math.atan2(y - centre[1], x - centre[0]) for x, y in (start, end))
-    return Arc(name, centre, math.dist(centre, start), first, last if last > first else last + 2 * math.pi, width)
+    return Arc(
+        name, centre, math.dist(centre, start), first, last if last > first else last + 2 * math.pi, width, colour
+    )
 
 
 def _point(place: Sequence[str | float], known: Mapping[str, float]) -> Point:

@@ -11,6 +11,7 @@ from http import HTTPStatus
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.problems import answer
@@ -37,7 +38,7 @@ class BodyLimit:
             packed = Problem("encoded-body", "Send it as it is.", headers={"Accept-Encoding": "identity"})
             await answer(packed)(scope, receive, send)
             return
-        largest, too_large = self._limit(headers)
+        largest, too_large = self._limit(Request(scope))
         announced = headers.get("content-length", "0")
         if announced.isdecimal() and int(announced[:20]) > largest:
             await answer(Problem("body-too-large", too_large))(scope, receive, send)
@@ -55,9 +56,14 @@ class BodyLimit:
 
         await self._app(scope, counted, send)
 
-    def _limit(self, headers: Headers) -> tuple[int, str]:
+    def _limit(self, request: Request) -> tuple[int, str]:
         """How many bytes a body may have, and what to do about one that has more."""
-        if headers.get("content-type", "").lower().startswith("multipart/form-data"):
+        if is_form(request):
             return self._largest_form, f"{self._largest_form} bytes are allowed; send fewer or smaller frames."
         largest = min(LARGEST_DOCUMENT, self._largest_form)
         return largest, f"{largest} bytes are allowed of what is not multipart/form-data."
+
+
+def is_form(request: Request) -> bool:
+    """Whether a request brings a form with files."""
+    return request.headers.get("content-type", "").lower().startswith("multipart/form-data")

@@ -35,6 +35,12 @@ def invalid(error: ValidationError | RequestValidationError, *inside: str) -> Pr
     return Problem("invalid-request", f"{first['where']}: {first['message']}", errors=findings)
 
 
+def not_json(request: Request) -> Problem:
+    """The same answer wherever a document comes as something else."""
+    got = request.headers.get("content-type", "")[:200]
+    return Problem("not-json", "Send it with Content-Type: application/json.", got=got)
+
+
 def install(app: FastAPI) -> None:
     """Let every error of `app` leave as a problem."""
 
@@ -47,8 +53,7 @@ def install(app: FastAPI) -> None:
         if any(finding["type"] == "json_invalid" for finding in error.errors()):
             return answer(Problem("malformed-request", "The body is not JSON."))
         if isinstance(error.body, bytes):
-            got = request.headers.get("content-type", "")[:200]
-            return answer(Problem("not-json", "Send it with Content-Type: application/json.", got=got))
+            return answer(not_json(request))
         return answer(invalid(error))
 
     @app.exception_handler(HTTPException)

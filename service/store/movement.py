@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fields.shapes import Arc, Line, Shape
+from fields.shapes import Arc, Line, Shape, Spot
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import LensModel, Moved, PosedCamera
 
@@ -57,18 +57,8 @@ def _shift_px(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> fl
 def _points(field: FieldOfPlay) -> Array:
     """Places on the markings of a field (N, 2), evenly along them."""
     shapes = field.plan.markings(field.size)
-    spacing = sum(map(_length, shapes)) / POINTS
+    spacing = sum(shape.length for shape in shapes if not isinstance(shape, Spot)) / POINTS
     return np.concatenate([_along(shape, spacing) for shape in shapes])
-
-
-def _length(shape: Shape) -> float:
-    match shape:
-        case Line():
-            return sum(math.dist(*piece) for piece in pairwise(shape.points))
-        case Arc():
-            return shape.radius * (shape.end - shape.start)
-        case _:
-            return 0.0
 
 
 def _along(shape: Shape, spacing: float) -> Array:
@@ -77,9 +67,9 @@ def _along(shape: Shape, spacing: float) -> Array:
             pieces = [np.array(piece) for piece in pairwise(shape.points)]
             return np.concatenate([a + _shares(math.dist(a, b), spacing) * (b - a) for a, b in pieces])
         case Arc():
-            angle = shape.start + _shares(_length(shape), spacing) * (shape.end - shape.start)
+            angle = shape.start + _shares(shape.length, spacing) * (shape.end - shape.start)
             return shape.centre + shape.radius * np.hstack([np.cos(angle), np.sin(angle)])
-        case _:
+        case Spot():
             return np.array([shape.centre])
 
 

@@ -11,6 +11,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    StringConstraints,
     Tag,
     ValidationInfo,
     WithJsonSchema,
@@ -18,6 +19,7 @@ from pydantic import (
     model_validator,
 )
 
+from fields.shapes import COLOUR_PATTERN, WHITE
 from fields.template import NAMES, Extent, Template, load
 from service.wire.base import Name, Number, Wire
 from service.wire.geometry import Row
@@ -25,8 +27,9 @@ from service.wire.geometry import Row
 Place = Annotated[list[Annotated[Number, Field(ge=-200, le=200)]], Field(min_length=2, max_length=2)]
 Length = Annotated[Number, Field(gt=0, le=400)]
 PaintWidth = Annotated[Number, Field(ge=0.01, le=1)]
+Colour = Annotated[str, StringConstraints(pattern=COLOUR_PATTERN)]
 # Further than this beside the field nothing counts as a marking of it.
-BESIDE_M = 1.0
+BESIDE_M = 2.0
 
 
 class ArcIn(Wire):
@@ -67,6 +70,11 @@ class MarkingIn(Wire):
     circle: CircleIn | None = None
     spot: SpotIn | None = None
     width_m: PaintWidth | None = Field(None, description="Of the paint; absent: the field's `line_width_m`.")
+    colour: Colour = Field(
+        WHITE,
+        description="Of the paint: white, yellow, black, blue, red, green, orange or `#rrggbb`.",
+        examples=["yellow", "#0a5fa8"],
+    )
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
@@ -79,7 +87,8 @@ class MarkingIn(Wire):
     @property
     def entry(self) -> dict[str, Any]:
         """As `fields.template` reads it."""
-        entry: dict[str, Any] = {"name": self.name} | ({} if self.width_m is None else {"width": self.width_m})
+        entry: dict[str, Any] = {"name": self.name, "colour": self.colour}
+        entry |= {} if self.width_m is None else {"width": self.width_m}
         if self.circle:
             return entry | {"circle": {"centre": self.circle.centre, "radius": self.circle.radius_m}}
         if self.spot:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fields.measures import value
-from fields.shapes import Arc, Line, Spot
+from fields.shapes import Arc, Line, Spot, dashes
 from fields.template import NAMES, Template, load
 
 every = pytest.mark.parametrize("name", NAMES)
@@ -78,10 +78,30 @@ def centre_of(shape):
 
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("football", 27), ("futsal", 25), ("basketball", 26), ("hockey", 69), ("rugby-union", 56), ("handball", 185)],
+    [
+        ("american-football", 385),
+        ("basketball", 26),
+        ("beach-volleyball", 4),
+        ("football", 27),
+        ("futsal", 25),
+        ("handball", 185),
+        ("hockey", 69),
+        ("ice-hockey", 53),
+        ("lacrosse", 17),
+        ("netball", 9),
+        ("padel", 3),
+        ("rugby-union", 56),
+        ("tennis", 11),
+        ("volleyball", 31),
+    ],
 )
 def test_every_marking_is_there(name, count):
     assert len(shapes(name)) == count
+
+
+def test_only_ice_hockey_has_lines_that_are_not_white():
+    coloured = {name for name in NAMES if any(shape.colour != "white" for shape in shapes(name).values())}
+    assert coloured == {"ice-hockey"}
 
 
 @given(st.data())
@@ -90,8 +110,8 @@ def test_markings_of_any_size_stay_on_the_field(name, data):
     size = {measure: data.draw(st.floats(e.least, e.most)) for measure, e in load(name).size.items()}
     for shape in load(name).markings(size):
         x, y = shape.reach
-        assert x < size["length"] / 2 + 1
-        assert y < size["width"] / 2 + 1
+        assert x < size["length"] / 2 + 2
+        assert y < size["width"] / 2 + 2
 
 
 @pytest.mark.parametrize(("length", "width"), [(105, 68), (90, 45), (120, 90)])
@@ -173,11 +193,154 @@ def test_the_field_of_play_of_rugby_lies_between_its_in_goals():
     assert {dash.points[0][0] for name, dash in found.items() if name.startswith("right 10-metre line")} == {10}
 
 
+FOOT, YARD, INCH = 0.3048, 0.9144, 0.0254
+
+
+@pytest.mark.parametrize(("feet", "from_the_sideline"), [(18.5, 70.75), (40, 60), (160 / 3, 160 / 3)])
+def test_the_hash_marks_of_american_football_are_where_each_law_has_them(feet, from_the_sideline):
+    found = shapes("american-football", hash=feet * FOOT)
+    near = [mark for name, mark in found.items() if name.startswith("left near hash mark")]
+    assert {round(max(y for _, y in mark.points), 4) for mark in near} == {round((from_the_sideline - 80) * FOOT, 4)}
+    assert [math.dist(*mark.points) for mark in near] == pytest.approx([2 * FOOT] * 40)
+    assert edges(found["right far inbounds mark, 9"], 1)[0] == pytest.approx((80 - from_the_sideline) * FOOT)
+
+
+def test_american_football_is_a_hundred_yards_between_two_end_zones():
+    found = shapes("american-football")
+    assert edges(found["left end line"], 0) == pytest.approx((-66 * YARD + 4 * YARD, -60 * YARD))
+    assert edges(found["far sideline"], 1) == pytest.approx((80 * FOOT, 86 * FOOT))
+    assert edges(found["left goal line"], 0) == pytest.approx((-50 * YARD - 8 * INCH, -50 * YARD))
+    for yards in range(5, 50, 5):
+        line = found[f"left {yards}-yard line"]
+        assert line.points[0] == pytest.approx((-(50 - yards) * YARD, -80 * FOOT + 8 * INCH))
+        assert line.width == pytest.approx(4 * INCH)
+    ticks = [mark.points[0][0] for name, mark in found.items() if name.startswith("right far sideline tick")]
+    assert sorted(round(tick / YARD, 6) for tick in ticks) == [yard for yard in range(1, 50) if yard % 5]
+    assert found["right try line"].points[0][0] == pytest.approx(48 * YARD)
+    assert math.dist(*found["right try line"].points) == pytest.approx(YARD)
+
+
+def test_tennis_is_measured_to_the_outside_of_its_lines():
+    found = shapes("tennis")
+    assert edges(found["left baseline"], 0) == pytest.approx((-11.885, -11.785))
+    assert edges(found["near doubles sideline"], 1)[0] == pytest.approx(-10.97 / 2)
+    assert edges(found["far singles sideline"], 1)[1] == pytest.approx(8.23 / 2)
+    assert edges(found["right service line"], 0)[1] == pytest.approx(6.4)
+    assert found["centre service line"].width == found["left centre mark"].width == 0.05
+    assert math.dist(*found["left centre mark"].points) == pytest.approx(0.1)
+
+
+def test_the_attack_lines_of_volleyball_go_on_in_five_dashes():
+    found = shapes("volleyball")
+    assert edges(found["left end line"], 0)[0] == pytest.approx(-9)
+    assert edges(found["far side line"], 1)[1] == pytest.approx(4.5)
+    assert edges(found["left attack line"], 0)[0] == pytest.approx(-3)
+    prolonged = [dash.points for name, dash in found.items() if name.startswith("right attack line, far")]
+    ends = [y for points in prolonged for _, y in points]
+    assert ends == pytest.approx([4.5 + far for far in (0.2, 0.35, 0.55, 0.7, 0.9, 1.05, 1.25, 1.4, 1.6, 1.75)])
+    assert found["left service zone, near mark"].reach == pytest.approx((9.35, 4.475))
+
+
+def test_the_attack_lines_of_volleyball_end_at_the_side_line_where_nothing_else_is_painted():
+    assert not [name for name in shapes("volleyball", prolongation=0.0) if "prolongation" in name]
+
+
+def test_beach_volleyball_has_nothing_but_its_boundary():
+    found = shapes("beach-volleyball")
+    assert set(found) == {"near side line", "far side line", "left end line", "right end line"}
+    assert edges(found["right end line"], 0)[1] == pytest.approx(8)
+    assert edges(found["near side line"], 1)[0] == pytest.approx(-4)
+
+
+def test_the_men_s_field_of_lacrosse_is_in_yards():
+    found = shapes("lacrosse")
+    assert edges(found["left end line"], 0)[1] == pytest.approx(-55 * YARD)
+    assert edges(found["near sideline"], 1)[1] == pytest.approx(-30 * YARD)
+    assert found["left goal line"].points == (pytest.approx((-40 * YARD, -YARD)), pytest.approx((-40 * YARD, YARD)))
+    crease = found["left crease"]
+    assert (*crease.centre, outer(crease)) == pytest.approx((-40 * YARD, 0, 9 * FOOT))
+    assert found["left restraining line"].points[0][0] == pytest.approx(-20 * YARD)
+    (end, y), (front, _) = found["left goal area, near side"].points
+    assert (end, front, y) == pytest.approx((-55 * YARD, -20 * YARD, -20 * YARD))
+    assert found["far wing line"].points == (
+        pytest.approx((-10 * YARD, 20 * YARD)),
+        pytest.approx((10 * YARD, 20 * YARD)),
+    )
+
+
+def test_ice_hockey_is_measured_from_its_boards():
+    found = shapes("ice-hockey")
+    assert found["left goal line"].points[0] == pytest.approx((-26, -6.5 - math.sqrt(8.5**2 - 4.5**2)))
+    assert found["left blue line"].points[1] == pytest.approx((-7.14, 15))
+    assert {found[name].width for name in ("left blue line", "right blue line", "centre line")} == {0.3}
+    assert found["right far face-off spot"].centre == pytest.approx((20, 7))
+    assert found["right far neutral face-off spot"].centre == pytest.approx((7.14 - 0.15 - 1.5, 7))
+    assert [outer(found[name]) for name in ("centre circle", "left near face-off circle")] == pytest.approx([4.5, 4.5])
+    crease = found["left crease"]
+    assert (outer(crease), crease.end - crease.start) == (pytest.approx(1.8), pytest.approx(math.pi))
+    colours = {
+        name: found[name].colour for name in ("left goal line", "left blue line", "centre line", "centre circle")
+    }
+    assert list(colours.values()) == ["red", "blue", "red", "blue"]
+
+
+def test_the_marks_of_a_face_off_circle_are_outside_of_it_and_its_ls_beside_the_spot():
+    found = shapes("ice-hockey")
+    marks = [shape for name, shape in found.items() if name.startswith("left far face-off circle, ")]
+    for mark in marks:
+        assert min(math.dist(point, (-20, 7)) for point in mark.points) == pytest.approx(4.5)
+        assert math.dist(*mark.points) == pytest.approx(0.6)
+    behind, ahead = sorted({mark.points[0][0] for mark in marks})
+    assert ahead - behind - 0.05 == pytest.approx(1.7)
+    far, corner, aside = found["left far face-off spot, far L towards the middle"].points
+    assert far == pytest.approx((-20 + 0.3 + 0.3 + 1.2, 7 + 0.225 + 0.025))
+    assert corner == pytest.approx((-20 + 0.3 + 0.3 + 0.025, 7 + 0.225 + 0.025))
+    assert aside[1] - corner[1] == pytest.approx(0.9)
+
+
+def test_the_crease_of_the_nhl_has_straight_sides():
+    nhl = {
+        "length": 200 * FOOT,
+        "width": 85 * FOOT,
+        "goal_line": 11 * FOOT,
+        "crease": 6 * FOOT,
+        "crease_width": 8 * FOOT,
+    }
+    found = shapes("ice-hockey", **nhl)
+    side = found["right crease, far side"]
+    assert edges(side, 1)[1] == pytest.approx(4 * FOOT)
+    assert math.dist(*side.points) == pytest.approx(4.5 * FOOT, abs=0.02)
+    assert side.points[0][0] == pytest.approx(89 * FOOT - math.dist(*side.points))
+    assert found["right blue line"].points[0][0] == pytest.approx(25 * FOOT)
+
+
+def test_netball_is_divided_into_thirds():
+    found = shapes("netball")
+    assert edges(found["left goal line"], 0)[0] == pytest.approx(-15.25)
+    assert edges(found["far side line"], 1)[1] == pytest.approx(7.625)
+    assert found["right transverse line"].points[0][0] == pytest.approx(30.5 / 6)
+    assert found["left goal circle"].centre == (-15.25, 0)
+    assert [outer(found[name]) for name in ("left goal circle", "centre circle")] == pytest.approx([4.9, 0.45])
+
+
+def test_the_service_lines_of_padel_are_three_metres_from_the_walls():
+    found = shapes("padel")
+    assert edges(found["right service line"], 0) == pytest.approx((6.95, 7.0))
+    assert found["right service line"].reach[1] == 5
+    assert found["central service line"].reach[0] == pytest.approx(7.2)
+
+
+def test_a_line_of_no_length_is_not_painted():
+    assert Template(marking=[{"name": "none", "line": [[1, 2], [1, 2]]}]).markings({"line": 0.05}) == []
+
+
 def test_dashes_are_whole_and_one_is_in_the_middle():
-    dashes = Line("line", ((0.0, 0.0), (10.0, 0.0)), 0.1).dashes(1.0, 2.0)
-    assert [dash.points for dash in dashes] == [((1.5, 0), (2.5, 0)), ((4.5, 0), (5.5, 0)), ((7.5, 0), (8.5, 0))]
-    quarter = Arc("arc", (0.0, 0.0), 2.0, 0.0, math.pi / 2, 0.1).dashes(0.5, 0.5)
-    assert [(dash.start + dash.end) / 2 * 2 for dash in quarter] == pytest.approx([math.pi / 2 + n for n in (-1, 0, 1)])
+    line = Line("line", ((0.0, 0.0), (10.0, 0.0)), 0.1)
+    pieces = line.pieces(dashes(line.length, 1.0, 2.0))
+    assert [dash.points for dash in pieces] == [((1.5, 0), (2.5, 0)), ((4.5, 0), (5.5, 0)), ((7.5, 0), (8.5, 0))]
+    quarter = Arc("arc", (0.0, 0.0), 2.0, 0.0, math.pi / 2, 0.1)
+    around = quarter.pieces(dashes(quarter.length, 0.5, 0.5))
+    assert [(dash.start + dash.end) / 2 * 2 for dash in around] == pytest.approx([math.pi / 2 + n for n in (-1, 0, 1)])
 
 
 @given(st.floats(-4, 4), st.floats(0.01, 2 * math.pi))
@@ -198,3 +361,26 @@ def test_measures_are_sums_and_products():
 def test_a_marking_of_no_shape_is_named():
     with pytest.raises(ValueError, match="blob is neither a line, an arc, a circle nor a spot"):
         Template(marking=[{"name": "blob", "blob": 1}]).markings({"line": 0.1})
+
+
+def test_markings_are_white_unless_they_have_a_colour_and_keep_it_at_both_ends_and_in_dashes():
+    line = {"line": [[-3, 0], [-1, 0]], "dash": {"paint": 0.2, "gap": 0.3}}
+    plan = Template(
+        marking=[{"name": "plain", "spot": {"centre": [0, 0], "diameter": 0.2}}],
+        end=[{"name": "{end} red", "colour": "red", **line}],
+    )
+    plain, *ends = plan.markings({"line": 0.05})
+    assert plain.colour == "white"
+    assert {shape.colour for shape in ends} == {"red"}
+    assert len(ends) == 6
+
+
+def test_a_row_repeats_a_marking_and_a_row_of_rows_the_row():
+    tick = {
+        "name": "tick",
+        "line": [[0, 0], [0, 1]],
+        "rows": [{"step": [10, 0], "count": 2}, {"step": [1, 0], "count": 3}],
+    }
+    ticks = Template(marking=[tick]).markings({"line": 0.05})
+    assert [shape.points[0][0] for shape in ticks] == [0, 1, 2, 10, 11, 12]
+    assert [shape.name for shape in ticks[2:4]] == ["tick, 1, 3", "tick, 2, 1"]

@@ -29,6 +29,7 @@ from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.search.search import ALONE_ON_THE_GROUND, COARSE_TO_FINE, ON_THE_GROUND, Level, Strategy, search
+from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.line_measurement import brightness_of
 from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import Region, reachable_regions
@@ -101,7 +102,8 @@ class Progress:
 class CameraResult:
     """One camera's answer. `sigma`, `repeatability` and `residual_px` are None where too few lines could be measured.
 
-    `repeatability`: the part of sigma that is not owed to lens and field, which are the same the next time.
+    `found`: share 0..1 of the markings' length in view that is seen where the pose puts it; `by_chance`: that is as
+    likely seen anywhere. `repeatability`: the part of sigma that is not owed to lens and field, which do not change.
     `intrinsics`: those that the pose belongs to, which are the given ones unless the focal length was to be found.
     """
 
@@ -112,6 +114,8 @@ class CameraResult:
     repeatability: Sigma | None
     moved: Movement
     iou: float
+    found: float
+    by_chance: float
     residual_px: float | None
 
 
@@ -188,7 +192,7 @@ def calibrate(
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
         stitch_before = stitch_error_px(pitch, cameras, by_id)
-        qualities = qualities_of(pitch, cameras, refined, responses)
+        qualities = qualities_of(pitch, cameras, refined, sight)
         journey.at("refinement", 1.0)
     return Calibration(
         refined.pitch,
@@ -256,28 +260,32 @@ def camera_result(quality: CameraQuality) -> CameraResult:
         quality.repeatability,
         quality.moved,
         quality.iou,
+        quality.evidence.share,
+        quality.evidence.by_chance,
         quality.residual_px,
     )
 
 
-def qualities_of(
-    pitch: Field, stored: Sequence[Camera], refined: Refined, responses: Sequence[Response]
-) -> list[CameraQuality]:
+def qualities_of(pitch: Field, stored: Sequence[Camera], refined: Refined, sight: Sight) -> list[CameraQuality]:
     """What the gate looks at: the finished cameras beside the `stored` ones on the pitch they were stored for."""
+    lines = pitch.line_points()
     return [
         CameraQuality(
             after,
             markings_iou(refined.pitch, after, response),
-            markings_iou(pitch, before, response),
+            evidence,
+            evidence_of(lines, before, bright, response),
             residual,
             _sigma(covariance),
             _sigma(repeatability),
             Movement.between(pitch, before, after),
         )
-        for before, after, response, residual, covariance, repeatability in zip(
+        for before, after, bright, response, evidence, residual, covariance, repeatability in zip(
             stored,
             refined.cameras,
-            responses,
+            sight.brightness,
+            sight.responses,
+            refined.evidence,
             refined.residual_px,
             refined.covariance,
             refined.repeatability,

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 import cv2
 import structlog
 
-from fields.template import Extent
 from service.settings import Settings
 from service.wire.field import FieldOfPlay
 from service.wire.job import Progress
@@ -49,7 +48,6 @@ def solve(
     report: Callable[[Progress], None],
 ) -> Solution[FieldResult]:
     """The measures of a venue's pitch from the files of its cameras, with or without a server around it."""
-    _require_lines_that_stay(venue.field)
     segmenter = segmenter_of(settings)
     cv2.setNumThreads(settings.threads)
     begun = time.perf_counter()
@@ -68,21 +66,6 @@ def solve(
     timings = {"decode": decoded - begun, **found.timings_s, "preview": time.perf_counter() - drawing}
     provenance = provenance_of(segmenter, options)
     return Solution(_result(venue.field, found, timings, provenance), pictures)
-
-
-def _require_lines_that_stay(field: FieldOfPlay) -> None:
-    """Refuse a field whose broken lines have other dashes when it is wider: no point of one is a point of the other."""
-    for measure, now in (("length", field.length_m), ("width", field.width_m)):
-        extent = field.plan.size.get(measure, Extent(now, 0.9 * now, 1.1 * now))
-        painted = {
-            len(field.plan.markings(field.size | {measure: there})) for there in (extent.least, now, extent.most)
-        }
-        if len(painted) > 1:
-            raise Failure(
-                "no-field-fit",
-                f"Its broken lines have more dashes with another {measure}, so none can be followed while it is "
-                "fitted: measure this field with a tape.",
-            )
 
 
 def _draw(

@@ -66,10 +66,29 @@ def test_a_field_is_stored_and_read_as_it_was():
     assert FieldOfPlay.model_validate(field.model_dump(mode="json", exclude_none=True)) == field
 
 
+def test_markings_of_ones_own_are_white_unless_they_have_a_colour():
+    line = [[-10, -5], [10, -5]]
+    colours = ["white", "yellow", "black", "blue", "red", "green", "orange", "#0a5fA8"]
+    given = [{"name": "plain", "line": line}, *({"name": c, "line": line, "colour": c} for c in colours)]
+    field = FieldOfPlay.model_validate(own(*given))
+    assert [shape.colour for shape in field.plan.markings(field.size)] == ["white", *colours]
+
+
+@pytest.mark.parametrize("colour", ["mauve", "#12", "#0a5fa8ff", "", "White", 3, None])
+def test_a_colour_that_is_none_is_refused(colour):
+    with pytest.raises(ValidationError) as refused:
+        FieldOfPlay.model_validate(own({"name": "a", "line": [[0, 0], [1, 0]], "colour": colour}))
+    assert refused.value.errors()[0]["loc"][-1] == "colour"
+
+
 @pytest.mark.parametrize(
     ("field", "where", "message"),
     [
-        ({"template": "curling"}, ("template", "name"), "curling is none of the templates basketball, football"),
+        (
+            {"template": "curling"},
+            ("template", "name"),
+            "curling is none of the templates american-football, basketball",
+        ),
         ({"length_m": 59}, ("length_m",), "football: 60 to 130 m, not 59"),
         ({"template": "basketball", "line_width_m": 0.3}, ("line_width_m",), "basketball: 0.02 to 0.12 m, not 0.3"),
         ({"template": "handball", "width_m": 13}, ("width_m",), "handball: 17 to 22 m, not 13"),
@@ -90,7 +109,7 @@ def test_a_field_is_stored_and_read_as_it_was():
         ),
         (own({"name": "a", "line": [[0, 0], [20, 10]]}), (), "a leaves the 20 x 10 m of the field, whose centre is"),
         (
-            own({"name": "a", "circle": {"centre": [0, 0], "radius_m": 7}}),
+            own({"name": "a", "circle": {"centre": [0, 0], "radius_m": 7.1}}),
             (),
             "a leaves the 20 x 10 m of the field, whose centre is the origin",
         ),

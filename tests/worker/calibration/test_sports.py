@@ -27,7 +27,7 @@ TENNIS = Template(
         {"name": "centre service line", "line": [[-6.4, 0], [6.4, 0]]},
     ]
 )
-SPORTS = ("basketball", "futsal", "handball", "hockey", "rugby-union", "tennis")
+SPORTS = ("basketball", "futsal", "handball", "hockey", "ice-hockey", "rugby-union", "tennis", "volleyball")
 every_sport = pytest.mark.parametrize("sport", SPORTS)
 
 

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.finish.estimate import Estimate, step, unevenness
-from worker.calibration.finish.residuals import Unknowns
+from worker.calibration.finish.residuals import Unknowns, misfit_px
 from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.finish.uncertainty import Determined, Deviation, judge
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
 from worker.calibration.scene.parameters import Parameter
+from worker.calibration.see.evidence import Evidence, evidence_of
 from worker.calibration.see.line_measurement import Measurements, measure_lines
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
@@ -29,6 +30,8 @@ The last rounds are there for measurements that change with the pose, and end as
 ASSESSING_SEARCH_PX = 8.0
 MOST_STEPS = 4
 """Per round."""
+MISFIT_FLATTENS_PX = 0.3
+"""Error that nothing explains at which the ground is taken for half as uneven as its heights say."""
 SETTLED_M = 5e-5
 """Cameras that a step, or a whole round, moves less than this have arrived."""
 
@@ -49,7 +52,8 @@ class Refined:
 
     `covariance` (6, 6) of (rotation in the camera's frame rad, position m), `repeatability` (6, 6) the same for whom
     lenses and field are what they are said to be, `residual_px` the rms of its lines. `deviations`: what the lines say
-    of lenses and field. `found`: what was left free, in that order.
+    of lenses and field. `found`: what was left free, in that order. `evidence`: how much of the lines is seen where the
+    finished cameras put them.
     """
 
     pitch: Field
@@ -59,6 +63,7 @@ class Refined:
     residual_px: list[float | None]
     deviations: list[Deviation]
     found: list[Determined]
+    evidence: list[Evidence]
 
 
 def refine(
@@ -81,11 +86,15 @@ def refine(
         unknowns = unknowns.around(here.pitch, here.lines)
         measured = measure_all(here.on_ground(unknowns), here.cameras, sight, search)
         before = here
+        measured = doubted(here, measured)
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
         # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
         here = _settled(here, cameras, measured, unknowns, stitch_weight)
+        measured = doubted(here, measured)
         here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
         uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
+        # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
+        uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
         here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
         if here.farthest_from(before) < SETTLED_M:
             break
@@ -102,10 +111,23 @@ def _settled(
 ) -> Estimate:
     """Where Huber's loss of the same measurements is least."""
     for _ in range(MOST_STEPS):
+        measured = doubted(here, measured)
         before, here = here, step(here, found, measured, unknowns, stitch_weight, huber_weights)
         if here.farthest_from(before) < SETTLED_M:
             break
     return here
+
+
+def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
+    """The measurements with the error that neither noise nor paint nor ground explains where the finish stands.
+
+    Lens and field are never quite what they are said to be, by pixels alike near and far. Without it, a far line that a
+    wrong lens puts beside itself by ten of its small sigmas would outweigh all near ones.
+    """
+    return [
+        replace(found, misfit_px=misfit_px(here.lines.position, camera, found))
+        for camera, found in zip(here.cameras, measured, strict=True)
+    ]
 
 
 def assess(
@@ -138,15 +160,26 @@ def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Refine
         [end.residual_px[0] for end in ends],
         [deviation for end in ends for deviation in end.deviations if deviation.camera is not None],
         [],
+        [end.evidence[0] for end in ends],
     )
 
 
 def _assessed(
     here: Estimate, found: Sequence[Camera], sight: Sight, unknowns: Unknowns, stitch_weight: float
 ) -> Refined:
-    measured = measure_all(here.on_ground(unknowns), here.cameras, sight, ASSESSING_SEARCH_PX)
+    lines = here.on_ground(unknowns)
+    evidence = [
+        evidence_of(lines, camera, bright, response)
+        for camera, bright, response in zip(here.cameras, sight.brightness, sight.responses, strict=True)
+    ]
+    measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
     prior, away = ordinary.prior(unknowns), here.away(found)
     judged = judge(here.pitch, here.lines, here.cameras, measured, unknowns, here.heights, prior, away, stitch_weight)
-    return Refined(here.pitch, here.cameras, **vars(judged))
+    return Refined(here.pitch, here.cameras, **vars(judged), evidence=evidence)
+
+
+def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
+    """The measurements of markings that are seen: ridges found where a line should be and is not fix no pose."""
+    return [found[np.isin(found.points.marking, seen.seen())] for found, seen in zip(measured, evidence, strict=True)]

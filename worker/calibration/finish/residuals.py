@@ -14,18 +14,19 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.robust import Weigh, tukey_weights
+from worker.calibration.finish.robust import Weigh, robust_scale, tukey_weights
 from worker.calibration.scene.camera import Array, Camera, Pose, project, rotation_matrices, rotation_vectors
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import Ground
 from worker.calibration.scene.parameters import FIELD_STEP_M, FieldParameter, Parameter
-from worker.calibration.see.line_measurement import NOISE_PX, Measurements
+from worker.calibration.see.line_measurement import Measurements
 
 POSE = 6
 """Numbers of a pose: a turn (rad, in the camera's own frame), a shift (m, in the world)."""
 LEAST_SINGLE_WEIGHT = 0.02
 FEWEST_MEASUREMENTS = 30
 JACOBIAN_STEP = 1e-5
+MISFIT_STEPS = 16
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,27 @@ def rms_px(points: Array, camera: Camera, measured: Measurements) -> float | Non
     return float(np.sqrt(np.mean(offset[counted] ** 2)))
 
 
+def misfit_px(points: Array, camera: Camera, measured: Measurements) -> float:
+    """The further error, in px, that makes the usual distance of lines from `points` (N, 3) what is expected.
+
+    0 where noise, paint and ground explain them. By the median: outliers say nothing of how well a lens is known.
+    """
+    offset = np.sum((measured.pixel - camera.project(points[measured.index])) * measured.normal, axis=1)
+    known = np.isfinite(offset)
+    offset, measured = offset[known], measured[known]
+
+    def explains(misfit: float) -> bool:
+        return robust_scale(offset / replace(measured, misfit_px=misfit).sigma_px) == 1.0
+
+    if len(offset) == 0 or explains(0.0):
+        return 0.0
+    low, high = 0.0, 2.0 * float(np.median(np.abs(offset)))
+    for _ in range(MISFIT_STEPS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if explains(middle) else (middle, high)
+    return high
+
+
 @dataclass(frozen=True)
 class _View:
     """Measurements against a pose: `offset` (M,) px, measured minus expected, and its `jacobian` (M, 6 N + E)."""
@@ -183,7 +205,7 @@ def _stitch(first: _View, second: _View) -> Residuals:
     index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
     scale_a, scale_b = first.measured.px_per_metre[a], second.measured.px_per_metre[b]
     up_a, up_b = first.measured.px_per_metre_up[a], second.measured.px_per_metre_up[b]
-    sigma_m = NOISE_PX * np.hypot(1 / scale_a, 1 / scale_b)
+    sigma_m = np.hypot(first.measured.noise_px[a] / scale_a, second.measured.noise_px[b] / scale_b)
     return Residuals(
         (first.offset[a] / scale_a - second.offset[b] / scale_b) / sigma_m,
         first.jacobian[a] / (scale_a * sigma_m)[:, None] - second.jacobian[b] / (scale_b * sigma_m)[:, None],

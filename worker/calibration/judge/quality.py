@@ -14,6 +14,7 @@ from worker.calibration.finish.uncertainty import Deviation
 from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.see.evidence import Evidence
 
 TOLERANCE_PX = 3.0
 """How far from its edge a line still counts as explained, in pixels of a 4K frame."""
@@ -24,17 +25,26 @@ MARKING = 0.5
 
 @dataclass(frozen=True)
 class Gate:
-    """Limits a result has to keep to replace the stored poses. Pixels are those of a 4K frame."""
+    """Limits a result has to keep to replace the stored poses. Pixels are those of a 4K frame, unless said.
 
-    least_iou: float = 0.45
-    iou_loss: float = 0.03
+    `least_agreement`: right poses find 0.8 and more of the lines beyond chance on fields of every kind, poses that have
+    settled on other lines up to 0.5. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
+    """
+
+    least_agreement: float = 0.6
+    agreement_loss: float = 0.05
     largest_residual_px: float = 2.0
+    residual_floor_px: float = 1.8
     largest_sigma_deg: float = 0.2
     largest_sigma_m: float = 0.5
     largest_rotation_deg: float = 8.0
     largest_shift_m: float = 1.5
     largest_stitch_error_px: float = 1.5
     highest_ridge_m: float = 3.0
+
+    def least_share(self, seen: Evidence) -> float:
+        """Of the markings that has to be seen, 0..1, where chance finds as much as it does."""
+        return seen.by_chance + self.least_agreement * (1 - seen.by_chance)
 
 
 @dataclass(frozen=True)
@@ -79,7 +89,8 @@ class CameraQuality:
 
     camera: Camera
     iou: float
-    iou_before: float
+    evidence: Evidence
+    evidence_before: Evidence
     residual_px: float | None
     sigma: Sigma | None
     repeatability: Sigma | None
@@ -112,7 +123,7 @@ def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) ->
 
 def believable(deviations: Sequence[Deviation], qualities: Sequence[CameraQuality], gate: Gate) -> list[Deviation]:
     """Those deviations that were read off cameras which see the pitch where they expect it."""
-    lost = {quality.camera.id for quality in qualities if quality.iou < gate.least_iou}
+    lost = {quality.camera.id for quality in qualities if quality.evidence.agreement < gate.least_agreement}
     return [d for d in deviations if (not lost if d.camera is None else d.camera not in lost)]
 
 
@@ -153,19 +164,20 @@ def rejection(
 
 
 def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
-    scale = quality.camera.intrinsics.relative_size
-    moved = quality.moved
-    if quality.iou < gate.least_iou:
+    moved, seen = quality.moved, quality.evidence
+    if seen.agreement < gate.least_agreement:
         return (
-            f"the markings in the frame do not fit this pitch (IoU {quality.iou:.2f}, at least {gate.least_iou}); "
+            f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is seen where it should "
+            f"be, at least {gate.least_share(seen):.0%} are needed and {seen.by_chance:.0%} would be seen anywhere; "
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
         )
     if quality.residual_px is None or quality.repeatability is None:
         return f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?"
-    if quality.residual_px > gate.largest_residual_px * scale:
+    limit = max(gate.largest_residual_px * quality.camera.intrinsics.relative_size, gate.residual_floor_px)
+    if quality.residual_px > limit:
         return (
-            f"lines are {quality.residual_px:.1f} px from where the pose puts them, at most "
-            f"{gate.largest_residual_px * scale:.1f} allowed; check intrinsics and the field's measures"
+            f"lines are {quality.residual_px:.1f} px from where the pose puts them, at most {limit:.1f} allowed; "
+            "check intrinsics and the field's measures"
         )
     sigma = quality.repeatability
     if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
@@ -179,8 +191,11 @@ def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
             f"{moved.position_m:.2f} m (at most {gate.largest_shift_m}); if somebody moved the camera, store a new "
             "first pose"
         )
-    if quality.iou < quality.iou_before - gate.iou_loss:
-        return f"the stored pose fits the frame better (IoU {quality.iou_before:.2f}, new {quality.iou:.2f})"
+    if seen.agreement < quality.evidence_before.agreement - gate.agreement_loss:
+        return (
+            f"the stored pose fits the frame better: {quality.evidence_before.share:.0%} of the markings' length is "
+            f"seen where it puts them, with the new pose {seen.share:.0%}"
+        )
     return None
 
 

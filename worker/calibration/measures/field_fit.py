@@ -127,7 +127,7 @@ def fit_field(
         journey.at("refinement", 0.9)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
-        qualities = qualities_of(pitch, cameras, refined, responses)
+        qualities = qualities_of(pitch, cameras, refined, sight)
         journey.at("refinement", 1.0)
     gate = Gate()
     rejected = (
@@ -203,6 +203,8 @@ def _settled(
         elif measure.known:
             pitch = parameter.write(pitch, parameter.read(fitted))
             still_free.append(parameter)
+    # Near the truth now, its broken lines can have the dashes that are painted.
+    pitch = pitch.dashed_anew()
     return (pitch.with_ridge_length(ridge.value) if ridge.known else pitch), still_free
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fields.landmarks import find
-from fields.shapes import Arc, Line, Shape
+from fields.shapes import WHITE, Arc, Line, Shape
 from fields.template import Template, load
 from worker.calibration.scene.camera import Array
 
@@ -26,11 +26,15 @@ LEAST_HIP_M = 0.5
 
 @dataclass(frozen=True)
 class Marking:
-    """A painted line of constant width: its name and the polyline (n, 2) of its centre, metres on the pitch."""
+    """A painted line of constant width: its name and the polyline (n, 2) of its centre, metres on the pitch.
+
+    `colour`: of the paint, one of `fields.shapes.COLOURS` or `#rrggbb`.
+    """
 
     name: str
     centre: Array
     width: float
+    colour: str = WHITE
 
     @property
     def closed(self) -> bool:
@@ -76,7 +80,8 @@ class LinePoints:
 class Field:
     """A field of a sport, a football pitch unless said; `measures`: what else its template leaves open, in metres.
 
-    `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat.
+    `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. `dashed`: the size whose dashes its broken
+    lines have, as many and stretched with them; None = its own.
     """
 
     length: float
@@ -85,6 +90,20 @@ class Field:
     ridge: Array | None = None
     template: Template = FOOTBALL
     measures: Mapping[str, float] = field(default_factory=dict)
+    dashed: Mapping[str, float] | None = None
+
+    def resized(self, *, length: float | None = None, width: float | None = None) -> Field:
+        """The same pitch with another length or width, point by point: with as many dashes."""
+        return replace(
+            self,
+            length=self.length if length is None else length,
+            width=self.width if width is None else width,
+            dashed=self._size if self.dashed is None else self.dashed,
+        )
+
+    def dashed_anew(self) -> Field:
+        """The same pitch with the dashes that fit on its lines."""
+        return replace(self, dashed=None)
 
     def flat(self) -> Field:
         """The same pitch on a plane."""
@@ -147,7 +166,7 @@ class Field:
 
     @cached_property
     def _markings(self) -> list[Marking]:
-        return [_marking(shape) for shape in self.template.markings(self._size)]
+        return [_marking(shape) for shape in self.template.markings(self._size, self.dashed)]
 
     @property
     def _size(self) -> dict[str, float]:
@@ -165,12 +184,8 @@ class Field:
         """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
         return self._line_points([fitting(marking.centre, spacing) for marking in self.markings()], spacing)
 
-    def painted_like(self, others: LinePoints) -> bool:
-        """Whether it has the markings of the pitch of these points: a longer broken line may have more dashes."""
-        return len(self.markings()) == others.marking[-1] + 1
-
     def same_line_points(self, others: LinePoints) -> LinePoints:
-        """The points that are those of a pitch of other measures: as many on each marking, as far along it."""
+        """The points that are those of the pitch before it was `resized`: as many on each marking, as far along it."""
         counts: list[int] = np.bincount(others.marking).tolist()
         return self._line_points(counts, others.spacing)
 
@@ -223,13 +238,14 @@ def equal_pieces(polyline: Array, count: int) -> tuple[Array, Array]:
 def _marking(shape: Shape) -> Marking:
     match shape:
         case Line():
-            return Marking(shape.name, np.array(shape.points), shape.width)
+            return Marking(shape.name, np.array(shape.points), shape.width, shape.colour)
         case Arc():
             count = max(8, int(np.ceil((shape.end - shape.start) * shape.radius / ARC_STEP_M)))
             angle = np.linspace(shape.start, shape.end, count + 1)
             around = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-            return Marking(shape.name, shape.centre + around, shape.width)
+            return Marking(shape.name, shape.centre + around, shape.width, shape.colour)
         case _:
             # A spot is a line as wide as itself and next to nothing long.
             offset = np.array([shape.diameter / 8, 0.0])
-            return Marking(shape.name, np.array([shape.centre - offset, shape.centre + offset]), shape.diameter)
+            across = np.array([shape.centre - offset, shape.centre + offset])
+            return Marking(shape.name, across, shape.diameter, shape.colour)

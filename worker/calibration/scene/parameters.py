@@ -64,11 +64,11 @@ class FieldParameter:
 
     def around(self, pitch: Field, lines: LinePoints) -> FieldParameter:
         """The same measure as it moves `lines` of a pitch that has been changed since."""
-        changed = {step: self.write(pitch, self.read(pitch) + step) for step in (FIELD_STEP_M, 0.0, -FIELD_STEP_M)}
-        # On the brink of one more dash, the other side has as many.
-        ahead, *_, behind = (step for step, one in changed.items() if one.painted_like(lines))
-        moved = changed[ahead].same_line_points(lines).position - changed[behind].same_line_points(lines).position
-        return replace(self, shift=moved / (ahead - behind))
+        ahead, behind = (
+            self.write(pitch, self.read(pitch) + step).same_line_points(lines).position
+            for step in (FIELD_STEP_M, -FIELD_STEP_M)
+        )
+        return replace(self, shift=(ahead - behind) / (2 * FIELD_STEP_M))
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
         """Cameras and pitch with this measure changed, as far as it can be."""
@@ -134,14 +134,12 @@ def _ridge_height(pitch: Field, expected: float) -> FieldParameter:
 def _length(pitch: Field, expected: float) -> FieldParameter:
     """Of the pitch; its ridge keeps its own."""
     return FieldParameter.of(
-        pitch, "length_m", expected, lambda one: one.length, lambda one, now: replace(one, length=now)
+        pitch, "length_m", expected, lambda one: one.length, lambda one, now: one.resized(length=now)
     )
 
 
 def _width(pitch: Field, expected: float) -> FieldParameter:
-    return FieldParameter.of(
-        pitch, "width_m", expected, lambda one: one.width, lambda one, now: replace(one, width=now)
-    )
+    return FieldParameter.of(pitch, "width_m", expected, lambda one: one.width, lambda one, now: one.resized(width=now))
 
 
 def _longer(lens: Intrinsics, by: float) -> Intrinsics:

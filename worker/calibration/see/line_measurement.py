@@ -1,7 +1,8 @@
 """Where the painted lines are in a frame: sub-pixel centres, measured across each line with a matched filter.
 
 The filter is the profile that a line of the expected width should have after the blur of lens and sensor. The frame's
-brightness says where it fits best; the segmentation only says whether a bright ridge is a marking.
+brightness says where it fits best. That it is a marking is said by one of two witnesses: the segmentation, or the ridge
+itself, where it goes on along the line as noise and things beside the line do not.
 """
 
 from __future__ import annotations
@@ -28,6 +29,10 @@ BESIDE_PX = 4.0
 """How much of the grass on each side belongs to the filter, beyond a third of the line's width."""
 LEAST_CORRELATION = 0.6
 LEAST_RESPONSE = 0.3
+TOGETHER_PX = 40.0
+"""Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one."""
+LEAST_ALONG = 0.5
+"""Mean correlation with the expected profile, over that length, from which a ridge is a line for itself."""
 CENTRE_STEPS = 2
 RIDGE = 1e-6
 OFF_CENTRE_PENALTY = 0.15
@@ -36,6 +41,9 @@ NOISE_PX = 0.2
 """Error of one measurement of a perfect line."""
 PAINT_M = 0.006
 """Lines are painted to about a centimetre."""
+
+MISFIT_ALIKE_PX = 10.0
+"""Length of line over which what lens and field have wrong is the same."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +61,25 @@ class Measurements:
     normal: Array
     px_per_metre: Array
     px_per_metre_up: Array
+    length_px: Array
+    misfit_px: float = 0.0
 
     def __len__(self) -> int:
         return len(self.index)
 
     @property
     def sigma_px(self) -> Array:
-        """Expected error (M,) along the normal: of the measurement, and of paint and ground."""
+        """Expected error (M,) along the normal: of the measurement, of paint and ground, and what nothing explains."""
         of_model = np.hypot(PAINT_M * self.px_per_metre, UNEVEN_M * self.px_per_metre_up)
-        return np.hypot(NOISE_PX, of_model)
+        return np.hypot(self.noise_px, of_model)
+
+    @property
+    def noise_px(self) -> Array:
+        """Expected error (M,) of a measurement when paint and ground are where the model has them.
+
+        What nothing explains is alike over `MISFIT_ALIKE_PX`: so much of a line counts as one measurement of it.
+        """
+        return np.hypot(NOISE_PX, self.misfit_px * np.sqrt(np.maximum(MISFIT_ALIKE_PX / self.length_px, 1.0)))
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Measurements:
         return Measurements(
@@ -71,6 +89,8 @@ class Measurements:
             self.normal[chosen],
             self.px_per_metre[chosen],
             self.px_per_metre_up[chosen],
+            self.length_px[chosen],
+            self.misfit_px,
         )
 
 
@@ -83,6 +103,48 @@ def brightness_of(frame: Frame) -> NDArray[np.uint8]:
     return frame[..., 1]
 
 
+@dataclass(frozen=True)
+class Profiles:
+    """Pieces of line of about one width, and how well they fit at shifts across themselves.
+
+    `which` (M,): of the lines that were looked for; `brightness` (M, S + K - 1): profiles across them, NaN outside the
+    picture, in steps of `sampling_px`; `expected` (M, K) at `offsets` (K,) from their centres, see `expected_profiles`;
+    `correlation` (M, S) of the two at `shifts` (S,) px along their normals; `along` (M, S): its mean over the pieces
+    of the same marking around each, -1..1: high where a ridge goes on along the line, near zero elsewhere.
+    """
+
+    which: NDArray[np.intp]
+    brightness: Array
+    expected: Array
+    offsets: Array
+    correlation: Array
+    along: Array
+    shifts: Array
+    sampling_px: float
+
+
+def line_profiles(
+    seen: SeenLines, brightness: NDArray[np.float32], reach_px: float, relative_size: float
+) -> list[Profiles]:
+    """The profiles of all lines that are wide enough to be seen, for shifts up to `reach_px`, by class of width."""
+    bend = _bend(seen)
+    classes = []
+    for low, high, sampling in WIDTH_CLASSES_PX:
+        which = np.flatnonzero((seen.width_px >= low) & (seen.width_px < high))
+        pieces = seen[which]
+        half_filter = int(np.ceil((high * 0.85 + BESIDE_PX) / sampling))
+        half_search = int(np.ceil(reach_px / sampling)) + 1
+        reach = half_filter + half_search
+        across = _profiles(brightness, pieces, bend[which], sampling * np.arange(-reach, reach + 1, dtype=float))
+        offsets = sampling * np.arange(-half_filter, half_filter + 1, dtype=float)
+        expected = expected_profiles(pieces.width_px, offsets)
+        correlation = sliding_correlation(across, expected)
+        along = _mean_along(correlation, pieces, TOGETHER_PX * relative_size)
+        shifts = sampling * np.arange(-half_search, half_search + 1, dtype=float)
+        classes.append(Profiles(which, across, expected, offsets, correlation, along, shifts, sampling))
+    return classes
+
+
 def measure_lines(
     lines: LinePoints,
     camera: Camera,
@@ -92,14 +154,12 @@ def measure_lines(
 ) -> Measurements:
     """The lines of `camera` found within `search_px` of where its pose expects them.
 
-    `brightness` (H, W) see `brightness_of`; `response` (H, W) the segmentation in 0..1.
+    `brightness` (H, W) see `brightness_of`; `response` (H, W) the segmentation in 0..1. What either the network or the
+    ridge along a line calls a marking is measured.
     """
     seen = SeenLines.from_camera(lines, camera)
-    bend = _bend(seen)
-    found = []
-    for low, high, sampling in WIDTH_CLASSES_PX:
-        of_class = (seen.width_px >= low) & (seen.width_px < high)
-        found.append(_measure_class(seen[of_class], bend[of_class], brightness, response, search_px, high, sampling))
+    profiles = line_profiles(seen, brightness, search_px, camera.intrinsics.relative_size)
+    found = [_measured(seen[of_class.which], of_class, response, search_px) for of_class in profiles]
     index = np.concatenate([m.index for m in found])
     return Measurements(
         index,
@@ -108,42 +168,43 @@ def measure_lines(
         np.concatenate([m.normal for m in found]),
         np.concatenate([m.px_per_metre for m in found]),
         np.concatenate([m.px_per_metre_up for m in found]),
+        np.concatenate([m.length_px for m in found]),
     )
 
 
-def _measure_class(
-    seen: SeenLines,
-    bend: Array,
-    brightness: NDArray[np.float32],
-    response: NDArray[np.float32],
-    search_px: float,
-    widest_px: float,
-    sampling_px: float,
-) -> Measurements:
-    """Lines of about one width: profiles, correlation with the expected one, peak, and what speaks against it."""
-    half_filter = int(np.ceil((widest_px * 0.85 + BESIDE_PX) / sampling_px))
-    half_search = int(np.ceil(search_px / sampling_px)) + 1
-    offsets = sampling_px * np.arange(-half_filter - half_search, half_filter + half_search + 1, dtype=float)
-    profiles = _profiles(brightness, seen, bend, offsets)
-    around = sampling_px * np.arange(-half_filter, half_filter + 1, dtype=float)
-    filters = expected_profiles(seen.width_px, around)
-    correlation = sliding_correlation(profiles, filters)
-
-    shifts = np.arange(-half_search, half_search + 1) * sampling_px
-    preference = correlation - OFF_CENTRE_PENALTY * (shifts / search_px) ** 2
+def _measured(seen: SeenLines, profiles: Profiles, response: NDArray[np.float32], search_px: float) -> Measurements:
+    """Where the lines of one class fit best, to a fraction of a pixel, but for what speaks against it."""
+    shifts = profiles.shifts
+    preference = profiles.correlation - OFF_CENTRE_PENALTY * (shifts / search_px) ** 2
     best = np.argmax(preference, axis=1)
     at_end = (best == 0) | (best == len(shifts) - 1)
-    windows = np.take_along_axis(profiles, best[:, None] + np.arange(filters.shape[1]), axis=1)
-    shift = shifts[best] + _centre(windows, seen.width_px, around, sampling_px)
+    windows = np.take_along_axis(profiles.brightness, best[:, None] + np.arange(profiles.expected.shape[1]), axis=1)
+    shift = shifts[best] + _centre(windows, seen.width_px, profiles.offsets, profiles.sampling_px)
     pixel = seen.pixel + shift[:, None] * seen.normal
     row = np.arange(len(seen))
+    marking = (bilinear(response, pixel) >= LEAST_RESPONSE) | (profiles.along[row, best] >= LEAST_ALONG)
     good = (
         ~at_end
-        & (correlation[row, best] >= LEAST_CORRELATION)
-        & (bilinear(response, pixel) >= LEAST_RESPONSE)
-        & np.isfinite(profiles).all(axis=1)
+        & (profiles.correlation[row, best] >= LEAST_CORRELATION)
+        & marking
+        & np.isfinite(profiles.brightness).all(axis=1)
     )
-    return Measurements(seen.index, seen.points, pixel, seen.normal, seen.px_per_metre, seen.px_per_metre_up)[good]
+    return Measurements(
+        seen.index, seen.points, pixel, seen.normal, seen.px_per_metre, seen.px_per_metre_up, seen.length_px
+    )[good]
+
+
+def _mean_along(correlation: Array, pieces: SeenLines, length_px: float) -> Array:
+    """Correlations (M, S) averaged along each marking over about `length_px`, as many pieces to each side."""
+    half = np.ceil(length_px / 2 / np.maximum(pieces.length_px, 1e-6)).astype(int)
+    breaks = (np.diff(pieces.index) != 1) | (np.diff(pieces.points.marking) != 0)
+    stretch = np.concatenate([[0], np.cumsum(breaks)])[: len(pieces)]
+    first = np.searchsorted(stretch, stretch, side="left")
+    last = np.searchsorted(stretch, stretch, side="right")
+    at = np.arange(len(pieces))
+    low, high = np.maximum(at - half, first), np.minimum(at + half + 1, last)
+    total = np.concatenate([np.zeros((1, correlation.shape[1])), np.cumsum(np.nan_to_num(correlation), axis=0)])
+    return np.asarray((total[high] - total[low]) / (high - low)[:, None])
 
 
 def expected_profiles(width_px: Array, offsets_px: Array) -> Array:

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from fields.template import load
 from tests.worker.calibration.synthetic import BARREL, CROWNED, PITCH, camera, moved, paint_frame, paint_markings, pair
 from worker.calibration.finish.refinement import Sight
 from worker.calibration.measures.field_fit import fit_measures
@@ -73,3 +74,16 @@ def test_a_flat_pitch_has_no_ridge_worth_mentioning_and_none_whose_length_could_
     assert refined.pitch.ridge_height == pytest.approx(0.0, abs=0.03)
     assert not length.known
     assert "from 0 to 100 m" in length.detail
+
+
+def test_a_handball_court_that_is_narrower_than_said_is_found_though_it_has_fewer_dashes():
+    truth = Field(39.8, 19.6, 0.05, template=load("handball"))
+    given = Field(40.0, 20.0, 0.05, template=load("handball"))
+    assert len(truth.markings()) < len(given.markings())
+    opposite = [
+        camera(name, (x, y, 7.0), (0.5 * x, 0.0), focal=600.0) for name, x, y in (("a", -9.0, -15.0), ("b", 9.0, 15.0))
+    ]
+    refined, measures = fitted(truth, opposite, given)
+    assert refined.pitch.length == pytest.approx(39.8, abs=0.02)
+    assert refined.pitch.width == pytest.approx(19.6, abs=0.02)
+    assert measures["width_m"].known

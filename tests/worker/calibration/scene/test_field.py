@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fields.template import Template, load
 from tests.worker.calibration.synthetic import CROWNED, PITCH
 from worker.calibration.scene.field import Field, resample
 
@@ -111,3 +112,45 @@ def test_a_ridge_gets_another_length_around_its_middle_as_far_as_there_is_room()
     widest = pitch.with_ridge_length(500.0)
     assert widest.ridge[:, 0] == pytest.approx([5.0 - 47.0, 5.0 + 47.0])
     assert PITCH.with_ridge_length(8.0).height(np.array([3.0, 5.0])) == 0.0
+
+
+def test_markings_have_the_colour_of_their_paint():
+    circle = {"name": "b", "circle": {"centre": [0, 0], "radius": 1}, "colour": "blue"}
+    spot = {"name": "c", "spot": {"centre": [0, 0], "diameter": 0.3}, "colour": "#ffcc00"}
+    plan = Template(marking=[{"name": "a", "line": [[0, 0], [1, 0]]}, circle, spot])
+    assert [marking.colour for marking in Field(10, 5, 0.05, template=plan).markings()] == ["white", "blue", "#ffcc00"]
+
+
+@pytest.mark.parametrize(
+    ("sport", "usual"), [("handball", (40, 20)), ("handball", (38, 18.4)), ("rugby-union", (120, 68))]
+)
+@given(by=st.floats(-1.5, 1.5))
+def test_a_resized_field_has_the_same_dashes_where_its_broken_lines_are_now(sport, usual, by):
+    template = load(sport)
+    size = {name: extent.default for name, extent in template.size.items()}
+    nominal = Field(*usual, size["line"], template=template)
+    wider = nominal.resized(width=usual[1] + by).resized(length=usual[0] + by)
+    assert [marking.name for marking in wider.markings()] == [marking.name for marking in nominal.markings()]
+    lines = nominal.line_points(0.1)
+    assert (wider.same_line_points(lines).marking == lines.marking).all()
+    if sport == "handball":
+        dashes = [marking for marking in wider.markings() if "left free-throw line, far" in marking.name]
+        ends = np.concatenate([dash.centre for dash in dashes])
+        post = np.array([-wider.length / 2, 1.5])
+        np.testing.assert_allclose(np.linalg.norm(ends - post, axis=1), 9 - 0.025)
+        assert ends[:, 1].max() < wider.width / 2
+
+
+def test_a_field_dashed_anew_has_whole_dashes_again():
+    wider = Field(40, 20, 0.05, template=load("handball")).resized(width=19.2)
+    anew = Field(40, 19.2, 0.05, template=load("handball"))
+    assert len(wider.markings()) > len(anew.markings())
+    assert len(wider.dashed_anew().markings()) == len(anew.markings())
+
+
+def test_the_points_of_broken_lines_move_smoothly_with_the_width():
+    nominal = Field(40, 20, 0.05, template=load("handball"))
+    before = nominal.line_points()
+    steps = [nominal.resized(width=20 + by).same_line_points(before).position for by in (0.0, 0.01, 0.02)]
+    np.testing.assert_allclose(steps[1] - steps[0], steps[2] - steps[1], atol=2e-4)
+    assert np.abs(steps[1] - steps[0]).max() < 0.03

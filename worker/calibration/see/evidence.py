@@ -1,0 +1,114 @@
+"""Whether the expected lines are there: how much of them is found, beside how much chance would find.
+
+Two witnesses see a piece of line: the network's response, and a ridge of the expected direction, width and polarity
+that goes on along the line. The second needs no training and sees lines on any ground. What chance would find is read
+off the same picture: the same pieces, looked for beside themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.field import LinePoints
+from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.see.line_measurement import LEAST_ALONG, line_profiles
+from worker.calibration.see.sampling import bilinear
+
+TOLERANCE_PX = 3.0
+"""How far from where it is expected a line is still found, in pixels of a 4K frame; never less than 2 px."""
+BESIDE_PX = 40.0
+"""How far to each side chance is given its tries, in pixels of a 4K frame; never less than 24 px."""
+LEAST_BEYOND_CHANCE = 0.3
+"""How much more of a marking than by chance has to be found for it to be seen at all, 0..1."""
+MARKING = 0.5
+"""Probability from which the network sees a marking."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What is seen of M pieces of expected line of one camera.
+
+    `index` (M,): which line points; `marking` (M,): which of the markings; `weight` (M,): px of line, less where
+    it is thinner than a pixel; `found` (M,): whether it is seen where it is expected; `chance` (M,): how often, 0..1, a
+    piece is seen as near to a place beside it.
+    """
+
+    index: NDArray[np.intp]
+    marking: NDArray[np.intp]
+    weight: Array
+    found: NDArray[np.bool_]
+    chance: Array
+
+    @property
+    def share(self) -> float:
+        """Of the expected length that is found, 0..1."""
+        return _mean(self.found, self.weight)
+
+    @property
+    def by_chance(self) -> float:
+        """Of the expected length that would be found anywhere, 0..1."""
+        return _mean(self.chance, self.weight)
+
+    @property
+    def agreement(self) -> float:
+        """The share found beyond chance: 1 where all lines are found, 0 where no more than anywhere (Cohen, 1960)."""
+        return (self.share - self.by_chance) / max(1.0 - self.by_chance, 0.05)
+
+    def of(self, marking: int) -> Evidence:
+        """That of one marking."""
+        its = self.marking == marking
+        return Evidence(self.index[its], self.marking[its], self.weight[its], self.found[its], self.chance[its])
+
+    def seen(self) -> NDArray[np.intp]:
+        """The markings that are found clearly more often than chance would: what else fits them is no line."""
+        markings = np.unique(self.marking)
+        beyond = [self.of(marking).share - self.of(marking).by_chance for marking in markings]
+        return np.asarray(markings[np.array(beyond) >= LEAST_BEYOND_CHANCE])
+
+
+def _mean(values: Array | NDArray[np.bool_], weight: Array) -> float:
+    total = float(weight.sum())
+    return float(np.sum(values * weight)) / total if total else 0.0
+
+
+def evidence_of(
+    lines: LinePoints, camera: Camera, brightness: NDArray[np.float32], response: NDArray[np.float32]
+) -> Evidence:
+    """How much of `lines` the frame shows where the pose of `camera` puts them.
+
+    `brightness` (H, W) see `line_measurement.brightness_of`; `response` (H, W) the segmentation in 0..1.
+    """
+    scale = camera.intrinsics.relative_size
+    tolerance, beside = max(TOLERANCE_PX * scale, 2.0), max(BESIDE_PX * scale, 24.0)
+    seen = SeenLines.from_camera(lines, camera)
+    parts = []
+    for looked in line_profiles(seen, brightness, tolerance + beside, scale):
+        pieces = seen[looked.which]
+        where = pieces.pixel[:, None] + looked.shifts[None, :, None] * pieces.normal[:, None]
+        network = bilinear(response, where) / (MARKING * np.minimum(pieces.width_px, 1.0))[:, None]
+        # Of either polarity: black lines on a light floor are lines too.
+        strength = np.maximum(np.abs(looked.along) / LEAST_ALONG, network)
+        near = np.abs(looked.shifts) <= tolerance
+        away = np.abs(looked.shifts) > 2 * tolerance + pieces.width_px.max(initial=0) / 2
+        # As many shifts at a time as there are around the expected place.
+        hits = _any_of(strength[:, away] >= 1, int(near.sum()))
+        parts.append(
+            Evidence(
+                pieces.index,
+                pieces.points.marking,
+                pieces.length_px * np.minimum(pieces.width_px, 1.0),
+                np.asarray((strength[:, near] >= 1).any(axis=1)),
+                hits.mean(axis=1) if len(hits) else np.empty(0),
+            )
+        )
+    return Evidence(*(np.concatenate(column) for column in zip(*(vars(part).values() for part in parts), strict=True)))
+
+
+def _any_of(hit: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
+    """Whether any of `count` neighbours is hit, for groups (M, G) of columns (M, S)."""
+    groups = hit.shape[1] // count
+    return np.asarray(hit[:, : groups * count].reshape(len(hit), groups, count).any(axis=2))
