@@ -60,6 +60,8 @@ def asked(monkeypatch):
                 Sigma(0.01, 0.02),
                 engine.Movement(0.0, 0.05, float("nan")),
                 0.9,
+                0.8,
+                0.1,
                 None,
             )
             for camera in cameras
