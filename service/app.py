@@ -13,21 +13,10 @@ from starlette.responses import Response
 
 from service.api import problems
 from service.api.access import QUIET, Access
-from service.api.auth import Gate
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
-from service.api.shared_reads import SharedReads
-from service.api.watch import Watch
-from service.intake.from_sources import FromSources
-from service.intake.snapshots import Snapshots
-from service.intake.submit import Intake
-from service.observe.disk import Disk
-from service.observe.metrics import Metrics
-from service.observe.readiness import Readiness
 from service.pages import ROUTERS as PAGES
-from service.queue import Queue
-from service.queue import migrate as migrate_queue
 from service.routes import (
     again,
     calibrate,
@@ -44,27 +33,15 @@ from service.routes import (
 )
 from service.settings import Settings
 from service.store.blobs import AWAY as BLOBS_AWAY
-from service.store.blobs import Blobs
-from service.store.counts.ends import Ends
-from service.store.counts.figures import look
 from service.store.engine import AWAY as DATABASE_AWAY
-from service.store.engine import connect, migrate
-from service.store.expiry import Expiry
-from service.store.jobs import Jobs
-from service.store.keys import Keys
-from service.store.sessions import Sessions
-from service.store.venues import Venues
-from service.store.workers import Workers
 from service.wire.problems import Problem
 
-# A client waits, and can come again.
-BLOB_PATIENCE_S = 10.0
 log = structlog.get_logger()
 
 
 def create_app(settings: Settings) -> FastAPI:
     """The application; brings the database up to date first."""
-    context = open_context(settings)
+    context = Context(settings)
     app = documented.DocumentedApp(
         title="ESC",
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
@@ -94,38 +71,6 @@ def create_app(settings: Settings) -> FastAPI:
     return app
 
 
-def open_context(settings: Settings) -> Context:
-    """Open the database, the files and the queue."""
-    engine = connect(settings.home_database_url)
-    migrate(engine)
-    migrate_queue(settings.home_database_url)
-    jobs_, workers, keys, disk = Jobs(engine), Workers(engine), Keys(engine), Disk(settings)
-    blobs = Blobs(settings.home_blob_url, BLOB_PATIENCE_S)
-    venues_, expiry = Venues(engine), Expiry(engine)
-    snapshots, intake = Snapshots(settings), Intake(settings, jobs_, expiry, blobs)
-    return Context(
-        settings=settings,
-        engine=engine,
-        queue=Queue(settings.home_database_url),
-        blobs=blobs,
-        disk=disk,
-        venues=venues_,
-        jobs=jobs_,
-        ends=Ends(engine),
-        expiry=expiry,
-        workers=workers,
-        reads=SharedReads(jobs_.get),
-        watch=Watch(jobs_.states),
-        metrics=Metrics(lambda: look(engine, settings.metrics_venues), disk, settings.takeover_after_s),
-        readiness=Readiness(jobs_, blobs, disk, workers, settings.takeover_after_s),
-        keys=keys,
-        gate=Gate(keys, Sessions(engine), settings),
-        snapshots=snapshots,
-        intake=intake,
-        from_sources=FromSources(venues_, jobs_, snapshots, intake),
-    )
-
-
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
@@ -136,8 +81,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         with suppress(asyncio.CancelledError):
             await task
     await context.gate.write_uses()
-    context.queue.close()
-    context.engine.dispose()
+    context.close()
 
 
 def _answer_outages(app: FastAPI) -> None:

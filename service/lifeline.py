@@ -1,4 +1,4 @@
-"""Processes that must not outlive the one that started them."""
+"""Child processes: they end with the one that started them, and those that read what strangers sent get no secrets."""
 
 from __future__ import annotations
 
@@ -11,11 +11,28 @@ import time
 
 PARENT = "ESC_PARENT"
 PR_SET_PDEATHSIG = 1
+# The machine and its languages, and what interpreters, libraries and the runtimes of networks read.
+HARMLESS = {"PATH", "HOME", "USER", "TMPDIR", "TZ", "LANG"}
+HARMLESS_FROM = ("LC_", "LD_", "PYTHON", "SSL_CERT_", "CUDA_", "NVIDIA_", "ORT_", "OPENVINO_")
 
 
 def for_child() -> dict[str, str]:
     """What the parent adds to the environment of a child that shall end with it."""
     return {PARENT: str(os.getpid())}
+
+
+def without_secrets(*also: str) -> dict[str, str]:
+    """The environment of a child that shall end with it and that decodes, in native code, what strangers sent.
+
+    No password of a database, no secret that callbacks are signed with. `also`: how the names of others begin that it
+    needs, in capital letters.
+    """
+    inherited = {
+        name: value
+        for name, value in os.environ.items()
+        if name in HARMLESS or name.upper().startswith((*HARMLESS_FROM, *also))
+    }
+    return inherited | for_child()
 
 
 def end_with_parent() -> None:

@@ -105,7 +105,7 @@ class Settings(BaseSettings):
     job_timeout_s: float = Field(600, gt=0, description="For jobs that name no limit of their own.")
     job_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.jobs.job"],
-        description="What computes one job; called with the job's id and the token of the attempt.",
+        description="What computes one job, which it reads on its standard input.",
     )
     takeover_after_s: float = Field(10, gt=2, description="Silence after which another worker takes a job over.")
 

@@ -10,67 +10,45 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
-import selectors
 import signal
-import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, TypeVar
 
 import structlog
-from pydantic import ValidationError
 
-from service import lifeline
-from service.intake.from_sources import FromSources
-from service.intake.snapshots import Snapshots
-from service.intake.submit import Intake
+from service.home import Home
 from service.observe import tracing
-from service.observe.disk import Disk
-from service.queue import Queue, WorkerQueue
-from service.queue import migrate as migrate_queue
+from service.queue import WorkerQueue
 from service.settings import Settings
-from service.store.blobs import Blobs
-from service.store.deliveries import Deliveries
-from service.store.engine import AWAY, connect, migrate
-from service.store.expiry import Expiry
-from service.store.jobs import Jobs, Task
-from service.store.schedules import Schedules
-from service.store.venues import Venues
-from service.store.workers import Workers
+from service.store.engine import AWAY
+from service.store.jobs.attempts import Attempts
+from service.store.jobs.task import Task
 from service.wire.job import JobError, Progress
 from service.wire.problems import KINDS, first_line, type_of
-from worker.duties import retention
+from worker.child import Child
 from worker.duties.alarms import Alarms
-from worker.duties.callbacks import Callbacks
+from worker.duties.delivering import Delivering
 from worker.duties.retention import Retention
 from worker.duties.scheduled import Scheduled
 from worker.message import Message
 from worker.spans import Spans
 
 BEAT_S = 2.0
-# Twice as often as a cancellation needs to reach the child.
-LOOK_S = 0.5
 PROGRESS_S = 0.25
 # How long the database may be away, beyond the time the job has anyway, before its end is lost.
 OUTAGE_S = 60.0
 TRY_AGAIN_S = 1.0
 PUT_OFF_S = 10.0
-LONGEST_LINE = 16 * 1024 * 1024
-# For a process that has closed its output.
-ENDING_S = 10.0
 Answer = TypeVar("Answer")
 log = structlog.get_logger()
 
 
 class AlreadyRunning(Exception):  # noqa: N818
     """A worker of this name runs on this machine."""
-
-
-class NoMessage(Exception):  # noqa: N818
-    """What a child writes is not what a program of jobs writes."""
 
 
 def run(settings: Settings) -> None:
@@ -96,24 +74,15 @@ class Worker:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        engine = connect(settings.home_database_url)
-        migrate(engine)
-        migrate_queue(settings.home_database_url)
-        self._jobs = Jobs(engine)
-        self._workers = Workers(engine)
+        home = Home(settings)
+        self._attempts, self._workers = home.attempts, home.workers
         self._queue = WorkerQueue(
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt
         )
-        blobs = Blobs(settings.home_blob_url, retention.PATIENCE_S)
-        self._retention = Retention(settings, Expiry(engine), blobs, self._workers, self._queue.forget)
-        deliveries = Deliveries(engine)
-        self._callbacks = Callbacks(settings, deliveries, self._jobs, deliveries.now)
-        venues, expiry = Venues(engine), Expiry(engine)
-        self._alarms = Alarms(venues)
-        intake = Intake(settings, self._jobs, expiry, blobs)
-        from_sources = FromSources(venues, self._jobs, Snapshots(settings), intake)
-        enqueue = Queue(settings.home_database_url).enqueue
-        self._scheduled = Scheduled(Schedules(engine), venues, from_sources, Disk(settings), enqueue)
+        self._retention = Retention(settings, home.expiry, home.blobs, home.workers, self._queue.forget)
+        self._delivering = Delivering(settings, home.deliveries, home.jobs, home.deliveries.now)
+        self._alarms = Alarms(home.venues)
+        self._scheduled = Scheduled(home.schedules, home.venues, home.from_sources, home.disk, home.queue.enqueue)
 
     def start(self) -> None:
         """Show up and take jobs."""
@@ -126,7 +95,7 @@ class Worker:
         Beside that, in threads of their own, tidy up, tell who asked for it of the ends of jobs and of alarms, see
         which alarms have come of time that has passed, and submit what schedules ask for.
         """
-        for look in (self._retention.look, self._callbacks.look, self._alarms.look, self._scheduled.look):
+        for look in (self._retention.look, self._delivering.look, self._alarms.look, self._scheduled.look):
             threading.Thread(target=_again_and_again, args=(look, stop), daemon=True).start()
         beaten, judging_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):
@@ -157,17 +126,17 @@ class Worker:
                 self._workers.leave(name, silence)
 
     def _reconcile(self) -> None:
-        silent = self._jobs.unchanged_for(self._settings.takeover_after_s)
+        silent = self._attempts.unchanged_for(self._settings.takeover_after_s)
         given_up = self._queue.given_up(silent) if silent else {}
         for job_id, why in given_up.items():
             # A slow job may have ended while the queue was asked.
-            if self._jobs.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log.")):
+            if self._attempts.abandon(job_id, _error("job-abandoned", f"{why}; see the worker's log.")):
                 log.error("job given up", job=job_id, why=why)
 
     def _attempt(self, job_id: str) -> None:
         """One attempt of a job, from its beginning to a state that is written down."""
         begun = time.monotonic()
-        task = _insist(lambda: self._jobs.begin(job_id), begun + OUTAGE_S)
+        task = _insist(lambda: self._attempts.begin(job_id), begun + OUTAGE_S)
         if task is None:
             return
         limit_s = task.options.timeout_s or self._settings.job_timeout_s
@@ -180,12 +149,12 @@ class Worker:
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
                 crashed = _error("job-crashed", f"The attempt broke off: {first_line(error)}")
-                _insist(lambda: self._jobs.fail(task, crashed), time.monotonic() + OUTAGE_S)
+                _insist(lambda: self._attempts.fail(task, crashed), time.monotonic() + OUTAGE_S)
             log.info("job ends", seconds=round(time.monotonic() - begun, 2))
 
     def _compute(self, task: Task, limit_s: float, spans: Spans) -> Message | None:
         """The last word about the job; None if it was taken away."""
-        deadline, shown, hold = time.monotonic() + limit_s, 0.0, Hold(self._jobs, task)
+        deadline, shown, hold = time.monotonic() + limit_s, 0.0, Hold(self._attempts, task)
         with Child(self._settings, task) as child:
             for message in child.messages():
                 if message is None and hold.lost():
@@ -206,22 +175,22 @@ class Worker:
 
     def _show(self, task: Task, progress: Progress) -> None:
         with suppress(*AWAY):
-            self._jobs.report(task, progress)
+            self._attempts.report(task, progress)
 
     def _write_down(self, task: Task, end: Message | None) -> None:
         if end is None:
             log.info("job taken away")
         elif end.result is not None:
-            self._jobs.finish(task, end.result, end.pictures)
+            self._attempts.finish(task, end.result, end.pictures)
         elif end.error is not None:
-            self._jobs.fail(task, end.error)
+            self._attempts.fail(task, end.error)
 
 
 class Hold:
     """An attempt's hold on its job: looked at often, and now and then renewed, which costs the database a write."""
 
-    def __init__(self, jobs: Jobs, task: Task) -> None:
-        self._jobs = jobs
+    def __init__(self, attempts: Attempts, task: Task) -> None:
+        self._attempts = attempts
         self._task = task
         self._renewed = time.monotonic()
 
@@ -229,78 +198,18 @@ class Hold:
         """Whether the job went to a cancellation or to another attempt; while the database is away, nobody can say."""
         try:
             if time.monotonic() - self._renewed < BEAT_S:
-                return not self._jobs.holds(self._task)
+                return not self._attempts.holds(self._task)
             self._renewed = time.monotonic()
-            return not self._jobs.keep(self._task)
+            return not self._attempts.keep(self._task)
         except AWAY:
             log.warning("cannot give a sign of life", exc_info=True)
             return False
-
-
-class Child:
-    """The process that computes one job; killed when the `with` block is left."""
-
-    def __init__(self, settings: Settings, task: Task) -> None:
-        self._process = subprocess.Popen(
-            [*settings.job_program, task.job_id, task.run_token],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            env=os.environ | _as_environment(settings) | settings.native_environment | lifeline.for_child(),
-        )
-        assert self._process.stdout is not None
-        self._output: IO[bytes] = self._process.stdout
-
-    def __enter__(self) -> Child:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.wait()
-        self._output.close()
-
-    def messages(self) -> Iterator[Message | None]:
-        """What the child says until it ends, and None at least every `LOOK_S`."""
-        descriptor, pending, looked = self._output.fileno(), b"", time.monotonic()
-        with selectors.DefaultSelector() as selector:
-            selector.register(descriptor, selectors.EVENT_READ)
-            while True:
-                if selector.select(LOOK_S):
-                    chunk = os.read(descriptor, 65536)
-                    if not chunk:
-                        return
-                    *lines, pending = (pending + chunk).split(b"\n")
-                    if len(pending) > LONGEST_LINE:
-                        raise NoMessage(f"its program wrote a line of more than {LONGEST_LINE} bytes")
-                    yield from (message for line in lines if (message := _understood(line)))
-                if time.monotonic() - looked >= LOOK_S:
-                    looked = time.monotonic()
-                    yield None
-
-    def how_it_ended(self) -> str:
-        """For the job's error, after the output has ended."""
-        try:
-            code = self._process.wait(ENDING_S)
-        except subprocess.TimeoutExpired:
-            return "Its process closed its output and went on with no result; see the worker's log."
-        if code == -signal.SIGKILL:
-            return "Its process was killed, most likely for lack of memory."
-        if code < 0:
-            return f"Its process died of {signal.Signals(-code).name}; see the worker's log."
-        return f"Its process ended with code {code} and no result; see the worker's log."
 
 
 def model_sha256(path: Path) -> str:
     """The hash of the model file, as in `provenance`."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _understood(line: bytes) -> Message | None:
-    try:
-        return Message.model_validate_json(line)
-    except ValidationError:
-        log.warning("not understood", line=line[:500].decode(errors="replace"))
-        return None
 
 
 def _insist(write: Callable[[], Answer], until: float) -> Answer:
@@ -328,19 +237,6 @@ def _again_and_again(look: Callable[[], float], stop: threading.Event) -> None:
 
 def _error(kind: str, detail: str) -> JobError:
     return JobError(type=type_of(kind), title=KINDS[kind].title, detail=detail)
-
-
-def _as_environment(settings: Settings) -> dict[str, str]:
-    """What the child needs to find the same home, however this process was configured."""
-    return {
-        "ESC_DATA": str(settings.data.absolute()),
-        "ESC_DATABASE_URL": settings.home_database_url,
-        "ESC_BLOB_URL": settings.home_blob_url,
-        "ESC_MODEL": str(settings.model.absolute()),
-        "ESC_THREADS": str(settings.threads),
-        "ESC_LOG_FORMAT": settings.log_format,
-        "ESC_LOG_LEVEL": settings.log_level,
-    }
 
 
 def _only_one(settings: Settings) -> IO[bytes]:

@@ -10,7 +10,7 @@ from opentelemetry import trace
 from opentelemetry.trace import Span, SpanKind, StatusCode
 
 from service.observe import tracing
-from service.store.jobs import Task
+from service.store.jobs.task import Task
 from service.wire.results import IntrinsicsResult
 from worker.message import Message
 

@@ -12,7 +12,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.observe.metrics import Metrics
 from service.observe.tracing import current_traceparent, trace_id_in
-from service.store.jobs import Origin
+from service.store.jobs.task import Origin
 
 REQUEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 # Asked every few seconds by machines: not worth a line, nor a span.

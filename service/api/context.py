@@ -2,56 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, cast
 
 from fastapi import Depends, Path, Request
-from sqlalchemy import Engine
 
 from service.api.auth import Gate
 from service.api.shared_reads import SharedReads
 from service.api.watch import Watch
-from service.intake.from_sources import FromSources
-from service.intake.snapshots import Snapshots
-from service.intake.submit import Intake
-from service.observe.disk import Disk
+from service.home import Home
 from service.observe.metrics import Metrics
 from service.observe.readiness import Readiness
-from service.queue import Queue
 from service.settings import Settings
-from service.store.blobs import Blobs
-from service.store.counts.ends import Ends
-from service.store.expiry import Expiry
-from service.store.jobs import Jobs
-from service.store.keys import Keys
-from service.store.venues import Venues
-from service.store.workers import Workers
+from service.store.counts.figures import look
 from service.wire.base import ID_PATTERN, JOB_ID_PATTERN
 
 
-@dataclass(frozen=True)
-class Context:
-    """Settings and everything that holds state."""
+class Context(Home):
+    """The home, and what answers from it."""
 
-    settings: Settings
-    engine: Engine
-    queue: Queue
-    blobs: Blobs
-    disk: Disk
-    venues: Venues
-    jobs: Jobs
-    ends: Ends
-    expiry: Expiry
-    workers: Workers
-    reads: SharedReads
-    watch: Watch
-    metrics: Metrics
-    readiness: Readiness
-    keys: Keys
-    gate: Gate
-    snapshots: Snapshots
-    intake: Intake
-    from_sources: FromSources
+    def __init__(self, settings: Settings) -> None:
+        super().__init__(settings)
+        silence_s = settings.takeover_after_s
+        self.reads = SharedReads(self.jobs.get)
+        self.watch = Watch(self.jobs.states)
+        self.metrics = Metrics(lambda: look(self.engine, settings.metrics_venues), self.disk, silence_s)
+        self.readiness = Readiness(self.jobs, self.blobs, self.disk, self.workers, silence_s)
+        self.gate = Gate(self.keys, self.sessions, settings)
 
 
 async def _context(request: Request) -> Context:

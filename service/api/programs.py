@@ -35,7 +35,7 @@ class OneAtATime:
             done = subprocess.run(
                 command,
                 input=given,
-                env={**os.environ, **environment, **lifeline.for_child()},
+                env={**lifeline.without_secrets(), **environment},
                 capture_output=True,
                 timeout=self._longest_s,
                 check=True,

@@ -9,7 +9,7 @@ from contextlib import suppress
 import structlog
 from starlette.concurrency import run_in_threadpool
 
-from service.store.jobs import State
+from service.store.jobs.reading import State
 
 INTERVAL_S = 0.25
 log = structlog.get_logger()

@@ -71,15 +71,15 @@ def run(
     settings, chosen = engine_settings(), options_of(options)
     if chosen.callback_url is not None:
         err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")
-    from service.store.jobs import picture_file
-    from worker.jobs import job
+    from service.store.jobs.files import picture_file
+    from worker.jobs import calibration
 
     stored = checked(VenueIn, venue.read_text(), str(venue)).stored()
     if chosen.seed is None:
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
     files = checked_files(stored, frames, settings)
     with failure_told(), bar() as show:
-        outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
+        outcome = calibration.solve(stored, files, chosen, settings, lambda step: show(step, ""))
     output.mkdir(parents=True, exist_ok=True)
     (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
     for name, picture in outcome.pictures.items():

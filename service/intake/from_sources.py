@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import io
-import secrets
 
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Enqueue, Intake, frame_paths
 from service.store.ids import new_id
-from service.store.jobs import Jobs, Origin, Submission
+from service.store.jobs.submission import Submission, Submissions
+from service.store.jobs.task import Origin, seeded
 from service.store.venues import Venues
 from service.wire.job import Job
 from service.wire.options import Options
@@ -19,9 +19,9 @@ from service.wire.venue import Venue
 class FromSources:
     """Fetches and submits."""
 
-    def __init__(self, venues: Venues, jobs: Jobs, snapshots: Snapshots, intake: Intake) -> None:
+    def __init__(self, venues: Venues, submissions: Submissions, snapshots: Snapshots, intake: Intake) -> None:
         self._venues = venues
-        self._jobs = jobs
+        self._submissions = submissions
         self._snapshots = snapshots
         self._intake = intake
 
@@ -34,12 +34,19 @@ class FromSources:
         same job whatever the cameras show meanwhile.
         """
         sent = hashlib.sha256(f"sources {options.model_dump_json()}".encode()).hexdigest()
-        known = self._jobs.same_as(venue.id, key, sent)
+        known = self._submissions.same_as(venue.id, key, sent)
         if known is not None:
             return known, False
         frames = self._snapshots.take(venue.cameras, self._venues.credentials(venue.id))
         job_id = new_id()
-        seeded = options if options.seed is not None else options.model_copy(update={"seed": secrets.randbelow(2**31)})
         paths = frame_paths(job_id, dict.fromkeys(frames, 1))
-        submission = Submission(job_id, venue, seeded, sent, key, paths, origin=origin)
+        submission = Submission(
+            job_id=job_id,
+            venue=venue,
+            options=seeded(options),
+            frames=paths,
+            origin=origin,
+            content_hash=sent,
+            idempotency_key=key,
+        )
         return self._intake.take(submission, {camera: [io.BytesIO(data)] for camera, data in frames.items()}, enqueue)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import tempfile
 import threading
@@ -83,7 +82,7 @@ class Snapshots:
             done = subprocess.run(
                 self._settings.source_program,
                 input=task.model_dump_json().encode(),
-                env={**os.environ, **self._settings.native_environment, **lifeline.for_child()},
+                env=lifeline.without_secrets() | self._settings.native_environment,
                 capture_output=True,
                 timeout=self._settings.source_timeout_s + STARTING_S,
             )

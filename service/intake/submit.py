@@ -11,15 +11,15 @@ import sqlalchemy as sa
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.expiry import Expiry
-from service.store.jobs import (
-    Jobs,
+from service.store.jobs.files import frame_folder
+from service.store.jobs.submission import (
     KeyReused,
     QueueFull,
     Submission,
+    Submissions,
     VenueBusy,
     VenueGone,
     VenueReplaced,
-    frame_folder,
 )
 from service.wire.job import Job
 
@@ -33,9 +33,9 @@ REFUSALS = (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull)
 class Intake:
     """Makes jobs of submissions."""
 
-    def __init__(self, settings: Settings, jobs: Jobs, expiry: Expiry, blobs: Blobs) -> None:
+    def __init__(self, settings: Settings, submissions: Submissions, expiry: Expiry, blobs: Blobs) -> None:
         self._settings = settings
-        self._jobs = jobs
+        self._submissions = submissions
         self._expiry = expiry
         self._blobs = blobs
 
@@ -48,13 +48,15 @@ class Intake:
         """
         venue_id = None if submission.venue is None else submission.venue.id
         try:
-            known = self._jobs.same_as(venue_id, submission.idempotency_key, submission.content_hash, submission.kind)
+            known = self._submissions.same_as(
+                venue_id, submission.idempotency_key, submission.content_hash, submission.kind
+            )
             if known is not None:
                 return known, False
             # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
             self._expiry.expect_upload(submission.job_id, UPLOAD_GRACE)
             self._store(submission, files)
-            job, new = self._jobs.submit(submission, self._settings.queue_limit, enqueue)
+            job, new = self._submissions.submit(submission, self._settings.queue_limit, enqueue)
         except REFUSALS:
             self._blobs.delete_under(frame_folder(submission.job_id))
             raise

@@ -18,12 +18,12 @@ from prometheus_client.registry import Collector
 
 from service.observe.disk import Disk
 from service.store.alarms import BEGUN
+from service.store.counts.endings import ENDED, OTHER_OUTCOMES, OTHERS_ENDED, OUTCOMES, RESTARTS, STAGES
 from service.store.counts.figures import Figures, VenueQuality, WorkerSeen
-from service.store.counts.outcomes import ENDED, OTHER_OUTCOMES, OTHERS_ENDED, OUTCOMES, RESTARTS, STAGES
 from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Buckets, Key
 from service.store.deliveries import CALLBACKS
 from service.store.engine import AWAY
-from service.store.jobs import PRIORITIES
+from service.store.jobs.submission import PRIORITIES
 from service.wire.health import AlarmRule
 
 log = structlog.get_logger()

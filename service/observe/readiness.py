@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.observe.disk import Disk
 from service.store.blobs import Blobs
-from service.store.jobs import Jobs
+from service.store.jobs.reading import Jobs
 from service.store.workers import SeenWorker, Workers
 
 # Anybody may ask, and a bucket asks for money: one look answers all who come within this time.

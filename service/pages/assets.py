@@ -6,13 +6,12 @@ import hashlib
 import mimetypes
 from functools import cache
 from pathlib import Path
-from typing import Annotated
 
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Response
 
-from service.api import etags
 from service.routes.documented import FOR_ALL
 from service.routes.guarded import Guarded
+from service.routes.tagged import IfNoneMatch, unless_known
 from service.wire.problems import Problem
 
 FILES = Path(__file__).parent / "static"
@@ -44,15 +43,11 @@ def address(path: str) -> str:
 
 
 @router.get("/{of_edition}/{path:path}", openapi_extra=FOR_ALL)
-async def static_file(of_edition: str, path: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
+async def static_file(of_edition: str, path: str, if_none_match: IfNoneMatch = None) -> Response:
     """A file; a page that was loaded before an update gets the new one, and does not keep it."""
     content = contents().get(path)
     if content is None:
         raise Problem("not-found", f"The page has no file {path[:200]}; load it again.")
-    tag = etags.of(content)
-    kept = FOR_A_YEAR if of_edition == edition() else "no-cache"
-    head = {"ETag": etags.quoted(tag), "Cache-Control": kept}
-    if if_none_match is not None and etags.names(if_none_match, tag):
-        return Response(status_code=304, headers=head)
     media_type = mimetypes.guess_type(path)[0] or "application/octet-stream"
-    return Response(content, headers=head, media_type=media_type)
+    kept = FOR_A_YEAR if of_edition == edition() else "no-cache"
+    return unless_known(content, if_none_match, lambda: Response(content, media_type=media_type), kept)

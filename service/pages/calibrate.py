@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from service.api.context import InContext, VenueIdPath
+from service.api.context import InContext
 from service.pages.shown import Page, page
 from service.routes.documented import needs
-from service.routes.venues import no_such_venue
+from service.routes.venues import ExistingVenue
 
 router = APIRouter(route_class=Page, include_in_schema=False)
 
 
 @router.get("/ui/venues/{venue_id}/calibrate", openapi_extra=needs("calibrate"))
-def calibrate(venue_id: VenueIdPath, request: Request, context: InContext) -> Response:
+def calibrate(venue: ExistingVenue, request: Request, context: InContext) -> Response:
     """The form that a calibration begins with."""
-    venue = context.venues.get(venue_id)
-    if venue is None:
-        raise no_such_venue(venue_id)
     limits = {
         "frames": context.settings.max_frames_per_camera,
         "bytes": round(context.settings.max_frame_mb * 1e6),

@@ -12,8 +12,8 @@ from service.pages.shown import Page, page
 from service.pages.sparkline import Sparkline, sparkline
 from service.routes.documented import needs
 from service.routes.guarded import Guarded
-from service.routes.venues import no_such_venue
-from service.store.counts.ends import Ended
+from service.routes.venues import ExistingVenue
+from service.store.counts.past_calibrations import PastCalibration
 from service.store.revisions import TAKEN
 from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import Alarm
@@ -34,7 +34,7 @@ class Row:
     """A venue in the list: its last calibration that ended, the one that is going on, a curve, and what rings."""
 
     venue: Venue
-    last: Ended | None
+    last: PastCalibration | None
     active: Job | None
     curve: Sparkline | None
     alarms: list[Alarm]
@@ -47,13 +47,13 @@ def venues(
     """Every venue, with its last result."""
     found = context.venues.page(after, PER_PAGE + 1)
     shown, more = found[:PER_PAGE], len(found) > PER_PAGE
-    active = context.ends.active([venue.id for venue in shown])
+    active = context.past_calibrations.active([venue.id for venue in shown])
     rows = [_row(context, venue, active.get(venue.id)) for venue in shown]
     return page(request, "venues.html", rows=rows, after=shown[-1].id if more else None, first=after is None)
 
 
 def _row(context: Context, venue: Venue, active: str | None) -> Row:
-    ends = context.ends.of(venue.id, IN_SPARKLINE)
+    ends = context.past_calibrations.of(venue.id, IN_SPARKLINE)
     results = [end for end in reversed(ends) if end.accepted is not None]
     limit = results[-1].stitch_error_limit_px if results else None
     curve = sparkline([end.stitch_error_px for end in results], limit)
@@ -68,17 +68,15 @@ def _row(context: Context, venue: Venue, active: str | None) -> Row:
 
 
 @router.get("/ui/venues/{venue_id}", openapi_extra=needs("read"))
-def venue(venue_id: VenueIdPath, request: Request, context: InContext) -> Response:
+def venue(stored: ExistingVenue, request: Request, context: InContext) -> Response:
     """One venue: its last result in pictures and numbers, and how it came to it."""
-    stored = context.venues.get(venue_id)
-    if stored is None:
-        raise no_such_venue(venue_id)
-    ends = context.ends.of(venue_id, IN_TABLE)
-    newest = context.ends.newest_result(venue_id)
+    venue_id = stored.id
+    ends = context.past_calibrations.of(venue_id, IN_TABLE)
+    newest = context.past_calibrations.newest_result(venue_id)
     job = context.jobs.get(newest) if newest else None
     revisions = context.venues.history(venue_id, None, IN_TABLE)
     health = context.venues.health(venue_id)
-    active = context.ends.active([venue_id]).get(venue_id)
+    active = context.past_calibrations.active([venue_id]).get(venue_id)
     return page(
         request,
         "venue.html",
@@ -96,7 +94,7 @@ def venue(venue_id: VenueIdPath, request: Request, context: InContext) -> Respon
 @data.get("/ui/venues/{venue_id}/history.json", openapi_extra=needs("read"))
 def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
     """What the chart draws, oldest first: times in seconds, a value or null for each."""
-    ends = [end for end in reversed(context.ends.of(venue_id, IN_CHART)) if end.accepted is not None]
+    ends = [end for end in reversed(context.past_calibrations.of(venue_id, IN_CHART)) if end.accepted is not None]
     cameras = sorted({camera for end in ends for camera in end.moved})
     return {
         "at": [end.finished_at.timestamp() for end in ends],

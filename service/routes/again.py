@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from io import BytesIO
+from typing import BinaryIO
 
 from fastapi import APIRouter, Request, Response
-from starlette.datastructures import UploadFile
 
 from service.api.context import Context, InContext
-from service.routes import uploads
-from service.routes.documented import headers, needs, problems
+from service.routes import forms, submissions
+from service.routes.documented import needs, problems, submitted
 from service.routes.guarded import Guarded
-from service.routes.jobs import Existing, job_answer
+from service.routes.jobs import Existing
 from service.routes.venues import no_such_venue
 from service.store.ids import new_id
-from service.store.jobs import Submission, frame_folder
+from service.store.jobs.files import frame_folder
+from service.store.jobs.submission import Submission
 from service.wire.job import Job
 from service.wire.problems import Problem
 from service.wire.venue import Venue
@@ -28,32 +28,26 @@ router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
     status_code=202,
     response_model=Job,
     openapi_extra=needs("calibrate"),
-    responses={
-        200: {"model": Job, "description": "It is being computed", **headers("ETag")},
-        202: headers("ETag", "Location", "Retry-After"),
-        **problems(404, 409, 410, 507),
-    },
+    responses=submitted("It is being computed") | problems(404, 409, 410, 507),
 )
 def submit_again(job: Existing, request: Request, context: InContext) -> Response:
     """Submit what a job was made of again, with its options, as long as its frames are kept."""
-    uploads.require_room(context)
-    before = context.jobs.submission(job.id)
+    forms.require_room(context)
+    before = context.submissions.of(job.id)
     if before is None:
         raise _gone(context, job)
     if before.venue is not None:
         _require_the_same(context, before.venue)
     files = {name: [_read(context, job, path) for path in paths] for name, paths in before.frames.items()}
-    submission = _renewed(before, request)
-    enqueue = context.queue.enqueue_light if job.kind == "locate" else context.queue.enqueue
-    again, new = uploads.enqueue_upload(context, submission, files, enqueue)
-    return job_answer(again, status=202 if new else 200)
+    return submissions.answer(*submissions.enqueued(context, _renewed(before, request), files))
 
 
 def _renewed(before: Submission, request: Request) -> Submission:
     job_id = new_id()
     old, new = frame_folder(before.job_id), frame_folder(job_id)
     frames = {name: [new + path.removeprefix(old) for path in paths] for name, paths in before.frames.items()}
-    return replace(before, job_id=job_id, frames=frames, idempotency_key=None, origin=request.state.origin)
+    renewed = {"job_id": job_id, "frames": frames, "idempotency_key": None, "origin": request.state.origin}
+    return before.model_copy(update=renewed)
 
 
 def _require_the_same(context: Context, then: Venue) -> None:
@@ -65,11 +59,11 @@ def _require_the_same(context: Context, then: Venue) -> None:
         raise Problem("venue-replaced", "Its pitch, cameras or lenses were changed since; send new frames.")
 
 
-def _read(context: Context, job: Job, path: str) -> UploadFile:
+def _read(context: Context, job: Job, path: str) -> BinaryIO:
     data = context.blobs.get(path)
     if data is None:
         raise _gone(context, job)
-    return UploadFile(BytesIO(data))
+    return BytesIO(data)
 
 
 def _gone(context: Context, job: Job) -> Problem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -10,7 +11,7 @@ from pydantic import BaseModel
 
 from service.wire.base import OPTIONS_PART, Scope
 from service.wire.health import AlarmEvent
-from service.wire.job import JobEvent
+from service.wire.job import Job, JobEvent
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
 from service.wire.problems import MEDIA_TYPE, ProblemDetails
 
@@ -31,6 +32,7 @@ HEADERS: dict[str, dict[str, Any]] = {
     "Location": {"description": "The job.", "schema": {"type": "string", "format": "uri-reference"}},
     "Retry-After": {"description": "In seconds.", "schema": {"type": "integer", "minimum": 0}},
 }
+FILE: dict[str, Any] = {"type": "string", "format": "binary"}
 # Of a route that anybody may call.
 FOR_ALL: dict[str, Any] = {"security": []}
 
@@ -73,19 +75,45 @@ def reference(model: type[BaseModel]) -> dict[str, str]:
     return {"$ref": f"{SCHEMAS}{model.__name__}"}
 
 
-def frames_upload(options: type[BaseModel], *, required: bool = True) -> dict[str, Any]:
-    """The body of a route that takes frames of all cameras of a venue; or not `required`, fetches them."""
+def form(
+    options: type[BaseModel],
+    description: str,
+    *,
+    needed: Sequence[str] = (),
+    parts: Mapping[str, Any] | None = None,
+    others: Mapping[str, Any] | bool = FILE,
+    required: bool = True,
+) -> dict[str, Any]:
+    """The body of a route that takes a form: `options`, `parts`, and of any other name what `others` says."""
     schema = {
         "type": "object",
-        "description": "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part to send "
-        "several frames of a camera, they are fused.",
-        "properties": {OPTIONS_PART: reference(options)},
-        # Not an array: generators write code for a repeated part of any name that does not compile.
-        "additionalProperties": {"type": "string", "format": "binary"},
+        "description": description,
+        "properties": {OPTIONS_PART: reference(options), **(parts or {})},
+        "additionalProperties": others,
+        **({"required": list(needed)} if needed else {}),
     }
     encoding = {OPTIONS_PART: {"contentType": "application/json"}}
     content = {"multipart/form-data": {"schema": schema, "encoding": encoding}}
     return {"requestBody": {"required": required, "content": content}}
+
+
+def frames_form(options: type[BaseModel], *, required: bool = True) -> dict[str, Any]:
+    """The body of a route that takes frames of all cameras of a venue; or not `required`, fetches them."""
+    # Its parts are no arrays: generators write code for a repeated part of any name that does not compile.
+    return form(
+        options,
+        "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part to send several frames of a "
+        "camera, they are fused.",
+        required=required,
+    )
+
+
+def submitted(known: str = "This content is already a job") -> dict[int | str, dict[str, Any]]:
+    """Entries for `responses=` of a route that makes a job; `known`: when there is no new one."""
+    return {
+        200: {"model": Job, "description": known, **headers("ETag")},
+        202: headers("ETag", "Location", "Retry-After"),
+    }
 
 
 def needs(scope: Scope) -> dict[str, Any]:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Annotated, Any
 
-from fastapi import Header, Query, Response
+from fastapi import Query, Response
 
-from service.api import etags
 from service.api.context import Context
 from service.formats.lens import Shot
 from service.formats.table import formats
 from service.routes.documented import headers
+from service.routes.tagged import TAGGED, IfNoneMatch, unless_known
 from service.wire.base import ID_PATTERN, FormatName
 from service.wire.problems import Problem
 from service.wire.venue import Venue
@@ -25,9 +25,10 @@ DOCUMENTS: dict[int | str, dict[str, Any]] = {
         "content": {
             **dict.fromkeys(("application/yaml", "application/zip", "application/octet-stream"), BINARY),
             "application/json": {},
-        }
+        },
+        **headers("ETag"),
     },
-    304: {"description": "Unchanged", **headers("ETag")},
+    304: TAGGED[304],
 }
 
 
@@ -36,7 +37,7 @@ class Wanted:
     """Which part of a document a caller asks for, and which he has."""
 
     camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None
-    if_none_match: Annotated[str | None, Header()] = None
+    if_none_match: IfNoneMatch = None
 
 
 def exported(context: Context, venue: Venue, called: str, form: FormatName, wanted: Wanted) -> Response:
@@ -45,14 +46,14 @@ def exported(context: Context, venue: Venue, called: str, form: FormatName, want
     # What the document is made of names it: one that the caller has is not computed again.
     made_of: list[Any] = [form, context.settings.freed_axes, version("esc-calibration")]
     made_of += [[shot.number, shot.camera.model_dump(mode="json")] for shot in shots]
-    tag = etags.of(json.dumps(made_of).encode())
-    head = {"ETag": etags.quoted(tag), "Cache-Control": "no-cache"}
-    if wanted.if_none_match is not None and etags.names(wanted.if_none_match, tag):
-        return Response(status_code=304, headers=head)
-    document = formats(context.settings)[form].document(shots)
-    name = "-".join([called, *([wanted.camera] if wanted.camera else []), form])
-    head["Content-Disposition"] = f'attachment; filename="{name}.{document.suffix}"'
-    return Response(document.content, headers=head, media_type=document.media_type)
+
+    def document() -> Response:
+        written = formats(context.settings)[form].document(shots)
+        name = "-".join([called, *([wanted.camera] if wanted.camera else []), form])
+        head = {"Content-Disposition": f'attachment; filename="{name}.{written.suffix}"'}
+        return Response(written.content, headers=head, media_type=written.media_type)
+
+    return unless_known(json.dumps(made_of).encode(), wanted.if_none_match, document)
 
 
 def _shots(venue: Venue, camera: str | None) -> list[Shot]:

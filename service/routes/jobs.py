@@ -11,14 +11,15 @@ from fastapi import APIRouter, Depends, Header, HTTPException, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from service.api import etags
 from service.api.context import Context, InContext, JobIdPath
-from service.routes.documented import headers, needs, problems
+from service.routes.documented import needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
+from service.routes.tagged import TAGGED, IfNoneMatch, unless_known
 from service.routes.venues import revision_unfit
 from service.store.engine import AWAY
-from service.store.jobs import MovedOn, NoPoses, State
+from service.store.jobs.decisions import MovedOn, NoPoses
+from service.store.jobs.reading import State
 from service.store.revisions import RevisionUnfit
 from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
 from service.wire.job import OPEN, Job, Jobs, Status
@@ -36,15 +37,12 @@ EVENT_AT_LEAST_EVERY_S = 10
 def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
     """The one form a job leaves in: body, ETag, Location of a new one, Retry-After while it is open."""
     body = job.model_dump_json().encode()
-    tag = etags.of(body)
-    headers = {"ETag": etags.quoted(tag), "Cache-Control": "no-cache"}
+    answer = unless_known(body, if_none_match, lambda: Response(body, status, media_type="application/json"))
     if job.open:
-        headers["Retry-After"] = str(RETRY_AFTER_S)
-    if if_none_match is not None and etags.names(if_none_match, tag):
-        return Response(status_code=304, headers=headers)
-    if status == 202:
-        headers["Location"] = job.links["self"]
-    return Response(body, status, headers, "application/json")
+        answer.headers["Retry-After"] = str(RETRY_AFTER_S)
+    if answer.status_code == HTTPStatus.ACCEPTED:
+        answer.headers["Location"] = job.links["self"]
+    return answer
 
 
 async def _existing(job_id: JobIdPath, context: InContext) -> Job:
@@ -76,13 +74,13 @@ def list_jobs(
     "/{job_id}",
     openapi_extra=needs("read"),
     response_model=Job,
-    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
+    responses=TAGGED | problems(404),
 )
 async def get_job(
     job: Existing,
     context: InContext,
     wait: Annotated[float, Query(ge=0, allow_inf_nan=False, description="Seconds, at most 60 are waited.")] = 0,
-    if_none_match: Annotated[str | None, Header()] = None,
+    if_none_match: IfNoneMatch = None,
 ) -> Response:
     """A job in whatever state. With `wait` the answer is held until the job ends."""
     if wait and job.open:
@@ -94,7 +92,7 @@ async def get_job(
 @router.post("/{job_id}/cancel", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404))
 def cancel_job(job: Existing, context: InContext) -> Response:
     """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
-    context.jobs.cancel(job.id)
+    context.decisions.cancel(job.id)
     return job_answer(context.jobs.get(job.id) or job)
 
 
@@ -104,7 +102,7 @@ def accept_job(job: Existing, context: InContext) -> Response:
 
     Only while the venue is as the calibration found it.
     """
-    return _decided(context, job, context.jobs.accept)
+    return _decided(context, job, context.decisions.accept)
 
 
 @router.post("/{job_id}/reject", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))
@@ -113,7 +111,7 @@ def reject_job(job: Existing, context: InContext) -> Response:
 
     Only while they are the last that came; to go back further, `POST /venues/{id}/restore`.
     """
-    return _decided(context, job, context.jobs.reject)
+    return _decided(context, job, context.decisions.reject)
 
 
 def _decided(context: Context, job: Job, decide: Callable[[str], None]) -> Response:
@@ -180,7 +178,7 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
     "/{job_id}/poses",
     openapi_extra=needs("read"),
     response_class=Response,
-    responses={**DOCUMENTS, 200: DOCUMENTS[200] | headers("ETag"), **problems(404)},
+    responses=DOCUMENTS | problems(404),
 )
 def job_poses(
     job: Existing,

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
-from typing import Annotated, Any
+from typing import Annotated
 
-from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.intake import images as border
-from service.routes import uploads
-from service.routes.calibrate import expecting
-from service.routes.documented import headers, needs, problems, reference
+from service.routes import forms, submissions
+from service.routes.documented import form, needs, problems, submitted
 from service.routes.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
-from service.store.ids import new_id
-from service.store.jobs import Origin, Submission
-from service.wire import callback_urls
+from service.routes.submissions import IdempotencyKey, Sent
+from service.routes.venues import camera_of
+from service.store.jobs.task import Origin
 from service.wire.base import ID_PATTERN, OPTIONS_PART
 from service.wire.job import OPEN, Job
 from service.wire.options import LocateOptions
@@ -27,35 +24,20 @@ from service.wire.venue import Camera, Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
-UPLOAD: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "description": "The points, and if you like the frame they were clicked in, its part named by the "
-                    "camera's id: then `points.jpg` shows them in it.",
-                    "properties": {OPTIONS_PART: reference(LocateOptions)},
-                    "required": [OPTIONS_PART],
-                    "additionalProperties": {"type": "string", "format": "binary"},
-                },
-                "encoding": {OPTIONS_PART: {"contentType": "application/json"}},
-            }
-        },
-    }
-}
+UPLOAD = form(
+    LocateOptions,
+    "The points, and if you like the frame they were clicked in, its part named by the camera's id: then `points.jpg` "
+    "shows them in it.",
+    needed=[OPTIONS_PART],
+)
 
 
 @router.post(
     "/venues/{venue_id}/cameras/{camera}/locate",
     status_code=202,
     response_model=Job,
-    responses={
-        200: {"model": Job, "description": "The job has ended, or this content is already a job", **headers("ETag")},
-        202: headers("ETag", "Location", "Retry-After"),
-        **problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
-    },
+    responses=submitted("The job has ended, or this content is already a job")
+    | problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
     openapi_extra=UPLOAD | needs("calibrate"),
 )
 async def locate(
@@ -66,17 +48,15 @@ async def locate(
     wait: Annotated[
         float, Query(ge=0, allow_inf_nan=False, description="Seconds that the answer is held, at most 60.")
     ] = 0,
-    idempotency_key: Annotated[
-        str | None, Header(pattern=uploads.KEY_PATTERN, description=uploads.KEY_DESCRIPTION)
-    ] = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Find the first pose of a camera from points of the pitch and their pixels. The stored pose stays as it is.
 
     The job takes about a second and waits for no calibration; with `wait` the answer is its end.
     """
-    uploads.require_form(request)
-    stored = await run_in_threadpool(expecting, context, venue_id)
-    async with uploads.form_of(request, 1) as form:
+    forms.require_form(request)
+    stored = await run_in_threadpool(forms.expecting, context, venue_id)
+    async with forms.form_of(request, 1) as form:
         origin = request.state.origin
         job, new = await run_in_threadpool(_submit, context, stored, camera, form, idempotency_key, origin)
     if wait and job.open:
@@ -89,30 +69,11 @@ async def locate(
 def _submit(
     context: Context, venue: Venue, camera_id: str, form: FormData, idempotency_key: str | None, origin: Origin
 ) -> tuple[Job, bool]:
-    camera = _camera(venue, camera_id)
-    options = uploads.options_of(form, LocateOptions)
-    if options.callback_url is not None:
-        callback_urls.check(options.callback_url, context.settings)
+    camera = camera_of(venue, camera_id)
+    options = forms.options_of(form, LocateOptions, context.settings)
     files = {camera_id: _frame(camera, form)}
-    sent = hashlib.sha256(f"locate {camera_id} {options.model_dump_json()}".encode())
-    for frame in files[camera_id]:
-        data = frame.file.read()
-        border.check(camera, data, context.settings)
-        sent.update(hashlib.sha256(data).digest())
-    job_id = new_id()
-    paths = uploads.frame_paths(job_id, files)
-    submission = Submission(job_id, venue, options, sent.hexdigest(), idempotency_key, paths, "locate", origin)
-    return uploads.enqueue_upload(context, submission, files, context.queue.enqueue_light)
-
-
-def _camera(venue: Venue, camera_id: str) -> Camera:
-    for camera in venue.cameras:
-        if camera.id == camera_id:
-            return camera
-    ids = [camera.id for camera in venue.cameras]
-    raise Problem(
-        "no-such-camera", f"Venue {venue.id} has the cameras {', '.join(ids)}.", camera=camera_id, expected=ids
-    )
+    check = submissions.of_cameras([camera], context.settings)
+    return submissions.take(context, Sent("locate", venue, options, files, check, idempotency_key, origin))
 
 
 def _frame(camera: Camera, form: FormData) -> list[UploadFile]:

@@ -10,7 +10,8 @@ from service.api.context import Context, InContext
 from service.routes.documented import needs, problems
 from service.routes.guarded import Guarded
 from service.routes.jobs import Existing
-from service.store.jobs import Pictures, picture_file
+from service.store.jobs.files import picture_file
+from service.store.jobs.reading import Pictures
 from service.wire.base import ID_PATTERN
 from service.wire.job import Job
 from service.wire.problems import Problem

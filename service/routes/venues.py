@@ -12,13 +12,14 @@ from service.intake import sources
 from service.routes.documented import headers, needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
+from service.routes.tagged import TAGGED, IfNoneMatch, json, unless_known
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 from service.wire import callback_urls
 from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
 from service.wire.problems import Problem
-from service.wire.venue import Venue, VenueIn, Venues
+from service.wire.venue import Camera, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 
@@ -26,6 +27,27 @@ router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 def no_such_venue(venue_id: str) -> Problem:
     """The same answer wherever a venue is named."""
     return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
+
+
+def camera_of(venue: Venue, camera_id: str) -> Camera:
+    """One of its cameras."""
+    for camera in venue.cameras:
+        if camera.id == camera_id:
+            return camera
+    ids = [camera.id for camera in venue.cameras]
+    raise Problem(
+        "no-such-camera", f"Venue {venue.id} has the cameras {', '.join(ids)}.", camera=camera_id, expected=ids
+    )
+
+
+def _existing(venue_id: VenueIdPath, context: InContext) -> Venue:
+    venue = context.venues.get(venue_id)
+    if venue is None:
+        raise no_such_venue(venue_id)
+    return venue
+
+
+ExistingVenue = Annotated[Venue, Depends(_existing)]
 
 
 def revision_unfit(unfit: RevisionUnfit) -> Problem:
@@ -57,9 +79,8 @@ def put_venue(
         callback_urls.check(venue.alarms.callback_url, context.settings)
 
     def allow(before: Venue | None) -> None:
+        _require_match(if_match, before)
         tag = _tag(before) if before else None
-        if if_match is not None and not etags.names(if_match, tag):
-            raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)
         if if_none_match is not None and etags.names(if_none_match, tag):
             raise Problem("venue-changed", "The venue is already there.", got=tag)
 
@@ -91,41 +112,27 @@ def list_venues(
     "/{venue_id}",
     openapi_extra=needs("read"),
     response_model=Venue,
-    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
+    responses=TAGGED | problems(404),
 )
-def get_venue(
-    venue_id: VenueIdPath,
-    response: Response,
-    context: InContext,
-    if_none_match: Annotated[str | None, Header()] = None,
-) -> Venue | Response:
+def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Response:
     """A venue with the poses that hold now."""
-    stored = context.venues.get(venue_id)
-    if stored is None:
-        raise no_such_venue(venue_id)
-    tag = _tag(stored)
-    if if_none_match is not None and etags.names(if_none_match, tag):
-        return Response(status_code=304, headers={"ETag": etags.quoted(tag)})
-    response.headers["ETag"] = etags.quoted(tag)
-    return stored
+    body = venue.model_dump_json().encode()
+    return unless_known(body, if_none_match, json(body))
 
 
 @router.get(
     "/{venue_id}/poses",
     openapi_extra=needs("read"),
     response_class=Response,
-    responses={**DOCUMENTS, 200: DOCUMENTS[200] | headers("ETag"), **problems(404)},
+    responses=DOCUMENTS | problems(404),
 )
 def venue_poses(
-    venue_id: VenueIdPath,
+    venue: ExistingVenue,
     context: InContext,
     wanted: Annotated[Wanted, Depends()],
     form: Annotated[FormatName, Query(alias="format")] = "json",
 ) -> Response:
     """The poses that hold now, in the format of another tool."""
-    venue = context.venues.get(venue_id)
-    if venue is None:
-        raise no_such_venue(venue_id)
     return exported(context, venue, venue.id, form, wanted)
 
 
@@ -133,27 +140,21 @@ def venue_poses(
     "/{venue_id}/history",
     openapi_extra=needs("read"),
     response_model=History,
-    responses={200: headers("ETag"), 304: {"description": "Unchanged", **headers("ETag")}, **problems(404)},
+    responses=TAGGED | problems(404),
 )
 def venue_history(
-    venue_id: VenueIdPath,
+    venue: ExistingVenue,
     context: InContext,
     limit: Annotated[int, Query(ge=1, le=1000)] = 50,
     cursor: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
-    if_none_match: Annotated[str | None, Header()] = None,
+    if_none_match: IfNoneMatch = None,
 ) -> Response:
     """Every change of the poses with its cause, newest first, in pages; how far each camera moved and has drifted."""
-    if context.venues.get(venue_id) is None:
-        raise no_such_venue(venue_id)
-    page = context.venues.history(venue_id, cursor, limit + 1)
+    page = context.venues.history(venue.id, cursor, limit + 1)
     more = len(page) > limit
     shown = History(revisions=page[:limit], next_cursor=page[limit - 1].revision if more else None)
     body = shown.model_dump_json().encode()
-    tag = etags.of(body)
-    head = {"ETag": etags.quoted(tag), "Cache-Control": "no-cache"}
-    if if_none_match is not None and etags.names(if_none_match, tag):
-        return Response(status_code=304, headers=head)
-    return Response(body, headers=head, media_type="application/json")
+    return unless_known(body, if_none_match, json(body))
 
 
 @router.get("/{venue_id}/health", openapi_extra=needs("read"), responses=problems(404))
@@ -182,10 +183,7 @@ def restore_venue(
     def allow(before: Venue | None) -> None:
         if before is None:
             raise no_such_venue(venue_id)
-        if if_match is not None and not etags.names(if_match, _tag(before)):
-            raise Problem(
-                "venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=_tag(before)
-            )
+        _require_match(if_match, before)
 
     try:
         restored = context.venues.restore(venue_id, wanted.revision, allow)
@@ -211,11 +209,16 @@ def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[
                 headers={"Location": f"/jobs/{active_job}"},
                 job=active_job,
             )
-        tag = _tag(before)
-        if if_match is not None and not etags.names(if_match, tag):
-            raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)
+        _require_match(if_match, before)
 
     context.venues.delete(venue_id, allow)
+
+
+def _require_match(if_match: str | None, before: Venue | None) -> None:
+    """Whoever changes a venue changes the one that he has seen."""
+    tag = _tag(before) if before else None
+    if if_match is not None and not etags.names(if_match, tag):
+        raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)
 
 
 def _tag(venue: Venue) -> str:

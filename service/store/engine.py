@@ -7,14 +7,20 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 
 MIGRATIONS = Path(__file__).parent / "migrations"
+# Which schema a database has. Before the first release its name was that of Alembic's default, and the numbers of the
+# schemas in it were those that releases count by now.
+SCHEMA_TABLE, UNRELEASED_SCHEMA_TABLE = "esc_schema", "alembic_version"
 WRITES = "esc_writes"
 # How a transaction that reads is to see one state; every transaction of SQLite does.
 SNAPSHOT: dict[str, dict[str, Any]] = {"sqlite": {}, "postgresql": {"isolation_level": "REPEATABLE READ"}}
@@ -35,7 +41,7 @@ PATIENCE = {
 
 
 class UnsupportedDatabase(Exception):  # noqa: N818
-    """This machine cannot run the service on this database; the message says what to do."""
+    """This program, or this machine, cannot run the service on this database; the message says what to do."""
 
 
 def connect(url: str) -> sa.Engine:
@@ -111,10 +117,30 @@ def clock(connection: sa.Connection) -> datetime:
 
 
 def migrate(engine: sa.Engine) -> None:
-    """Bring the schema up to date; of several processes that start together one does it."""
+    """Bring the schema up to date; of several processes that start together one does it.
+
+    Raises `UnsupportedDatabase` for one that a newer program made, or one from before the first release.
+    """
     with writing(engine) as connection:
         serialise(connection, "schema")
         config = Config()
         config.set_main_option("script_location", str(MIGRATIONS))
         config.attributes["connection"] = connection
+        _require_a_known_schema(connection, ScriptDirectory.from_config(config))
         command.upgrade(config, "head")
+
+
+def _require_a_known_schema(connection: sa.Connection, known: ScriptDirectory) -> None:
+    found = MigrationContext.configure(connection, opts={"version_table": SCHEMA_TABLE}).get_current_revision()
+    program, newest = f"ESC {version('esc-calibration')}", known.get_current_head()
+    if found is None and {UNRELEASED_SCHEMA_TABLE, "jobs"} <= {*sa.inspect(connection).get_table_names()}:
+        raise UnsupportedDatabase(
+            "This database was made by a development version from before the first release, which cannot be brought up "
+            f"to date: {program} begins with schema {newest} on an empty one. Set ESC_DATA, or ESC_DATABASE_URL, to a "
+            "new place and PUT the venues there as the old version gives them (GET /venues)."
+        )
+    if found not in (None, *(script.revision for script in known.walk_revisions())):
+        raise UnsupportedDatabase(
+            f"This database has schema {found}, and {program} knows none after {newest}: a newer version has been at "
+            "it. Start that version again, or restore the backup from before the upgrade; there is no way back."
+        )

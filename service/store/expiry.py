@@ -16,7 +16,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.engine import clock, reading, serialise, writing
-from service.store.jobs import frame_folder, pictures_folder
+from service.store.jobs.files import frame_folder, pictures_folder
 from service.store.revisions import TAKEN
 
 j = tables.jobs.c

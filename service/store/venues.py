@@ -13,7 +13,7 @@ from service.store.engine import clock, reading, serialise, writing
 from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
 from service.store.schedules import forget_schedule, plan
 from service.wire.health import VenueHealth
-from service.wire.history import Revision
+from service.wire.history import Cause, Revision
 from service.wire.results import Result
 from service.wire.venue import Venue
 
@@ -136,6 +136,14 @@ def save_venue(connection: sa.Connection, venue: Venue) -> None:
     replaced = connection.execute(sa.update(table).where(table.c.id == venue.id).values(**values))
     if replaced.rowcount == 0:
         connection.execute(sa.insert(table).values(id=venue.id, **values))
+
+
+def let_hold(connection: sa.Connection, venue: Venue, result: Result, cause: Cause, job_id: str) -> None:
+    """Let a venue be as a calibration found it, inside the caller's serialised transaction."""
+    found = with_result(venue, result)
+    save_venue(connection, found)
+    add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
+    settle_alarms(connection, found)
 
 
 def with_result(venue: Venue, result: Result) -> Venue:

@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlparse
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.jobs import picture_folder
+from service.store.jobs.files import picture_folder
 from service.wire.job import OPEN
 from tests.e2e.running import Service, wait_for
 from tests.homes import files

@@ -8,8 +8,8 @@ import time
 from service import lifeline
 from service.settings import Settings
 from service.store.blobs import Blobs
-from service.store.engine import connect
-from service.store.jobs import Jobs, picture_folder
+from service.store.jobs.files import picture_folder
+from service.store.jobs.task import Task
 from service.wire.geometry import Moved, Pose
 from service.wire.job import JobError, Progress
 from service.wire.results import CameraResult, FieldResult, MeasureResult, Provenance, Result
@@ -27,13 +27,13 @@ def say(**message):
     print(Message(**message).line(), flush=True)
 
 
-def main(job_id: str, run_token: str) -> None:
+def main() -> None:
     lifeline.end_with_parent()
     settings = Settings()
-    task = Jobs(connect(settings.home_database_url)).task(job_id, run_token)
+    task = Task.model_validate_json(sys.stdin.buffer.read())
     behaviour, _, seconds = task.venue.name.partition(" ")
     with (settings.data / "begun").open("a") as begun:
-        begun.write(f"{job_id} {os.getpid()}\n")
+        begun.write(f"{task.job_id} {os.getpid()}\n")
     say(progress=Progress(stage="segmentation", fraction=0.1))
     end = time.monotonic() + float(seconds or 0)
     while time.monotonic() < end:
@@ -60,7 +60,7 @@ def main(job_id: str, run_token: str) -> None:
     if behaviour == "reject":
         pictures.remove("preview")
     for name in pictures:
-        blobs.put(f"{picture_folder(job_id, run_token)}/{name}.jpg", JPEG)
+        blobs.put(f"{picture_folder(task.job_id, task.run_token)}/{name}.jpg", JPEG)
     cameras = [
         CameraResult(
             id=camera.id,
@@ -90,4 +90,4 @@ def main(job_id: str, run_token: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

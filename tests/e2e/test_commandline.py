@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import httpx
 import pytest
 
+from service.store.engine import SCHEMA_TABLE, connect, migrate, writing
 from tests.e2e.running import png, venue, wait_for
 
 FRAMES = ("left=left.png", "right=right.png")
@@ -152,6 +153,19 @@ def test_a_database_out_of_reach_is_told_in_a_line(tmp_path, command):
     assert (answer.returncode, "The database cannot be used: " in answer.stderr) == (1, True)
     assert "Traceback" not in answer.stderr
     assert "secret" not in answer.stderr
+
+
+def test_a_database_of_another_version_is_told_in_a_line(tmp_path):
+    engine = connect(f"sqlite:///{tmp_path}/esc.sqlite")
+    migrate(engine)
+    with writing(engine) as connection:
+        connection.exec_driver_sql(f"UPDATE {SCHEMA_TABLE} SET version_num = '0999'")
+    engine.dispose()
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", str(tmp_path)]
+    answer = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 2
+    assert answer.stderr.startswith("This database has schema 0999")
+    assert "Traceback" not in answer.stderr
 
 
 def test_ctrl_c_ends_it_cleanly(start):

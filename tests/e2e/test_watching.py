@@ -8,7 +8,7 @@ import time
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from service.store.counts.outcomes import STAGES
+from service.store.counts.endings import STAGES
 from tests.e2e.running import wait_for
 from tests.homes import in_both_homes
 

@@ -1,27 +1,29 @@
 """What several processes do to one home at the same moment."""
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
-from threading import Barrier, Thread
+from threading import Barrier, BrokenBarrierError, Thread
 
 import pytest
 
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
-from service.store import jobs as store
+from service.store.counts import tallies
 from service.store.engine import connect, migrate
 from service.store.ids import new_id
-from service.store.jobs import Jobs, QueueFull, Submission
-from service.store.venues import Venues
+from service.store.jobs import attempts
+from service.store.jobs.submission import QueueFull, Submission
 from service.store.workers import Workers
 from service.wire.geometry import Moved, Pose
+from service.wire.health import Alarms as Rules
 from service.wire.job import JobError
 from service.wire.options import Options
 from service.wire.results import CameraResult, Provenance, Result
 from service.wire.venue import VenueIn
 from tests.e2e.running import venue
-from tests.homes import in_both_homes
-from tests.worker.stock import Stock
+from tests.homes import in_both_homes, on_servers
+from tests.worker.stock import Stock, anyway, result
 
 LIMIT = 3
 SHIFTED = [0.0, -55.0, 9.0]
@@ -32,7 +34,14 @@ def stored(name):
 
 
 def submission(name, content="c"):
-    return Submission(new_id(), stored(name), Options(seed=1), content, None, {"left": ["frames/x/left/0"]})
+    return Submission(
+        job_id=new_id(),
+        venue=stored(name),
+        options=Options(seed=1),
+        frames={"left": ["frames/x/left/0"]},
+        content_hash=content,
+        idempotency_key=None,
+    )
 
 
 def found():
@@ -66,11 +75,9 @@ def queue(home, tmp_path, engine):
 
 
 @pytest.fixture
-def running(engine):
+def running(stock):
     """A job that a worker has begun."""
-    Venues(engine).put(stored("v"), lambda _: None)
-    job, _ = Jobs(engine).submit(submission("v"), LIMIT, lambda *_: None)
-    return Jobs(engine).begin(job.id)
+    return stock.attempts.begin(stock.submitted("v"))
 
 
 @in_both_homes
@@ -84,35 +91,34 @@ def test_processes_that_start_together_make_the_schema_once(home, tmp_path):
 
 
 @in_both_homes
-def test_the_queue_takes_no_more_than_its_limit_however_many_come_at_once(engine, queue):
-    jobs, crowd = Jobs(engine), 8
+def test_the_queue_takes_no_more_than_its_limit_however_many_come_at_once(stock, queue):
+    crowd = 8
     for number in range(crowd):
-        Venues(engine).put(stored(f"v{number}"), lambda _: None)
+        stock.venues.put(stored(f"v{number}"), lambda _: None)
     together = Barrier(crowd)
 
     def submit(number):
         together.wait()
         try:
-            return jobs.submit(submission(f"v{number}"), LIMIT, queue.enqueue)[1]
+            return stock.submissions.submit(submission(f"v{number}"), LIMIT, queue.enqueue)[1]
         except QueueFull:
             return False
 
     with ThreadPoolExecutor(crowd) as pool:
         assert sum(pool.map(submit, range(crowd))) == LIMIT
-    assert [job.status for job in jobs.page(None, None, None, 100)] == ["queued"] * LIMIT
+    assert [job.status for job in stock.jobs.page(None, None, None, 100)] == ["queued"] * LIMIT
 
 
 @in_both_homes
 @pytest.mark.parametrize("other", ["cancel", "begin", "fail"])
-def test_the_poses_move_only_with_the_job_that_ends_with_them(engine, running, monkeypatch, other):
-    jobs, venues = Jobs(engine), Venues(engine)
+def test_the_poses_move_only_with_the_job_that_ends_with_them(stock, running, monkeypatch, other):
     meddle = {
-        "cancel": lambda: jobs.cancel(running.job_id),
-        "begin": lambda: jobs.begin(running.job_id),
-        "fail": lambda: jobs.fail(running, JobError(type="/problems/job-crashed", title="", detail="")),
+        "cancel": lambda: stock.decisions.cancel(running.job_id),
+        "begin": lambda: stock.attempts.begin(running.job_id),
+        "fail": lambda: stock.attempts.fail(running, JobError(type="/problems/job-crashed", title="", detail="")),
     }
     meddler = Thread(target=meddle[other])
-    find_venue = store.find_venue
+    find_venue = attempts.find_venue
 
     def find_venue_slowly(*arguments):
         # Who meddles may look for the venue too.
@@ -121,11 +127,11 @@ def test_the_poses_move_only_with_the_job_that_ends_with_them(engine, running, m
             meddler.join(0.5)
         return find_venue(*arguments)
 
-    monkeypatch.setattr(store, "find_venue", find_venue_slowly)
-    jobs.finish(running, found(), [])
+    monkeypatch.setattr(attempts, "find_venue", find_venue_slowly)
+    stock.attempts.finish(running, found(), [])
     meddler.join()
-    moved = venues.get("v").cameras[0].pose.position == SHIFTED
-    assert (jobs.get(running.job_id).status, moved) == ("succeeded", True)
+    moved = stock.venues.get("v").cameras[0].pose.position == SHIFTED
+    assert (stock.jobs.get(running.job_id).status, moved) == ("succeeded", True)
 
 
 def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(servers, tmp_path, monkeypatch):
@@ -134,7 +140,7 @@ def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(servers, 
     with monkeypatch.context() as patch:
         patch.setattr("service.store.engine.datetime", wrong)
         job = stock.jobs.get(stock.submitted("v", callback_url="https://example.com/"))
-        stock.jobs.cancel(job.id)
+        stock.decisions.cancel(job.id)
         stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", timedelta(hours=1))
         assert stock.expiry.leftovers(stock.expiry.now(), 10) == []
         assert stock.deliveries.attempt(stock.deliveries.now(), stock.deliveries.now(), 10)
@@ -154,3 +160,28 @@ def test_workers_are_not_dead_because_the_clock_of_their_machine_is_wrong(server
         Workers(engine).enter("w", None)
     assert Workers(engine).silent(10) == []
     engine.dispose()
+
+
+@on_servers
+def test_a_job_that_is_rejected_and_one_that_fails_do_not_wait_for_each_other(stock, monkeypatch):
+    for name in ("v", "w"):
+        rules = Rules(rejected_in_a_row=1)
+        stock.venues.put(stored(name).model_copy(update={"alarms": rules}), anyway)
+    rejected, failed = (stock.attempts.begin(stock.submitted(name)) for name in ("v", "w"))
+    # Both count an alarm and an end; each has counted one of them before either counts the other.
+    add, counted = tallies.add, Barrier(2)
+
+    def add_slowly(connection, amounts):
+        add(connection, amounts)
+        with suppress(BrokenBarrierError):
+            counted.wait(1)
+
+    monkeypatch.setattr(tallies, "add", add_slowly)
+    error = JobError(type="/problems/job-crashed", title="", detail="")
+    with ThreadPoolExecutor(2) as both:
+        ends = [
+            both.submit(stock.attempts.finish, rejected, result(rejected.venue, False), []),
+            both.submit(stock.attempts.fail, failed, error),
+        ]
+    assert [end.exception() for end in ends] == [None, None]
+    assert [stock.jobs.get(task.job_id).status for task in (rejected, failed)] == ["succeeded", "failed"]

@@ -8,13 +8,10 @@ import sqlalchemy as sa
 from service.settings import Settings
 from service.store import tables
 from service.store.blobs import Blobs
-from service.store.deliveries import Deliveries
-from service.store.engine import connect, migrate
-from service.store.expiry import Expiry
 from service.store.ids import new_id
-from service.store.jobs import Jobs, Submission, picture_folder
-from service.store.venues import Venues
-from service.store.workers import Workers
+from service.store.jobs.files import picture_folder
+from service.store.jobs.submission import Submission
+from service.store.stores import Stores
 from service.wire.geometry import Moved, Pose
 from service.wire.health import AlarmEvent
 from service.wire.job import JobError
@@ -25,13 +22,10 @@ from tests.e2e.running import venue
 from tests.homes import files
 
 
-class Stock:
+class Stock(Stores):
     def __init__(self, data: Path, **settings) -> None:
         self.settings = Settings(data=data, worker_name="w", **settings)
-        self.engine = connect(self.settings.home_database_url)
-        migrate(self.engine)
-        self.jobs, self.venues, self.workers = Jobs(self.engine), Venues(self.engine), Workers(self.engine)
-        self.expiry, self.deliveries = Expiry(self.engine), Deliveries(self.engine)
+        super().__init__(self.settings.home_database_url)
         self.blobs = Blobs(self.settings.home_blob_url)
         self.enqueued: list[str] = []
 
@@ -40,19 +34,26 @@ class Stock:
         job_id = new_id()
         frames = {"left": [f"frames/{job_id}/left/0"]}
         self.blobs.put(frames["left"][0], b"frame")
-        submission = Submission(job_id, self.venue(venue_id), Options(seed=1, **options), job_id, None, frames)
-        self.jobs.submit(submission, 100, lambda _, job_id, __: self.enqueued.append(job_id))
+        submission = Submission(
+            job_id=job_id,
+            venue=self.venue(venue_id),
+            options=Options(seed=1, **options),
+            frames=frames,
+            content_hash=job_id,
+            idempotency_key=None,
+        )
+        self.submissions.submit(submission, 100, lambda _, job_id, __: self.enqueued.append(job_id))
         return job_id
 
     def ended(self, venue_id: str, at: datetime, *, accepted: bool | None = True, **options) -> str:
         """A job that ended at a moment, with a picture; `accepted` None: it failed and has none."""
         job_id = self.submitted(venue_id, **options)
-        task = self.jobs.begin(job_id)
+        task = self.attempts.begin(job_id)
         if accepted is None:
-            self.jobs.fail(task, JobError(type="/problems/job-crashed", title="", detail=""))
+            self.attempts.fail(task, JobError(type="/problems/job-crashed", title="", detail=""))
         else:
             self.blobs.put(f"{picture_folder(job_id, task.run_token)}/preview.jpg", b"picture")
-            self.jobs.finish(task, result(task.venue, accepted), ["preview"])
+            self.attempts.finish(task, result(task.venue, accepted), ["preview"])
         with self.engine.begin() as connection:
             connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job_id).values(finished_at=at))
         return job_id
@@ -60,8 +61,8 @@ class Stock:
     def calibrated(self, venue_id: str, *, accepted: bool = True, **options) -> str:
         """A job that has just ended."""
         job_id = self.submitted(venue_id, **options)
-        task = self.jobs.begin(job_id)
-        self.jobs.finish(task, result(task.venue, accepted), [])
+        task = self.attempts.begin(job_id)
+        self.attempts.finish(task, result(task.venue, accepted), [])
         return job_id
 
     def moved_by_hand(self, venue_id: str, x: float, **camera) -> None:

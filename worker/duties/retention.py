@@ -25,8 +25,7 @@ BREATH_S = 2.0
 # Between two looks at whether a round is due.
 LOOK_S = 10.0
 TRY_AGAIN_AFTER = timedelta(hours=1)
-# A store that is away is asked for so long about a folder, and about so many folders per round.
-PATIENCE_S = 10.0
+# A store that is away is asked about so many folders per round.
 FAILURES = 3
 log = structlog.get_logger()
 

@@ -10,7 +10,7 @@ import structlog
 from service.intake.from_sources import FromSources
 from service.intake.submit import REFUSALS, Enqueue
 from service.observe.disk import Disk
-from service.store.jobs import Origin
+from service.store.jobs.task import Origin
 from service.store.schedules import Firing, Schedules
 from service.store.venues import Venues
 from service.wire.options import Options

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from importlib.metadata import version
 
 import cv2
 import structlog
@@ -23,14 +22,16 @@ from worker.calibration.scene.field import Field
 from worker.jobs.wire import (
     PREVIEW_FRACTION,
     Failure,
-    Outcome,
     Picture,
+    Solution,
     camera_of,
     decoded_frame,
     jpeg,
     number,
     pitch_of,
+    provenance_of,
     segmenter_of,
+    to_the_millisecond,
     wire_camera,
     wire_progress,
 )
@@ -45,7 +46,7 @@ def solve(
     options: FieldOptions,
     settings: Settings,
     report: Callable[[Progress], None],
-) -> Outcome[FieldResult]:
+) -> Solution[FieldResult]:
     """The measures of a venue's pitch from the files of its cameras, with or without a server around it."""
     segmenter = segmenter_of(settings)
     cv2.setNumThreads(settings.threads)
@@ -63,13 +64,8 @@ def solve(
     drawing = time.perf_counter()
     pictures = _draw(pitch, cameras, found, frames)
     timings = {"decode": decoded - begun, **found.timings_s, "preview": time.perf_counter() - drawing}
-    provenance = Provenance(
-        software=version("esc-calibration"),
-        model_sha256=segmenter.sha256,
-        seed=options.seed or 0,
-        options=options.model_dump(mode="json", exclude={"callback_url"}),
-    )
-    return Outcome(_result(venue.field, found, timings, provenance), pictures)
+    provenance = provenance_of(segmenter, options)
+    return Solution(_result(venue.field, found, timings, provenance), pictures)
 
 
 def _draw(
@@ -95,7 +91,7 @@ def _result(given: FieldOfPlay, found: FieldFit, timings_s: Mapping[str, float],
         measures=[_wire_measure(measure) for measure in found.measures],
         cameras=[wire_camera(camera) for camera in found.cameras],
         stitch_error_px=number(found.stitch_error_px),
-        timings_s={stage: round(seconds, 3) for stage, seconds in timings_s.items()},
+        timings_s=to_the_millisecond(timings_s),
         provenance=provenance,
     )
 

@@ -15,14 +15,14 @@ from service.wire.results import CoverageResult, IntrinsicsResult, LensTrial, Ph
 from worker.calibration.draw.inspection import coverage_picture
 from worker.calibration.first.boards import Board, Charuco, find_board, other_size
 from worker.calibration.first.lens_calibration import LensCalibration, NoLens, Photo, calibrate_lens
-from worker.jobs.wire import Failure, Outcome, Picture, decoded, jpeg, number, wire_lens
+from worker.jobs.wire import Failure, Picture, Solution, decoded, jpeg, number, to_the_millisecond, wire_lens
 
 DETECTION_FRACTION = 0.8
 
 
 def solve(
     files: Mapping[str, bytes], options: IntrinsicsOptions, report: Callable[[Progress], None]
-) -> Outcome[IntrinsicsResult]:
+) -> Solution[IntrinsicsResult]:
     """The lens of the camera that took the photos, `files` by their names."""
     begun = time.perf_counter()
     board = _board(options.board)
@@ -46,7 +46,7 @@ def solve(
     fitted = time.perf_counter()
     picture = jpeg(coverage_picture(found))
     timings = {"detection": detected - begun, "fit": fitted - detected, "picture": time.perf_counter() - fitted}
-    return Outcome(_result(found, timings), {"coverage": picture})
+    return Solution(_result(found, timings), {"coverage": picture})
 
 
 def _board(board: wire.Board) -> Board:
@@ -97,7 +97,7 @@ def _result(found: LensCalibration, timings_s: Mapping[str, float]) -> Intrinsic
         ],
         trials=[LensTrial(terms=list(t.terms), rms_px=t.rms_px, left_out_px=t.left_out_px) for t in found.trials],
         warnings=[_sentence(warning) for warning in found.warnings],
-        timings_s={stage: round(seconds, 3) for stage, seconds in timings_s.items()},
+        timings_s=to_the_millisecond(timings_s),
         software=version("esc-calibration"),
     )
 

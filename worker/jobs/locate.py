@@ -20,7 +20,18 @@ from worker.calibration.first.first_pose import FirstPose, LensGain, NoPose, fir
 from worker.calibration.first.point_fit import Clicks
 from worker.calibration.scene.camera import Array, Intrinsics
 from worker.calibration.scene.field import Field
-from worker.jobs.wire import Failure, Outcome, decoded_frame, jpeg, lens_of, number, pitch_of, wire_lens, wire_pose
+from worker.jobs.wire import (
+    Failure,
+    Solution,
+    decoded_frame,
+    jpeg,
+    lens_of,
+    number,
+    pitch_of,
+    to_the_millisecond,
+    wire_lens,
+    wire_pose,
+)
 
 
 def solve(
@@ -29,7 +40,7 @@ def solve(
     options: LocateOptions,
     frame: bytes | None,
     report: Callable[[Progress], None],
-) -> Outcome[LocateResult]:
+) -> Solution[LocateResult]:
     """The first pose of a camera of a venue. `frame`: the file that the points were clicked in, for the picture."""
     (stored,) = (one for one in venue.cameras if one.id == camera)
     lens = lens_of(stored.intrinsics, stored.image_size)
@@ -43,7 +54,7 @@ def locate(
     points: list[ClickedPoint],
     frame: bytes | None,
     report: Callable[[Progress], None],
-) -> Outcome[LocateResult]:
+) -> Solution[LocateResult]:
     """The first pose of a camera that may belong to no venue yet."""
     begun = time.perf_counter()
     pitch = pitch_of(field)
@@ -54,7 +65,7 @@ def locate(
     fitted = time.perf_counter()
     drawn = jpeg(clicks_picture(pitch, clicks, found, picture))
     timings = {"fit": fitted - begun, "picture": time.perf_counter() - fitted}
-    return Outcome(result_of(found, points, timings), {"points": drawn})
+    return Solution(result_of(found, points, timings), {"points": drawn})
 
 
 def pose_of(camera: str, pitch: Field, lens: Intrinsics, clicks: Clicks) -> FirstPose:
@@ -113,7 +124,7 @@ def result_of(found: FirstPose, points: list[ClickedPoint], timings_s: dict[str,
         ],
         lens=None if found.lens is None else _gain(found.lens),
         warnings=list(found.warnings),
-        timings_s={stage: round(seconds, 3) for stage, seconds in timings_s.items()},
+        timings_s=to_the_millisecond(timings_s),
         software=version("esc-calibration"),
     )
 

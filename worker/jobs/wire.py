@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from math import isfinite
 from typing import Any, Generic, TypeVar
 
@@ -15,8 +17,9 @@ from service.wire import geometry
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Moved
 from service.wire.job import JobError, Progress
+from service.wire.options import FieldOptions, Options
 from service.wire.problems import KINDS, type_of
-from service.wire.results import AnyResult, CameraResult, Sigma, View
+from service.wire.results import AnyResult, CameraResult, Provenance, Sigma, View
 from worker.calibration import calibrate as engine
 from worker.calibration.judge import quality
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
@@ -32,11 +35,27 @@ R = TypeVar("R", bound=AnyResult, covariant=True)
 
 
 @dataclass(frozen=True)
-class Outcome(Generic[R]):
-    """A result and the files of its pictures, by the names that `service.store.jobs.picture_file` knows."""
+class Solution(Generic[R]):
+    """A result and the files of its pictures, by the names that `service.store.jobs.files.picture_file` knows."""
 
     result: R
     pictures: dict[str, bytes]
+
+
+def provenance_of(segmenter: Segmenter, options: Options | FieldOptions) -> Provenance:
+    """What computes a solution, so that it can be computed again."""
+    return Provenance(
+        software=version("esc-calibration"),
+        model_sha256=segmenter.sha256,
+        seed=options.seed or 0,
+        # Who is told changes no number, and the address may be a secret.
+        options=options.model_dump(mode="json", exclude={"callback_url"}),
+    )
+
+
+def to_the_millisecond(timings_s: Mapping[str, float]) -> dict[str, float]:
+    """The seconds of each stage, as a result shows them."""
+    return {stage: round(seconds, 3) for stage, seconds in timings_s.items()}
 
 
 class Failure(Exception):  # noqa: N818

@@ -2,5 +2,9 @@
 
 from alembic import context
 
-context.configure(connection=context.config.attributes["connection"], transactional_ddl=False)
+from service.store.engine import SCHEMA_TABLE
+
+context.configure(
+    connection=context.config.attributes["connection"], transactional_ddl=False, version_table=SCHEMA_TABLE
+)
 context.run_migrations()

@@ -6,11 +6,11 @@ from io import BytesIO
 import pytest
 from starlette.datastructures import FormData, UploadFile
 
-from service.app import open_context
+from service.api.context import Context
 from service.intake import submit
 from service.routes import calibrate
 from service.settings import Settings
-from service.store.jobs import Origin
+from service.store.jobs.task import Origin
 from service.wire.problems import Problem
 from service.wire.venue import VenueIn
 from tests.e2e.running import png, venue
@@ -21,10 +21,9 @@ pytestmark = in_both_homes
 
 @pytest.fixture
 def context(home, tmp_path):
-    context = open_context(Settings(data=tmp_path, **home.settings(tmp_path)))
+    context = Context(Settings(data=tmp_path, **home.settings(tmp_path)))
     yield context
-    context.queue.close()
-    context.engine.dispose()
+    context.close()
 
 
 @pytest.fixture
@@ -56,7 +55,7 @@ def test_a_job_begins_from_the_poses_that_were_found_during_the_upload(context, 
     context.venues.put(read.with_poses({"left": moved}), lambda _: None)
     assert calibrate.submit(context, read, form, None, Origin()).status_code == 202
     (job,) = context.jobs.page("v", None, None, 10)
-    assert context.jobs.begin(job.id).venue == context.venues.get("v")
+    assert context.attempts.begin(job.id).venue == context.venues.get("v")
 
 
 def test_frames_of_a_venue_that_was_deleted_during_the_upload_are_refused(context, read, form):
@@ -85,7 +84,7 @@ def test_frames_are_on_the_list_of_what_goes_until_they_are_a_job(context, read,
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(context.jobs, "submit", killed)
+        patch.setattr(context.submissions, "submit", killed)
         with pytest.raises(KeyboardInterrupt):
             calibrate.submit(context, read, form, None, Origin())
     (folder,) = {path.rsplit("/", 2)[0] for path in files(context.settings.home_blob_url)}

@@ -25,8 +25,8 @@ def rings(stock):
 
 
 def failed(stock, **options):
-    task = stock.jobs.begin(stock.submitted("v", **options))
-    stock.jobs.fail(task, ERROR)
+    task = stock.attempts.begin(stock.submitted("v", **options))
+    stock.attempts.fail(task, ERROR)
 
 
 @in_both_homes
@@ -62,7 +62,7 @@ def test_taking_a_rejected_result_by_hand_ends_the_row(stock):
     watched(stock, rejected_in_a_row=1)
     job = stock.calibrated("v", accepted=False)
     assert rings(stock) == [("rejected-in-a-row", None)]
-    stock.jobs.accept(job)
+    stock.decisions.accept(job)
     assert rings(stock) == []
 
 

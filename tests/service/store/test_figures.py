@@ -5,8 +5,8 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import sqlalchemy as sa
 
+from service.store.counts.endings import ENDED, ERRORS, STAGES, Ending
 from service.store.counts.figures import look
-from service.store.counts.outcomes import ENDED, ERRORS, STAGES, End
 from service.store.counts.tallies import STAGE, Buckets, add, read
 from service.wire.job import JobError
 from tests.homes import in_both_homes
@@ -53,7 +53,7 @@ def end(**values):
         "finished_at": NOON + timedelta(seconds=10),
         "attempts": 1,
     }
-    return End(**(shown | values)).tallies()
+    return Ending(**(shown | values)).tallies()
 
 
 def test_an_error_that_nobody_knows_makes_no_new_series():

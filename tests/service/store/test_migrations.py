@@ -5,19 +5,18 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import sqlalchemy as sa
 from alembic import command
+from alembic.autogenerate import compare_metadata
 from alembic.config import Config
+from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
+from service.store import tables
+from service.store.counts.endings import ENDED
 from service.store.counts.figures import VenueQuality, look
-from service.store.counts.outcomes import ENDED
-from service.store.deliveries import Deliveries
-from service.store.engine import MIGRATIONS, connect, migrate, writing
-from service.store.expiry import Expiry
+from service.store.engine import MIGRATIONS, SCHEMA_TABLE, UnsupportedDatabase, connect, migrate, writing
 from service.store.ids import new_id
-from service.store.jobs import Jobs, Submission
-from service.store.keys import Keys
-from service.store.venues import Venues
-from service.store.workers import Workers
+from service.store.jobs.submission import Submission
+from service.store.stores import Stores
 from service.wire.options import Board, IntrinsicsOptions, LocateOptions, Options
 from service.wire.results import Result
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
@@ -71,25 +70,7 @@ def job(id_, **values):
 
 # What each table held at the first revision, and what later ones added.
 ROWS = {
-    "venues": [{"id": VENUE.id, "document": VENUE.model_dump(mode="json"), "revision": 3, "updated_at": NOON}],
-    # Until revision 0009.
-    "pose_history": [
-        {
-            "venue": VENUE.id,
-            "camera": "left",
-            "pose": FIRST_POSE.model_dump(),
-            "cause": "put",
-            "since": NOON - timedelta(days=1),
-        },
-        {
-            "venue": VENUE.id,
-            "camera": "left",
-            "pose": VENUE.cameras[0].pose.model_dump(),
-            "cause": "calibration",
-            "job": DONE,
-            "since": NOON,
-        },
-    ],
+    "venues": [{"id": VENUE.id, "document": VENUE.model_dump(mode="json"), "updated_at": NOON}],
     "jobs": [
         job(
             DONE,
@@ -104,18 +85,10 @@ ROWS = {
     ],
     "workers": [{"name": "w", "model_sha256": "f" * 64, "started_at": NOON, "seen_at": NOON}],
     "api_keys": [{"name": "cron", "hash": "0" * 64, "scope": "calibrate", "created_at": NOON, "last_used_at": NOON}],
+    "sessions": [{"hash": "1" * 64, "key_hash": "0" * 64, "expires_at": NOON + timedelta(days=36500)}],
     "leftovers": [{"folder": "frames/lost", "due_at": NOON}],
     "deliveries": [
-        {
-            # Called `id` since revision 0010.
-            "job": DONE,
-            "id": DONE,
-            "url": RECEIVER,
-            "status": "waiting",
-            "attempts": 1,
-            "due_at": NOON,
-            "last_error": "timed out",
-        }
+        {"id": DONE, "url": RECEIVER, "status": "waiting", "attempts": 1, "due_at": NOON, "last_error": "timed out"}
     ],
     "alarms": [{"venue": VENUE.id, "rule": "not-calibrated", "camera": "", "since": NOON, "why": "No poses."}],
     "credentials": [{"venue": VENUE.id, "camera": "left", "userinfo": "user:secret"}],
@@ -141,24 +114,29 @@ ROWS = {
 
 
 @pytest.fixture
-def old(home, tmp_path):
-    """Make a database as a release of that revision left it."""
-    engine = connect(home.database_url(tmp_path))
+def upgraded(home, tmp_path):
+    """Bring up to date what a release of that revision left."""
+    url = home.database_url(tmp_path)
+    engine = connect(url)
 
-    def old(revision):
+    def upgraded(revision):
         with writing(engine) as connection:
             config = Config()
             config.set_main_option("script_location", str(MIGRATIONS))
             config.attributes["connection"] = connection
             command.upgrade(config, revision)
-            tables = sa.MetaData()
-            tables.reflect(connection)
-            for name in tables.tables.keys() & ROWS.keys():
-                insert_what_it_has_columns_for(connection, tables.tables[name], ROWS[name])
-        return engine
+            then = sa.MetaData()
+            then.reflect(connection)
+            for name in then.tables.keys() & ROWS.keys():
+                insert_what_it_has_columns_for(connection, then.tables[name], ROWS[name])
+        engine.dispose()
+        stores.append(Stores(url))
+        return stores[-1]
 
-    yield old
-    engine.dispose()
+    stores = []
+    yield upgraded
+    for opened in stores:
+        opened.engine.dispose()
 
 
 def insert_what_it_has_columns_for(connection, table, rows):
@@ -168,10 +146,9 @@ def insert_what_it_has_columns_for(connection, table, rows):
 
 @in_both_homes
 @pytest.mark.parametrize("revision", sorted(REVISIONS))
-def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
-    engine = old(revision)
-    migrate(engine)
-    venues, jobs = Venues(engine), Jobs(engine)
+def test_what_an_older_release_stored_is_there_after_the_upgrade(upgraded, revision):
+    stores = upgraded(revision)
+    venues, jobs = stores.venues, stores.jobs
     assert venues.get(VENUE.id) == VENUE
     put, held = reversed(venues.history(VENUE.id, None, 10))
     assert (put.revision, put.cause, put.job, put.cameras[0].pose) == (1, "put", None, FIRST_POSE)
@@ -180,65 +157,115 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(old, revision):
     done = jobs.get(DONE)
     assert (done.status, done.created_at, done.finished_at) == ("succeeded", NOON, NOON)
     assert done.result == Result.model_validate(RESULT)
-    assert jobs.same_as(VENUE.id, "k", "c" * 64).id == DONE
+    assert stores.submissions.same_as(VENUE.id, "k", "c" * 64).id == DONE
     assert jobs.get(WAITING).queue_position == 1
-    task = jobs.begin(WAITING)
+    task = stores.attempts.begin(WAITING)
     assert (task.venue, task.options.seed, task.frames) == (VENUE, 7, FRAMES)
-    assert task.origin.request_id == ("van-3" if revision >= "0007" else None)
-    assert Workers(engine).silent(0) == ["w"]
-    keys = Keys(engine).all()
-    assert [(key.name, key.scope, key.last_used_at) for key in keys] == (
-        [("cron", "calibrate", NOON)] if revision >= "0003" else []
-    )
-    assert Expiry(engine).leftovers(NOON, 10) == (["frames/lost"] if revision >= "0004" else [])
-    due = Deliveries(engine).attempt(NOON, NOON, 10)
-    assert [(delivery.id, delivery.attempt) for delivery in due] == ([(DONE, 2)] if revision >= "0005" else [])
-    error = "timed out" if revision >= "0006" else None
-    assert [state.last_error for state in [jobs.get(DONE).callback] if state] == ([error] if revision >= "0005" else [])
+    assert task.origin.request_id == "van-3"
+    assert stores.workers.silent(0) == ["w"]
+    (key,) = stores.keys.all()
+    assert (key.name, key.scope, key.last_used_at) == ("cron", "calibrate", NOON)
+    assert stores.sessions.key_of("1" * 64) == key
+    assert stores.expiry.leftovers(NOON, 10) == ["frames/lost"]
+    (due,) = stores.deliveries.attempt(NOON, NOON, 10)
+    assert (due.id, due.attempt, jobs.get(DONE).callback.last_error) == (DONE, 2, "timed out")
     health = venues.health(VENUE.id)
-    assert [alarm.why for alarm in health.alarms] == (["No poses."] if revision >= "0010" else [])
-    assert (health.revision, health.rejected_in_a_row) == (2, 0)
-    assert venues.credentials(VENUE.id) == ({"left": "user:secret"} if revision >= "0011" else {})
-    assert [state.last_job for state in [health.schedule] if state] == ([DONE] if revision >= "0012" else [])
-    seen = look(engine, 10)
-    assert seen.tallies == ({(ENDED, ("succeeded", "accepted", "")): 3} if revision >= "0007" else {})
-    assert seen.venues == ([VenueQuality(VENUE.id, 0.2, 2.0, NOON)] if revision >= "0007" else [])
+    assert [alarm.why for alarm in health.alarms] == ["No poses."]
+    assert (health.revision, health.rejected_in_a_row, health.schedule.last_job) == (2, 0, DONE)
+    assert venues.credentials(VENUE.id) == {"left": "user:secret"}
+    seen = look(stores.engine, 10)
+    assert seen.tallies == {(ENDED, ("succeeded", "accepted", "")): 3}
+    assert seen.venues == [VenueQuality(VENUE.id, 0.2, 2.0, NOON)]
 
 
 @in_both_homes
 @pytest.mark.parametrize("revision", sorted(REVISIONS))
-def test_an_upgraded_database_takes_new_rows(old, revision):
-    engine = old(revision)
-    migrate(engine)
+def test_an_upgraded_database_takes_new_rows(upgraded, revision):
+    stores = upgraded(revision)
     lens = Submission(
-        new_id(),
-        None,
-        IntrinsicsOptions(board=Board(columns=9, rows=6, square_m=0.03)),
-        "l",
-        None,
-        {},
-        "intrinsics",
+        job_id=new_id(),
+        kind="intrinsics",
+        venue=None,
+        options=IntrinsicsOptions(board=Board(columns=9, rows=6, square_m=0.03)),
+        frames={},
+        content_hash="l",
+        idempotency_key=None,
     )
     points = [{"world": [x, y], "pixel": [0, 0]} for x in (0, 1) for y in (0, 1)]
     clicks = LocateOptions.model_validate({"points": points})
     # A venue with an active calibration takes any number of first poses.
-    place = Submission(new_id(), VENUE, clicks, "p", None, {"left": []}, "locate")
+    place = Submission(
+        job_id=new_id(),
+        kind="locate",
+        venue=VENUE,
+        options=clicks,
+        frames={"left": []},
+        content_hash="p",
+        idempotency_key=None,
+    )
     for submission in (lens, place):
-        job, new = Jobs(engine).submit(submission, 100, lambda *_: None)
+        job, new = stores.submissions.submit(submission, 100, lambda *_: None)
         assert (new, job.kind, job.queue_position) == (True, submission.kind, 2 if submission is lens else 1)
-        task = Jobs(engine).begin(job.id)
+        task = stores.attempts.begin(job.id)
         assert (task.venue, task.options) == (submission.venue, submission.options)
     # Numbers go on where those of the old rows ended.
     moved = VENUE.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
-    Venues(engine).put(VENUE.with_poses({"left": moved}), lambda _: None)
-    held = Venues(engine).history(VENUE.id, None, 10)
+    stores.venues.put(VENUE.with_poses({"left": moved}), lambda _: None)
+    held = stores.venues.history(VENUE.id, None, 10)
     assert [(revision.revision, revision.cause) for revision in held] == [(3, "put"), (2, "calibrated"), (1, "put")]
     # What was never measured is not made up; what comes now is.
     assert [revision.cameras[0].moved is None for revision in held] == [False, True, True]
-    Venues(engine).restore(VENUE.id, 1, lambda _: None)
-    assert Venues(engine).get(VENUE.id).cameras[0].pose == FIRST_POSE
-    key = Keys(engine).add("guest", "read", NOON + timedelta(days=36500))
+    stores.venues.restore(VENUE.id, 1, lambda _: None)
+    assert stores.venues.get(VENUE.id).cameras[0].pose == FIRST_POSE
+    key = stores.keys.add("guest", "read", NOON + timedelta(days=36500))
     assert key.startswith("esc_")
-    # What ended before files were ever deleted is past its time like any other.
-    assert Expiry(engine).expire_frames(NOON + timedelta(days=2), NOON, 10) == 1
-    assert f"frames/{DONE}" in Expiry(engine).leftovers(NOON, 10)
+    assert stores.expiry.expire_frames(NOON + timedelta(days=2), NOON, 10) == 1
+    assert f"frames/{DONE}" in stores.expiry.leftovers(NOON, 10)
+
+
+@in_both_homes
+def test_the_migrations_make_the_tables_that_the_code_knows(engine, home, tmp_path):
+    with engine.connect() as connection:
+        compared = MigrationContext.configure(connection, opts={"version_table": SCHEMA_TABLE})
+        assert compare_metadata(compared, tables.metadata) == []
+    # Alembic does not compare conditions.
+    as_the_code_says = connect(home.database_url(tmp_path / "other"))
+    tables.metadata.create_all(as_the_code_says)
+    assert conditions_of_indexes(engine) == conditions_of_indexes(as_the_code_says)
+    as_the_code_says.dispose()
+
+
+def conditions_of_indexes(engine):
+    reflected = sa.MetaData()
+    reflected.reflect(engine)
+    indexes = [index for table in reflected.tables.values() for index in table.indexes]
+    return {index.name: str(index.dialect_options[engine.dialect.name].get("where")) for index in indexes}
+
+
+@in_both_homes
+def test_migrating_twice_changes_nothing(engine):
+    migrate(engine)
+
+
+@in_both_homes
+def test_a_database_from_before_the_first_release_is_told_and_left_alone(home, tmp_path):
+    engine = connect(home.database_url(tmp_path))
+    with writing(engine) as connection:
+        for statement in (
+            "CREATE TABLE jobs (id VARCHAR(26))",
+            "CREATE TABLE alembic_version (version_num VARCHAR(32))",
+            "INSERT INTO alembic_version VALUES ('0001')",
+        ):
+            connection.exec_driver_sql(statement)
+    with pytest.raises(UnsupportedDatabase, match=r"development version .* begins with schema 0001 .* new place"):
+        migrate(engine)
+    assert sorted(sa.inspect(engine).get_table_names()) == ["alembic_version", "jobs"]
+    engine.dispose()
+
+
+@in_both_homes
+def test_a_database_that_a_newer_version_has_upgraded_is_told(engine):
+    with writing(engine) as connection:
+        connection.exec_driver_sql(f"UPDATE {SCHEMA_TABLE} SET version_num = '0999'")
+    with pytest.raises(UnsupportedDatabase, match=r"has schema 0999, .* knows none after 0001: .* restore the backup"):
+        migrate(engine)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from service.store.jobs import MovedOn, NoPoses
+from service.store.jobs.decisions import MovedOn, NoPoses
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Intrinsics
@@ -120,7 +120,7 @@ def test_a_result_that_did_not_move_the_venue_can_be_taken_by_hand(stock, how):
     job = stock.calibrated("v", **how)
     assert (standing(stock), stock.jobs.get(job).venue_revision) == (-1.0, None)
     for _ in range(2):
-        stock.jobs.accept(job)
+        stock.decisions.accept(job)
     assert (standing(stock), stock.jobs.get(job).venue_revision) == (-0.999, 2)
     assert told(stock) == [(2, "accepted", job, None), (1, "put", None, None)]
 
@@ -130,11 +130,11 @@ def test_what_was_taken_can_be_given_back_and_taken_again(stock):
     stock.venue("v")
     job = stock.calibrated("v")
     for _ in range(2):
-        stock.jobs.reject(job)
+        stock.decisions.reject(job)
     assert (standing(stock), told(stock)[0]) == (-1.0, (3, "restored", job, 1))
-    stock.jobs.accept(job)
+    stock.decisions.accept(job)
     assert (standing(stock), told(stock)[0]) == (-0.999, (4, "accepted", job, None))
-    stock.jobs.reject(job)
+    stock.decisions.reject(job)
     assert (standing(stock), told(stock)[0]) == (-1.0, (5, "restored", job, 3))
 
 
@@ -143,10 +143,10 @@ def test_nothing_by_hand_undoes_what_came_later(stock):
     stock.venue("v")
     refused, taken = stock.calibrated("v", accepted=False), stock.calibrated("v")
     with pytest.raises(MovedOn) as moved:
-        stock.jobs.accept(refused)
+        stock.decisions.accept(refused)
     assert moved.value.newest.revision == 2
     stock.moved_by_hand("v", -3.0)
-    for decide in (stock.jobs.accept, stock.jobs.reject):
+    for decide in (stock.decisions.accept, stock.decisions.reject):
         with pytest.raises(MovedOn):
             decide(taken)
     assert standing(stock) == -3.0
@@ -155,7 +155,7 @@ def test_nothing_by_hand_undoes_what_came_later(stock):
 @in_both_homes
 def test_giving_back_what_never_held_changes_nothing(stock):
     stock.venue("v")
-    stock.jobs.reject(stock.calibrated("v", accepted=False))
+    stock.decisions.reject(stock.calibrated("v", accepted=False))
     assert told(stock) == [(1, "put", None, None)]
 
 
@@ -163,7 +163,7 @@ def test_giving_back_what_never_held_changes_nothing(stock):
 def test_a_job_without_poses_has_none_to_take(stock):
     stock.venue("v")
     waiting = stock.submitted("v")
-    for decide in (stock.jobs.accept, stock.jobs.reject):
+    for decide in (stock.decisions.accept, stock.decisions.reject):
         with pytest.raises(NoPoses):
             decide(waiting)
 
@@ -174,14 +174,14 @@ def test_poses_that_were_found_for_another_venue_are_not_taken(stock):
     job = stock.calibrated("v", accepted=False)
     stock.venues.put(venue.model_copy(update={"field": FieldOfPlay(length_m=104, width_m=68)}), anyway)
     with pytest.raises(MovedOn):
-        stock.jobs.accept(job)
+        stock.decisions.accept(job)
 
 
 @in_both_homes
 def test_what_is_decided_while_a_job_runs_is_not_undone_by_its_result(stock):
     stock.venue("v")
     first = stock.calibrated("v")
-    running = stock.jobs.begin(stock.submitted("v"))
-    stock.jobs.reject(first)
-    stock.jobs.finish(running, result(running.venue, True), [])
+    running = stock.attempts.begin(stock.submitted("v"))
+    stock.decisions.reject(first)
+    stock.attempts.finish(running, result(running.venue, True), [])
     assert (standing(stock), stock.jobs.get(running.job_id).result.accepted) == (-1.0, False)

@@ -3,37 +3,17 @@ import time
 
 import obstore
 import pytest
-import sqlalchemy as sa
 from obstore.exceptions import BaseError
 from obstore.store import from_url
 
-from service.store import tables
 from service.store.blobs import Blobs
-from service.store.engine import migrate
 from service.store.ids import new_id
-from service.store.jobs import Jobs
 from service.store.venues import Venues
 from service.store.workers import Workers
 from service.wire.geometry import Intrinsics
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
 from tests.homes import in_both_homes, on_servers
 from tests.worker.stock import Stock, result
-
-
-@in_both_homes
-def test_the_migrations_make_the_tables_that_the_code_knows(engine):
-    found = sa.MetaData()
-    found.reflect(engine)
-    for name, table in tables.metadata.tables.items():
-        assert {c.name: (c.type.compile(engine.dialect), c.nullable) for c in found.tables[name].columns} == {
-            c.name: (c.type.compile(engine.dialect), c.nullable) for c in table.columns
-        }
-        assert {index.name for index in found.tables[name].indexes} == {index.name for index in table.indexes}
-
-
-@in_both_homes
-def test_migrating_twice_changes_nothing(engine):
-    migrate(engine)
 
 
 @in_both_homes
@@ -55,11 +35,11 @@ def test_job_ids_sort_by_time():
 
 
 @in_both_homes
-def test_jobs_that_are_not_there_are_none(engine):
-    jobs = Jobs(engine)
-    assert jobs.get(new_id()) is None
-    assert jobs.begin(new_id()) is None
-    assert jobs.states([new_id()]) == {}
+def test_jobs_that_are_not_there_are_none(stock):
+    assert stock.jobs.get(new_id()) is None
+    assert stock.attempts.begin(new_id()) is None
+    assert stock.submissions.of(new_id()) is None
+    assert stock.jobs.states([new_id()]) == {}
 
 
 @in_both_homes
@@ -130,12 +110,12 @@ def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(tmp_path):
     stock = Stock(tmp_path)
     job_id = stock.submitted("v")
     assert stock.jobs.posed(job_id) is None
-    task = stock.jobs.begin(job_id)
+    task = stock.attempts.begin(job_id)
     left, right = task.venue.cameras
     longer = Intrinsics(matrix=[[61, 0, 32], [0, 61, 24], [0, 0, 1]], distortion=[])
     found = result(task.venue, False)
     cameras = [found.cameras[0].model_copy(update={"intrinsics": longer}), *found.cameras[1:]]
-    stock.jobs.finish(task, found.model_copy(update={"cameras": cameras}), [])
+    stock.attempts.finish(task, found.model_copy(update={"cameras": cameras}), [])
     posed = stock.jobs.posed(job_id)
     assert [camera.intrinsics for camera in posed.cameras] == [longer, right.intrinsics]
     assert posed.cameras[0].pose == cameras[0].pose

@@ -16,7 +16,7 @@ from tests.worker.stock import Stock, anyway
 from worker.calibration.scene.camera import Camera, Intrinsics
 from worker.calibration.scene.field import Field
 from worker.duties.alarms import Alarms
-from worker.jobs import job
+from worker.jobs import calibration
 
 SIZE, FOCAL, LENS = (640, 360), 400.0, (-0.12, 0.02, 0.0, 0.0, 0.0)
 OTHER_PITCH = Field(92.0, 50.0)
@@ -99,10 +99,10 @@ class Year:
     def day(self, called: str, frames: Frames) -> bool:
         """A calibration; says whether its poses were taken, which must then be right."""
         files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
-        task = self.home.jobs.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
+        task = self.home.attempts.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
         before = self.home.venues.get("v")
-        found = job.solve(task.venue, files, task.options, self.home.settings, lambda _: None)
-        self.home.jobs.finish(task, found.result, [])
+        found = calibration.solve(task.venue, files, task.options, self.home.settings, lambda _: None)
+        self.home.attempts.finish(task, found.result, [])
         now = self.home.venues.get("v")
         if not found.result.accepted:
             self.rejected[called] = found.result.rejected_because
@@ -142,7 +142,7 @@ def exchanged(of: Camera) -> Camera:
 @pytest.mark.timeout(900)
 def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stock, monkeypatch):
     # Nobody looks at the pictures.
-    monkeypatch.setattr(job, "draw", lambda *_: {})
+    monkeypatch.setattr(calibration, "draw", lambda *_: {})
     year = Year(stock)
 
     year.pass_(1)

@@ -80,7 +80,7 @@ def test_nothing_of_a_deleted_venue_is_kept_for_ever(stock, retention):
 
 def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
     queued, running = stock.submitted("a"), stock.submitted("b")
-    stock.jobs.begin(running)
+    stock.attempts.begin(running)
     retention.round(datetime(2099, 1, 1, tzinfo=UTC))
     assert stock.files() == {f"frames/{queued}", f"frames/{running}"}
     assert (stock.jobs.get(queued).status, stock.jobs.get(running).status) == ("queued", "running")
@@ -194,7 +194,7 @@ def test_two_rounds_at_once_do_no_harm(stock, retention):
 
 def test_short_of_room_frames_of_ended_jobs_go_at_once_and_nothing_else(stock, retention):
     ended, running = stock.ended("a", ago(minutes=1)), stock.submitted("b")
-    stock.jobs.begin(running)
+    stock.attempts.begin(running)
     retention.round(NOW, short_of_room=True)
     assert stock.files() == {f"pictures/{ended}", f"frames/{running}"}
 

@@ -18,8 +18,8 @@ j = tables.jobs.c
 
 
 @dataclass(frozen=True)
-class Ended:
-    """The end of a calibration; what needs a result is None, or empty, without one.
+class PastCalibration:
+    """A calibration that has ended; what needs a result is None, or empty, without one.
 
     `accepted`: the gate's verdict. `moved` by camera, from the pose that was stored to the one that was found.
     """
@@ -42,13 +42,13 @@ class Ended:
         return max((moved.pixels for moved in self.moved.values() if moved.pixels is not None), default=None)
 
 
-class Ends:
-    """The ends of calibrations in the database."""
+class PastCalibrations:
+    """The calibrations in the database that have ended, and which have not."""
 
     def __init__(self, engine: sa.Engine) -> None:
         self._engine = engine
 
-    def of(self, venue: str, limit: int) -> list[Ended]:
+    def of(self, venue: str, limit: int) -> list[PastCalibration]:
         """The last `limit` calibrations of a venue that have ended, newest first."""
         query = (
             sa.select(j.id, j.status, j.finished_at, j.result, j.error, j.options)
@@ -57,7 +57,7 @@ class Ends:
             .limit(limit)
         )
         with reading(self._engine) as connection:
-            return [_ended(row) for row in connection.execute(query)]
+            return [_past(row) for row in connection.execute(query)]
 
     def newest_result(self, venue: str) -> str | None:
         """The job of a venue's newest calibration that has a result, accepted or not."""
@@ -77,9 +77,9 @@ class Ends:
             return {row.venue: row.id for row in connection.execute(query)}
 
 
-def _ended(row: Any) -> Ended:
+def _past(row: Any) -> PastCalibration:
     result = row.result or {}
-    return Ended(
+    return PastCalibration(
         job=row.id,
         status=row.status,
         finished_at=row.finished_at,

@@ -2,7 +2,6 @@
 
 from datetime import UTC, datetime, timedelta
 
-from service.store.counts.ends import Ends
 from tests.homes import in_both_homes
 
 NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
@@ -15,7 +14,7 @@ def test_the_ends_of_calibrations_are_told_newest_first(stock):
         for number, accepted in enumerate((True, False, None))
     ]
     stock.ended("another", NOW)
-    ends = Ends(stock.engine).of("v", 10)
+    ends = stock.past_calibrations.of("v", 10)
     assert [end.job for end in ends] == jobs[::-1]
     assert [(end.status, end.accepted, end.dry_run) for end in ends] == [
         ("failed", None, False),
@@ -25,12 +24,12 @@ def test_the_ends_of_calibrations_are_told_newest_first(stock):
     assert ends[0].finished_at == NOW + timedelta(minutes=2)
     assert (ends[0].moved_px, ends[0].stitch_error_px) == (None, None)
     assert ends[2].moved_px == max(moved.pixels for moved in ends[2].moved.values())
-    assert [end.job for end in Ends(stock.engine).of("v", 1)] == jobs[2:]
+    assert [end.job for end in stock.past_calibrations.of("v", 1)] == jobs[2:]
 
 
 @in_both_homes
 def test_the_newest_result_is_that_of_the_last_job_that_has_one(stock):
-    ends = Ends(stock.engine)
+    ends = stock.past_calibrations
     assert ends.newest_result("v") is None
     rejected = stock.ended("v", NOW, accepted=False)
     stock.ended("v", NOW, accepted=None)
@@ -41,4 +40,4 @@ def test_the_newest_result_is_that_of_the_last_job_that_has_one(stock):
 def test_what_waits_or_runs_is_known_by_its_venue(stock):
     waiting = stock.submitted("v")
     stock.ended("another", NOW)
-    assert Ends(stock.engine).active(["v", "another", "nowhere"]) == {"v": waiting}
+    assert stock.past_calibrations.active(["v", "another", "nowhere"]) == {"v": waiting}

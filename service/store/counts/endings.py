@@ -1,4 +1,4 @@
-"""What the end of a job adds to the tallies."""
+"""How a job ended, and what that adds to the tallies."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ RESTARTS = "job_restarts"
 
 
 @dataclass(frozen=True)
-class End:
+class Ending:
     """How a job ended, and when it was what."""
 
     kind: Kind

@@ -12,7 +12,7 @@ import structlog
 
 from service.settings import Settings
 from service.store.deliveries import Deliveries, Delivery
-from service.store.jobs import Jobs
+from service.store.jobs.reading import Jobs
 from service.wire.job import JobEvent
 from worker.duties import webhook
 
@@ -30,7 +30,7 @@ GONE = 410
 log = structlog.get_logger()
 
 
-class Callbacks:
+class Delivering:
     """Sends what is due by the clock `now`."""
 
     def __init__(self, settings: Settings, deliveries: Deliveries, jobs: Jobs, now: Callable[[], datetime]) -> None:

@@ -17,7 +17,7 @@ from tests.homes import in_both_homes
 from tests.worker.receiver import Dripping, Endless, NulSaying, Receiver, Silent
 from tests.worker.stock import Stock, anyway
 from worker.duties import webhook
-from worker.duties.callbacks import ATTEMPT, Callbacks
+from worker.duties.delivering import ATTEMPT, Delivering
 
 SECRET, OTHER_SECRET = ("whsec_" + b64encode(bytes([n]) * 32).decode() for n in (7, 8))
 LOCAL = {"webhook_secret": SECRET, "callback_allow_http": True, "callback_allow_private": True}
@@ -68,8 +68,8 @@ def receiver():
         one.close()
 
 
-def callbacks(stock, clock) -> Callbacks:
-    return Callbacks(stock.settings, stock.deliveries, stock.jobs, clock)
+def callbacks(stock, clock) -> Delivering:
+    return Delivering(stock.settings, stock.deliveries, stock.jobs, clock)
 
 
 def ended(stock, url: str, **more) -> str:
@@ -101,7 +101,7 @@ def test_every_end_is_told(stock, receiver, clock, how):
     if how == "job.failed":
         ended(home, hook.url, accepted=None)
     else:
-        home.jobs.cancel(home.submitted("v", callback_url=hook.url))
+        home.decisions.cancel(home.submitted("v", callback_url=hook.url))
     callbacks(home, clock).look()
     assert json.loads(hook.received[0].body)["type"] == how
 
@@ -145,8 +145,8 @@ def test_a_job_that_asked_for_nothing_is_not_told_of(stock):
 def test_a_cancelled_job_is_told_of_once(stock):
     home = stock()
     job = home.submitted("v", callback_url="https://example.com/")
-    home.jobs.cancel(job)
-    home.jobs.cancel(job)
+    home.decisions.cancel(job)
+    home.decisions.cancel(job)
     assert home.callbacks() == {"waiting": 1}
 
 
@@ -198,7 +198,7 @@ def test_the_job_says_how_far_the_telling_has_come(stock, receiver, clock):
     home, hook = stock(), receiver(NulSaying, 500, 200)
     waiting = home.submitted("a", callback_url=hook.url)
     assert home.jobs.get(waiting).callback is None
-    home.jobs.cancel(waiting)
+    home.decisions.cancel(waiting)
     assert home.jobs.get(waiting).callback.model_dump(exclude={"next_attempt_at"}) == {
         "state": "waiting",
         "attempts": 0,

@@ -1,0 +1,59 @@
+"""The end of a job, whoever brings it: row, callback and tallies in one transaction."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+from service.store import tables
+from service.store.counts import tallies
+from service.store.counts.endings import Ending
+from service.store.deliveries import add_delivery
+from service.store.engine import clock
+from service.store.jobs.task import OPTIONS
+from service.wire.job import OPEN, JobError, Status
+from service.wire.results import AnyResult
+
+# What must still hold of a row when it is written.
+Still = list[sa.ColumnElement[bool]]
+j = tables.jobs.c
+
+
+def end(
+    connection: sa.Connection,
+    job_id: str,
+    still: Still,
+    status: Status,
+    *,
+    result: AnyResult | None = None,
+    error: JobError | None = None,
+    **values: Any,
+) -> bool:
+    """End a job, have it told and counted; False, and nothing is done, if the row is not `still` so."""
+    now = clock(connection)
+    for name, document in (("result", result), ("error", error)):
+        if document is not None:
+            values[name] = document.model_dump(mode="json")
+    ended = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **changed(now))
+    if connection.execute(ended).rowcount == 0:
+        return False
+    query = sa.select(j.kind, j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
+    row = connection.execute(query).one()
+    options = OPTIONS[row.kind].model_validate(row.options)
+    if options.callback_url is not None:
+        add_delivery(connection, job_id, options.callback_url, now)
+    ending = Ending(row.kind, status, result, error, row.created_at, row.started_at, now, row.attempt)
+    tallies.add(connection, ending.tallies())
+    return True
+
+
+def still_open(job_id: str) -> Still:
+    """It waits or runs."""
+    return [j.id == job_id, j.status.in_(OPEN)]
+
+
+def changed(now: datetime) -> dict[str, Any]:
+    """What every change of a row that clients see writes beside it."""
+    return {"revision": j.revision + 1, "updated_at": now}

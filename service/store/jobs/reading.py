@@ -1,0 +1,144 @@
+"""Jobs as clients see them, and what waits for them watches."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+
+from service.store import tables
+from service.store.deliveries import delivery_of
+from service.store.engine import reading
+from service.store.jobs.files import picture_file, picture_folder
+from service.store.revisions import revision_of_job
+from service.store.venues import with_result
+from service.wire.job import Job, Status
+from service.wire.results import Result
+from service.wire.venue import Venue
+
+j = tables.jobs.c
+# What pollers ask for, hundreds of times a second: to put the statement together takes longer than to run it.
+ONE = sa.select(tables.jobs).where(j.id == sa.bindparam("job_id"))
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """The pictures of a job that has a result: where they lie in the blob store, and whether they still do."""
+
+    folder: str
+    names: list[str]
+    deleted: bool
+
+
+@dataclass(frozen=True)
+class State:
+    """What waiters watch: `revision` grows with every change."""
+
+    revision: int
+    status: Status
+
+
+class Jobs:
+    """The jobs in the database."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def get(self, job_id: str) -> Job | None:
+        """One job as clients see it."""
+        with reading(self._engine) as connection:
+            try:
+                return read_job(connection, job_id)
+            except sa.exc.NoResultFound:
+                return None
+
+    def page(
+        self, venue: str | None, status: str | None, before: str | None, limit: int, kind: str | None = None
+    ) -> list[Job]:
+        """Up to `limit` jobs, newest first, those older than `before`."""
+        query = sa.select(tables.jobs).order_by(j.id.desc()).limit(limit)
+        for column, value in ((j.venue, venue), (j.status, status), (j.kind, kind)):
+            if value is not None:
+                query = query.where(column == value)
+        if before is not None:
+            query = query.where(j.id < before)
+        with reading(self._engine) as connection:
+            return [_job(connection, row) for row in connection.execute(query)]
+
+    def states(self, job_ids: Collection[str]) -> dict[str, State]:
+        """What waiters need to know about several jobs."""
+        query = sa.select(j.id, j.revision, j.status).where(j.id.in_(job_ids))
+        with reading(self._engine) as connection:
+            return {row.id: State(row.revision, row.status) for row in connection.execute(query)}
+
+    def pictures(self, job_id: str) -> Pictures | None:
+        """The pictures of a job, None if it has no result (yet)."""
+        query = sa.select(j.run_token, j.pictures, j.pictures_deleted_at).where(j.id == job_id, j.result.is_not(None))
+        with reading(self._engine) as connection:
+            row = connection.execute(query).one_or_none()
+        if row is None:
+            return None
+        return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
+
+    def posed(self, job_id: str) -> Venue | None:
+        """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
+        with reading(self._engine) as connection:
+            found = found_poses(connection, job_id)
+        return None if found is None else with_result(*found)
+
+    def check(self) -> None:
+        """Raise unless the database answers, and has them."""
+        with reading(self._engine) as connection:
+            connection.execute(sa.select(j.id).limit(1))
+
+
+def read_job(connection: sa.Connection, job_id: str) -> Job:
+    """One job as clients see it, which is there."""
+    return _job(connection, connection.execute(ONE, {"job_id": job_id}).one())
+
+
+def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] | None:
+    """What a calibration began with and what it found; None: it found no poses (yet), or the job is no calibration."""
+    done = [j.id == job_id, j.kind == "calibration", j.result.is_not(None)]
+    row = connection.execute(sa.select(j.venue_document, j.result).where(*done)).one_or_none()
+    return None if row is None else (Venue.model_validate(row.venue_document), Result.model_validate(row.result))
+
+
+def _job(connection: sa.Connection, row: Any) -> Job:
+    return Job(
+        id=row.id,
+        kind=row.kind,
+        venue=row.venue,
+        status=row.status,
+        progress=row.progress,
+        queue_position=_position(connection, row) if row.status == "queued" else None,
+        attempt=row.attempt,
+        created_at=row.created_at,
+        started_at=row.started_at,
+        finished_at=row.finished_at,
+        error=row.error,
+        result=row.result,
+        callback=delivery_of(connection, row.id) if row.finished_at and row.options["callback_url"] else None,
+        venue_revision=revision_of_job(connection, row.id) if row.kind == "calibration" and row.result else None,
+        links=_links(row),
+    )
+
+
+def _position(connection: sa.Connection, row: Any) -> int:
+    ahead = sa.or_(j.priority < row.priority, sa.and_(j.priority == row.priority, j.id < row.id))
+    # First poses have a queue of their own.
+    same_queue = (j.kind == "locate") if row.kind == "locate" else (j.kind != "locate")
+    count = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued", same_queue, ahead))
+    return 1 + (count or 0)
+
+
+def _links(row: Any) -> dict[str, str]:
+    base = f"/jobs/{row.id}"
+    links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel"}
+    if row.venue is not None:
+        links["venue"] = f"/venues/{row.venue}"
+    # `overlay_left` in the store is `overlay/left` in an address.
+    names = row.pictures or () if row.pictures_deleted_at is None else ()
+    return links | {name.replace("_", "/", 1): f"{base}/{picture_file(name).replace('_', '/', 1)}" for name in names}

@@ -1,0 +1,165 @@
+"""How what a client sent becomes a job, or turns out to be one already."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import sqlalchemy as sa
+
+from service.store import tables
+from service.store.engine import clock, reading, serialise, writing
+from service.store.jobs.files import frame_folder
+from service.store.jobs.reading import ONE, read_job
+from service.store.jobs.task import Asked, Origin
+from service.store.venues import find_venue, venue_lock
+from service.wire.job import OPEN, Job, Kind
+from service.wire.venue import Venue
+
+PRIORITIES = {"live": 1, "routine": 100}
+j = tables.jobs.c
+
+
+class Submission(Asked):
+    """What a client sent, checked: ready to become a job once its frames are stored."""
+
+    content_hash: str
+    idempotency_key: str | None
+
+
+class KeyReused(Exception):  # noqa: N818
+    """The idempotency key belongs to a job of other content."""
+
+    def __init__(self, job_id: str) -> None:
+        self.job_id = job_id
+
+
+class VenueBusy(Exception):  # noqa: N818
+    """The venue has an active job of other content."""
+
+    def __init__(self, job_id: str) -> None:
+        self.job_id = job_id
+
+
+class VenueGone(Exception):  # noqa: N818
+    """The venue was deleted while its frames arrived."""
+
+
+class VenueReplaced(Exception):  # noqa: N818
+    """The pitch or a lens of the venue was changed while its frames arrived: they were checked against another one."""
+
+
+class QueueFull(Exception):  # noqa: N818
+    """As many jobs wait as may."""
+
+
+class Submissions:
+    """The beginning of the jobs in the database."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def submit(
+        self, submission: Submission, queue_limit: int, enqueue: Callable[[sa.Connection, str, int], None]
+    ) -> tuple[Job, bool]:
+        """Row and queue entry in one transaction, or the job that the content already is; also says which.
+
+        The job begins from the poses that hold now: others may have been found since the upload began.
+        """
+        with writing(self._engine) as connection:
+            venue_id = None if submission.venue is None else submission.venue.id
+            # Those of no venue wait for each other, so that the same content sent twice at once is one job.
+            serialise(connection, submission.kind if venue_id is None else venue_lock(venue_id))
+            same = _duplicate(
+                connection, submission.kind, venue_id, submission.idempotency_key, submission.content_hash
+            )
+            if same is not None:
+                return read_job(connection, same), False
+            venue = None if submission.venue is None else _as_it_is_now(connection, submission.venue)
+            # From here on the frames are the job's.
+            folder = frame_folder(submission.job_id)
+            connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
+            priority, now = PRIORITIES[submission.options.priority], clock(connection)
+            connection.execute(
+                sa.insert(tables.jobs).values(
+                    id=submission.job_id,
+                    kind=submission.kind,
+                    venue=venue_id,
+                    status="queued",
+                    priority=priority,
+                    options=submission.options.model_dump(mode="json"),
+                    content_hash=submission.content_hash,
+                    idempotency_key=submission.idempotency_key,
+                    venue_document=venue.model_dump(mode="json") if venue else None,
+                    frames=submission.frames,
+                    request_id=submission.origin.request_id,
+                    traceparent=submission.origin.traceparent,
+                    created_at=now,
+                    updated_at=now,
+                )
+            )
+            enqueue(connection, submission.job_id, priority)
+            # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
+            serialise(connection, "queue")
+            waiting = connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
+            if waiting > queue_limit:
+                raise QueueFull
+        with reading(self._engine) as connection:
+            return read_job(connection, submission.job_id), True
+
+    def same_as(
+        self, venue_id: str | None, idempotency_key: str | None, content_hash: str, kind: Kind = "calibration"
+    ) -> Job | None:
+        """The job that this content already is, so that nothing needs to be stored."""
+        with reading(self._engine) as connection:
+            job_id = _duplicate(connection, kind, venue_id, idempotency_key, content_hash)
+            return None if job_id is None else read_job(connection, job_id)
+
+    def of(self, job_id: str) -> Submission | None:
+        """What a job was made of; None if its frames are kept no more."""
+        with reading(self._engine) as connection:
+            row = connection.execute(ONE, {"job_id": job_id}).one_or_none()
+        if row is None or row.frames_deleted_at is not None:
+            return None
+        return Submission(
+            job_id=job_id,
+            kind=row.kind,
+            venue=row.venue_document,
+            options=row.options,
+            frames=row.frames,
+            origin=Origin(row.request_id, row.traceparent),
+            content_hash=row.content_hash,
+            idempotency_key=row.idempotency_key,
+        )
+
+
+def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:
+    """The venue, if frames of the one that was read are frames of it."""
+    venue = find_venue(connection, read.id)
+    if venue is None:
+        raise VenueGone
+    if not venue.films_like(read):
+        raise VenueReplaced
+    return venue
+
+
+def _duplicate(
+    connection: sa.Connection, kind: Kind, venue_id: str | None, idempotency_key: str | None, content_hash: str
+) -> str | None:
+    if idempotency_key is not None:
+        # Of no venue is a place of its own.
+        here = j.venue.is_(None) if venue_id is None else j.venue == venue_id
+        query = sa.select(j.id, j.content_hash).where(here, j.idempotency_key == idempotency_key)
+        known = connection.execute(query).one_or_none()
+        if known is not None:
+            if known.content_hash != content_hash:
+                raise KeyReused(known.id)
+            return str(known.id)
+    if kind != "calibration":
+        return None
+    query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.kind == "calibration", j.status.in_(OPEN))
+    active = connection.execute(query).one_or_none()
+    if active is None:
+        return None
+    if active.content_hash != content_hash:
+        raise VenueBusy(active.id)
+    return str(active.id)

@@ -1,0 +1,75 @@
+"""What a job is to compute. It travels as JSON to the program that computes it, which sees no database."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+
+from service.wire.job import Kind
+from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.wire.venue import Venue
+
+AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
+OPTIONS: dict[Kind, type[AnyOptions]] = {
+    "calibration": Options,
+    "intrinsics": IntrinsicsOptions,
+    "locate": LocateOptions,
+    "field": FieldOptions,
+}
+
+
+def seeded(options: AnyOptions) -> AnyOptions:
+    """The options with a seed where one can be chosen and was not, so that a job can be computed again alike."""
+    if not isinstance(options, Options | FieldOptions) or options.seed is not None:
+        return options
+    return options.model_copy(update={"seed": secrets.randbelow(2**31)})
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The request that a job came with: how the log calls it, and its place in a trace (W3C Trace Context)."""
+
+    request_id: str | None = None
+    traceparent: str | None = None
+
+    def names(self) -> dict[str, str]:
+        """For every line of the log that comes of it."""
+        trace = self.traceparent.split("-")[1] if self.traceparent else None
+        return {name: value for name, value in (("request", self.request_id), ("trace", trace)) if value}
+
+
+class Asked(BaseModel):
+    """What is asked of a job. `options` are those of its kind; only photos of a lens have no venue.
+
+    `frames`: the paths in the blob store by camera, of photos by their names.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    job_id: str
+    kind: Kind = "calibration"
+    venue: Venue | None
+    options: AnyOptions
+    frames: dict[str, list[str]]
+    origin: Origin = Origin()
+
+    @field_validator("options", mode="before")
+    @classmethod
+    def _are_of_the_kind(cls, options: Any, others: ValidationInfo) -> Any:
+        # By their members alone, those of one kind could be those of another.
+        return OPTIONS[others.data["kind"]].model_validate(options) if isinstance(options, dict) else options
+
+
+class Task(Asked):
+    """An attempt of a job: what a worker needs to compute it."""
+
+    # A worker that lost its job holds another one than the row.
+    run_token: str
+    attempt: int = 1
+
+    def without_addresses(self) -> Task:
+        """The same but for who is told of its end: to compute it nobody need know, and the address may be a secret."""
+        return self.model_copy(update={"options": self.options.model_copy(update={"callback_url": None})})

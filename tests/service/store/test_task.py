@@ -1,0 +1,36 @@
+"""A task, as it travels to the program that computes it."""
+
+import pytest
+
+from service.store.jobs.task import Origin, Task, seeded
+from service.wire.options import Board, FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.wire.venue import VENUE_EXAMPLE, VenueIn
+
+VENUE = VenueIn.model_validate(VENUE_EXAMPLE).stored()
+POINTS = [{"world": [x, y], "pixel": [10.5 * x, y]} for x in (0, 1) for y in (0, 1)]
+ORIGIN = Origin("van-3", "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01")
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "venue"),
+    [
+        ("calibration", Options(generations=40), VENUE),
+        ("field", FieldOptions(), VENUE),
+        ("locate", LocateOptions.model_validate({"points": POINTS}), VENUE),
+        ("intrinsics", IntrinsicsOptions(board=Board(columns=9, rows=6, square_m=0.03)), None),
+    ],
+)
+def test_a_task_arrives_as_it_was_sent(kind, options, venue):
+    frames = {"left": ["frames/job/left/0"]}
+    task = Task(
+        job_id="job", kind=kind, venue=venue, options=options, frames=frames, origin=ORIGIN, run_token="t", attempt=2
+    )
+    arrived = Task.model_validate_json(task.model_dump_json())
+    assert arrived == task
+    assert type(arrived.options) is type(options)
+
+
+def test_a_seed_is_chosen_where_there_is_one_and_none_was():
+    assert seeded(Options(seed=7)).seed == 7
+    assert {type(seeded(options).seed) for options in (Options(), FieldOptions())} == {int}
+    assert seeded(Options()).seed != seeded(Options()).seed

@@ -1,0 +1,202 @@
+import cv2
+import numpy as np
+import pytest
+
+from service.settings import Settings
+from service.store.jobs.files import picture_file
+from service.wire.options import Options
+from service.wire.venue import VenueIn
+from worker.calibration import calibrate as engine
+from worker.calibration.finish.diagnosis import Suspicion
+from worker.calibration.judge.quality import Sigma
+from worker.calibration.scene.camera import Pose
+from worker.calibration.see.view import ViewCondition
+from worker.jobs import calibration, pictures, wire
+from worker.message import Message
+
+SIZE = (320, 180)
+UP_LEFT = [1.675, 0.372, -0.462]
+
+
+@pytest.fixture
+def venue():
+    matrix = [[220, 0, 160], [0, 220, 90], [0, 0, 1]]
+    cameras = [
+        {
+            "id": camera,
+            "image_size": SIZE,
+            "intrinsics": {"matrix": matrix, "distortion": [-0.1, 0.02, 0, 0]},
+            "pose": {"rotation": [UP_LEFT[0], side * UP_LEFT[1], side * UP_LEFT[2]], "position": [-side, -49, 8]},
+        }
+        for camera, side in (("left", 1), ("right", -1))
+    ]
+    field = {"length_m": 105, "width_m": 68, "ridge": [[-18, 0, 0.2], [18, 0, 0.2]]}
+    return VenueIn.model_validate({"id": "v", "field": field, "cameras": cameras}).stored()
+
+
+@pytest.fixture
+def files():
+    green = np.full((SIZE[1], SIZE[0], 3), (30, 120, 40), dtype=np.uint8)
+    data = cv2.imencode(".jpg", green)[1].tobytes()
+    return {"left": [data, data], "right": [data]}
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The engine, replaced by one that keeps what it was asked and moves each camera by 5 cm."""
+    asked = {}
+
+    def calibrate(pitch, cameras, frames, segment, options, report, stop=None):
+        asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options)
+        for several in frames.values():
+            for frame in several:
+                segment(frame, [])
+        report(engine.Progress("evolution", 1.5, 3, float("inf")))
+        results = [
+            engine.CameraResult(
+                camera.id,
+                camera.intrinsics,
+                Pose(camera.pose.rotation, camera.pose.position + [0.05, 0, 0]),
+                ViewCondition(True, None, None, "The field can be seen.", None),
+                Sigma(float("inf"), 0.1),
+                Sigma(0.01, 0.02),
+                engine.Movement(0.0, 0.05, float("nan")),
+                0.9,
+                0.8,
+                0.1,
+                None,
+            )
+            for camera in cameras
+        ]
+        doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
+        return engine.Calibration(pitch, results, None, 0.2, None, 0.1, 3, [doubt], {"evolution": 1.0})
+
+    class Segmenter:
+        sha256 = "f" * 64
+
+        def __init__(self, model, threads, provider):
+            assert provider == "CPUExecutionProvider"
+
+        def __call__(self, frame, regions):
+            return np.full(frame.shape[:2], 255, np.uint8)
+
+    monkeypatch.setattr(calibration, "calibrate", calibrate)
+    monkeypatch.setattr(wire, "Segmenter", Segmenter)
+    return asked
+
+
+@pytest.fixture
+def settings(tmp_path):
+    model = tmp_path / "unet.onnx"
+    model.touch()
+    return Settings(model=model, threads=1)
+
+
+def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, settings):
+    options = Options(seed=7, preset="paper", stitch_weight=0.25, parents=8)
+    calibration.solve(venue, files, options, settings, lambda _: None)
+    assert asked["pitch"].ridge.tolist() == [[-18, 0, 0.2], [18, 0, 0.2]]
+    left = asked["cameras"][0]
+    assert (left.id, left.intrinsics.size, left.pose.rotation.tolist()) == ("left", SIZE, UP_LEFT)
+    assert [len(asked["frames"][camera]) for camera in ("left", "right")] == [2, 1]
+    assert asked["frames"]["left"][0].shape == (180, 320, 3)
+    assert asked["options"] == engine.Options(preset="paper", seed=7, parents=8, stitch_weight=0.25)
+
+
+def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files, asked, settings):
+    steps = []
+    outcome = calibration.solve(venue, files, Options(seed=7), settings, steps.append)
+    result = outcome.result
+    assert result.accepted
+    assert result.cameras[0].pose.position == [-0.95, -49, 8]
+    assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
+    assert set(result.timings_s) == {"decode", "evolution", "preview"}
+    assert [step.stage for step in steps] == ["evolution", "preview"]
+    of_cameras = {f"{kind}_{camera}" for kind in ("overlay", "frame", "stored", "new", "mask") for camera in files}
+    assert set(outcome.pictures) == {"preview", "preview_before", "seam", "birdseye"} | of_cameras
+    begins = {".jpg": b"\xff\xd8", ".png": b"\x89PNG"}
+    assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())
+
+
+def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, settings):
+    plain, fitted = (
+        calibration.solve(venue, files, Options(fit_focal_length=fit, fit_ridge=fit), settings, lambda _: None).result
+        for fit in (False, True)
+    )
+    assert (plain.cameras[0].intrinsics, plain.ridge) == (None, None)
+    assert fitted.cameras[0].intrinsics.matrix == venue.cameras[0].intrinsics.matrix
+    assert fitted.ridge == venue.field.ridge
+    assert asked["options"] == engine.Options(fit_focal_length=True, fit_ridge=True)
+
+
+def test_what_the_lines_contradict_is_told(venue, files, asked, settings):
+    (doubt,) = calibration.solve(venue, files, Options(), settings, lambda _: None).result.diagnosis
+    assert (doubt.camera, doubt.quantity, doubt.deviation, doubt.sigma) == ("left", "k1", 0.01, 0.001)
+
+
+def test_what_json_cannot_say_is_null(venue, files, asked, settings):
+    steps = []
+    camera = calibration.solve(venue, files, Options(seed=7), settings, steps.append).result.cameras[0]
+    assert (camera.sigma, camera.moved.pixels, camera.residual_px) == (None, None, None)
+    assert camera.repeatability.position_m == 0.02
+    assert (steps[0].loss, steps[0].fraction) == (None, wire.PREVIEW_FRACTION)
+
+
+def test_what_a_program_says_is_what_its_worker_understands(venue, files, asked, settings):
+    steps = []
+    outcome = calibration.solve(venue, files, Options(), settings, steps.append)
+    for message in (Message(progress=steps[0]), Message(result=outcome.result)):
+        assert Message.model_validate_json(message.line()) == message
+
+
+def test_the_orientation_a_camera_writes_into_its_files_is_not_obeyed(venue, files, asked, settings):
+    turned = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
+    files["right"] = [files["right"][0][:2] + turned + files["right"][0][2:]]
+    calibration.solve(venue, files, Options(), settings, lambda _: None)
+    assert asked["frames"]["right"][0].shape == (180, 320, 3)
+
+
+def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, files, asked, settings):
+    files["right"] = [b"\xff\xd8\xff\xda\0\x02\xff\xd9"]
+    with pytest.raises(wire.Failure) as failure:
+        calibration.solve(venue, files, Options(), settings, lambda _: None)
+    assert (failure.value.error.type, failure.value.error.camera) == ("/problems/broken-image", "right")
+
+
+def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, settings):
+    files["right"] = [cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()]
+    with pytest.raises(wire.Failure, match=r"right decodes to 64x48 pixels; .* 320x180"):
+        calibration.solve(venue, files, Options(), settings, lambda _: None)
+
+
+def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, asked, settings, monkeypatch):
+    def calibrate(*_):
+        raise engine.CalibrationError("left", "no-markings-in-view", "store another pose")
+
+    monkeypatch.setattr(calibration, "calibrate", calibrate)
+    with pytest.raises(wire.Failure) as failure:
+        calibration.solve(venue, files, Options(), settings, lambda _: None)
+    error = failure.value.error
+    assert (error.type, error.camera, error.detail) == ("/problems/no-markings-in-view", "left", "store another pose")
+
+
+def test_a_missing_network_fails_and_says_where_it_should_be(venue, files, settings):
+    gone = settings.model_copy(update={"model": settings.model / "nowhere"})
+    with pytest.raises(wire.Failure, match="nowhere"):
+        calibration.solve(venue, files, Options(), gone, lambda _: None)
+
+
+def test_a_provider_that_is_not_installed_fails_and_says_what_to_set(venue, files):
+    with pytest.raises(wire.Failure, match=r"no CUDAExecutionProvider, only .* ESC_PROVIDER=cpu") as failure:
+        calibration.solve(venue, files, Options(), Settings(threads=1, provider="cuda"), lambda _: None)
+    assert failure.value.error.type == "/problems/provider-missing"
+
+
+def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, settings, monkeypatch):
+    def stitched(*_):
+        raise ValueError
+
+    monkeypatch.setattr(pictures.stitching, "stitched", stitched)
+    outcome = calibration.solve(venue, files, Options(seed=1), settings, lambda _: None)
+    assert {"birdseye", "overlay_left", "overlay_right"} <= set(outcome.pictures)
+    assert not {"preview", "preview_before"} & set(outcome.pictures)
