@@ -18,12 +18,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.draw.stitching import ground_grid, ground_view
 from worker.calibration.scene.camera import Array, Camera, cross_matrices, inside
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.look import Mask, ground_grid, ground_view
 
 Response = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 # A response seen from above, on a square grid of the pitch: values, and where the camera sees it.
 View = tuple[Response, Mask]
 Sight = tuple[Camera, Response]

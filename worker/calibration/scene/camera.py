@@ -325,8 +325,10 @@ class Camera:
     pose: Pose
 
     def project(self, points: Array) -> Array:
-        """World points (N, 3) to pixels (N, 2); NaN behind the camera and outside what the lens model covers."""
-        return project(points, self.pose.rotation[None], self.pose.position[None], self.intrinsics)[0]
+        """World points (..., 3) to pixels (..., 2); NaN behind the camera and outside what the lens model covers."""
+        in_a_row = points.reshape(-1, 3)
+        pixels = project(in_a_row, self.pose.rotation[None], self.pose.position[None], self.intrinsics)[0]
+        return pixels.reshape(*points.shape[:-1], 2)
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Directions in the world (..., 3), not normalised (depth 1), through pixels (..., 2)."""
