@@ -17,8 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.residuals import moved
-from worker.calibration.first.point_fit import POSE_NUMBERS, Clicks, PointFit, fit, refit
+from worker.calibration.first.point_fit import Clicks, PointFit, fit, refit
 from worker.calibration.scene.camera import (
     Array,
     Camera,
@@ -28,6 +27,7 @@ from worker.calibration.scene.camera import (
     project,
     rotation_angles_deg,
 )
+from worker.calibration.scene.motion import POSE_NUMBERS, pixel_slopes
 
 FEWEST_CLICKS = 4
 TRIPLES = 400
@@ -501,11 +501,7 @@ def _what_to_add(best: PointFit, landmarks: Mapping[str, Array]) -> str:
 
 def sigma_px(found: PointFit, points: Array) -> Array:
     """One standard deviation (N,) px of where points (N, 3) are in the picture, by the pose alone."""
-    step = 1e-5
-    columns = [
-        (moved(found.camera, sign * step * axis).project(points) * sign) for axis in np.eye(6) for sign in (1.0, -1.0)
-    ]
-    slopes = np.stack([columns[2 * i] + columns[2 * i + 1] for i in range(6)], axis=-1) / (2 * step)
+    slopes = pixel_slopes(found.camera, points)
     spread = np.einsum("nai,ij,naj->n", slopes, found.covariance[:6, :6], slopes)
     return np.sqrt(np.nan_to_num(np.maximum(spread, 0.0), nan=0.0))
 

@@ -14,21 +14,20 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.residuals import moved
-from worker.calibration.scene.camera import NEAREST_DEPTH_M, Array, Camera, Intrinsics, cross_matrices
+from worker.calibration.scene.camera import Array, Camera, Intrinsics
+from worker.calibration.scene.motion import POSE_NUMBERS, moved, pixel_slopes
 
 CLICK_PX = 2.0
 """How well people click, in pixels of a 4K frame, and after how many numbers of evidence that belief counts half."""
 CLICK_EVIDENCE = 4.0
 LENS_NUMBERS = ("focal length", "centre x", "centre y", "k1", "k2")
-POSE_NUMBERS = 6
 LEAST_NOISE_PX = (16.0, 8.0, 4.0, CLICK_PX)
 """In the rounds before any click is believed or doubted, in pixels of a 4K frame: a start from three clicks fits those
 exactly, and they alone must not settle how well people click.
 """
 VERDICTS, STEPS = 4, 6
 """Rounds in which each click is believed or doubted, and steps of Levenberg-Marquardt with the same weights."""
-RAY_STEP = TERM_STEP = 1e-6
+TERM_STEP = 1e-6
 SQUARE_WITHIN = 0.02
 """Pixels this near to square are square: a board that says otherwise by less was misread."""
 
@@ -278,16 +277,8 @@ class _Problem:
     def _jacobian(self, camera: Camera, change: Array) -> Array:
         """Of the pixels by pose and free numbers: (N, 2, 6 + L)."""
         points = (self.clicks.world - camera.pose.position) @ camera.pose.matrix.T
-        depth = np.where(points[:, 2] > NEAREST_DEPTH_M, points[:, 2], np.nan)
-        rays = points[:, :2] / depth[:, None]
-        lens = camera.intrinsics
-        by_ray = np.stack(
-            [(lens.distort(rays + step) - lens.distort(rays - step)) / (2 * RAY_STEP) for step in RAY_STEP * np.eye(2)],
-            axis=-1,
-        )
-        # By a point in the camera's frame; a turn by w moves it by w x p, a shift of the camera by -R of the shift.
-        by_point = np.concatenate([by_ray, -(by_ray @ rays[..., None])], axis=-1) / depth[:, None, None]
-        pose = np.concatenate([-by_point @ cross_matrices(points), -by_point @ camera.pose.matrix], axis=-1)
+        rays, lens = points[:, :2] / points[:, 2:], camera.intrinsics
+        pose = pixel_slopes(camera, self.clicks.world)
         columns = [self._by_lens_number(which, rays, lens, change)[..., None] for which in self.index]
         return np.concatenate([pose, *columns], axis=-1)
 

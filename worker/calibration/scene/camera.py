@@ -27,6 +27,7 @@ FISHEYE_DISTORTION_LENGTHS = (0, 4)
 WIDEST_FISHEYE_RAD = np.radians(89.0)
 """How far off its axis a fisheye is used: beyond a right angle there are no image coordinates at depth 1."""
 NEAREST_DEPTH_M = 0.1
+RAY_STEP = 1e-6
 
 
 def rotation_matrices(vectors: ArrayLike) -> Array:
@@ -186,6 +187,11 @@ class Intrinsics:
         column, row = fx * xd + skew * yd + cx, fy * yd + cy
         beyond = r2 > self.largest_radius**2
         return np.where(beyond, np.nan, column), np.where(beyond, np.nan, row)
+
+    def slopes(self, rays: Array) -> Array:
+        """How the pixels of rays (..., 2) move with them, (..., 2, 2); NaN beyond `largest_radius`."""
+        steps = RAY_STEP * np.eye(2)
+        return np.stack([(self.distort(rays + s) - self.distort(rays - s)) / (2 * RAY_STEP) for s in steps], axis=-1)
 
     def undistort(self, pixels: ArrayLike, iterations: int = 20) -> Array:
         """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
