@@ -83,12 +83,12 @@ def residuals(
     `points` (N, 3): where the field has its line points; `heights` (K,) of the ground's nodes above the field. At
     `stitch_weight` 0.5 the residuals count as their expected errors say.
     """
-    sides = [_Against.build(points, cameras, index, found, unknowns) for index, found in enumerate(measured)]
-    sides = [side for side in sides if len(side.measured) >= FEWEST_MEASUREMENTS]
+    compared = [_Compared.build(points, cameras, index, found, unknowns) for index, found in enumerate(measured)]
+    compared = [one for one in compared if len(one.measured) >= FEWEST_MEASUREMENTS]
     single_weight = max(2 * (1 - stitch_weight), LEAST_SINGLE_WEIGHT)
-    parts = [_weighted(_single(side), unknowns.ground, heights, single_weight, weigh) for side in sides]
+    parts = [_weighted(_single(one), unknowns.ground, heights, single_weight, weigh) for one in compared]
     if stitch_weight > 0:
-        pairs = [_stitch(first, second) for first, second in combinations(sides, 2)]
+        pairs = [_stitch(first, second) for first, second in combinations(compared, 2)]
         parts += [_weighted(pair, unknowns.ground, heights, 2 * stitch_weight, weigh) for pair in pairs]
     parts.append(_none(unknowns))
     columns = zip(*(vars(part).values() for part in parts), strict=True)
@@ -131,7 +131,7 @@ def misfit_px(points: Array, camera: Camera, measured: Measurements) -> float:
 
 
 @dataclass(frozen=True)
-class _Against:
+class _Compared:
     """Measurements against a pose: `offset` (M,) px, measured minus expected, and its `jacobian` (M, 6 N + E)."""
 
     measured: Measurements
@@ -141,7 +141,7 @@ class _Against:
     @classmethod
     def build(
         cls, points: Array, cameras: Sequence[Camera], index: int, measured: Measurements, unknowns: Unknowns
-    ) -> _Against:
+    ) -> _Compared:
         here = points[measured.index]
         expected = cameras[index].project(here)
         offset = np.sum((measured.pixel - expected) * measured.normal, axis=1)
@@ -167,7 +167,7 @@ def _slope(points: Array, camera: Camera, index: int, measured: Measurements, pa
     return np.asarray(np.sum((ahead - behind) * measured.normal, axis=1) / (2 * step))
 
 
-def _single(side: _Against) -> Residuals:
+def _single(side: _Compared) -> Residuals:
     """How far one camera puts the markings from where it sees them."""
     sigma = side.measured.sigma_px
     return Residuals(
@@ -179,7 +179,7 @@ def _single(side: _Against) -> Residuals:
     )
 
 
-def _stitch(first: _Against, second: _Against) -> Residuals:
+def _stitch(first: _Compared, second: _Compared) -> Residuals:
     """How far apart two cameras put the same pieces of line on the ground."""
     index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
     scale_a, scale_b = first.measured.px_per_metre[a], second.measured.px_per_metre[b]
