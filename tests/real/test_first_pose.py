@@ -10,9 +10,9 @@ from service.settings import MODEL_BESIDE_THE_CODE
 from tests.real.pair import FOLDER
 from worker.calibration.calibrate import Options, calibrate
 from worker.calibration.first.boards import Board, find_board
+from worker.calibration.first.clicks import Clicks
 from worker.calibration.first.first_pose import first_pose
 from worker.calibration.first.lens_calibration import Photo, calibrate_lens
-from worker.calibration.first.point_fit import Clicks
 from worker.calibration.see.segmentation import Segmenter
 
 pytestmark = pytest.mark.real

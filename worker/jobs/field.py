@@ -15,7 +15,7 @@ from service.wire.options import FieldOptions
 from service.wire.results import FieldResult, MeasureResult, Provenance
 from service.wire.venue import Venue
 from worker.calibration.calibrate import CalibrationError
-from worker.calibration.draw import stitching
+from worker.calibration.draw.overlays import overlay
 from worker.calibration.measures.field_fit import FieldFit, Measure, fit_field
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
@@ -75,7 +75,7 @@ def _draw(
     for old, new in zip(before, found.cameras, strict=True):
         after = Camera(new.id, new.intrinsics, new.pose)
         try:
-            drawn = stitching.overlay((pitch, old), (found.pitch, after), frames[old.id][0], "field")
+            drawn = overlay((pitch, old), (found.pitch, after), frames[old.id][0], "field")
         except Exception:  # what was rejected may look anywhere; a picture is not worth losing the reason
             log.warning("cannot draw", camera=old.id, exc_info=True)
             continue

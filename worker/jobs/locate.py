@@ -16,8 +16,10 @@ from service.wire.options import ClickedPoint, LocateOptions
 from service.wire.results import LocateResult, LocateSigma, PointResult
 from service.wire.venue import Venue
 from worker.calibration.draw.inspection import clicks_picture
-from worker.calibration.first.first_pose import FirstPose, LensGain, NoPose, first_pose
-from worker.calibration.first.point_fit import Clicks
+from worker.calibration.first.clicks import Clicks, NoPose
+from worker.calibration.first.first_pose import first_pose
+from worker.calibration.first.freed_lens import LensGain
+from worker.calibration.first.verdict import FirstPose
 from worker.calibration.scene.camera import Array, Intrinsics
 from worker.calibration.scene.field import Field
 from worker.jobs.wire import (

@@ -11,7 +11,9 @@ import structlog
 from numpy.typing import NDArray
 
 from worker.calibration.calibrate import Calibration, Segment
-from worker.calibration.draw import layers, stitching
+from worker.calibration.draw import layers, mosaic
+from worker.calibration.draw.overlays import overlay
+from worker.calibration.draw.viewpoint import viewpoint
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Region
@@ -54,7 +56,7 @@ def draw(
     parts: list[Callable[[], dict[str, bytes]]] = [
         lambda: _preview(found.pitch, after, first),
         lambda: _preview_before((pitch, before), (found.pitch, after), first),
-        lambda: {"birdseye": jpeg(stitching.birdseye(found.pitch, after, first))},
+        lambda: {"birdseye": jpeg(mosaic.birdseye(found.pitch, after, first))},
     ]
     for old, new in zip(before, after, strict=True):
         frame, response = first[old.id], responses.get(old.id)
@@ -73,8 +75,8 @@ def draw(
 
 def _preview(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Picture]) -> dict[str, bytes]:
     """One view by the new poses, and where one camera hands over to another in it."""
-    view = stitching.viewpoint(pitch, cameras, PREVIEW_WIDTH)
-    stitched = stitching.stitched(pitch, view, cameras, frames)
+    view = viewpoint(pitch, cameras, PREVIEW_WIDTH)
+    stitched = mosaic.stitched(pitch, view, cameras, frames)
     return {"preview": jpeg(stitched.picture), "seam": png(layers.seam_layer(stitched.owner))}
 
 
@@ -82,14 +84,14 @@ def _preview_before(
     stored: tuple[Field, Sequence[Camera]], new: tuple[Field, Sequence[Camera]], frames: Mapping[str, Picture]
 ) -> dict[str, bytes]:
     """The same view by the stored poses."""
-    view = stitching.viewpoint(*new, PREVIEW_WIDTH)
+    view = viewpoint(*new, PREVIEW_WIDTH)
     pitch, cameras = stored
-    return {"preview_before": jpeg(stitching.stitched(pitch, view, cameras, frames).picture)}
+    return {"preview_before": jpeg(mosaic.stitched(pitch, view, cameras, frames).picture)}
 
 
 def _overlay(stored: Standing, new: Standing, frame: Picture) -> dict[str, bytes]:
     """The frame with both fields on it."""
-    return {f"overlay_{stored[1].id}": jpeg(stitching.overlay(stored, new, frame))}
+    return {f"overlay_{stored[1].id}": jpeg(overlay(stored, new, frame))}
 
 
 def _layers(stored: Standing, new: Standing, frame: Picture, response: NDArray[np.uint8] | None) -> dict[str, bytes]:

@@ -12,7 +12,7 @@ from math import isfinite
 
 from service import lifeline
 from service.wire.clicked_pose import ClickedCamera, ClickedPose, Polyline
-from worker.calibration.draw.stitching import outline
+from worker.calibration.draw.overlays import outline
 from worker.calibration.scene.camera import Camera, inside
 from worker.calibration.scene.field import Field
 from worker.jobs.locate import clicks_of, pose_of, result_of

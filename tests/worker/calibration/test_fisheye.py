@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.calibrate import Options, calibrate
-from worker.calibration.draw.stitching import birdseye, overlay, preview
+from worker.calibration.draw.mosaic import birdseye, stitched
+from worker.calibration.draw.overlays import overlay
+from worker.calibration.draw.viewpoint import viewpoint
 from worker.calibration.scene.camera import (
     FISHEYE_DISTORTION_LENGTHS,
     WIDEST_FISHEYE_RAD,
@@ -177,5 +179,5 @@ def test_outdated_poses_of_fisheyes_are_found_again_and_drawn():
     above = birdseye(CROWNED, after, first)
     halfway = above[:, above.shape[1] // 2 - 2 : above.shape[1] // 2 + 3].max(axis=1)
     assert np.median(halfway[above.shape[0] // 8 : -above.shape[0] // 8].min(axis=1)) > 150
-    assert preview(CROWNED, after, first).std() > 20
+    assert stitched(CROWNED, viewpoint(CROWNED, after, 960), after, first).picture.std() > 20
     assert overlay((CROWNED, outdated[0]), (CROWNED, after[0]), first["left"]).shape == first["left"].shape

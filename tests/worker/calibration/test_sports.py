@@ -9,7 +9,8 @@ from fields.template import Template, load
 from tests.worker.calibration.synthetic import camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
 from worker.calibration.calibrate import Options, calibrate
-from worker.calibration.draw.stitching import birdseye, overlay
+from worker.calibration.draw.mosaic import birdseye
+from worker.calibration.draw.overlays import overlay
 from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
 

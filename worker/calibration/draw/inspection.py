@@ -5,10 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from worker.calibration.draw.stitching import NEW_COLOUR, draw_line, legend, outline
-from worker.calibration.first.first_pose import FirstPose
+from worker.calibration.draw.overlays import NEW_COLOUR, draw_line, legend, outline
+from worker.calibration.first.clicks import Clicks
 from worker.calibration.first.lens_calibration import LensCalibration
-from worker.calibration.first.point_fit import Clicks
+from worker.calibration.first.verdict import FirstPose
 from worker.calibration.scene.camera import Array, Camera, Frame
 from worker.calibration.scene.field import Field
 

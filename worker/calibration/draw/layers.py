@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.draw.stitching import EDGE_GAP, NEW_COLOUR, STORED_COLOUR, draw_line, frame_of, outline
+from worker.calibration.draw.overlays import EDGE_GAP, NEW_COLOUR, STORED_COLOUR, draw_line, frame_of, outline
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 
@@ -52,7 +52,7 @@ def mask_layer(response: NDArray[np.uint8], size: tuple[int, int]) -> Layer:
 
 
 def seam_layer(owner: NDArray[np.int8]) -> Layer:
-    """Where one camera hands over to another, dashed; `owner` as in `stitching.Stitched`."""
+    """Where one camera hands over to another, dashed; `owner` as in `mosaic.Stitched`."""
     seam = np.zeros(owner.shape, np.uint8)
     for axis in (0, 1):
         one, other = (np.take(owner, range(k, owner.shape[axis] - 1 + k), axis) for k in (0, 1))

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from worker.calibration.finish.normal_equations import normal_equations
-from worker.calibration.finish.residuals import POSE, Unknowns, change_between, moved, residuals
+from worker.calibration.finish.residuals import Unknowns, residuals
 from worker.calibration.finish.robust import Weigh
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import UNEVEN_M
+from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved
 from worker.calibration.see.line_measurement import Measurements
 
 PRIOR_RAD, PRIOR_M = 0.03, 1.0
@@ -55,12 +56,14 @@ class Estimate:
 
     def moved(self, move: Array, unknowns: Unknowns) -> Estimate:
         """After a step (U,)."""
-        poses, values, heights = np.split(move, [POSE * unknowns.cameras, unknowns.dense])
+        poses, values, heights = np.split(move, [POSE_NUMBERS * unknowns.cameras, unknowns.dense])
         pitch, cameras = self.pitch, self.cameras
         for parameter, by in zip(unknowns.parameters, values.tolist(), strict=True):
             cameras, pitch = parameter.applied(cameras, pitch, by)
         lines = self.lines if pitch is self.pitch else pitch.same_line_points(self.lines)
-        cameras = [moved(camera, change) for camera, change in zip(cameras, poses.reshape(-1, POSE), strict=True)]
+        cameras = [
+            moved(camera, change) for camera, change in zip(cameras, poses.reshape(-1, POSE_NUMBERS), strict=True)
+        ]
         values, heights = self.values + values, self.heights + heights
         return replace(self, pitch=pitch, lines=lines, cameras=cameras, values=values, heights=heights)
 

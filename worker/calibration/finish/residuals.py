@@ -15,17 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.finish.robust import Weigh, robust_scale, tukey_weights
-from worker.calibration.scene.camera import Array, Camera, Pose, project, rotation_matrices, rotation_vectors
+from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import Ground
+from worker.calibration.scene.motion import POSE_NUMBERS, pixel_slopes
 from worker.calibration.scene.parameters import FIELD_STEP_M, FieldParameter, Parameter
 from worker.calibration.see.line_measurement import Measurements
 
-POSE = 6
-"""Numbers of a pose: a turn (rad, in the camera's own frame), a shift (m, in the world)."""
 LEAST_SINGLE_WEIGHT = 0.02
 FEWEST_MEASUREMENTS = 30
-JACOBIAN_STEP = 1e-5
 MISFIT_STEPS = 16
 
 
@@ -43,7 +41,7 @@ class Unknowns:
     @property
     def dense(self) -> int:
         """6 N + E."""
-        return POSE * self.cameras + len(self.parameters)
+        return POSE_NUMBERS * self.cameras + len(self.parameters)
 
     def around(self, pitch: Field, lines: LinePoints) -> Unknowns:
         """The same unknowns on a pitch that has been changed since."""
@@ -71,23 +69,6 @@ class Residuals:
         return Residuals(*(part[chosen] for part in vars(self).values()))
 
 
-def moved(camera: Camera, change: Array) -> Camera:
-    """The camera turned by change[:3] (rad, in its own frame) and shifted by change[3:] (m, in the world)."""
-    return camera.with_pose(Pose(*_after(camera.pose, change)))
-
-
-def _after(pose: Pose, changes: Array) -> tuple[Array, Array]:
-    """Rotations and positions (..., 3) of a pose after changes (..., 6), see `moved`."""
-    rotations = rotation_vectors(rotation_matrices(changes[..., :3]) @ pose.matrix)
-    return rotations, pose.position + changes[..., 3:]
-
-
-def change_between(before: Camera, after: Camera) -> Array:
-    """The change (6,) that `moved` makes `after` of `before` with."""
-    turn = rotation_vectors(after.pose.matrix @ before.pose.matrix.T)
-    return np.concatenate([turn, after.pose.position - before.pose.position])
-
-
 def residuals(
     points: Array,
     cameras: Sequence[Camera],
@@ -102,12 +83,12 @@ def residuals(
     `points` (N, 3): where the field has its line points; `heights` (K,) of the ground's nodes above the field. At
     `stitch_weight` 0.5 the residuals count as their expected errors say.
     """
-    views = [_View.build(points, cameras, index, found, unknowns) for index, found in enumerate(measured)]
-    views = [view for view in views if len(view.measured) >= FEWEST_MEASUREMENTS]
+    compared = [_Compared.build(points, cameras, index, found, unknowns) for index, found in enumerate(measured)]
+    compared = [one for one in compared if len(one.measured) >= FEWEST_MEASUREMENTS]
     single_weight = max(2 * (1 - stitch_weight), LEAST_SINGLE_WEIGHT)
-    parts = [_weighted(_single(view), unknowns.ground, heights, single_weight, weigh) for view in views]
+    parts = [_weighted(_single(one), unknowns.ground, heights, single_weight, weigh) for one in compared]
     if stitch_weight > 0:
-        pairs = [_stitch(first, second) for first, second in combinations(views, 2)]
+        pairs = [_stitch(first, second) for first, second in combinations(compared, 2)]
         parts += [_weighted(pair, unknowns.ground, heights, 2 * stitch_weight, weigh) for pair in pairs]
     parts.append(_none(unknowns))
     columns = zip(*(vars(part).values() for part in parts), strict=True)
@@ -150,7 +131,7 @@ def misfit_px(points: Array, camera: Camera, measured: Measurements) -> float:
 
 
 @dataclass(frozen=True)
-class _View:
+class _Compared:
     """Measurements against a pose: `offset` (M,) px, measured minus expected, and its `jacobian` (M, 6 N + E)."""
 
     measured: Measurements
@@ -160,16 +141,14 @@ class _View:
     @classmethod
     def build(
         cls, points: Array, cameras: Sequence[Camera], index: int, measured: Measurements, unknowns: Unknowns
-    ) -> _View:
+    ) -> _Compared:
         here = points[measured.index]
-        # A step forward and one back in each number, and none.
-        changes = np.concatenate([JACOBIAN_STEP * np.eye(POSE), -JACOBIAN_STEP * np.eye(POSE), np.zeros((1, POSE))])
-        pixels = project(here, *_after(cameras[index].pose, changes), cameras[index].intrinsics)
-        expected = np.einsum("pmi,mi->pm", pixels, measured.normal)
-        offset = np.sum(measured.pixel * measured.normal, axis=1) - expected[-1]
+        expected = cameras[index].project(here)
+        offset = np.sum((measured.pixel - expected) * measured.normal, axis=1)
         jacobian = np.zeros((len(measured), unknowns.dense))
-        jacobian[:, POSE * index : POSE * (index + 1)] = -(expected[:6] - expected[6:12]).T / (2 * JACOBIAN_STEP)
-        for column, parameter in enumerate(unknowns.parameters, POSE * unknowns.cameras):
+        pose = slice(POSE_NUMBERS * index, POSE_NUMBERS * (index + 1))
+        jacobian[:, pose] = -np.einsum("mij,mi->mj", pixel_slopes(cameras[index], here), measured.normal)
+        for column, parameter in enumerate(unknowns.parameters, POSE_NUMBERS * unknowns.cameras):
             jacobian[:, column] = -_slope(here, cameras[index], index, measured, parameter)
         known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         return cls(measured[known], offset[known], jacobian[known])
@@ -188,19 +167,19 @@ def _slope(points: Array, camera: Camera, index: int, measured: Measurements, pa
     return np.asarray(np.sum((ahead - behind) * measured.normal, axis=1) / (2 * step))
 
 
-def _single(view: _View) -> Residuals:
+def _single(side: _Compared) -> Residuals:
     """How far one camera puts the markings from where it sees them."""
-    sigma = view.measured.sigma_px
+    sigma = side.measured.sigma_px
     return Residuals(
-        view.offset / sigma,
-        view.jacobian / sigma[:, None],
+        side.offset / sigma,
+        side.jacobian / sigma[:, None],
         np.ones(len(sigma)),
-        view.measured.index,
-        view.measured.px_per_metre_up / sigma,
+        side.measured.index,
+        side.measured.px_per_metre_up / sigma,
     )
 
 
-def _stitch(first: _View, second: _View) -> Residuals:
+def _stitch(first: _Compared, second: _Compared) -> Residuals:
     """How far apart two cameras put the same pieces of line on the ground."""
     index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
     scale_a, scale_b = first.measured.px_per_metre[a], second.measured.px_per_metre[b]

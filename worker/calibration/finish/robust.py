@@ -26,9 +26,9 @@ def huber_weights(values: Array) -> Array:
     return np.minimum(1.0, HUBER * scale / np.maximum(np.abs(values), 1e-12)) / scale**2
 
 
-def tukey_weights(values: Array, scale: float | None = None) -> Array:
-    """Tukey's biweight (M,): 1 at zero, 0 for what cannot be this line. `scale`: that of the values unless given."""
-    scale = scale or robust_scale(values)
+def tukey_weights(values: Array) -> Array:
+    """Tukey's biweight (M,) at the scale of the values themselves: 1 at zero, 0 for what cannot be this line."""
+    scale = robust_scale(values)
     return np.maximum(0.0, 1 - (values / (TUKEY * scale)) ** 2) ** 2 / scale**2
 
 

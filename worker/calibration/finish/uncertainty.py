@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from worker.calibration.finish.normal_equations import error_of_measurement, normal_equations
-from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS, POSE, Unknowns, residuals, rms_px
+from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS, Unknowns, residuals, rms_px
 from worker.calibration.finish.robust import tukey_weights
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
+from worker.calibration.scene.motion import POSE_NUMBERS
 from worker.calibration.scene.parameters import LensParameter, Parameter, field_parameters, lens_parameters
 from worker.calibration.see.line_measurement import Measurements
 
@@ -155,7 +156,7 @@ def _certainty(information: Array, pull: Array, suspects: Sequence[Parameter]) -
 
 def _determined(number: int, unknowns: Unknowns, covariance: Array, nearer: Array) -> Determined:
     """What is known of the free parameter of this number."""
-    first = POSE * unknowns.cameras
+    first = POSE_NUMBERS * unknowns.cameras
     at = first + number
     variance = np.diag(covariance)[first : unknowns.dense]
     together = np.sqrt(variance * variance[number])
@@ -171,5 +172,5 @@ def _determined(number: int, unknowns: Unknowns, covariance: Array, nearer: Arra
 
 def _of_pose(covariance: Array, nearer: Array, camera: int) -> Array:
     """Second moment (6, 6) of one pose's error: its variance, and how far it is from where it should be."""
-    its = slice(POSE * camera, POSE * (camera + 1))
+    its = slice(POSE_NUMBERS * camera, POSE_NUMBERS * (camera + 1))
     return np.asarray(covariance[its, its] + np.outer(nearer[its], nearer[its]))

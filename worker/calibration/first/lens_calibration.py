@@ -10,14 +10,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.first.boards import Sighting
-from worker.calibration.scene.camera import LENSES, Array, Intrinsics, LensModel, rotation_matrices
+from worker.calibration.first.lens_fit import (
+    LADDERS,
+    NUMBERS,
+    LensFit,
+    Rung,
+    fit_lens,
+    foretold_px,
+    numbers_of,
+    off_px,
+    rms,
+)
+from worker.calibration.scene.camera import Array, Intrinsics, LensModel
 
 FEWEST_PHOTOS, FEW_PHOTOS = 4, 10
 FOLDS = 5
@@ -74,7 +85,7 @@ class Coverage:
 
 
 @dataclass(frozen=True)
-class Trial:
+class LensTrial:
     """A lens that was tried: its free numbers, and rms residuals of photos fitted and of photos left out."""
 
     terms: tuple[str, ...]
@@ -98,7 +109,7 @@ class LensCalibration:
     spread: Mapping[str, float]
     photos: Sequence[PhotoVerdict]
     coverage: Coverage
-    trials: Sequence[Trial]
+    trials: Sequence[LensTrial]
     warnings: Sequence[str]
     corners: Array = field(repr=False)
     off: Array = field(repr=False)
@@ -106,45 +117,6 @@ class LensCalibration:
 
 class NoLens(Exception):  # noqa: N818
     """The photos cannot fix a lens: says why and what to do."""
-
-
-@dataclass(frozen=True)
-class Rung:
-    """A lens to try: OpenCV's flags, and the names of the numbers they leave free."""
-
-    terms: tuple[str, ...]
-    flags: int
-
-
-_PINHOLE = cv2.CALIB_USE_INTRINSIC_GUESS
-_ONE_F = _PINHOLE | cv2.CALIB_FIX_ASPECT_RATIO
-_STRAIGHT = cv2.CALIB_ZERO_TANGENT_DIST
-_K1 = cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3
-_FISHEYE = cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW | cv2.CALIB_USE_INTRINSIC_GUESS
-LADDERS: Mapping[LensModel, Sequence[Rung]] = {
-    "opencv": (
-        Rung(("f", "k1"), _ONE_F | _STRAIGHT | _K1 | cv2.CALIB_FIX_PRINCIPAL_POINT),
-        Rung(("f", "cx", "cy", "k1"), _ONE_F | _STRAIGHT | _K1),
-        Rung(("f", "cx", "cy", "k1", "k2"), _ONE_F | _STRAIGHT | cv2.CALIB_FIX_K3),
-        Rung(("f", "cx", "cy", "k1", "k2", "p1", "p2"), _ONE_F | cv2.CALIB_FIX_K3),
-        Rung(("f", "cx", "cy", "k1", "k2", "p1", "p2", "k3"), _ONE_F),
-        Rung(("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"), _PINHOLE),
-        Rung(
-            ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
-            _PINHOLE | cv2.CALIB_RATIONAL_MODEL,
-        ),
-    ),
-    "fisheye": (
-        Rung(("fx", "fy", "cx", "cy", "k1"), _FISHEYE | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_K4),
-        Rung(("fx", "fy", "cx", "cy", "k1", "k2"), _FISHEYE | cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_K4),
-        Rung(("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"), _FISHEYE),
-    ),
-}
-"""From the simplest to the richest. Sensors have square pixels; a picture stretched by a converter has not."""
-NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
-    "opencv": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
-    "fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
-}
 
 
 def calibrate_lens(
@@ -194,28 +166,17 @@ def _require_enough(used: Mapping[str, Sighting], photos: Sequence[Photo]) -> No
 
 
 @dataclass(frozen=True)
-class _Fit:
-    """OpenCV's answer: the board's place in each photo, `sigma` (K,) in the order of `NUMBERS`, rms `by_photo`."""
-
-    lens: Intrinsics
-    turns: Sequence[Array]
-    shifts: Sequence[Array]
-    sigma: Array
-    by_photo: Array
-
-
-@dataclass(frozen=True)
 class _Tried:
     """A rung: its fit to all photos, and what the fits without some of them say of those, and of the numbers."""
 
     rung: Rung
-    fit: _Fit
+    fit: LensFit
     left_out_by_photo: Array
     spread: Array
 
     @property
-    def trial(self) -> Trial:
-        return Trial(self.rung.terms, _rms(self.fit.by_photo), _rms(self.left_out_by_photo))
+    def trial(self) -> LensTrial:
+        return LensTrial(self.rung.terms, rms(self.fit.by_photo), rms(self.left_out_by_photo))
 
 
 @dataclass(frozen=True)
@@ -258,113 +219,16 @@ def _try(sightings: Sequence[Sighting], size: tuple[int, int], model: LensModel,
     numbers = []
     for fold in range(count):
         out = [i for i in range(len(sightings)) if i % count == fold]
-        without = _fit([s for i, s in enumerate(sightings) if i not in out], size, model, rung)
-        left_out[out] = [_foretold_px(without.lens, sightings[i]) for i in out]
-        numbers.append(_numbers(without.lens))
-    return _Tried(rung, _fit(sightings, size, model, rung), left_out, _jackknife(numbers))
-
-
-def _fit(sightings: Sequence[Sighting], size: tuple[int, int], model: LensModel, rung: Rung) -> _Fit:
-    world = [s.world.astype(np.float32) for s in sightings]
-    pixel = [s.pixel.astype(np.float32) for s in sightings]
-    return (_fit_fisheye if model == "fisheye" else _fit_pinhole)(world, pixel, size, rung)
-
-
-def _fit_pinhole(
-    world: list[NDArray[np.float32]], pixel: list[NDArray[np.float32]], size: tuple[int, int], rung: Rung
-) -> _Fit:
-    guess = _centred(float(max(size)), size)
-    _, matrix, distortion, turns, shifts, sigma, _, by_photo = cv2.calibrateCameraExtended(
-        world, pixel, size, guess, np.zeros(8 if rung.flags & cv2.CALIB_RATIONAL_MODEL else 5), flags=rung.flags
-    )
-    lens = LENSES["opencv"](_floats(matrix), _floats(distortion).ravel(), size)
-    numbers = _floats(sigma).ravel()[: len(NUMBERS["opencv"])]
-    return _Fit(lens, _vectors(turns), _vectors(shifts), numbers, _floats(by_photo).ravel())
-
-
-def _fit_fisheye(
-    world: list[NDArray[np.float32]], pixel: list[NDArray[np.float32]], size: tuple[int, int], rung: Rung
-) -> _Fit:
-    # From a lens of 180 degrees across the longer side.
-    guess = _centred(max(size) / np.pi, size)
-    _, matrix, distortion, turns, shifts = cv2.fisheye.calibrate(
-        [w[None] for w in world], [p[None] for p in pixel], size, guess, np.zeros((4, 1)), flags=rung.flags
-    )
-    lens = LENSES["fisheye"](_floats(matrix), _floats(distortion).ravel(), size)
-    places = _vectors(turns), _vectors(shifts)
-    off = [_off(lens, *place) for place in zip(*places, map(_floats, world), map(_floats, pixel), strict=True)]
-    by_photo = np.array([_rms(np.linalg.norm(o, axis=1)) for o in off])
-    sigma = _fisheye_sigma(lens, *places, [_floats(w) for w in world], rung, np.concatenate(off))
-    return _Fit(lens, *places, sigma, by_photo)
-
-
-def _centred(focal: float, size: tuple[int, int]) -> Array:
-    return np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
-
-
-def _fisheye_sigma(
-    lens: Intrinsics, turns: Sequence[Array], shifts: Sequence[Array], world: Sequence[Array], rung: Rung, off: Array
-) -> Array:
-    """What `calibrateCameraExtended` gives for a pinhole: the boards' places taken out of the normal matrix (Schur)."""
-    names = NUMBERS["fisheye"]
-    free = np.array([name in rung.terms for name in names])
-    information = np.zeros((int(free.sum()), int(free.sum())))
-    for turn, shift, corners in zip(turns, shifts, world, strict=True):
-        _, jacobian = cv2.fisheye.projectPoints(corners[None], turn, shift, lens.matrix, lens.distortion)
-        # Its columns: fx fy cx cy k1 to k4, the turn, the shift, the skew.
-        slopes = _floats(jacobian)
-        a, b = slopes[:, :8][:, free], slopes[:, 8:14]
-        information += a.T @ a - a.T @ b @ np.linalg.solve(b.T @ b, b.T @ a)
-    spare = max(off.size - int(free.sum()) - 6 * len(world), 1)
-    variance = np.diag(np.linalg.pinv(information, hermitian=True)) * np.sum(off**2) / spare
-    sigma = np.zeros(len(names))
-    sigma[free] = np.sqrt(np.maximum(variance, 0.0))
-    return sigma
-
-
-def _foretold_px(lens: Intrinsics, sighting: Sighting) -> float:
-    """Rms of the corners of a photo by a lens that was not fitted to it; only the board's place is."""
-    unforetold = float(max(lens.size))
-    rays = lens.undistort(sighting.pixel)
-    known = np.isfinite(rays).all(axis=1)
-    if known.sum() < 6:
-        return unforetold
-    found, turn, shift = cv2.solvePnP(sighting.world[known], rays[known], np.eye(3), None)
-    if not found:
-        return unforetold
-    off = _off(lens, _floats(turn).ravel(), _floats(shift).ravel(), sighting.world, sighting.pixel)
-    return _rms(np.linalg.norm(np.nan_to_num(off, nan=unforetold), axis=1))
-
-
-def _off(lens: Intrinsics, turn: Array, shift: Array, world: Array, pixel: Array) -> Array:
-    """Projected minus seen (N, 2) of a board at OpenCV's rvec and tvec."""
-    points = world @ rotation_matrices(turn).T + shift
-    return lens.distort(points[:, :2] / points[:, 2:]) - pixel
-
-
-def _floats(values: Any) -> Array:
-    """As NumPy has numbers, whatever OpenCV calls them."""
-    return np.asarray(values, dtype=float)
-
-
-def _vectors(columns: Any) -> list[Array]:
-    return [_floats(column).ravel() for column in columns]
-
-
-def _numbers(lens: Intrinsics) -> Array:
-    """In the order of `NUMBERS`."""
-    terms = lens.coefficients[: len(NUMBERS[lens.model]) - 4]
-    return np.array([lens.matrix[0, 0], lens.matrix[1, 1], lens.matrix[0, 2], lens.matrix[1, 2], *terms])
+        without = fit_lens([s for i, s in enumerate(sightings) if i not in out], size, model, rung)
+        left_out[out] = [foretold_px(without.lens, sightings[i]) for i in out]
+        numbers.append(numbers_of(without.lens))
+    return _Tried(rung, fit_lens(sightings, size, model, rung), left_out, _jackknife(numbers))
 
 
 def _jackknife(parts: Sequence[Array]) -> Array:
     """Standard deviations of numbers from what they are without each of some groups."""
     numbers = np.stack(parts)
     return np.sqrt((len(parts) - 1) * np.mean((numbers - numbers.mean(axis=0)) ** 2, axis=0))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 # Which photos
@@ -387,7 +251,7 @@ def _result(
     best = chosen.best
     lens, fit = best.fit.lens, best.fit
     off = [
-        _off(lens, turn, shift, s.world, s.pixel)
+        off_px(lens, turn, shift, s.world, s.pixel)
         for turn, shift, s in zip(fit.turns, fit.shifts, used.values(), strict=True)
     ]
     corners = np.concatenate([s.pixel for s in used.values()])
@@ -416,7 +280,7 @@ def _verdicts(
     hurting: Mapping[str, float],
     best: _Tried,
 ) -> list[PhotoVerdict]:
-    rms = dict(zip(used, best.fit.by_photo.tolist(), strict=True))
+    fitted = dict(zip(used, best.fit.by_photo.tolist(), strict=True))
     foretold = dict(hurting) | dict(zip(used, best.left_out_by_photo.tolist(), strict=True))
     edges = [p.sighting.edge_px for p in photos if p.sighting and p.sighting.edge_px]
     wide = max(BLURRED * float(np.median(edges)), BLURRED_PX) if edges else np.inf
@@ -432,7 +296,7 @@ def _verdicts(
         PhotoVerdict(
             p.name,
             fate(p),
-            rms.get(p.name),
+            fitted.get(p.name),
             foretold.get(p.name),
             bool(p.sighting and p.sighting.edge_px and p.sighting.edge_px > wide),
         )

@@ -14,45 +14,25 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.residuals import moved
-from worker.calibration.scene.camera import NEAREST_DEPTH_M, Array, Camera, Intrinsics, cross_matrices
+from worker.calibration.first.clicks import Clicks
+from worker.calibration.scene.camera import Array, Camera, Intrinsics
+from worker.calibration.scene.motion import POSE_NUMBERS, moved, pixel_slopes
 
 CLICK_PX = 2.0
 """How well people click, in pixels of a 4K frame, and after how many numbers of evidence that belief counts half."""
 CLICK_EVIDENCE = 4.0
 LENS_NUMBERS = ("focal length", "centre x", "centre y", "k1", "k2")
-POSE_NUMBERS = 6
 LEAST_NOISE_PX = (16.0, 8.0, 4.0, CLICK_PX)
 """In the rounds before any click is believed or doubted, in pixels of a 4K frame: a start from three clicks fits those
 exactly, and they alone must not settle how well people click.
 """
 VERDICTS, STEPS = 4, 6
 """Rounds in which each click is believed or doubted, and steps of Levenberg-Marquardt with the same weights."""
-RAY_STEP = TERM_STEP = 1e-6
-SQUARE_WITHIN = 0.02
-"""Pixels this near to square are square: a board that says otherwise by less was misread."""
-
-
-@dataclass(frozen=True)
-class Clicks:
-    """Points that somebody clicked: `names` (N), `world` (N, 3) metres, `pixel` (N, 2)."""
-
-    names: tuple[str, ...]
-    world: Array
-    pixel: Array
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Clicks:
-        index = np.arange(len(self))[chosen]
-        return Clicks(tuple(self.names[i] for i in index), self.world[index], self.pixel[index])
-
-    def swapped(self, first: int, second: int) -> Clicks:
-        """The labels of two clicks exchanged."""
-        order = np.arange(len(self))
-        order[[first, second]] = second, first
-        return Clicks(tuple(self.names[i] for i in order), self.world[order], self.pixel)
+TERM_STEP = 1e-6
+UNFIXED = 1e3
+"""Standard deviation (rad, m) of what the clicks do not fix of a pose: more than any pitch has room for."""
+STRONG, AMBIGUOUS = 10.0, 6.0
+"""Differences of costs: very strong evidence, and not even positive (Kass and Raftery, "Bayes factors", 1995)."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +66,12 @@ class PointFit:
         return self.costs >= anywhere_cost(self.camera.intrinsics.size)
 
     @property
+    def believable_px(self) -> float:
+        """Up to where a click belongs to a point."""
+        width, height = self.camera.intrinsics.size
+        return float(self.noise_px * np.sqrt(2 * np.log(width * height / (2 * np.pi * self.noise_px**2))))
+
+    @property
     def rms_px(self) -> float:
         """Rms of the clicks that are not doubted."""
         kept = ~self.doubted
@@ -110,8 +96,6 @@ def anywhere_cost(size: tuple[int, int]) -> float:
 
 def fit(clicks: Clicks, start: Camera, free: tuple[str, ...] = ()) -> PointFit:
     """The robust fit nearest to `start`: its pose, and the numbers of its lens that are `free` (`LENS_NUMBERS`)."""
-    if "k1" in free:
-        start = start.with_lens(two_terms(start.intrinsics))
     problem = _Problem(clicks, start.intrinsics, free)
     camera, change = start, np.zeros(len(free))
     for least in LEAST_NOISE_PX:
@@ -142,42 +126,6 @@ def refit(before: PointFit, clicks: Clicks) -> PointFit:
         off=problem.off(camera),
         covariance=problem.covariance(camera, change, weights),
     )
-
-
-def two_terms(lens: Intrinsics) -> Intrinsics:
-    """The lens of the same kind with k1 and k2 alone, and square pixels, that comes nearest to `lens`."""
-    matrix = lens.matrix.copy()
-    matrix[0, 1] = 0.0
-    if abs(matrix[1, 1] / matrix[0, 0] - 1) < SQUARE_WITHIN:
-        matrix[0, 0] = matrix[1, 1] = np.sqrt(matrix[0, 0] * matrix[1, 1])
-    farthest = np.nanmax(np.linalg.norm(lens.undistort(_border(lens)), axis=1))
-    radius = np.linspace(0.0, farthest, 50)[1:-1]
-    across = np.stack([radius, np.zeros_like(radius)], axis=1)
-    plain = type(lens)(np.eye(3), np.zeros(0), lens.size)
-    bent = type(lens)(np.eye(3), radial_only(lens), lens.size).distort(across)[:, 0]
-    straight = plain.distort(across)[:, 0]
-    terms = np.stack([straight**3, straight**5], axis=1)
-    (k1, k2), *_ = np.linalg.lstsq(terms, bent - straight, rcond=None)
-    distortion = np.zeros(4 if lens.model == "fisheye" else 5)
-    distortion[:2] = k1, k2
-    return type(lens)(matrix, distortion, lens.size)
-
-
-def radial_only(lens: Intrinsics) -> Array:
-    """The distortion of a lens without what is not the same all around its axis."""
-    distortion = np.array(lens.distortion, dtype=float)
-    if lens.model == "opencv":
-        distortion[2:4] = 0.0
-        distortion[8:] = 0.0
-    return distortion
-
-
-def _border(lens: Intrinsics) -> Array:
-    """Pixels (M, 2) along the border of the picture."""
-    width, height = lens.size
-    x, y = np.linspace(0, width - 1, 20), np.linspace(0, height - 1, 20)
-    sides = [(x, 0 * x), (x, 0 * x + height - 1), (0 * y, y), (0 * y + width - 1, y)]
-    return np.concatenate([np.stack(side, axis=1) for side in sides])
 
 
 class _Problem:
@@ -219,8 +167,9 @@ class _Problem:
     def covariance(self, camera: Camera, change: Array, weights: Array) -> Array:
         """Of pose and free numbers, from weights (N,) that are the inverse variances of the clicks."""
         normal, _ = self._normal(camera, change, weights)
-        # A pose that the clicks do not fix has an infinite variance; as good as infinite will do.
-        return np.linalg.pinv(normal + 1e-12 * np.eye(len(normal)), hermitian=True).astype(float)
+        # What the clicks do not fix has an infinite variance; as good as infinite will do, nothing less.
+        weakest = np.concatenate([np.full(POSE_NUMBERS, UNFIXED**-2), np.zeros(len(self.index))])
+        return np.linalg.inv(normal + np.diag(weakest)).astype(float)
 
     def median_noise(self, camera: Camera, least: float) -> float:
         """Of a click, per axis (px), not below `least` (px of a 4K frame); half of the clicks may be anywhere."""
@@ -277,27 +226,16 @@ class _Problem:
 
     def _jacobian(self, camera: Camera, change: Array) -> Array:
         """Of the pixels by pose and free numbers: (N, 2, 6 + L)."""
-        points = (self.clicks.world - camera.pose.position) @ camera.pose.matrix.T
-        depth = np.where(points[:, 2] > NEAREST_DEPTH_M, points[:, 2], np.nan)
-        rays = points[:, :2] / depth[:, None]
-        lens = camera.intrinsics
-        by_ray = np.stack(
-            [(lens.distort(rays + step) - lens.distort(rays - step)) / (2 * RAY_STEP) for step in RAY_STEP * np.eye(2)],
-            axis=-1,
-        )
-        # By a point in the camera's frame; a turn by w moves it by w x p, a shift of the camera by -R of the shift.
-        by_point = np.concatenate([by_ray, -(by_ray @ rays[..., None])], axis=-1) / depth[:, None, None]
-        pose = np.concatenate([-by_point @ cross_matrices(points), -by_point @ camera.pose.matrix], axis=-1)
-        columns = [self._by_lens_number(which, rays, lens, change)[..., None] for which in self.index]
-        return np.concatenate([pose, *columns], axis=-1)
+        columns = [self._by_lens_number(which, camera, change)[..., None] for which in self.index]
+        return np.concatenate([pixel_slopes(camera, self.clicks.world), *columns], axis=-1)
 
-    def _by_lens_number(self, which: int, rays: Array, lens: Intrinsics, change: Array) -> Array:
-        """Of the pixels (N, 2) of rays (N, 2) by one free number."""
+    def _by_lens_number(self, which: int, camera: Camera, change: Array) -> Array:
+        """Of the pixels (N, 2) by one free number."""
         if LENS_NUMBERS[which] == "focal length":
-            return lens.distort(rays) - lens.matrix[:2, 2]
+            return camera.project(self.clicks.world) - camera.intrinsics.matrix[:2, 2]
         if LENS_NUMBERS[which] in ("centre x", "centre y"):
-            return np.broadcast_to(np.eye(2)[which - 1], rays.shape)
+            return np.broadcast_to(np.eye(2)[which - 1], self.clicks.pixel.shape)
         step = np.zeros(len(self.index))
         step[self.index.index(which)] = TERM_STEP
-        ahead, behind = (self._lens(change + sign * step).distort(rays) for sign in (1, -1))
-        return (ahead - behind) / (2 * TERM_STEP)
+        ahead, behind = (camera.with_lens(self._lens(change + sign * step)) for sign in (1, -1))
+        return (ahead.project(self.clicks.world) - behind.project(self.clicks.world)) / (2 * TERM_STEP)

@@ -18,15 +18,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.draw.stitching import ground_grid, ground_view
-from worker.calibration.scene.camera import Array, Camera, cross_matrices, inside
+from worker.calibration.scene.camera import Array, Camera, inside
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.look import Mask, ground_grid, ground_view
+from worker.calibration.scene.motion import ground_slopes
 
 Response = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 # A response seen from above, on a square grid of the pitch: values, and where the camera sees it.
-View = tuple[Response, Mask]
-Sight = tuple[Camera, Response]
+BirdsEye = tuple[Response, Mask]
+Segmented = tuple[Camera, Response]
 
 PIXEL_M = 0.1
 
@@ -42,8 +42,8 @@ NEAR_M = 0.5
 
 # Sampled finely, so that no edge of a line falls between two samples; once blurred, every second sample will do.
 FINE_STEP_M, FINE_HALF_M, FINE_STRIDE = 0.05, 12.0, 2
-# What is expected of a camera that is out of place: the paper's Start errors.
-EXPECTED_TURN_RAD, EXPECTED_MOVE_M = 0.02, 0.16
+# What is expected of a camera that is out of place, rad and m: the paper's Start errors.
+EXPECTED = np.array([0.02, 0.02, 0.02, 0.16, 0.16, 0.16])
 # Blur in metres, number of steps, and the part of what is expected that is expected at least. Coarse to fine; the last
 # blur is about what a far camera smears: with less, the smear of two cameras that face each other would show as a
 # displacement. What is expected shrinks with the displacement found: cameras that agree at the centre are not
@@ -120,9 +120,9 @@ def register_pair(
     centre = _reference_point(pitch, first, second)
     if centre is None:
         return None
-    sights = ((first, first_response), (second, second_response))
+    segmented = ((first, first_response), (second, second_response))
     held = _directions_in_common(pitch, first, second, centre)
-    fits = [_fit(pitch, sights, middle, shift, held) for middle, shift in _guesses(pitch, sights, centre)]
+    fits = [_fit(pitch, segmented, middle, shift, held) for middle, shift in _guesses(pitch, segmented, centre)]
     best = max(fits, key=lambda fit: fit.support * fit.correlation, default=None)
     if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
         return None
@@ -169,10 +169,10 @@ def _directions_in_common(pitch: Field, first: Camera, second: Camera, centre: A
     return int(min(np.count_nonzero(enough), np.count_nonzero(held)))
 
 
-def _guesses(pitch: Field, sights: Sequence[Sight], centre: Array) -> list[tuple[Array, Array]]:
+def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> list[tuple[Array, Array]]:
     """Where to measure (2,), and how far apart (2,) the views may be there: as they should be, and as they look."""
     grid = _square(centre, COARSE_HALF_M, COARSE_STEP_M)
-    views = [ground_view(pitch, camera, response, grid) for camera, response in sights]
+    views = [ground_view(pitch, camera, response, grid) for camera, response in segmented]
     shift = _coarse_shift(views[0], views[1], pitch.line_width)
     if shift is None:
         return []
@@ -194,19 +194,19 @@ class _Fit:
     correlation: float
 
 
-def _fit(pitch: Field, sights: Sequence[Sight], middle: Array, shift: Array, held: int) -> _Fit:
+def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Array, held: int) -> _Fit:
     """The displacement of the views in the `middle`, from a guess that is right to a metre or so.
 
     In at most as many directions as the markings should hold: along a short arc of a circle, which tells a little of
     both, the second is mostly noise.
     """
     on_surface = pitch.lift(middle)
-    at_middle = _forms_of_both(sights[0][0], sights[1][0], on_surface)
+    at_middle = _forms_of_both(segmented[0][0], segmented[1][0], on_surface)
     # The most likely turns and moves that make the shift.
     start = at_middle.T @ np.linalg.solve(at_middle @ at_middle.T, shift)
     grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
     views, forms = [], []
-    for (camera, response), moves in zip(sights, (start[:6], start[6:]), strict=True):
+    for (camera, response), moves in zip(segmented, (start[:6], start[6:]), strict=True):
         surface = pitch.lift(grid)
         views.append(ground_view(pitch, camera, response, grid + _displacement(camera, surface, moves)))
         forms.append(_forms(camera, surface[::FINE_STRIDE, ::FINE_STRIDE]))
@@ -223,7 +223,7 @@ def _square(middle: Array, half_m: float, step_m: float) -> Array:
     return ground_grid(count, count, step_m) + middle
 
 
-def _template(pitch: Field, centre: Array) -> View:
+def _template(pitch: Field, centre: Array) -> BirdsEye:
     """The markings as they should be, on the coarse grid."""
     points = pitch.line_points(COARSE_STEP_M / 4)
     count = round(COARSE_HALF_M / COARSE_STEP_M)
@@ -234,7 +234,7 @@ def _template(pitch: Field, centre: Array) -> View:
     return values.astype(np.float32), np.ones(values.shape, bool)
 
 
-def _coarse_shift(first: View, second: View, line_width: float) -> Array | None:
+def _coarse_shift(first: BirdsEye, second: BirdsEye, line_width: float) -> Array | None:
     """Shift (2,) in metres, world axes, of the second view relative to the first with the highest correlation."""
     a_seen, b_seen = first[1], second[1]
     a, b = (_smooth(view, COARSE_BLUR_M, COARSE_STEP_M, line_width) * view[1] for view in (first, second))
@@ -264,14 +264,9 @@ def _coarse_shift(first: View, second: View, line_width: float) -> Array | None:
 def _forms(camera: Camera, points: Array) -> Array:
     """How points (..., 3) of the pitch move, (..., 2, 6) metres, in the view of a camera that believes a wrong pose.
 
-    One column per expected turn about and move along each axis of the world.
+    One column per expected turn about each axis of the camera and move along each axis of the world.
     """
-    ray = points - camera.pose.position
-    turned = -EXPECTED_TURN_RAD * cross_matrices(ray)
-    moved = np.broadcast_to(EXPECTED_MOVE_M * np.eye(3), turned.shape)
-    change = np.concatenate([turned, moved], axis=-1)
-    # The changed ray, back to where it meets the surface.
-    return np.asarray(change[..., :2, :] - ray[..., :2, None] * change[..., 2:, :] / ray[..., 2, None, None])
+    return ground_slopes(camera, points) * EXPECTED
 
 
 def _forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
@@ -281,9 +276,10 @@ def _forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
 
 def _displacement(camera: Camera, points: Array, moves: Array) -> Array:
     """How points (..., 3) move, (..., 2) metres, by given `moves` (6,): `_forms` times those, without the forms."""
+    change = EXPECTED * moves
     ray = points - camera.pose.position
-    change = EXPECTED_MOVE_M * moves[3:] - EXPECTED_TURN_RAD * np.cross(ray, moves[:3])
-    return np.asarray(change[..., :2] - ray[..., :2] * (change[..., 2:] / ray[..., 2:]))
+    carried = change[3:] + np.cross(ray, camera.pose.matrix.T @ change[:3])
+    return np.asarray(carried[..., :2] - ray[..., :2] * (carried[..., 2:] / ray[..., 2:]))
 
 
 @dataclass(frozen=True)
@@ -299,7 +295,9 @@ class _Fine:
     correlation: float
 
 
-def _fine_moves(first: View, second: View, forms: Array, at_middle: Array, start: Array, line_width: float) -> _Fine:
+def _fine_moves(
+    first: BirdsEye, second: BirdsEye, forms: Array, at_middle: Array, start: Array, line_width: float
+) -> _Fine:
     """Gauss-Newton on the moves (12,) of both cameras.
 
     `forms` (n, n, 2, 12): what they do to every `FINE_STRIDE`th point of each view; `at_middle` (2, 12): what they do
@@ -349,7 +347,7 @@ def _normal_equations(
     return np.einsum("mi,m->i", weighted, residual), np.einsum("mi,mj->ij", weighted, slope)
 
 
-def _smooth(view: View, blur_m: float, step_m: float, line_width: float) -> Response:
+def _smooth(view: BirdsEye, blur_m: float, step_m: float, line_width: float) -> Response:
     """A view blurred over what the camera sees, and no brighter than a line of the width then is.
 
     Lines stay as they are; players and lettering, wider than a line, cannot outweigh them.

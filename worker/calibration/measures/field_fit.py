@@ -46,7 +46,7 @@ UNTOUCHED = 0.9
 """Where they leave this part, no line that it moves was measured."""
 SURE_DIP = 2.0
 """A ridge that is lower than the corners by this many sigma is no measurement of a flat pitch."""
-WORDS = {
+IN_WORDS = {
     "length_m": "the pitch's length",
     "width_m": "the pitch's width",
     "ridge_height_m": "the ridge's height",
@@ -152,8 +152,8 @@ def fit_measures(
         for parameter, found in zip(free, everything.found, strict=True)
     ]
     ridge = _ridge_length(pitch, trials)
-    settled, still_free = _settled(pitch, everything.pitch, free, measures, ridge)
-    final = refine(settled, everything.cameras, sight, stitch_weight, still_free)
+    known, still_free = _with_known(pitch, everything.pitch, free, measures, ridge)
+    final = refine(known, everything.cameras, sight, stitch_weight, still_free)
     told = [
         replace(measure, value=parameter.read(final.pitch)) if measure.known else measure
         for measure, parameter in zip(measures, free, strict=True)
@@ -192,7 +192,7 @@ def _ridge_length(given: Field, trials: RidgeTrials) -> Measure:
     return Measure("ridge_length_m", given.ridge_length, trials.best, trials.sigma, open_m, known, detail)
 
 
-def _settled(
+def _with_known(
     given: Field, fitted: Field, free: Sequence[FieldParameter], measures: Sequence[Measure], ridge: Measure
 ) -> tuple[Field, list[FieldParameter]]:
     """The given pitch with the measures that are known, and which of them are found along with poses."""
@@ -211,7 +211,7 @@ def _settled(
 
 
 def _named(parameter: Parameter, cameras: Sequence[Camera]) -> str:
-    words = WORDS[parameter.name]
+    words = IN_WORDS[parameter.name]
     return f"{words} of camera {cameras[parameter.camera].id}" if isinstance(parameter, LensParameter) else words
 
 

@@ -1,37 +1,36 @@
 """How long a ridge may be: each length tried, because it moves the lines in kinks that no tangent foretells.
 
-A ridge of another length is a crown of another shape, and so is a ground that swells. How much this ground swells is
-found anew for every length, so that a shape wins only if it spares the ground more than chance does.
+A length is believed by how well the lines fit with it once poses, measures and the swells of the ground are found anew.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from worker.calibration.finish.estimate import Estimate, step, unevenness
-from worker.calibration.finish.normal_equations import CLUSTER_POINTS, normal_equations
+from worker.calibration.finish.estimate import Estimate, step
+from worker.calibration.finish.normal_equations import CLUSTER_POINTS
 from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Refined, Sight, measure_all
-from worker.calibration.finish.residuals import Unknowns, residuals
+from worker.calibration.finish.residuals import Residuals, Unknowns, residuals
 from worker.calibration.finish.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.scene.ground import UNEVEN_M, Ground
+from worker.calibration.scene.ground import Ground
 from worker.calibration.scene.parameters import Parameter
 from worker.calibration.see.line_measurement import Measurements
 
 SPACING_M = 10.0
-SETTLING_STEPS, UNEVENNESS_STEPS = 3, 4
-"""Per length: first for the poses, then with the unevenness of the ground as well."""
+STEPS = 4
+"""Per length, for everything that is found with it."""
 ALIKE = 4.0
 """Lengths whose costs are this near to the least fit alike: two standard deviations."""
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A pitch with a ridge of some length, everything else found for it; `cost`: -2 log evidence, from any zero."""
+class RidgeTrial:
+    """A pitch with a ridge of some length, everything else found for it; `cost`: -2 log likelihood, from any zero."""
 
     pitch: Field
     cost: float
@@ -39,10 +38,10 @@ class Trial:
 
 @dataclass(frozen=True)
 class RidgeTrials:
-    """`held`: at the length that the pitch came with; `tried`: every `SPACING_M` from none to the whole pitch."""
+    """`held`: the pitch with the length that it came with; `tried`: every `SPACING_M` from none to the whole pitch."""
 
-    held: Trial
-    tried: Sequence[Trial]
+    held: Field
+    tried: Sequence[RidgeTrial]
 
     @property
     def lengths(self) -> Array:
@@ -52,8 +51,7 @@ class RidgeTrials:
     @property
     def credence(self) -> Array:
         """How probable each of the tried lengths is (T,), if all were before."""
-        cost = self._costs
-        likelihood = np.exp((cost.min() - cost) / 2)
+        likelihood = np.exp((self._costs.min() - self._costs) / 2)
         return np.asarray(likelihood / likelihood.sum())
 
     @property
@@ -75,7 +73,7 @@ class RidgeTrials:
 
     def spread(self, read: Callable[[Field], float]) -> float:
         """How far (rms) another measure is off because the ridge is not as long as it was held."""
-        off = np.array([read(trial.pitch) for trial in self.tried]) - read(self.held.pitch)
+        off = np.array([read(trial.pitch) for trial in self.tried]) - read(self.held)
         return float(np.sqrt(self.credence @ off**2))
 
     @property
@@ -87,71 +85,45 @@ def try_ridges(base: Refined, free: Sequence[Parameter], sight: Sight, stitch_we
     """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
     lines = base.pitch.line_points()
     measured = measure_all(lines, base.cameras, sight, ASSESSING_SEARCH_PX)
-    ground = Ground.under(lines)
-    believe = _Belief.of(base, measured, ground, stitch_weight)
-
-    def trial(length: float) -> Trial:
-        return _trial(
-            base.pitch.with_ridge_length(length), base.cameras, free, measured, ground, believe, stitch_weight
-        )
-
-    lengths = np.arange(0.0, base.pitch.length, SPACING_M)
-    return RidgeTrials(trial(base.pitch.ridge_length), [trial(length) for length in lengths.tolist()])
+    unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
+    held = _settled_on(base.pitch, base.cameras, measured, unknowns, stitch_weight)
+    scale = robust_scale(held.rows.value)
+    together = _together(held.rows, scale)
+    tried = []
+    for length in np.arange(0.0, base.pitch.length, SPACING_M).tolist():
+        found = _settled_on(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns, stitch_weight)
+        loss = float(np.sum(tukey_loss(found.rows.value, scale))) + found.strain
+        tried.append(RidgeTrial(found.pitch, loss / together))
+    return RidgeTrials(held.pitch, tried)
 
 
 @dataclass(frozen=True)
-class _Belief:
-    """How residuals are weighted, the same in all trials: Tukey's at a fixed `scale`, and `together` as many that
-    neighbours err as one count as one.
-    """
+class _Found:
+    """What was found with a ridge: the `pitch`, the `rows` that are left, the `strain` of what was thought before."""
 
-    scale: float
-    together: float
-
-    @classmethod
-    def of(cls, base: Refined, measured: Sequence[Measurements], ground: Ground, stitch_weight: float) -> _Belief:
-        unknowns = Unknowns(len(base.cameras), [], ground)
-        here = Estimate.at(base.pitch, base.cameras, unknowns)
-        for _ in range(SETTLING_STEPS):
-            here = step(here, base.cameras, measured, unknowns, stitch_weight, tukey_weights)
-        rows = residuals(
-            here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights
-        )
-        scale = robust_scale(rows.value)
-        good = np.abs(rows.value) < TUKEY * scale
-        value = rows.value[good] / scale
-        sums = np.bincount(rows.point[good] // CLUSTER_POINTS, value)
-        return cls(scale, max(float(np.sum(sums**2) / np.sum(value**2)), 1.0))
-
-    def weights(self, values: Array) -> Array:
-        return tukey_weights(values, self.scale) / self.together
-
-    def cost(self, values: Array) -> float:
-        return float(np.sum(tukey_loss(values, self.scale))) / self.together
+    pitch: Field
+    rows: Residuals
+    strain: float
 
 
-def _trial(
+def _settled_on(
     pitch: Field,
     cameras: Sequence[Camera],
-    free: Sequence[Parameter],
     measured: Sequence[Measurements],
-    ground: Ground,
-    believe: _Belief,
+    unknowns: Unknowns,
     stitch_weight: float,
-) -> Trial:
-    unknowns = Unknowns(len(cameras), free, ground)
-    here = replace(Estimate.at(pitch, cameras, unknowns), uneven_m=UNEVEN_M)
-    for number in range(SETTLING_STEPS + UNEVENNESS_STEPS):
+) -> _Found:
+    here = Estimate.at(pitch, cameras, unknowns)
+    for _ in range(STEPS):
         unknowns = unknowns.around(here.pitch, here.lines)
-        here = step(here, cameras, measured, unknowns, stitch_weight, believe.weights)
-        if number >= SETTLING_STEPS:
-            uneven = unevenness(here, measured, unknowns, stitch_weight, believe.weights)
-            here = replace(here, uneven_m=uneven)
-    rows = residuals(
-        here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, believe.weights
-    )
-    prior, away = here.prior(unknowns), here.away(cameras)
-    # Laplace's approximation: a ground that may swell more fits better, and pays for it.
-    room = np.linalg.slogdet(normal_equations(rows, unknowns).information + prior)[1]
-    room += 2 * len(ground) * np.log(here.uneven_m)
-    return Trial(here.pitch, believe.cost(rows.value) + float(away @ prior @ away) + float(room))
+        here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
+    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
+    away = here.away(cameras)
+    return _Found(here.pitch, rows, float(away @ here.prior(unknowns) @ away))
+
+
+def _together(rows: Residuals, scale: float) -> float:
+    """As many residuals that neighbours on a line err alike count as one."""
+    good = np.abs(rows.value) < TUKEY * scale
+    sums = np.bincount(rows.point[good] // CLUSTER_POINTS, rows.value[good])
+    return max(float(np.sum(sums**2) / np.sum(rows.value[good] ** 2)), 1.0)

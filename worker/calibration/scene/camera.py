@@ -27,6 +27,7 @@ FISHEYE_DISTORTION_LENGTHS = (0, 4)
 WIDEST_FISHEYE_RAD = np.radians(89.0)
 """How far off its axis a fisheye is used: beyond a right angle there are no image coordinates at depth 1."""
 NEAREST_DEPTH_M = 0.1
+RAY_STEP = 1e-6
 
 
 def rotation_matrices(vectors: ArrayLike) -> Array:
@@ -187,6 +188,11 @@ class Intrinsics:
         beyond = r2 > self.largest_radius**2
         return np.where(beyond, np.nan, column), np.where(beyond, np.nan, row)
 
+    def slopes(self, rays: Array) -> Array:
+        """How the pixels of rays (..., 2) move with them, (..., 2, 2); NaN beyond `largest_radius`."""
+        steps = RAY_STEP * np.eye(2)
+        return np.stack([(self.distort(rays + s) - self.distort(rays - s)) / (2 * RAY_STEP) for s in steps], axis=-1)
+
     def undistort(self, pixels: ArrayLike, iterations: int = 20) -> Array:
         """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
 
@@ -325,8 +331,10 @@ class Camera:
     pose: Pose
 
     def project(self, points: Array) -> Array:
-        """World points (N, 3) to pixels (N, 2); NaN behind the camera and outside what the lens model covers."""
-        return project(points, self.pose.rotation[None], self.pose.position[None], self.intrinsics)[0]
+        """World points (..., 3) to pixels (..., 2); NaN behind the camera and outside what the lens model covers."""
+        in_a_row = points.reshape(-1, 3)
+        pixels = project(in_a_row, self.pose.rotation[None], self.pose.position[None], self.intrinsics)[0]
+        return pixels.reshape(*points.shape[:-1], 2)
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Directions in the world (..., 3), not normalised (depth 1), through pixels (..., 2)."""

@@ -5,7 +5,8 @@ import numpy as np
 
 from tests.worker.calibration.synthetic import CROWNED, pair
 from worker.calibration.draw.layers import mask_layer, new_layer, seam_layer, stored_layer
-from worker.calibration.draw.stitching import stitched, viewpoint
+from worker.calibration.draw.mosaic import stitched
+from worker.calibration.draw.viewpoint import viewpoint
 
 LEFT, RIGHT = pair()
 SMALL = (LEFT.intrinsics.size[0] // 2, LEFT.intrinsics.size[1] // 2)

@@ -6,8 +6,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fields.landmarks import UnknownLandmark
-from worker.calibration.first.first_pose import NoPose, first_pose
-from worker.calibration.first.point_fit import Clicks, two_terms
+from worker.calibration.first.clicks import Clicks, NoPose
+from worker.calibration.first.first_pose import first_pose
+from worker.calibration.first.freed_lens import two_terms
+from worker.calibration.first.point_fit import fit
 from worker.calibration.scene.camera import Camera, Fisheye, Intrinsics, Pose, inside, rotation_angles_deg
 from worker.calibration.scene.field import Field
 
@@ -16,6 +18,8 @@ PITCH = Field(105.0, 68.0, ridge=np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]])
 NAMED = {name: point for name, point in PITCH.places().items() if not name.endswith(" spot")}
 SIZE = (1920, 1080)
 LENS = Intrinsics(np.array([[1250.0, 0, 970], [0, 1250, 530], [0, 0, 1]]), np.array([-0.3, 0.09, 0, 0, 0]), SIZE)
+TELE = Intrinsics(np.array([[5200.0, 0, 970], [0, 5200, 530], [0, 0, 1]]), np.array([-0.1, 0.05, 0, 0, 0]), SIZE)
+DOME = Fisheye(np.array([[700.0, 0, 970], [0, 700, 530], [0, 0, 1]]), np.array([-0.02, 0.004, 0, 0]), SIZE)
 CAMERA = Camera("left", LENS, Pose.looking_at([-3.0, -50.0, 11.0], [-16.0, -6.0, 0.0], roll_deg=1.0))
 SOME = (
     "left near corner",
@@ -157,10 +161,10 @@ def test_a_camera_beyond_the_pitch_is_taken_with_a_warning():
     assert "exchange near with far" in found.warnings[0]
 
 
-def answer(given_):
+def answer(given_, lens=LENS):
     """Why the clicks were refused or rejected; None where they gave a pose."""
     try:
-        return first_pose(given_, LENS, NAMED).rejected_because
+        return first_pose(given_, lens, NAMED).rejected_because
     except NoPose as refusal:
         return str(refusal)
 
@@ -193,6 +197,74 @@ def on_a_line(points):
 def test_points_that_cannot_fix_a_pose_are_refused_with_what_to_add(given_, what_to_do):
     with pytest.raises(NoPose, match=what_to_do):
         first_pose(given_, LENS, NAMED)
+
+
+def seen_by(kind):
+    """A camera of some kind, and eight points on one line in the middle of its picture."""
+    lens, position, (x, y) = {
+        "wide": (LENS, [-3.0, -50.0, 11.0], (-16.0, -6.0)),
+        "tele": (TELE, [-30.0, -60.0, 14.0], (-44.0, 0.0)),
+        "fisheye": (DOME, [1.0, -44.0, 10.0], (-10.0, -5.0)),
+    }[kind]
+    camera = Camera(kind, lens, Pose.looking_at(position, [x, y, 0.0], 1.0))
+    return camera, [(x + 1, y + along) for along in np.linspace(-6, 8, 8)], [(x - 5, y - 3), (x + 4, y + 6)]
+
+
+def clicked(camera, points, seed):
+    world = PITCH.flat().lift(np.array(points))
+    return Clicks(
+        tuple(map(str, range(len(points)))),
+        world,
+        camera.project(world) + np.random.default_rng(seed).normal(0, 1.0, (len(points), 2)),
+    )
+
+
+def misplaced(given_, which, seed):
+    """The same clicks, some of them a hundred pixels or more from where their points are."""
+    rng, pixel = np.random.default_rng(seed), given_.pixel.copy()
+    for number in which:
+        angle = rng.uniform(0, 2 * np.pi)
+        pixel[number] += rng.uniform(100, 300) * np.array([np.cos(angle), np.sin(angle)])
+    return Clicks(given_.names, given_.world, np.clip(pixel, 0, np.array(SIZE) - 1.0))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", ["wide", "tele", "fisheye"])
+def test_a_pose_is_not_believed_on_one_point_beside_a_line_right_or_wrong(kind, seed):
+    camera, line, (beside, _) = seen_by(kind)
+    given_ = misplaced(clicked(camera, [*line, beside], seed), [8], seed)
+    said = answer(given_, camera.intrinsics)
+    assert "lie on one line" in said
+    assert "add points" in said
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("kind", ["wide", "tele", "fisheye"])
+def test_points_that_are_doubted_do_not_hold_a_camera_that_the_others_let_turn_around_a_line(kind, seed):
+    camera, line, beside = seen_by(kind)
+    given_ = misplaced(clicked(camera, [*line, *beside], seed), [8, 9], seed)
+    found = first_pose(given_, camera.intrinsics, NAMED)
+    assert far(found, camera) > (1.0, 1.0)
+    assert [click.name for click in found.clicks if click.doubted] == ["9"]
+    assert found.rejected_because.startswith("all points but those doubted and 8 lie on one line")
+
+
+@pytest.mark.parametrize("kind", ["wide", "tele", "fisheye"])
+def test_two_right_points_beside_a_line_fix_the_pose(kind):
+    camera, line, beside = seen_by(kind)
+    found = first_pose(clicked(camera, [*line, *beside], 0), camera.intrinsics, NAMED)
+    assert found.rejected_because is None
+    metres, degrees = far(found, camera)
+    assert metres < 4 * found.sigma_position_m
+    assert degrees < 4 * found.sigma_rotation_deg
+    assert not any(click.doubted for click in found.clicks)
+
+
+@pytest.mark.parametrize("kind", ["wide", "tele", "fisheye"])
+def test_what_points_on_a_line_leave_open_is_not_called_sure(kind):
+    camera, line, _ = seen_by(kind)
+    covariance = fit(clicked(camera, line, 0), camera).covariance
+    assert np.sqrt(np.trace(covariance[3:, 3:])) > 100
 
 
 def test_a_click_outside_the_picture_is_refused_by_its_name():
@@ -247,10 +319,9 @@ def test_too_few_points_change_no_lens():
 
 
 def test_a_fisheye_is_located_and_corrected_like_any_lens():
-    glass = Fisheye(np.array([[700.0, 0, 970], [0, 700, 530], [0, 0, 1]]), np.array([-0.02, 0.004, 0, 0]), SIZE)
-    camera = Camera("dome", glass, Pose.looking_at([1.0, -44.0, 10.0], [-10.0, -5.0, 0.0]))
+    camera = Camera("dome", DOME, Pose.looking_at([1.0, -44.0, 10.0], [-10.0, -5.0, 0.0]))
     given_ = clicks(camera=camera, noise_px=1.0)
-    assert far(first_pose(given_, glass, NAMED), camera) < (0.3, 0.3)
+    assert far(first_pose(given_, DOME, NAMED), camera) < (0.3, 0.3)
     off = Fisheye(np.array([[660.0, 0, 970], [0, 660, 530], [0, 0, 1]]), np.array([0.03, 0.0, 0, 0]), SIZE)
     found = first_pose(given_, off, NAMED)
     assert found.lens.after.rms_px < 2.5

@@ -4,33 +4,32 @@ from __future__ import annotations
 
 from functools import cache
 
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from tests.worker.calibration.synthetic import (
-    BARREL,
     CROWNED,
     GRASS,
     PITCH,
     camera,
-    moved,
     paint_frame,
-    paint_markings,
     pair,
 )
-from worker.calibration.draw import stitching
-from worker.calibration.draw.stitching import BACKDROP, birdseye, ground_grid, ground_view, overlay, preview, viewpoint
+from worker.calibration.draw import mosaic
+from worker.calibration.draw.mosaic import BACKDROP, birdseye, stitched
+from worker.calibration.draw.viewpoint import Viewpoint, viewpoint, world_behind
 from worker.calibration.scene.camera import (
     Array,
     Camera,
-    Intrinsics,
+    Frame,
     Pose,
     inside,
     rotation_matrices,
     rotation_vectors,
 )
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.look import ground_grid, look_through
 
 CAMERAS = pair()
 FRAME_SIZE = (960, 540)
@@ -48,13 +47,18 @@ def lines_across(picture: NDArray[np.uint8], y: int, x: slice) -> int:
     return int(np.count_nonzero(np.diff(white.astype(int)) == 1))
 
 
+def preview(pitch: Field, cameras: list[Camera], pictures: dict[str, NDArray[np.uint8]], width: int) -> Frame:
+    """The cameras' pictures, stitched as they are seen from between them."""
+    return stitched(pitch, viewpoint(pitch, cameras, width), cameras, pictures).picture
+
+
 def turned(one: Camera, yaw_deg: float) -> Camera:
     """The camera turned about the vertical, to the right."""
     about_vertical = rotation_matrices(np.array([0.0, 0.0, np.radians(yaw_deg)]))
     return one.with_pose(Pose(rotation_vectors(one.pose.matrix @ about_vertical), one.pose.position))
 
 
-def halfway(view: stitching.Viewpoint, y: float) -> Array:
+def halfway(view: Viewpoint, y: float) -> Array:
     """Where the preview shows a point of the halfway line."""
     return view.project(CROWNED.lift(np.array([0.0, y])))
 
@@ -108,19 +112,19 @@ def test_exposures_are_evened_out() -> None:
 def test_an_exposure_gain_is_bounded() -> None:
     grid = ground_grid(60, 60, 0.2)
     looks = [
-        stitching._look(one, np.full((540, 960, 3), value, np.uint8), stitching._project(one, CROWNED.lift(grid)))
+        look_through(one, np.full((540, 960, 3), value, np.uint8), one.project(CROWNED.lift(grid)))
         for one, value in zip(CAMERAS, (200, 40), strict=True)
     ]
-    gains = stitching.exposure_gains(looks)
-    assert gains.max() <= stitching.LARGEST_GAIN + 1e-6
-    assert gains.min() >= 1 / stitching.LARGEST_GAIN - 1e-6
+    gains = mosaic.exposure_gains(looks)
+    assert gains.max() <= mosaic.LARGEST_GAIN + 1e-6
+    assert gains.min() >= 1 / mosaic.LARGEST_GAIN - 1e-6
 
 
 def test_feathers_sum_to_one_wherever_a_camera_sees() -> None:
     quality = np.random.default_rng(0).uniform(0, 1, (3, 40, 50)).astype(np.float32)
     quality[:, :5] = 0
-    for sharpness in (stitching.DETAIL_SHARPNESS, stitching.SMOOTH_SHARPNESS):
-        total = stitching.seam_weights(quality, sharpness).sum(axis=0)
+    for sharpness in (mosaic.DETAIL_SHARPNESS, mosaic.SMOOTH_SHARPNESS):
+        total = mosaic.seam_weights(quality, sharpness).sum(axis=0)
         assert total[5:] == pytest.approx(1.0, abs=1e-5)
         assert (total[:5] == 0).all()
 
@@ -133,11 +137,11 @@ def test_the_geometry_of_the_preview_is_exact_to_a_twentieth_of_a_pixel() -> Non
         for name, x in (("left", -1.0), ("right", 1.0))
     ]
     view = viewpoint(CROWNED, wide, 1920)
-    dense = stitching._world_behind(CROWNED, view, np.stack(np.meshgrid(*map(np.arange, view.size)), axis=-1) * 1.0)
-    coarse = stitching._world_behind(CROWNED, view, stitching._every_nth_pixel(view.size))
+    dense = world_behind(CROWNED, view, np.stack(np.meshgrid(*map(np.arange, view.size)), axis=-1) * 1.0)
+    coarse = world_behind(CROWNED, view, mosaic._every_nth_pixel(view.size))
     for one in wide:
-        exact = stitching._project(one, dense)
-        quick = stitching._every_pixel(stitching._project(one, coarse), view)
+        exact = one.project(dense)
+        quick = mosaic._every_pixel(one.project(coarse), view)
         # On the ground; at the horizon the world bends away more sharply than anyone could see.
         judged = inside(exact, size, margin=8) & (np.abs(dense[..., 1]) < 200)
         assert np.linalg.norm(exact - quick, axis=-1)[judged].max() < 0.1
@@ -197,74 +201,6 @@ def test_the_centre_mark_is_in_the_centre_pixel_of_the_birdseye_view() -> None:
     # The near side of the circle; the far one is a smear in so small a frame.
     below = row + np.sqrt(radius**2 - 40**2)
     assert crossing(picture[:, column + 40], below) == pytest.approx(below, abs=1.0)
-
-
-def test_the_far_side_is_at_the_top_of_the_birdseye_view() -> None:
-    grid = ground_grid(3, 2, 0.5, centre=(1.0, 2.0))
-    assert grid.shape == (5, 7, 2)
-    assert grid[0, 0] == pytest.approx([-0.5, 3.0])
-    assert grid[-1, -1] == pytest.approx([2.5, 1.0])
-
-
-def test_a_ground_view_samples_the_image_where_the_camera_sees_the_point() -> None:
-    one = CAMERAS[0]
-    x, y = np.meshgrid(np.arange(960.0), np.arange(540.0))
-    ramp = np.stack([x, y], axis=-1).astype(np.float32)
-    grid = ground_grid(40, 40, 0.05, centre=(-10.0, 0.0))
-    values, valid = ground_view(CROWNED, one, ramp, grid)
-    assert valid.all()
-    expected = one.project(CROWNED.lift(grid).reshape(-1, 3)).reshape(values.shape)
-    # OpenCV interpolates pictures of several channels at steps of 1/32 px.
-    assert np.abs(values - expected).max() < 0.02
-
-
-def test_a_ground_view_is_blind_where_the_camera_or_its_lens_model_is() -> None:
-    bent = Camera(
-        "bent",
-        Intrinsics(CAMERAS[0].intrinsics.matrix, np.array([-0.9, 0.2, 0.0, 0.0]), FRAME_SIZE),
-        CAMERAS[0].pose,
-    )
-    assert bent.intrinsics.largest_radius < 2
-    values, valid = ground_view(PITCH, bent, np.ones((540, 960), np.float32), ground_grid(60, 40, 1.0))
-    assert not valid.all()
-    assert valid.any()
-    assert np.isfinite(values).all()
-    assert values[valid] == pytest.approx(1.0)
-
-
-def test_the_strokes_of_the_overlay_frame_the_painted_line() -> None:
-    near = camera("near", (3.0, -48.0, 10.0), (0.0, -20.0), focal=1500.0, distortion=BARREL)
-    paint = paint_markings(PITCH, near)
-    elsewhere = near.with_pose(Pose.looking_at(near.pose.position, (0.0, -200.0, 0.0)))
-    drawn = overlay((PITCH, elsewhere), (PITCH, near), np.zeros((540, 960, 3), np.uint8))
-    row = round(near.project(np.array([[0.0, -25.0, 0.0]]))[0, 1])
-    blue = drawn[row].astype(float)[:, 0]
-    middle = (np.arange(960) * paint[row]).sum() / paint[row].sum()
-    left, right = (
-        np.average(np.flatnonzero(part), weights=blue[part])
-        for part in ((blue > 0) & (np.arange(960) < middle), (blue > 0) & (np.arange(960) > middle))
-    )
-    assert (left + right) / 2 == pytest.approx(middle, abs=0.15)
-    # The paint between them, and one stroke's gap on either side.
-    assert right - left == pytest.approx(paint[row].sum() + 2 * stitching.EDGE_GAP, abs=0.5)
-
-
-def test_the_overlay_draws_both_poses_and_leaves_the_frame_alone() -> None:
-    frame = frames()["left"]
-    before = frame.copy()
-    drawn = overlay((CROWNED, moved(CAMERAS[0], rotation=(0.01, 0.0, 0.0))), (CROWNED, CAMERAS[0]), frame)
-    assert (frame == before).all()
-    for colour in (stitching.STORED_COLOUR, stitching.NEW_COLOUR):
-        assert (np.abs(drawn[:450] - np.array(colour)).max(axis=-1) < 60).sum() > 200
-
-
-def test_an_overlay_of_a_pose_that_sees_no_pitch_is_the_frame_with_a_legend() -> None:
-    frame = frames()["left"]
-    up = camera("left", (0.0, -48.0, 10.0), (0.0, -90.0))
-    drawn = overlay((PITCH, up), (PITCH, up), frame)
-    assert (drawn[:400] == frame[:400]).all()
-    assert (drawn[-80:] != frame[-80:]).any()
-    assert cv2.absdiff(drawn, frame)[:, 300:].max() == 0
 
 
 @pytest.mark.parametrize("by", [(0.0, 0.0, 700.0), (1100.0, 0.0, 0.0), (0.0, -60.0, 60.0)])

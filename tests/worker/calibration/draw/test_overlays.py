@@ -1,0 +1,57 @@
+"""The overlay shows whether a pose is right: the painted line lies between the strokes of one that is."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import (
+    BARREL,
+    CROWNED,
+    PITCH,
+    camera,
+    moved,
+    paint_frame,
+    paint_markings,
+    pair,
+)
+from worker.calibration.draw.overlays import EDGE_GAP, NEW_COLOUR, STORED_COLOUR, overlay
+from worker.calibration.scene.camera import Pose
+
+LEFT = pair()[0]
+
+
+def test_the_strokes_of_the_overlay_frame_the_painted_line() -> None:
+    near = camera("near", (3.0, -48.0, 10.0), (0.0, -20.0), focal=1500.0, distortion=BARREL)
+    paint = paint_markings(PITCH, near)
+    elsewhere = near.with_pose(Pose.looking_at(near.pose.position, (0.0, -200.0, 0.0)))
+    drawn = overlay((PITCH, elsewhere), (PITCH, near), np.zeros((540, 960, 3), np.uint8))
+    row = round(near.project(np.array([[0.0, -25.0, 0.0]]))[0, 1])
+    blue = drawn[row].astype(float)[:, 0]
+    middle = (np.arange(960) * paint[row]).sum() / paint[row].sum()
+    left, right = (
+        np.average(np.flatnonzero(part), weights=blue[part])
+        for part in ((blue > 0) & (np.arange(960) < middle), (blue > 0) & (np.arange(960) > middle))
+    )
+    assert (left + right) / 2 == pytest.approx(middle, abs=0.15)
+    # The paint between them, and one stroke's gap on either side.
+    assert right - left == pytest.approx(paint[row].sum() + 2 * EDGE_GAP, abs=0.5)
+
+
+def test_the_overlay_draws_both_poses_and_leaves_the_frame_alone() -> None:
+    frame = paint_frame(CROWNED, LEFT)
+    before = frame.copy()
+    drawn = overlay((CROWNED, moved(LEFT, rotation=(0.01, 0.0, 0.0))), (CROWNED, LEFT), frame)
+    assert (frame == before).all()
+    for colour in (STORED_COLOUR, NEW_COLOUR):
+        assert (np.abs(drawn[:450] - np.array(colour)).max(axis=-1) < 60).sum() > 200
+
+
+def test_an_overlay_of_a_pose_that_sees_no_pitch_is_the_frame_with_a_legend() -> None:
+    frame = paint_frame(CROWNED, LEFT)
+    up = camera("left", (0.0, -48.0, 10.0), (0.0, -90.0))
+    drawn = overlay((PITCH, up), (PITCH, up), frame)
+    assert (drawn[:400] == frame[:400]).all()
+    assert (drawn[-80:] != frame[-80:]).any()
+    assert cv2.absdiff(drawn, frame)[:, 300:].max() == 0

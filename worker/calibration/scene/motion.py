@@ -1,0 +1,68 @@
+"""A small change of a camera's pose, and what moves by it: the pose's derivatives, all of one kind.
+
+A change (6,) is a turn (rad, a rotation vector in the camera's own frame) and a shift (m, in the world). So a turn
+turns the view about the camera, and a shift means the same for all cameras.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from worker.calibration.scene.camera import (
+    NEAREST_DEPTH_M,
+    Array,
+    Camera,
+    Pose,
+    cross_matrices,
+    rotation_matrices,
+    rotation_vectors,
+)
+
+POSE_NUMBERS = 6
+
+
+def moved(camera: Camera, change: Array) -> Camera:
+    """The camera after a change (6,) of its pose."""
+    turned = rotation_vectors(rotation_matrices(change[:3]) @ camera.pose.matrix)
+    return camera.with_pose(Pose(turned, camera.pose.position + change[3:]))
+
+
+def change_between(before: Camera, after: Camera) -> Array:
+    """The change (6,) that `moved` makes `after` of `before` with."""
+    turn = rotation_vectors(after.pose.matrix @ before.pose.matrix.T)
+    return np.concatenate([turn, after.pose.position - before.pose.position])
+
+
+def pixel_slopes(camera: Camera, points: Array) -> Array:
+    """How the pixels of world points (..., 3) move when their camera does: (..., 2, 6), per rad and metre.
+
+    NaN where `Camera.project` is.
+    """
+    seen = _in_camera(camera, points)
+    depth = np.where(seen[..., 2:] > NEAREST_DEPTH_M, seen[..., 2:], np.nan)
+    rays = seen[..., :2] / depth
+    by_ray = camera.intrinsics.slopes(rays)
+    by_point = np.concatenate([by_ray, -(by_ray @ rays[..., None])], axis=-1) / depth[..., None]
+    return by_point @ _point_slopes(camera, seen)
+
+
+def ground_slopes(camera: Camera, points: Array) -> Array:
+    """How far (..., 2) off the camera puts points (..., 3) that it sees on the ground when its pose is a little wrong.
+
+    (..., 2, 6), per rad and metre of what its pose is too much: along the level ground through each point.
+    """
+    ray = points - camera.pose.position
+    carried = -camera.pose.matrix.T @ _point_slopes(camera, _in_camera(camera, points))
+    # The changed ray, back to where it meets the ground.
+    return np.asarray(carried[..., :2, :] - ray[..., :2, None] * carried[..., 2:, :] / ray[..., 2, None, None])
+
+
+def _in_camera(camera: Camera, points: Array) -> Array:
+    """World points (..., 3) in the camera's frame."""
+    return (points - camera.pose.position) @ camera.pose.matrix.T
+
+
+def _point_slopes(camera: Camera, seen: Array) -> Array:
+    """How points (..., 3) in the camera's frame move in it, (..., 3, 6): a turn w by w x p, a shift by its opposite."""
+    shift = np.broadcast_to(-camera.pose.matrix, (*seen.shape, 3))
+    return np.concatenate([-cross_matrices(seen), shift], axis=-1)
