@@ -196,7 +196,7 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, set
     def stitched(*_):
         raise ValueError
 
-    monkeypatch.setattr(pictures.stitching, "stitched", stitched)
+    monkeypatch.setattr(pictures.mosaic, "stitched", stitched)
     outcome = calibration.solve(venue, files, Options(seed=1), settings, lambda _: None)
     assert {"birdseye", "overlay_left", "overlay_right"} <= set(outcome.pictures)
     assert not {"preview", "preview_before"} & set(outcome.pictures)
