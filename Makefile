@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check bench bench-real bench-segmentation bench-service bench-rate train lock clean
+.PHONY: setup demo test check bench bench-real bench-fields bench-segmentation bench-service bench-rate train lock clean
 
 setup: $(VENV)/.installed
 
@@ -29,6 +29,9 @@ check: setup
 
 bench-real: setup
 	$(BIN)/python -m tests.benchmarks.real_pair
+
+bench-fields: setup
+	$(BIN)/python -m tests.benchmarks.fields
 
 bench-segmentation: $(VENV)/.train
 	$(BIN)/python -m tests.benchmarks.segmentation

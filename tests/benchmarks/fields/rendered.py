@@ -76,13 +76,13 @@ def section(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     )
     yield (
         f"Right: accepted within 1 cm and 0.02°. Far off: accepted and more than 30 cm away; beyond 3 sigma: accepted "
-        f"and farther off than three times what it says. Of the views that show less than {LEAST_SHOWN:.0%} of their lines "
-        "(too dark, veiled, hidden), only what was accepted counts."
+        f"and farther off than three times what it says. Of the views that show less than {LEAST_SHOWN:.0%} of their "
+        "lines (too dark, veiled, hidden), only what was accepted counts."
     )
     yield ""
     yield (
-        "| template | clear views | right | accepted, not as near | far off | beyond 3 sigma | refused | off, cm "
-        "| off, ° | unclear views | accepted | far off | beyond 3 sigma |"
+        "| template | clear views | right | accepted, not as near | far off | beyond 3 sigma | refused "
+        "| off (sigma), cm | off (sigma), ° | unclear views | accepted | far off | beyond 3 sigma |"
     )
     yield "|---" * 13 + "|"
     for name, judged in [*rows.items(), ("all", [row for each in rows.values() for row in each])]:
@@ -105,16 +105,22 @@ def _line(name: str, rows: Sequence[dict]) -> str:
     clear = [row for row in rows if row["shown"] >= LEAST_SHOWN]
     unclear = [row for row in rows if row["shown"] < LEAST_SHOWN]
     accepted = [row for row in clear if row["accepted"]]
-    off = [f"{np.median([f * row[key] for row in accepted]):.{d}f}" if accepted else ""
-           for key, f, d in (("shift_m", 100, 2), ("turn_deg", 1, 4))]  # fmt: skip
     return (
         f"| {name} | {len(clear)} | {share([caught(row) for row in clear])} "
         f"| {share([row['accepted'] and not caught(row) for row in clear])} "
         f"| {sum(map(far_off, clear))} | {sum(map(overconfident, clear))} "
-        f"| {share([not row['accepted'] for row in clear])} | {off[0]} | {off[1]} "
+        f"| {share([not row['accepted'] for row in clear])} "
+        f"| {_medians(accepted, 'shift_m', 'sigma_m', 100)} | {_medians(accepted, 'turn_deg', 'sigma_deg', 1)} "
         f"| {len(unclear)} | {sum(row['accepted'] for row in unclear)} | {sum(map(far_off, unclear))} "
         f"| {sum(map(overconfident, unclear))} |"
     )
+
+
+def _medians(rows: Sequence[dict], off: str, sigma: str, factor: int) -> str:
+    if not rows:
+        return ""
+    measured, said = (factor * np.median([row[name] for row in rows]) for name in (off, sigma))
+    return f"{measured:.3f} ({said:.3f})"
 
 
 def _judged(name: str, number: int, engine: Engine, pictures: Path | None) -> dict:

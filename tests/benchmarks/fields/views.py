@@ -82,10 +82,17 @@ def _table(kind: str, views: Sequence[View], options: argparse.Namespace, engine
             other = _other(view, views) if name == OTHER else None
             if name == OTHER and other is None:
                 continue
-            key = {"view": view.name, "spoiled": name, "model": engine.name, "looked": look_at is not None}
+            key = {
+                "view": view.name,
+                "spoiled": name,
+                "deg": options.turn,
+                "cm": options.shift,
+                "model": engine.name,
+                "looked": look_at is not None,
+            }
             row = engine.rows.remembered(key, lambda v=view, n=name, o=other: _judged(v, n, o, options, engine))
             rows[name].append(row)
-    yield f"{kind}, stored poses {options.turn:g}° and {options.shift:g} cm off; near: within 30 cm and 1° of the truth."
+    yield f"{kind}; stored poses {options.turn:g}° and {options.shift:g} cm off; near: within 30 cm and 1°."
     yield ""
     yield "| picture | views | accepted | of these near | causes named | refused because |"
     yield "|---|---|---|---|---|---|"
