@@ -18,14 +18,26 @@ from tests.benchmarks.fields.engine import Engine, camera_row, found_camera
 from tests.benchmarks.fields.judging import caught, far_off, overconfident, reasons, share
 from tests.benchmarks.scenes import started
 from tests.benchmarks.truth import apart
-from worker.calibration.scene.camera import Camera, Frame, Intrinsics, Pose, inside
+from worker.calibration.scene.camera import (
+    Camera,
+    Frame,
+    Intrinsics,
+    Pose,
+    inside,
+    rotation_matrices,
+    rotation_vectors,
+)
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.visibility import SeenLines
 
 SIZE_PX = 1280
 LARGE_M = 45.0
 """Fields longer than this are seen from higher up, and halves of them more often than all."""
 LEAST_IN_VIEW = 0.6
 """Of the lines of the field or of a half of it, that a view has to take in."""
+NOISE_PX, LARGEST_SIGMA_M = 0.3, 0.01
+"""With such noise on every 25 cm of line a view has to tell where its camera is: some see no more than a few lines."""
+LARGEST_CONDITION = 1e10
 LEAST_SHOWN = 0.6
 """Of the lines in view that a picture shows: in one that shows less nobody is blamed for not finding them."""
 GROUNDS: dict[str, Sequence[Floor]] = {
@@ -179,8 +191,26 @@ def random_camera(rng: np.random.Generator, pitch: Field) -> Camera:
         if not 0.7 * SIZE_PX < focal < 4 * SIZE_PX:
             continue
         camera = Camera("camera", _lens(rng, float(focal)), pose)
-        if inside(camera.project(part), camera.intrinsics.size).mean() >= LEAST_IN_VIEW:
+        in_view = inside(camera.project(part), camera.intrinsics.size).mean()
+        if in_view >= LEAST_IN_VIEW and _position_sigma(pitch, camera) <= LARGEST_SIGMA_M:
             return camera
+
+
+def _position_sigma(pitch: Field, camera: Camera) -> float:
+    """Metres that the camera's place is unsure by if lines are measured, across themselves, with `NOISE_PX`."""
+    seen = SeenLines.from_camera(pitch.line_points(), camera)
+    step = 1e-5
+    columns = []
+    for direction in np.eye(6):
+        turned = rotation_vectors(rotation_matrices(step * direction[:3]) @ camera.pose.matrix)
+        moved = camera.with_pose(Pose(turned, camera.pose.position + step * direction[3:]))
+        shift = (moved.project(seen.points.position) - camera.project(seen.points.position)) / step
+        columns.append((seen.normal * shift).sum(axis=1))
+    design = np.stack(columns, axis=1)
+    information = design.T @ design / NOISE_PX**2
+    if np.linalg.cond(information) > LARGEST_CONDITION:
+        return float("inf")
+    return float(np.sqrt(np.diag(np.linalg.inv(information))[3:].sum()))
 
 
 def _lens(rng: np.random.Generator, focal: float) -> Intrinsics:
