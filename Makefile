@@ -59,7 +59,7 @@ train: $(VENV)/.train
 
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --group dev -o requirements.lock pyproject.toml
-	uv pip compile --universal --python-version 3.11 --generate-hashes --extra tracing --constraint requirements.lock \
+	uv pip compile --universal --python-version 3.11 --generate-hashes --extra exr --extra tracing --constraint requirements.lock \
 		-o docker/requirements.lock pyproject.toml
 
 clean:

@@ -11,16 +11,17 @@ import structlog
 from fastapi import FastAPI, Request
 from starlette.responses import Response
 
+from service.api import problems
 from service.api.access import QUIET, Access
 from service.api.auth import Gate
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
-from service.api.conventions import Conventions
+from service.api.http_defaults import HttpDefaults
 from service.api.shared_reads import SharedReads
 from service.api.watch import Watch
+from service.intake.from_sources import FromSources
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake
-from service.intake.unattended import Unattended
 from service.observe.disk import Disk
 from service.observe.metrics import Metrics
 from service.observe.readiness import Readiness
@@ -54,7 +55,6 @@ from service.store.keys import Keys
 from service.store.sessions import Sessions
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.wire import problems
 from service.wire.problems import Problem
 
 # A client waits, and can come again.
@@ -80,9 +80,9 @@ def create_app(settings: Settings) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.context = context
-    app.add_middleware(BodyLimit, largest=int(settings.max_body_mb * 1e6))
+    app.add_middleware(BodyLimit, largest_form=int(settings.max_body_mb * 1e6))
     app.add_middleware(Access, metrics=context.metrics)
-    app.add_middleware(Conventions)
+    app.add_middleware(HttpDefaults)
     documented.document_callback(app)
     documented.document_alarms(app)
     problems.install(app)
@@ -122,7 +122,7 @@ def open_context(settings: Settings) -> Context:
         gate=Gate(keys, Sessions(engine), settings),
         snapshots=snapshots,
         intake=intake,
-        unattended=Unattended(venues_, jobs_, snapshots, intake),
+        from_sources=FromSources(venues_, jobs_, snapshots, intake),
     )
 
 
@@ -145,7 +145,7 @@ def _answer_outages(app: FastAPI) -> None:
 
     async def away(_: Request, error: Exception) -> Response:
         log.error("storage is away", exc_info=error)
-        return Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}).response()
+        return problems.answer(Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}))
 
     for error in (*DATABASE_AWAY, *BLOBS_AWAY):
         app.add_exception_handler(error, away)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from pydantic import BaseModel
 
-from service.wire.schemas import FieldResult, IntrinsicsResult, JobError, LocateResult, Progress, Result
+from service.wire.job import JobError, Progress
+from service.wire.results import AnyResult
 
 
 class Message(BaseModel):
     """One line: exactly one of progress, result and error. `error` and `result` are the program's last word."""
 
     progress: Progress | None = None
-    result: Result | IntrinsicsResult | LocateResult | FieldResult | None = None
+    result: AnyResult | None = None
     error: JobError | None = None
     # Beside a result: the pictures that lie in the folder of the attempt.
     pictures: list[str] = []

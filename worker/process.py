@@ -24,9 +24,9 @@ import structlog
 from pydantic import ValidationError
 
 from service import lifeline
+from service.intake.from_sources import FromSources
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake
-from service.intake.unattended import Unattended
 from service.observe import tracing
 from service.observe.disk import Disk
 from service.queue import Queue, WorkerQueue
@@ -40,8 +40,8 @@ from service.store.jobs import Jobs, Task
 from service.store.schedules import Schedules
 from service.store.venues import Venues
 from service.store.workers import Workers
+from service.wire.job import JobError, Progress
 from service.wire.problems import KINDS, first_line, type_of
-from service.wire.schemas import JobError, Progress
 from worker.duties import retention
 from worker.duties.alarms import Alarms
 from worker.duties.callbacks import Callbacks
@@ -111,9 +111,9 @@ class Worker:
         venues, expiry = Venues(engine), Expiry(engine)
         self._alarms = Alarms(venues)
         intake = Intake(settings, self._jobs, expiry, blobs)
-        unattended = Unattended(venues, self._jobs, Snapshots(settings), intake)
+        from_sources = FromSources(venues, self._jobs, Snapshots(settings), intake)
         enqueue = Queue(settings.home_database_url).enqueue
-        self._scheduled = Scheduled(Schedules(engine), venues, unattended, Disk(settings), enqueue)
+        self._scheduled = Scheduled(Schedules(engine), venues, from_sources, Disk(settings), enqueue)
 
     def start(self) -> None:
         """Show up and take jobs."""

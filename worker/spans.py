@@ -11,7 +11,7 @@ from opentelemetry.trace import Span, SpanKind, StatusCode
 
 from service.observe import tracing
 from service.store.jobs import Task
-from service.wire.schemas import IntrinsicsResult
+from service.wire.results import IntrinsicsResult
 from worker.message import Message
 
 # Before a job's program says how far it is: it starts, fetches and decodes the frames.

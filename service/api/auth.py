@@ -32,8 +32,9 @@ from service.api.rate_limit import Buckets
 from service.settings import Settings
 from service.store.keys import Key, Keys, hash_of
 from service.store.sessions import Sessions
+from service.wire.addresses import ip_of
+from service.wire.base import Scope
 from service.wire.problems import Problem
-from service.wire.schemas import Scope
 
 BELIEVED_FOR_S = 5.0
 COOKIE, TOKEN_HEADER = "esc_session", "X-CSRF-Token"
@@ -220,8 +221,7 @@ def _later(wait_s: float) -> dict[str, str]:
 def _address(request: HTTPConnection) -> str:
     """Where a request comes from; of IPv6 the network of 64 bits, which is what one customer has."""
     host = request.client.host if request.client else ""
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return host
-    return str(ipaddress.ip_network((address, 64), strict=False)) if address.version == 6 else host
+    address = ip_of(host)
+    if isinstance(address, ipaddress.IPv6Address):
+        return str(ipaddress.ip_network((address, 64), strict=False))
+    return host

@@ -1,6 +1,8 @@
-"""No request is larger than the setting says, nor packed; the answer to one that is, is a problem like every other.
+"""No request is larger than its kind may be, nor packed; the answer to one that is, is a problem like every other.
 
-FastAPI's own limit answers a too large Content-Length in plain text, around every handler.
+Files of a form are spooled to disk as they come. Any other body is held in memory, and parsed while everybody else
+waits: it may have a megabyte, which is more than a document needs. FastAPI's own limit answers a too large
+Content-Length in plain text, around every handler.
 """
 
 from __future__ import annotations
@@ -9,17 +11,21 @@ from http import HTTPStatus
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.api.problems import answer
 from service.wire.problems import Problem
+
+LARGEST_DOCUMENT = 1_000_000
 
 
 class BodyLimit:
-    """ASGI middleware; `largest` in bytes."""
+    """ASGI middleware; `largest_form` in bytes."""
 
-    def __init__(self, app: ASGIApp, largest: int) -> None:
+    def __init__(self, app: ASGIApp, largest_form: int) -> None:
         self._app = app
-        self._largest = largest
+        self._largest_form = largest_form
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse a body that says its size before it is read, and any other once it has grown too large."""
@@ -30,12 +36,12 @@ class BodyLimit:
         if headers.get("content-encoding", "identity").lower() != "identity":
             # A few bytes can be gigabytes, and frames do not shrink by it anyway.
             packed = Problem("encoded-body", "Send it as it is.", headers={"Accept-Encoding": "identity"})
-            await packed.response()(scope, receive, send)
+            await answer(packed)(scope, receive, send)
             return
+        largest, too_large = self._limit(Request(scope))
         announced = headers.get("content-length", "0")
-        if announced.isdecimal() and int(announced[:20]) > self._largest:
-            refusal = Problem("body-too-large", f"{self._largest} bytes are allowed; send fewer or smaller frames.")
-            await refusal.response()(scope, receive, send)
+        if announced.isdecimal() and int(announced[:20]) > largest:
+            await answer(Problem("body-too-large", too_large))(scope, receive, send)
             return
         arrived = 0
 
@@ -43,9 +49,21 @@ class BodyLimit:
             nonlocal arrived
             message = await receive()
             arrived += len(message.get("body", b""))
-            if arrived > self._largest:
+            if arrived > largest:
                 # The one exception that FastAPI's reading of a body lets through.
-                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, too_large)
             return message
 
         await self._app(scope, counted, send)
+
+    def _limit(self, request: Request) -> tuple[int, str]:
+        """How many bytes a body may have, and what to do about one that has more."""
+        if is_form(request):
+            return self._largest_form, f"{self._largest_form} bytes are allowed; send fewer or smaller frames."
+        largest = min(LARGEST_DOCUMENT, self._largest_form)
+        return largest, f"{largest} bytes are allowed of what is not multipart/form-data."
+
+
+def is_form(request: Request) -> bool:
+    """Whether a request brings a form with files."""
+    return request.headers.get("content-type", "").lower().startswith("multipart/form-data")

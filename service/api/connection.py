@@ -15,9 +15,9 @@ from typing import Any, Literal
 import h11
 import structlog
 import uvicorn
-from starlette.responses import Response
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from service.api.problems import answer
 from service.wire.problems import Problem
 
 # What the client owes: the head of a request, its body, or taking an answer.
@@ -85,7 +85,7 @@ class Connection(H11Protocol):
     def _refuse(self, problem: Problem) -> None:
         """Answer, where no answer has begun, and close; whoever waits for the rest of the request waits no longer."""
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            response: Response = problem.response()
+            response = answer(problem)
             head = [*response.raw_headers, (b"connection", b"close")]
             for part in (
                 h11.Response(status_code=response.status_code, headers=head),

@@ -11,9 +11,9 @@ from sqlalchemy import Engine
 from service.api.auth import Gate
 from service.api.shared_reads import SharedReads
 from service.api.watch import Watch
+from service.intake.from_sources import FromSources
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake
-from service.intake.unattended import Unattended
 from service.observe.disk import Disk
 from service.observe.metrics import Metrics
 from service.observe.readiness import Readiness
@@ -26,7 +26,7 @@ from service.store.jobs import Jobs
 from service.store.keys import Keys
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.wire.schemas import ID_PATTERN, JOB_ID_PATTERN
+from service.wire.base import ID_PATTERN, JOB_ID_PATTERN
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Context:
     gate: Gate
     snapshots: Snapshots
     intake: Intake
-    unattended: Unattended
+    from_sources: FromSources
 
 
 async def _context(request: Request) -> Context:

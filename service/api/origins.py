@@ -8,12 +8,12 @@ address in place of a name cannot be made to point elsewhere.
 
 from __future__ import annotations
 
-import ipaddress
 from urllib.parse import SplitResult, urlsplit
 
 from starlette.requests import HTTPConnection
 
 from service.settings import Settings
+from service.wire.addresses import ip_of
 from service.wire.problems import Problem
 
 READING = {"GET", "HEAD", "OPTIONS"}
@@ -46,15 +46,7 @@ def check(request: HTTPConnection, settings: Settings) -> None:
 
 def _is_ours(host: SplitResult, allowed: list[str]) -> bool:
     name = (host.hostname or "").rstrip(".")
-    return name == "localhost" or name in allowed or _is_address(name)
-
-
-def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
+    return name == "localhost" or name in allowed or ip_of(name) is not None
 
 
 def _split(url: str) -> SplitResult:

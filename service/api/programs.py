@@ -23,7 +23,10 @@ class OneAtATime:
         self._turn = threading.Lock()
 
     def run(self, command: Sequence[str], environment: Mapping[str, str], given: bytes) -> bytes:
-        """What the program writes to its standard output for what it is `given` on its input."""
+        """What the program writes to its standard output for what it is `given` on its input.
+
+        One that lacks a package says so on its standard error and ends with `os.EX_UNAVAILABLE`.
+        """
         if not self._turn.acquire(timeout=self._patience_s):
             raise Problem(
                 "unavailable", f"Another {self._what} is being made.", headers={"Retry-After": str(self._again_s)}
@@ -40,7 +43,10 @@ class OneAtATime:
         except subprocess.TimeoutExpired as error:
             raise Problem("unavailable", f"The {self._what} was not done after {self._longest_s:g} s.") from error
         except subprocess.CalledProcessError as error:
-            log.error("a program failed", program=self._what, stderr=error.stderr.decode(errors="replace")[-2000:])
+            said = error.stderr.decode(errors="replace")
+            if error.returncode == os.EX_UNAVAILABLE:
+                raise Problem("extra-missing", f"{said.strip()}.") from None
+            log.error("a program failed", program=self._what, stderr=said[-2000:])
             raise
         finally:
             self._turn.release()

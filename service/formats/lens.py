@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from service.wire.geometry import rotated
 from service.wire.problems import Problem
-from service.wire.schemas import Camera, rotated
+from service.wire.venue import Camera
 
 # OpenCV's order.
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")

@@ -11,8 +11,8 @@ from service.formats import colmap, freed, opencv, opentrackio, plain, soccernet
 from service.formats.archive import archive
 from service.formats.lens import Shot
 from service.settings import Settings
+from service.wire.base import FormatName
 from service.wire.problems import Problem
-from service.wire.schemas import FormatName
 
 JSON, ZIP = "application/json", "application/zip"
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from service.settings import Settings
 from service.wire.problems import Problem
-from service.wire.schemas import Camera, Venue
+from service.wire.venue import Camera, Venue
 
 JPEG_START = b"\xff\xd8\xff"
 PNG_START = b"\x89PNG\r\n\x1a\n"

@@ -13,10 +13,11 @@ import structlog
 from pydantic import BaseModel, ValidationError
 
 from service import lifeline
-from service.intake import images as border
+from service.intake import images
 from service.settings import Settings
+from service.wire.addresses import HIDDEN
 from service.wire.problems import Problem
-from service.wire.schemas import HIDDEN, Camera
+from service.wire.venue import Camera
 
 # Beyond the time that the sources have: to start, and to encode.
 STARTING_S = 10.0
@@ -103,7 +104,7 @@ class Snapshots:
                 source=camera.source,
             )
         data = (folder / camera.id).read_bytes()
-        border.check(camera, data, self._settings)
+        images.check(camera, data, self._settings)
         return data
 
 

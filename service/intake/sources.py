@@ -7,8 +7,9 @@ from collections.abc import Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 from urllib.parse import urlsplit
 
+from service.wire.addresses import HIDDEN, IpAddress, ip_of
 from service.wire.problems import Problem
-from service.wire.schemas import HIDDEN, Camera, Venue
+from service.wire.venue import Camera, Venue
 
 
 def credentials_of(
@@ -49,7 +50,8 @@ def check(venue: Venue, allowed: Sequence[str]) -> None:
                 "This service fetches no frames: name the hosts of its cameras in ESC_SOURCES, or upload frames.",
                 camera=camera.id,
             )
-        if not (_named(host, allowed) or _in_a_network([host], allowed) or (_is_name(host) and _networks(allowed))):
+        may_lead_there = ip_of(host) is None and _networks(allowed)
+        if not (_named(host, allowed) or _in_a_network([host], allowed) or may_lead_there):
             raise Problem(
                 "source-refused",
                 f"The source of camera {camera.id} is on {host}, which ESC_SOURCES does not name.",
@@ -69,14 +71,13 @@ def _host(camera: Camera) -> tuple[str, str]:
 
 
 def _named(host: str, allowed: Sequence[str]) -> bool:
-    return _is_name(host) and any(fnmatchcase(host.lower(), pattern.lower()) for pattern in allowed)
+    return ip_of(host) is None and any(fnmatchcase(host.lower(), pattern.lower()) for pattern in allowed)
 
 
 def _in_a_network(addresses: Collection[str], allowed: Sequence[str]) -> bool:
     networks = _networks(allowed)
-    return bool(addresses) and all(
-        not _is_name(address) and any(_plain(address) in network for network in networks) for address in addresses
-    )
+    found = [_plain(address) for address in addresses]
+    return bool(found) and all(ip is not None and any(ip in network for network in networks) for ip in found)
 
 
 def _networks(allowed: Sequence[str]) -> list[ipaddress.IPv4Network | ipaddress.IPv6Network]:
@@ -89,15 +90,7 @@ def _networks(allowed: Sequence[str]) -> list[ipaddress.IPv4Network | ipaddress.
     return networks
 
 
-def _plain(address: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
-    """An address without its zone; an IPv4 address in its IPv6 form is the IPv4 address."""
-    ip = ipaddress.ip_address(address.partition("%")[0])
+def _plain(address: str) -> IpAddress | None:
+    """An IPv4 address in its IPv6 form is the IPv4 address."""
+    ip = ip_of(address)
     return (ip.ipv4_mapped or ip) if isinstance(ip, ipaddress.IPv6Address) else ip
-
-
-def _is_name(host: str) -> bool:
-    try:
-        ipaddress.ip_address(host.partition("%")[0])
-    except ValueError:
-        return True
-    return False

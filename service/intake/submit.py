@@ -21,7 +21,7 @@ from service.store.jobs import (
     VenueReplaced,
     frame_folder,
 )
-from service.wire.schemas import Job
+from service.wire.job import Job
 
 # Longer than any upload takes from its first stored frame to its job.
 UPLOAD_GRACE = timedelta(hours=1)

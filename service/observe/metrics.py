@@ -24,7 +24,7 @@ from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Bu
 from service.store.deliveries import CALLBACKS
 from service.store.engine import AWAY
 from service.store.jobs import PRIORITIES
-from service.wire.schemas import AlarmRule
+from service.wire.health import AlarmRule
 
 log = structlog.get_logger()
 

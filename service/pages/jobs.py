@@ -10,8 +10,9 @@ from service.api.context import InContext, JobIdPath
 from service.pages.shown import Page, page
 from service.pages.venues import holds
 from service.routes.documented import needs
+from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
+from service.wire.job import Kind, Status
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN, JOB_ID_PATTERN, FormatName, Kind, Status
 
 PER_PAGE = 50
 # In their order; other kinds of jobs have others.

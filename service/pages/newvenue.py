@@ -9,12 +9,14 @@ from fastapi import APIRouter, Request, Response
 
 from fields.shapes import Arc, Line, Point, Shape
 from fields.template import NAMES
-from service.api.clicking import ClickedCamera, ClickedPose, clicked_pose
+from service.api.clicked_pose import clicked_pose
 from service.api.context import InContext
 from service.pages.shown import Page, page
 from service.routes.documented import needs
 from service.routes.guarded import Guarded
-from service.wire.schemas import FieldOfPlay, LensModel
+from service.wire.clicked_pose import ClickedCamera, ClickedPose
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import LensModel
 
 ARC_STEP_RAD = math.radians(4)
 router = APIRouter(route_class=Page, include_in_schema=False)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Coroutine
 from http import HTTPStatus
 from importlib.metadata import version
 from typing import Any
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote
 
 import structlog
 from fastapi import Request, Response
@@ -20,8 +21,8 @@ from service.pages.assets import address
 from service.routes.guarded import Guarded
 from service.store.engine import AWAY
 from service.store.keys import Key
+from service.wire.base import Scope
 from service.wire.problems import KINDS, Problem
-from service.wire.schemas import Scope
 
 SIGN_IN = "/ui/sign-in"
 # Scripts, styles and pictures are files of this service; nothing inline, nobody frames it.
@@ -104,5 +105,6 @@ def refusal(request: Request, problem: Problem) -> Response:
 
 def local(target: str) -> str:
     """An address of this service to go on to, whatever somebody wrote into a link."""
-    parts = urlsplit(target.replace("\\", "/"))
-    return target if target.startswith("/") and not (parts.netloc or parts.scheme) else "/"
+    # As browsers read it: without tabs and line ends, and a second slash of any kind begins the name of a host.
+    read = re.sub(r"[\t\r\n]", "", target).replace("\\", "/")
+    return target if read.startswith("/") and not read.startswith("//") else "/"

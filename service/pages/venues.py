@@ -15,7 +15,11 @@ from service.routes.guarded import Guarded
 from service.routes.venues import no_such_venue
 from service.store.counts.ends import Ended
 from service.store.revisions import TAKEN
-from service.wire.schemas import ID_PATTERN, Alarm, FormatName, Job, Revision, Venue
+from service.wire.base import ID_PATTERN, FormatName
+from service.wire.health import Alarm
+from service.wire.history import Revision
+from service.wire.job import Job
+from service.wire.venue import Venue
 
 PER_PAGE = 50
 IN_SPARKLINE = 40

@@ -16,8 +16,9 @@ from service.routes.jobs import Existing, job_answer
 from service.routes.venues import no_such_venue
 from service.store.ids import new_id
 from service.store.jobs import Submission, frame_folder
+from service.wire.job import Job
 from service.wire.problems import Problem
-from service.wire.schemas import Job, Venue
+from service.wire.venue import Venue
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 

@@ -18,8 +18,10 @@ from service.routes.jobs import job_answer
 from service.routes.venues import no_such_venue
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
-from service.wire import callbacks
-from service.wire.schemas import Job, Options, Venue
+from service.wire import callback_urls
+from service.wire.job import Job
+from service.wire.options import Options
+from service.wire.venue import Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -72,7 +74,7 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
     """Make a form a job of `venue`, which is the venue as it was before the form arrived."""
     options = uploads.options_of(form, Options)
     if options.callback_url is not None:
-        callbacks.check(options.callback_url, context.settings)
+        callback_urls.check(options.callback_url, context.settings)
     if uploads.has_no_frames(form) and any(camera.source for camera in venue.cameras):
         return fetch(context, venue, options, idempotency_key, origin)
     files = uploads.frames_of(venue, form, context)
@@ -88,7 +90,7 @@ def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str 
 def fetch(context: Context, venue: Venue, options: Options, idempotency_key: str | None, origin: Origin) -> Response:
     """Make what the cameras of `venue` show now a job."""
     try:
-        job, new = context.unattended.calibrate(venue, options, idempotency_key, origin, context.queue.enqueue)
+        job, new = context.from_sources.calibrate(venue, options, idempotency_key, origin, context.queue.enqueue)
     except REFUSALS as refusal:
         raise uploads.in_words(refusal, venue.id, context.settings) from None
     return job_answer(job, status=202 if new else 200)

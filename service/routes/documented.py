@@ -8,18 +8,11 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
-from service.wire.problems import MEDIA_TYPE
-from service.wire.schemas import (
-    OPTIONS_PART,
-    AlarmEvent,
-    FieldOptions,
-    IntrinsicsOptions,
-    JobEvent,
-    LocateOptions,
-    Options,
-    ProblemDetails,
-    Scope,
-)
+from service.wire.base import OPTIONS_PART, Scope
+from service.wire.health import AlarmEvent
+from service.wire.job import JobEvent
+from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.wire.problems import MEDIA_TYPE, ProblemDetails
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
 MODELS = (Options, IntrinsicsOptions, LocateOptions, FieldOptions, ProblemDetails)

@@ -14,8 +14,9 @@ from service.api.context import Context
 from service.formats.lens import Shot
 from service.formats.table import formats
 from service.routes.documented import headers
+from service.wire.base import ID_PATTERN, FormatName
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN, FormatName, Venue
+from service.wire.venue import Venue
 
 BINARY = {"schema": {"type": "string", "format": "binary"}}
 # Of `responses=`: what a document can be.

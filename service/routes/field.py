@@ -18,8 +18,10 @@ from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
-from service.wire import callbacks
-from service.wire.schemas import FieldOptions, Job, Venue
+from service.wire import callback_urls
+from service.wire.job import Job
+from service.wire.options import FieldOptions
+from service.wire.venue import Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -57,7 +59,7 @@ async def fit_field(
 def _submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None, origin: Origin) -> Response:
     options = uploads.options_of(form, FieldOptions)
     if options.callback_url is not None:
-        callbacks.check(options.callback_url, context.settings)
+        callback_urls.check(options.callback_url, context.settings)
     files = uploads.frames_of(venue, form, context)
     # The same frames may be those of a calibration with the same key, which is another job.
     sent = hashlib.sha256(f"field {uploads.checked(context, venue, files, options)}".encode()).hexdigest()

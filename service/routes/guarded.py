@@ -8,8 +8,10 @@ from typing import Any
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
+from service.api.body_limit import is_form
+from service.api.problems import not_json
 from service.routes.documented import KEY_SCHEME, problems
-from service.wire.schemas import Scope
+from service.wire.base import Scope
 
 
 class Guarded(APIRoute):
@@ -30,11 +32,15 @@ class Guarded(APIRoute):
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Check, then handle."""
         handle, needed = super().get_route_handler(), self.needed
+        takes_document = self.body_field is not None
         if needed is None:
             return handle
 
         async def guarded(request: Request) -> Response:
             request.state.key = await request.app.state.context.gate.admit(request, needed)
+            # Forms may be large, and here one would be held in memory only to be refused.
+            if takes_document and is_form(request):
+                raise not_json(request)
             return await handle(request)
 
         return guarded

@@ -18,9 +18,11 @@ from service.routes.guarded import Guarded
 from service.routes.jobs import job_answer
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission, frame_folder
-from service.wire import callbacks
+from service.wire import callback_urls
+from service.wire.base import OPTIONS_PART, PHOTOS_PART
+from service.wire.job import Job
+from service.wire.options import IntrinsicsOptions
 from service.wire.problems import Problem
-from service.wire.schemas import OPTIONS_PART, PHOTOS_PART, IntrinsicsOptions, Job
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -76,7 +78,7 @@ async def intrinsics(
 def _submit(context: Context, form: FormData, idempotency_key: str | None, origin: Origin) -> Response:
     options = uploads.options_of(form, IntrinsicsOptions)
     if options.callback_url is not None:
-        callbacks.check(options.callback_url, context.settings)
+        callback_urls.check(options.callback_url, context.settings)
     files = _photos(form, context)
     sent = hashlib.sha256(b"intrinsics " + options.model_dump_json().encode())
     for name, (photo,) in files.items():

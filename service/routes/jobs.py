@@ -20,8 +20,9 @@ from service.routes.venues import revision_unfit
 from service.store.engine import AWAY
 from service.store.jobs import MovedOn, NoPoses, State
 from service.store.revisions import RevisionUnfit
+from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
+from service.wire.job import OPEN, Job, Jobs, Status
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Job, Jobs, Status
 
 log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)

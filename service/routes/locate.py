@@ -18,9 +18,12 @@ from service.routes.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
 from service.store.ids import new_id
 from service.store.jobs import Origin, Submission
-from service.wire import callbacks
+from service.wire import callback_urls
+from service.wire.base import ID_PATTERN, OPTIONS_PART
+from service.wire.job import OPEN, Job
+from service.wire.options import LocateOptions
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN, OPEN, OPTIONS_PART, Camera, Job, LocateOptions, Venue
+from service.wire.venue import Camera, Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -89,7 +92,7 @@ def _submit(
     camera = _camera(venue, camera_id)
     options = uploads.options_of(form, LocateOptions)
     if options.callback_url is not None:
-        callbacks.check(options.callback_url, context.settings)
+        callback_urls.check(options.callback_url, context.settings)
     files = {camera_id: _frame(camera, form)}
     sent = hashlib.sha256(f"locate {camera_id} {options.model_dump_json()}".encode())
     for frame in files[camera_id]:

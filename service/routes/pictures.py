@@ -11,8 +11,9 @@ from service.routes.documented import needs, problems
 from service.routes.guarded import Guarded
 from service.routes.jobs import Existing
 from service.store.jobs import Pictures, picture_file
+from service.wire.base import ID_PATTERN
+from service.wire.job import Job
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN, Job
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 

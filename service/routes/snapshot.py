@@ -11,8 +11,8 @@ from service.intake.images import PNG_START
 from service.routes.documented import needs, problems
 from service.routes.guarded import Guarded
 from service.routes.venues import no_such_venue
+from service.wire.base import ID_PATTERN
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
 BINARY = {"schema": {"type": "string", "format": "binary"}}

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context
+from service.api.problems import invalid
 from service.intake import images as border
 from service.intake import submit
 from service.intake.submit import REFUSALS, Enqueue, Refusal
@@ -27,8 +28,10 @@ from service.store.jobs import (
     VenueGone,
     VenueReplaced,
 )
-from service.wire.problems import Problem, invalid
-from service.wire.schemas import OPTIONS_PART, Job, Venue
+from service.wire.base import OPTIONS_PART
+from service.wire.job import Job
+from service.wire.problems import Problem
+from service.wire.venue import Venue
 
 KEY_PATTERN = r"^[\x21-\x7e]{1,255}$"
 KEY_DESCRIPTION = "The same key and the same content are the same job, for as long as that job is kept."

@@ -13,9 +13,12 @@ from service.routes.documented import headers, needs, problems
 from service.routes.exported import DOCUMENTS, Wanted, exported
 from service.routes.guarded import Guarded
 from service.store.revisions import NoSuchRevision, RevisionUnfit
-from service.wire import callbacks
+from service.wire import callback_urls
+from service.wire.base import ID_PATTERN, FormatName
+from service.wire.health import VenueHealth
+from service.wire.history import History, Restore
 from service.wire.problems import Problem
-from service.wire.schemas import ID_PATTERN, FormatName, History, Restore, Venue, VenueHealth, VenueIn, Venues
+from service.wire.venue import Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 
@@ -51,7 +54,7 @@ def put_venue(
     if venue.id != venue_id:
         raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
     if venue.alarms is not None and venue.alarms.callback_url is not None:
-        callbacks.check(venue.alarms.callback_url, context.settings)
+        callback_urls.check(venue.alarms.callback_url, context.settings)
 
     def allow(before: Venue | None) -> None:
         tag = _tag(before) if before else None

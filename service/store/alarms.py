@@ -17,17 +17,9 @@ from service.store.deliveries import add_alarm_delivery
 from service.store.engine import clock, reading
 from service.store.revisions import TAKEN, first_revision_at, newest_revision
 from service.store.schedules import schedule_of
-from service.wire.schemas import (
-    Alarm,
-    AlarmEvent,
-    AlarmRule,
-    Alarms,
-    Revision,
-    RevisionCamera,
-    Venue,
-    VenueAlarm,
-    VenueHealth,
-)
+from service.wire.health import Alarm, AlarmEvent, AlarmRule, Alarms, VenueAlarm, VenueHealth
+from service.wire.history import Revision, RevisionCamera
+from service.wire.venue import Venue
 
 BEGUN = "alarms_begun"
 # Rule and camera, which is empty where the alarm is of the whole venue.

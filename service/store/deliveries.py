@@ -16,7 +16,8 @@ from service.store import tables
 from service.store.counts import tallies
 from service.store.engine import clock, reading, serialise, writing
 from service.store.ids import new_id
-from service.wire.schemas import AlarmEvent, CallbackState
+from service.wire.health import AlarmEvent
+from service.wire.job import CallbackState
 
 CALLBACKS = "callbacks"
 LONGEST_ERROR = 500

@@ -25,33 +25,18 @@ from service.store.counts.outcomes import End
 from service.store.deliveries import add_delivery, delivery_of
 from service.store.engine import clock, reading, serialise, writing
 from service.store.revisions import TAKEN, add_revision, newest_revision, revision_of_job
-from service.store.venues import find_venue, put_back, save_venue, venue_lock
-from service.wire.schemas import (
-    OPEN,
-    Cause,
-    FieldOptions,
-    FieldResult,
-    IntrinsicsOptions,
-    IntrinsicsResult,
-    Job,
-    JobError,
-    Kind,
-    LocateOptions,
-    LocateResult,
-    Options,
-    Progress,
-    Result,
-    Revision,
-    Status,
-    Venue,
-)
+from service.store.venues import find_venue, put_back, save_venue, venue_lock, with_result
+from service.wire.history import Cause, Revision
+from service.wire.job import OPEN, Job, JobError, Kind, Progress, Status
+from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.wire.results import AnyResult, Result
+from service.wire.venue import Venue
 
 PRIORITIES = {"live": 1, "routine": 100}
 # Pictures to be laid over others.
 LAYERS = ("seam", "stored", "new", "mask")
 DONE = Progress(stage="preview", fraction=1.0)
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
-AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult
 OPTIONS: dict[Kind, type[AnyOptions]] = {
     "calibration": Options,
     "intrinsics": IntrinsicsOptions,
@@ -317,7 +302,7 @@ class Jobs:
             row = connection.execute(query).one_or_none()
         if row is None:
             return None
-        return Venue.model_validate(row.venue_document).with_result(Result.model_validate(row.result))
+        return with_result(Venue.model_validate(row.venue_document), Result.model_validate(row.result))
 
     def check(self) -> None:
         """Raise unless the database answers, and has them."""
@@ -406,7 +391,7 @@ class Jobs:
         moves = result.accepted and not task.options.dry_run
         note_quality(connection, task.venue.id, result, clock(connection), moved=moves)
         if moves:
-            self._take(connection, now_stored.with_result(result), "calibrated", task.job_id, result)
+            self._take(connection, with_result(now_stored, result), "calibrated", task.job_id, result)
         elif not task.options.dry_run:
             self._miss(connection, now_stored)
         return result
@@ -436,7 +421,7 @@ class Jobs:
             if now_stored is None or not now_stored.calibrates_like(began_with):
                 raise MovedOn(newest)
             note_quality(connection, began_with.id, result, clock(connection), moved=True)
-            self._take(connection, now_stored.with_result(result), "accepted", job_id, result)
+            self._take(connection, with_result(now_stored, result), "accepted", job_id, result)
             self._touch(connection, job_id)
 
     def reject(self, job_id: str) -> None:

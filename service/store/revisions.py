@@ -14,8 +14,10 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.counts.figures import note
 from service.store.engine import clock
-from service.wire import motion
-from service.wire.schemas import Camera, Cause, Movement, PosedCamera, Revision, RevisionCamera, Venue
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Movement, PosedCamera
+from service.wire.history import Cause, Revision, RevisionCamera
+from service.wire.venue import Camera, Venue
 
 r = tables.revisions.c
 # Whose poses hold, or held.
@@ -99,7 +101,7 @@ def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venu
     if then != now:
         raise RevisionUnfit(f"It has the cameras {_in_words(then)}, and the venue now has {_in_words(now)}.")
     try:
-        return venue.with_state(cameras, row.ridge), _revision(row)
+        return _with_state(venue, cameras, row.ridge), _revision(row)
     except ValueError:
         raise RevisionUnfit("Its ridge is none of the pitch that the venue now has.") from None
 
@@ -107,6 +109,17 @@ def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venu
 def forget_revisions(connection: sa.Connection, venue_id: str) -> None:
     """The venue is gone."""
     connection.execute(sa.delete(tables.revisions).where(r.venue == venue_id))
+
+
+def _with_state(venue: Venue, cameras: list[PosedCamera], ridge: list[list[float]] | None) -> Venue:
+    """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
+    then = {camera.id: camera for camera in cameras}
+    back = [
+        camera.model_copy(update={"pose": then[camera.id].pose, "intrinsics": then[camera.id].intrinsics})
+        for camera in venue.cameras
+    ]
+    field = FieldOfPlay.model_validate(venue.field.model_dump() | {"ridge": ridge})
+    return venue.model_copy(update={"cameras": back, "field": field})
 
 
 def _movements(
@@ -129,8 +142,11 @@ def _movements(
 def _movement(
     venue: Venue, camera: Camera, last: PosedCamera | None, firsts: dict[str, PosedCamera], since: int
 ) -> Movement:
+    # Loads OpenCV, for which neither a command nor the start of a service waits.
+    from service.store.movement import moved
+
     def from_there(then: PosedCamera | None) -> Any:
-        return None if then is None else motion.moved(venue.field, then, camera)
+        return None if then is None else moved(venue.field, then, camera)
 
     return Movement(moved=from_there(last), drift=from_there(firsts.get(camera.id, camera)), drift_since=since)
 

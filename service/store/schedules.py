@@ -13,8 +13,8 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.engine import clock, reading, serialise, writing
-from service.wire.schedule import next_time
-from service.wire.schemas import ScheduleState, Venue
+from service.wire.schedule import ScheduleState, next_time
+from service.wire.venue import Venue
 
 LONGEST_ERROR = 500
 s = tables.schedules.c

@@ -25,7 +25,7 @@ venues = sa.Table(
     "venues",
     metadata,
     sa.Column("id", sa.String(64), primary_key=True),
-    # schemas.Venue, with the poses that hold now.
+    # wire.venue.Venue, with the poses that hold now.
     sa.Column("document", sa.JSON, nullable=False),
     sa.Column("updated_at", Instant, nullable=False),
 )
@@ -39,16 +39,16 @@ revisions = sa.Table(
     # Counts from 1 in each venue.
     sa.Column("number", sa.Integer, nullable=False),
     sa.Column("at", Instant, nullable=False),
-    # schemas.Cause.
+    # wire.history.Cause.
     sa.Column("cause", sa.String(16), nullable=False),
     # Whose poses they are, or, of what was put back, whose were rejected by hand.
     sa.Column("job", sa.String(26)),
     sa.Column("restored_from", sa.Integer),
     sa.Column("stitch_error_px", sa.Double),
-    # schemas.PosedCamera of each, and the ridge that their poses belong to.
+    # wire.geometry.PosedCamera of each, and the ridge that their poses belong to.
     sa.Column("cameras", sa.JSON, nullable=False),
     sa.Column("ridge", sa.JSON, nullable=False),
-    # schemas.Movement by camera.
+    # wire.geometry.Movement by camera.
     sa.Column("movements", sa.JSON, nullable=False),
     sa.Index("revisions_by_venue", "venue", "number", unique=True),
     sa.Index("revisions_by_job", "job"),
@@ -58,13 +58,13 @@ jobs = sa.Table(
     "jobs",
     metadata,
     sa.Column("id", sa.String(26), primary_key=True),
-    # schemas.Kind.
+    # wire.job.Kind.
     sa.Column("kind", sa.String(16), nullable=False, server_default="calibration"),
     # Null: the photos of a lens belong to no venue.
     sa.Column("venue", sa.String(64)),
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("priority", sa.Integer, nullable=False),
-    # What was asked: schemas.Options or FieldOptions (the seed filled in), IntrinsicsOptions or LocateOptions.
+    # What was asked: wire.options.Options or FieldOptions (the seed filled in), IntrinsicsOptions or LocateOptions.
     sa.Column("options", sa.JSON, nullable=False),
     # Of the frames and options as they were sent: the same content is the same job.
     sa.Column("content_hash", sa.String(64), nullable=False),
@@ -141,7 +141,7 @@ deliveries = sa.Table(
     sa.Column("due_at", Instant, nullable=False),
     # Why the last attempt that failed did.
     sa.Column("last_error", sa.String(500)),
-    # schemas.AlarmEvent; null: that the job has ended.
+    # wire.health.AlarmEvent; null: that the job has ended.
     sa.Column("event", sa.JSON(none_as_null=True)),
     sa.Index("deliveries_by_due", "status", "due_at"),
 )
@@ -180,7 +180,7 @@ alarms = sa.Table(
     "alarms",
     metadata,
     sa.Column("venue", sa.String(64), primary_key=True),
-    # schemas.AlarmRule.
+    # wire.health.AlarmRule.
     sa.Column("rule", sa.String(32), primary_key=True),
     # Empty: of the whole venue.
     sa.Column("camera", sa.String(64), primary_key=True),
@@ -230,7 +230,7 @@ api_keys = sa.Table(
     sa.Column("name", sa.String(64), primary_key=True),
     # SHA-256 of the key, which itself is nowhere.
     sa.Column("hash", sa.String(64), nullable=False),
-    # schemas.Scope.
+    # wire.base.Scope.
     sa.Column("scope", sa.String(16), nullable=False),
     sa.Column("created_at", Instant, nullable=False),
     # Null: never.

@@ -12,7 +12,10 @@ from service.store.counts.figures import forget_quality, note_restored
 from service.store.engine import clock, reading, serialise, writing
 from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
 from service.store.schedules import forget_schedule, plan
-from service.wire.schemas import Revision, Venue, VenueHealth
+from service.wire.health import VenueHealth
+from service.wire.history import Revision
+from service.wire.results import Result
+from service.wire.venue import Venue
 
 
 class Venues:
@@ -133,6 +136,21 @@ def save_venue(connection: sa.Connection, venue: Venue) -> None:
     replaced = connection.execute(sa.update(table).where(table.c.id == venue.id).values(**values))
     if replaced.rowcount == 0:
         connection.execute(sa.insert(table).values(id=venue.id, **values))
+
+
+def with_result(venue: Venue, result: Result) -> Venue:
+    """The same venue as an accepted calibration found it: poses, and the lenses and the ridge they belong to."""
+    found = {camera.id: camera for camera in result.cameras}
+    cameras = [
+        camera.model_copy(
+            update={"pose": found[camera.id].pose, "intrinsics": found[camera.id].intrinsics or camera.intrinsics}
+        )
+        if camera.id in found
+        else camera
+        for camera in venue.cameras
+    ]
+    field = venue.field if result.ridge is None else venue.field.model_copy(update={"ridge": result.ridge})
+    return venue.model_copy(update={"cameras": cameras, "field": field})
 
 
 def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job: str | None = None) -> Venue:

@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import structlog
-from fastapi import FastAPI, Request
-from fastapi.exceptions import RequestValidationError
-from fastapi.routing import iter_route_contexts
-from pydantic import ValidationError
-from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
-from starlette.responses import Response
-from starlette.routing import compile_path
+from pydantic import BaseModel, ConfigDict
 
 MEDIA_TYPE = "application/problem+json"
-log = structlog.get_logger()
 
 
 @dataclass(frozen=True)
@@ -104,6 +94,7 @@ KINDS: dict[str, Kind] = {
     "job-abandoned": Kind(500, "The job was given up"),
     # The service.
     "disk-full": Kind(507, "The disk is nearly full"),
+    "extra-missing": Kind(503, "The service was installed without this"),
     "unavailable": Kind(503, "The service cannot answer right now"),
     "internal-error": Kind(500, "The service made a mistake"),
 }
@@ -140,71 +131,28 @@ class Problem(Exception):  # noqa: N818  (the term of RFC 9457)
             **self.parts,
         }
 
-    def response(self) -> Response:
-        """The HTTP answer. Escaped to ASCII: a client's lone surrogates must not break it."""
-        content = json.dumps(self.members(), ensure_ascii=True).encode("ascii")
-        return Response(content, KINDS[self.kind].status, self.headers, MEDIA_TYPE)
 
+class ProblemDetails(BaseModel):
+    """RFC 9457. Beside these members a problem carries the part that is wrong: camera, expected, got, job, errors."""
 
-def invalid(error: ValidationError | RequestValidationError, *inside: str) -> Problem:
-    """What a schema found, each finding with the place it was found at."""
-    findings = [
-        {"where": ".".join(str(step) for step in (*inside, *finding["loc"])), "message": finding["msg"]}
-        for finding in error.errors()
-    ]
-    first = findings[0]
-    return Problem("invalid-request", f"{first['where']}: {first['message']}", errors=findings)
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={
+            "examples": [
+                {
+                    "type": "/problems/frame-size",
+                    "title": "The frame does not have the size of the camera",
+                    "status": 422,
+                    "detail": "Send camera left in 3840x2160 pixels, the size of its intrinsics.",
+                    "camera": "left",
+                    "expected": [3840, 2160],
+                    "got": [1920, 1080],
+                }
+            ]
+        },
+    )
 
-
-def install(app: FastAPI) -> None:
-    """Let every error of `app` leave as a problem."""
-
-    @app.exception_handler(Problem)
-    async def problem(_: Request, error: Problem) -> Response:
-        return error.response()
-
-    @app.exception_handler(RequestValidationError)
-    async def validation(request: Request, error: RequestValidationError) -> Response:
-        if any(finding["type"] == "json_invalid" for finding in error.errors()):
-            return Problem("malformed-request", "The body is not JSON.").response()
-        if isinstance(error.body, bytes):
-            got = request.headers.get("content-type", "")[:200]
-            return Problem("not-json", "Send it with Content-Type: application/json.", got=got).response()
-        return invalid(error).response()
-
-    @app.exception_handler(HTTPException)
-    async def http(request: Request, error: HTTPException) -> Response:
-        if error.status_code < 400:
-            return Response(status_code=error.status_code, headers=error.headers)
-        return _from_http(request, error).response()
-
-    @app.exception_handler(ClientDisconnect)
-    async def gone(_: Request, __: Exception) -> Response:
-        return Problem("malformed-request", "The request broke off.").response()
-
-    @app.exception_handler(Exception)
-    async def unexpected(_: Request, error: Exception) -> Response:
-        log.error("unexpected error", exc_info=error)
-        return Problem("internal-error", "This is a fault of the service; its log has the details.").response()
-
-
-def _from_http(request: Request, error: HTTPException) -> Problem:
-    match error.status_code:
-        case 404:
-            return Problem("not-found", f"Nothing is at {request.url.path}; /docs lists what there is.")
-        case 405:
-            allowed = ", ".join(sorted(_methods_at(request)))
-            return Problem("method-not-allowed", f"Here work {allowed}.", headers={"Allow": allowed})
-        case 413:
-            return Problem("body-too-large", "Send fewer or smaller frames.", headers=error.headers)
-        case _:
-            return Problem("malformed-request", str(error.detail), headers=error.headers)
-
-
-def _methods_at(request: Request) -> set[str]:
-    """What works at this address; the router itself names the methods of one of its routes."""
-    path = request.scope["path"]
-    routes = iter_route_contexts(request.app.routes)
-    here = [route for route in routes if route.path is not None and compile_path(route.path)[0].match(path)]
-    methods = {method for route in here for method in route.methods or ()}
-    return methods | {"HEAD"} if "GET" in methods else methods
+    type: str
+    title: str
+    status: int
+    detail: str

@@ -1,13 +1,43 @@
-"""When a schedule fires: cron's five fields, in a time zone."""
+"""Schedules of venues and when they fire: cron's five fields, in a time zone."""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from typing import Annotated, Self
 from zoneinfo import ZoneInfo
 
 from croniter import CroniterError, croniter
+from pydantic import ConfigDict, Field, StringConstraints, model_validator
+
+from service.wire.base import Wire
 
 FIELDS = 5
+
+
+class Schedule(Wire):
+    """When the service calibrates a venue by itself, with frames from the sources of its cameras."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"cron": "*/15 6-23 * * *", "time_zone": "Europe/Berlin"}]}
+    )
+
+    cron: Annotated[str, StringConstraints(max_length=100)] = Field(
+        description="Cron's five fields: minute, hour, day, month, day of the week."
+    )
+    time_zone: Annotated[str, StringConstraints(max_length=64)] = Field("UTC", description="A name of IANA's.")
+
+    @model_validator(mode="after")
+    def _fires(self) -> Self:
+        next_time(self.cron, self.time_zone, datetime.now(UTC))
+        return self
+
+
+class ScheduleState(Wire):
+    """When a venue is calibrated next, and what came of the last time."""
+
+    next_at: datetime
+    last_job: str | None
+    last_error: str | None = Field(description="Why the last time brought no job.")
 
 
 class NoSchedule(ValueError):  # noqa: N818

@@ -27,7 +27,11 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from service.store import tables
 from service.store.engine import connect, migrate, writing
-from service.wire.schemas import CameraResult, Moved, Options, Pose, Progress, Provenance, Result, VenueIn
+from service.wire.geometry import Moved, Pose
+from service.wire.job import Progress
+from service.wire.options import Options
+from service.wire.results import CameraResult, Provenance, Result
+from service.wire.venue import VenueIn
 from tests.e2e.running import upload, venue, wait_for
 from tests.homes import postgres_binaries, postgres_server
 from worker.message import Message

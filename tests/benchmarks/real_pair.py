@@ -19,7 +19,8 @@ import numpy as np
 from rich.console import Console
 
 from service.client import Client
-from service.wire.schemas import Job, VenueIn
+from service.wire.job import Job
+from service.wire.venue import VenueIn
 from tests.demo.__main__ import service
 from tests.real.pair import FOLDER, RealPair
 from worker.calibration.scene.camera import Pose, rotation_angles_deg

@@ -16,7 +16,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service.client import Client
-from service.wire.schemas import Job, VenueIn
+from service.wire.job import Job
+from service.wire.venue import VenueIn
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent.parent / "build" / "demo"

@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.jobs import picture_folder
-from service.wire.schemas import OPEN
+from service.wire.job import OPEN
 from tests.e2e.running import Service, wait_for
 from tests.homes import files
 

@@ -10,17 +10,9 @@ from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.engine import connect
 from service.store.jobs import Jobs, picture_folder
-from service.wire.schemas import (
-    CameraResult,
-    FieldResult,
-    JobError,
-    MeasureResult,
-    Moved,
-    Pose,
-    Progress,
-    Provenance,
-    Result,
-)
+from service.wire.geometry import Moved, Pose
+from service.wire.job import JobError, Progress
+from service.wire.results import CameraResult, FieldResult, MeasureResult, Provenance, Result
 from worker.message import Message
 
 JPEG = b"\xff\xd8\xff\xd9"

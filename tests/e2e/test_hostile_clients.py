@@ -212,6 +212,11 @@ def test_a_length_beyond_all_numbers_is_too_large(connection):
     assert problem(answer(connection)[0]) == "/problems/body-too-large"
 
 
+def test_a_form_where_a_document_is_asked_for_is_refused_before_it_is_read(connection):
+    connection.sendall(head("PUT /venues/v", FORM + "Content-Length: 1000000\r\n"))
+    assert problem(answer(connection)[0]) == "/problems/not-json"
+
+
 def test_chunks_without_end_are_cut_off(connection):
     connection.sendall(head("PUT /venues/v", JSON + "Transfer-Encoding: chunked\r\n"))
     many = b"10000\r\n" + b" " * 65536 + b"\r\n"

@@ -26,6 +26,14 @@ def test_poses_are_written_in_both_conventions(service, name):
     assert set(pose) == {"rotation", "position", "translation"}
 
 
+def test_what_get_gives_put_takes_and_nothing_changes(service, name):
+    service.venue(name)
+    read = service.http.get(f"/venues/{name}")
+    again = service.http.put(f"/venues/{name}", json=read.json(), headers={"If-Match": read.headers["etag"]})
+    assert (again.status_code, again.headers["etag"], again.json()) == (200, read.headers["etag"], read.json())
+    assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 1
+
+
 def test_a_conditional_put_of_an_outdated_venue_is_refused(service, name):
     old, new = (service.http.put(f"/venues/{name}", json=venue(name, b)).headers["etag"] for b in ("accept", "other"))
     answer = service.http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": old})

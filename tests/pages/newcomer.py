@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Page, expect
 
-from service.wire.schemas import Pose, VenueIn
+from service.wire.geometry import Pose
+from service.wire.venue import VenueIn
 from tests import demo
 from worker.calibration.scene.camera import Camera
 from worker.jobs.wire import camera_of, pitch_of

@@ -6,7 +6,9 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.ids import new_id
-from service.wire.schemas import Moved, Options, Venue, VenueIn
+from service.wire.geometry import Moved
+from service.wire.options import Options
+from service.wire.venue import Venue, VenueIn
 from tests.e2e import running
 from tests.worker.stock import result
 

@@ -7,18 +7,9 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.ids import new_id
-from service.wire.schemas import (
-    Board,
-    ClickedPoint,
-    CoverageResult,
-    IntrinsicsOptions,
-    IntrinsicsResult,
-    LocateOptions,
-    LocateResult,
-    LocateSigma,
-    PointResult,
-    VenueIn,
-)
+from service.wire.options import Board, ClickedPoint, IntrinsicsOptions, LocateOptions
+from service.wire.results import CoverageResult, IntrinsicsResult, LocateResult, LocateSigma, PointResult
+from service.wire.venue import VenueIn
 from tests.e2e.running import venue
 
 CAMERA = VenueIn.model_validate(venue("kinds")).stored().cameras[0]

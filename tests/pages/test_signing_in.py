@@ -4,6 +4,7 @@ import httpx
 import pytest
 from playwright.sync_api import expect
 
+from service.pages.shown import local
 from tests.e2e.running import Service, venue, wait_for
 from tests.e2e.test_access import keys_in
 from tests.pages.browsing import grave
@@ -50,6 +51,31 @@ def test_a_link_leads_nobody_to_another_site_by_way_of_signing_in(guarded, visit
     page = visit(service.url, "/ui/sign-in?next=//evil.example/%5Cpath")
     sign_in(page, keys["read"])
     expect(page.get_by_role("heading", name="Venues")).to_be_visible()
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "//evil.example/x",
+        "///evil.example/x",
+        "////evil.example",
+        "/\\evil.example",
+        "/\t/evil.example",
+        "\t//evil.example",
+        "/\n\\evil.example",
+        "https://evil.example",
+        "javascript:alert(1)",
+        "evil.example",
+        "",
+    ],
+)
+def test_an_address_of_another_site_is_none_to_go_on_to(target):
+    assert local(target) == "/"
+
+
+@pytest.mark.parametrize("target", ["/", "/ui/venues/field", "/ui/jobs?status=failed&next=//x", "/a//b"])
+def test_an_address_of_this_site_is_one_to_go_on_to(target):
+    assert local(target) == target
 
 
 def test_a_wrong_key_is_told_so(guarded, visit):

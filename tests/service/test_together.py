@@ -14,7 +14,11 @@ from service.store.ids import new_id
 from service.store.jobs import Jobs, QueueFull, Submission
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.wire.schemas import CameraResult, JobError, Moved, Options, Pose, Provenance, Result, VenueIn
+from service.wire.geometry import Moved, Pose
+from service.wire.job import JobError
+from service.wire.options import Options
+from service.wire.results import CameraResult, Provenance, Result
+from service.wire.venue import VenueIn
 from tests.e2e.running import venue
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock

@@ -15,18 +15,12 @@ from service.store.ids import new_id
 from service.store.jobs import Jobs, Submission, picture_folder
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.wire.schemas import (
-    AlarmEvent,
-    CameraResult,
-    JobError,
-    Moved,
-    Options,
-    Pose,
-    Provenance,
-    Result,
-    Venue,
-    VenueIn,
-)
+from service.wire.geometry import Moved, Pose
+from service.wire.health import AlarmEvent
+from service.wire.job import JobError
+from service.wire.options import Options
+from service.wire.results import CameraResult, Provenance, Result
+from service.wire.venue import Venue, VenueIn
 from tests.e2e.running import venue
 from tests.homes import files
 

@@ -5,7 +5,8 @@ import pytest
 
 from service.settings import Settings
 from service.store.jobs import Task
-from service.wire.schemas import VENUE_EXAMPLE, Options, VenueIn
+from service.wire.options import Options
+from service.wire.venue import VENUE_EXAMPLE, VenueIn
 from worker import process
 
 TASK = Task("job", "token", VenueIn.model_validate(VENUE_EXAMPLE).stored(), Options(), {})

@@ -28,11 +28,20 @@ from worker.calibration.scene.camera import Array, Camera, Frame, Intrinsics, Po
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.search.search import ALONE_ON_THE_GROUND, COARSE_TO_FINE, ON_THE_GROUND, Level, Strategy, search
+from worker.calibration.search.search import (
+    ALONE_ON_THE_GROUND,
+    COARSE_TO_FINE,
+    ON_THE_GROUND,
+    Found,
+    Level,
+    Strategy,
+    search,
+)
 from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.line_measurement import brightness_of
 from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import Region, reachable_regions
+from worker.calibration.see.view import ViewCondition, look_at
 
 Response = NDArray[np.float32]
 Preset = Literal["esc", "paper", "scpr"]
@@ -102,6 +111,7 @@ class Progress:
 class CameraResult:
     """One camera's answer. `sigma`, `repeatability` and `residual_px` are None where too few lines could be measured.
 
+    `view`: whether its frame could be used, and what is wrong with it if not.
     `found`: share 0..1 of the markings' length in view that is seen where the pose puts it; `by_chance`: that is as
     likely seen anywhere. `repeatability`: the part of sigma that is not owed to lens and field, which do not change.
     `intrinsics`: those that the pose belongs to, which are the given ones unless the focal length was to be found.
@@ -110,6 +120,7 @@ class CameraResult:
     id: str
     intrinsics: Intrinsics
     pose: Pose
+    view: ViewCondition
     sigma: Sigma | None
     repeatability: Sigma | None
     moved: Movement
@@ -176,23 +187,32 @@ def calibrate(
     clock = Clock()
     journey = Journey(report, stop)
     require_markings_in_view(pitch, cameras)
+    with clock.measuring("view"):
+        views = [view_of(frames[camera.id], pitch, camera) for camera in cameras]
+        usable = all(view.usable for view in views)
     with clock.measuring("segmentation"):
         responses = segment_all(pitch, cameras, frames, segment, journey)
     with clock.measuring("evolution"):
         strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
         rng = np.random.default_rng(options.seed)
-        found = search(pitch, cameras, responses, method.levels, strategy, rng, journey.evolution(options.generations))
+        # What cannot be seen is not searched for: the stored poses are judged as they are, beside what is wrong.
+        found = (
+            search(pitch, cameras, responses, method.levels, strategy, rng, journey.evolution(options.generations))
+            if usable
+            else Found(list(cameras), np.inf, 0)
+        )
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
         brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
         sight = Sight(brightness, responses)
-        refined = method.finish(pitch, found.cameras, sight, options.stitch_weight, _free(options, pitch, cameras))
+        finish = method.finish if usable else assess
+        refined = finish(pitch, found.cameras, sight, options.stitch_weight, _free(options, pitch, cameras))
     with clock.measuring("quality"):
         journey.at("refinement", 0.6)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
         stitch_before = stitch_error_px(pitch, cameras, by_id)
-        qualities = qualities_of(pitch, cameras, refined, sight)
+        qualities = qualities_of(pitch, cameras, refined, sight, views)
         journey.at("refinement", 1.0)
     return Calibration(
         refined.pitch,
@@ -256,6 +276,7 @@ def camera_result(quality: CameraQuality) -> CameraResult:
         quality.camera.id,
         quality.camera.intrinsics,
         quality.camera.pose,
+        quality.view,
         quality.sigma,
         quality.repeatability,
         quality.moved,
@@ -266,12 +287,23 @@ def camera_result(quality: CameraQuality) -> CameraResult:
     )
 
 
-def qualities_of(pitch: Field, stored: Sequence[Camera], refined: Refined, sight: Sight) -> list[CameraQuality]:
+def view_of(frames: Sequence[Frame], pitch: Field, camera: Camera) -> ViewCondition:
+    """The view of the first frame that can be used, or what is wrong with the first."""
+    views = [look_at(frames[0], pitch, camera)]
+    while not views[-1].usable and len(views) < len(frames):
+        views.append(look_at(frames[len(views)], pitch, camera))
+    return views[-1] if views[-1].usable else views[0]
+
+
+def qualities_of(
+    pitch: Field, stored: Sequence[Camera], refined: Refined, sight: Sight, views: Sequence[ViewCondition]
+) -> list[CameraQuality]:
     """What the gate looks at: the finished cameras beside the `stored` ones on the pitch they were stored for."""
     lines = pitch.line_points()
     return [
         CameraQuality(
             after,
+            view,
             markings_iou(refined.pitch, after, response),
             evidence,
             evidence_of(lines, before, bright, response),
@@ -280,9 +312,10 @@ def qualities_of(pitch: Field, stored: Sequence[Camera], refined: Refined, sight
             _sigma(repeatability),
             Movement.between(pitch, before, after),
         )
-        for before, after, bright, response, evidence, residual, covariance, repeatability in zip(
+        for before, after, view, bright, response, evidence, residual, covariance, repeatability in zip(
             stored,
             refined.cameras,
+            views,
             sight.brightness,
             sight.responses,
             refined.evidence,

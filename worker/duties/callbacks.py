@@ -13,7 +13,7 @@ import structlog
 from service.settings import Settings
 from service.store.deliveries import Deliveries, Delivery
 from service.store.jobs import Jobs
-from service.wire.schemas import JobEvent
+from service.wire.job import JobEvent
 from worker.duties import webhook
 
 LOOK_S = 1.0

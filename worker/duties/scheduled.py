@@ -7,14 +7,14 @@ from datetime import UTC, timedelta
 
 import structlog
 
+from service.intake.from_sources import FromSources
 from service.intake.submit import REFUSALS, Enqueue
-from service.intake.unattended import Unattended
 from service.observe.disk import Disk
 from service.store.jobs import Origin
 from service.store.schedules import Firing, Schedules
 from service.store.venues import Venues
+from service.wire.options import Options
 from service.wire.problems import Problem
-from service.wire.schemas import Options
 
 LOOK_S = 1.0
 # As many venues have their frames fetched at the same time.
@@ -28,11 +28,11 @@ class Scheduled:
     """Fires what is due by the clock of the database."""
 
     def __init__(
-        self, schedules: Schedules, venues: Venues, unattended: Unattended, disk: Disk, enqueue: Enqueue
+        self, schedules: Schedules, venues: Venues, from_sources: FromSources, disk: Disk, enqueue: Enqueue
     ) -> None:
         self._schedules = schedules
         self._venues = venues
-        self._unattended = unattended
+        self._from_sources = from_sources
         self._disk = disk
         self._enqueue = enqueue
         self._fetchers = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="schedule")
@@ -65,6 +65,6 @@ class Scheduled:
             raise Problem("disk-full", "Less is free on the disk than must be.")
         # Fired again after a worker died over it, it is the same job.
         name = f"schedule-{firing.due_at.astimezone(UTC):%Y%m%dT%H%M%SZ}"
-        job, _ = self._unattended.calibrate(venue, Options(), name, Origin(request_id=name), self._enqueue)
+        job, _ = self._from_sources.calibrate(venue, Options(), name, Origin(request_id=name), self._enqueue)
         log.info("schedule fired", job=job.id)
         return job.id

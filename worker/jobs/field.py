@@ -10,7 +10,11 @@ import cv2
 import structlog
 
 from service.settings import Settings
-from service.wire.schemas import FieldOfPlay, FieldOptions, FieldResult, MeasureResult, Progress, Provenance, Venue
+from service.wire.field import FieldOfPlay
+from service.wire.job import Progress
+from service.wire.options import FieldOptions
+from service.wire.results import FieldResult, MeasureResult, Provenance
+from service.wire.venue import Venue
 from worker.calibration.calibrate import CalibrationError
 from worker.calibration.draw import stitching
 from worker.calibration.measures.field_fit import FieldFit, Measure, fit_field

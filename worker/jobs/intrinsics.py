@@ -8,8 +8,10 @@ from importlib.metadata import version
 
 import cv2
 
-from service.wire import schemas
-from service.wire.schemas import CoverageResult, IntrinsicsOptions, IntrinsicsResult, LensTrial, PhotoResult, Progress
+from service.wire import options as wire
+from service.wire.job import Progress
+from service.wire.options import IntrinsicsOptions
+from service.wire.results import CoverageResult, IntrinsicsResult, LensTrial, PhotoResult
 from worker.calibration.draw.inspection import coverage_picture
 from worker.calibration.first.boards import Board, Charuco, find_board, other_size
 from worker.calibration.first.lens_calibration import LensCalibration, NoLens, Photo, calibrate_lens
@@ -47,7 +49,7 @@ def solve(
     return Outcome(_result(found, timings), {"coverage": picture})
 
 
-def _board(board: schemas.Board) -> Board:
+def _board(board: wire.Board) -> Board:
     charuco = board.charuco
     extra = None if charuco is None else Charuco(charuco.dictionary, charuco.marker_m)
     return Board(board.columns, board.rows, board.square_m, extra)

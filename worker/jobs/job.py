@@ -21,20 +21,11 @@ from service.settings import Settings
 from service.store.blobs import AWAY, Blobs
 from service.store.engine import connect
 from service.store.jobs import Jobs, Task, picture_file, picture_folder
-from service.wire import schemas
+from service.wire.job import Progress
+from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
 from service.wire.problems import first_line
-from service.wire.schemas import (
-    FieldOptions,
-    FieldResult,
-    IntrinsicsOptions,
-    IntrinsicsResult,
-    LocateOptions,
-    LocateResult,
-    Progress,
-    Provenance,
-    Result,
-    Venue,
-)
+from service.wire.results import AnyResult, Provenance, Result, Suspicion
+from service.wire.venue import Venue
 from worker.calibration import calibrate as engine
 from worker.calibration.calibrate import CalibrationError, calibrate
 from worker.calibration.judge.quality import Gate
@@ -83,7 +74,7 @@ def main(job_id: str, run_token: str) -> None:
 
 def _compute(
     task: Task, files: Mapping[str, Sequence[bytes]], settings: Settings, report: Callable[[Progress], None]
-) -> Outcome[Result | IntrinsicsResult | LocateResult | FieldResult]:
+) -> Outcome[AnyResult]:
     """What the kind of the job asks for."""
     cv2.setNumThreads(settings.threads)
     match task.options:
@@ -104,7 +95,7 @@ def _compute(
 def solve(
     venue: Venue,
     files: Mapping[str, Sequence[bytes]],
-    options: schemas.Options,
+    options: Options,
     settings: Settings,
     report: Callable[[Progress], None],
 ) -> Outcome[Result]:
@@ -174,7 +165,7 @@ def _store(task: Task, blobs: Blobs, pictures: Mapping[str, bytes]) -> None:
             raise Failure("job-crashed", f"Its pictures cannot be stored: {first_line(error)}") from error
 
 
-def _engine_options(options: schemas.Options) -> engine.Options:
+def _engine_options(options: Options) -> engine.Options:
     given = options.model_dump(
         include={
             "preset",
@@ -193,7 +184,7 @@ def _engine_options(options: schemas.Options) -> engine.Options:
 
 
 def _result(
-    found: engine.Calibration, options: schemas.Options, timings_s: Mapping[str, float], provenance: Provenance
+    found: engine.Calibration, options: Options, timings_s: Mapping[str, float], provenance: Provenance
 ) -> Result:
     ridge = found.pitch.ridge
     return Result(
@@ -204,7 +195,7 @@ def _result(
             for camera in found.cameras
         ],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
-        diagnosis=[schemas.Suspicion(**vars(suspicion)) for suspicion in found.suspicions],
+        diagnosis=[Suspicion(**vars(suspicion)) for suspicion in found.suspicions],
         stitch_error_px=number(found.stitch_error_px),
         stitch_error_before_px=number(found.stitch_error_before_px),
         stitch_error_limit_px=Gate().largest_stitch_error_px,

@@ -9,8 +9,12 @@ from importlib.metadata import version
 import numpy as np
 
 from fields.landmarks import UnknownLandmark
-from service.wire import schemas
-from service.wire.schemas import ClickedPoint, LocateOptions, LocateResult, LocateSigma, PointResult, Progress, Venue
+from service.wire import results
+from service.wire.field import FieldOfPlay
+from service.wire.job import Progress
+from service.wire.options import ClickedPoint, LocateOptions
+from service.wire.results import LocateResult, LocateSigma, PointResult
+from service.wire.venue import Venue
 from worker.calibration.draw.inspection import clicks_picture
 from worker.calibration.first.first_pose import FirstPose, LensGain, NoPose, first_pose
 from worker.calibration.first.point_fit import Clicks
@@ -34,7 +38,7 @@ def solve(
 
 def locate(
     camera: str,
-    field: schemas.FieldOfPlay,
+    field: FieldOfPlay,
     lens: Intrinsics,
     points: list[ClickedPoint],
     frame: bytes | None,
@@ -114,8 +118,8 @@ def result_of(found: FirstPose, points: list[ClickedPoint], timings_s: dict[str,
     )
 
 
-def _gain(gain: LensGain) -> schemas.LensGain:
-    return schemas.LensGain(
+def _gain(gain: LensGain) -> results.LensGain:
+    return results.LensGain(
         given=wire_lens(gain.before.camera.intrinsics),
         free=list(gain.after.free),
         sigma=dict(gain.sigma),

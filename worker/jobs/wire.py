@@ -11,19 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.settings import Settings
-from service.wire import schemas
+from service.wire import geometry
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Moved
+from service.wire.job import JobError, Progress
 from service.wire.problems import KINDS, type_of
-from service.wire.schemas import (
-    CameraResult,
-    FieldResult,
-    IntrinsicsResult,
-    JobError,
-    LocateResult,
-    Moved,
-    Progress,
-    Result,
-    Sigma,
-)
+from service.wire.results import AnyResult, CameraResult, Sigma, View
 from worker.calibration import calibrate as engine
 from worker.calibration.judge import quality
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
@@ -35,7 +28,7 @@ JPEG_QUALITY = 90
 PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
 # The engine's report ends with the refinement; what is left is drawing.
 PREVIEW_FRACTION = 0.96
-R = TypeVar("R", bound=Result | IntrinsicsResult | LocateResult | FieldResult, covariant=True)
+R = TypeVar("R", bound=AnyResult, covariant=True)
 
 
 @dataclass(frozen=True)
@@ -91,32 +84,32 @@ def png(picture: Picture) -> bytes:
     return data.tobytes()
 
 
-def pitch_of(field: schemas.FieldOfPlay) -> Field:
+def pitch_of(field: FieldOfPlay) -> Field:
     """The engine's pitch."""
     ridge = None if field.ridge is None else np.array(field.ridge)
     return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
 
 
-def lens_of(lens: schemas.Intrinsics, image_size: list[int]) -> Intrinsics:
+def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Intrinsics:
     """The engine's lens."""
     matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
     return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]))
 
 
-def camera_of(camera: schemas.Camera) -> Camera:
+def camera_of(camera: geometry.PosedCamera) -> Camera:
     """The engine's camera at its stored pose."""
     pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
     return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
 
 
-def wire_lens(lens: Intrinsics) -> schemas.Intrinsics:
+def wire_lens(lens: Intrinsics) -> geometry.Intrinsics:
     """A lens of the engine for the wire."""
-    return schemas.Intrinsics(model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
+    return geometry.Intrinsics(model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
 
 
-def wire_pose(pose: Pose) -> schemas.Pose:
+def wire_pose(pose: Pose) -> geometry.Pose:
     """A pose of the engine for the wire."""
-    return schemas.Pose(
+    return geometry.Pose(
         rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
     )
 
@@ -146,7 +139,7 @@ def wire_progress(step: engine.Progress) -> Progress:
     )
 
 
-def wire_camera(camera: engine.CameraResult, lens: schemas.Intrinsics | None = None) -> CameraResult:
+def wire_camera(camera: engine.CameraResult, lens: geometry.Intrinsics | None = None) -> CameraResult:
     """What a finish has to say of a camera; `lens` where it was found as well."""
     return CameraResult(
         id=camera.id,
@@ -160,6 +153,11 @@ def wire_camera(camera: engine.CameraResult, lens: schemas.Intrinsics | None = N
             pixels=number(camera.moved.pixels),
         ),
         iou=number(camera.iou),
+        found=number(camera.found),
+        by_chance=number(camera.by_chance),
+        view=View(
+            usable=camera.view.usable, cause=camera.view.cause, where=camera.view.where, detail=camera.view.words
+        ),
         residual_px=number(camera.residual_px),
     )
 

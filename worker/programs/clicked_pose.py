@@ -1,6 +1,6 @@
 """The first pose of a camera while its points are being clicked, in a process of its own: JSON in, JSON out.
 
-`python -m worker.programs.clicked_pose`. What comes is a `service.api.clicking.ClickedCamera`, what leaves a
+`python -m worker.programs.clicked_pose`. What comes is a `service.wire.clicked_pose.ClickedCamera`, what leaves a
 `ClickedPose`.
 """
 
@@ -11,7 +11,7 @@ import time
 from math import isfinite
 
 from service import lifeline
-from service.api.clicking import ClickedCamera, ClickedPose, Polyline
+from service.wire.clicked_pose import ClickedCamera, ClickedPose, Polyline
 from worker.calibration.draw.stitching import outline
 from worker.calibration.scene.camera import Camera, inside
 from worker.calibration.scene.field import Field

@@ -6,17 +6,18 @@ bottom for Nuke and Flame and from the top for Unreal.
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-import OpenEXR
 from numpy.typing import NDArray
 
 from service import lifeline
 from service.formats.archive import archive
-from service.wire.schemas import Camera
+from service.wire.venue import Camera
 from worker.calibration.draw.st_maps import StMap, distorting, undistorting
 from worker.jobs.wire import lens_of
 
@@ -24,6 +25,9 @@ from worker.jobs.wire import lens_of
 def main(origin: str) -> None:
     """Read the camera, write the maps."""
     lifeline.end_with_parent()
+    if find_spec("OpenEXR") is None:
+        print("ST maps need OpenEXR: pip install 'esc-calibration[exr]'", file=sys.stderr)
+        sys.exit(os.EX_UNAVAILABLE)
     camera = Camera.model_validate_json(sys.stdin.buffer.read())
     lens = lens_of(camera.intrinsics, camera.image_size)
     maps = {"undistort": undistorting(lens), "distort": distorting(lens)}
@@ -37,6 +41,9 @@ def _from(origin: str, st: StMap) -> NDArray[np.float32]:
 
 
 def _exr(pixels: NDArray[np.float32]) -> bytes:
+    # Of the extra `exr`.
+    import OpenEXR
+
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "map.exr"
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}

@@ -11,7 +11,8 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.engine import reading
-from service.wire.schemas import OPEN, Moved, Status
+from service.wire.geometry import Moved
+from service.wire.job import OPEN, Status
 
 j = tables.jobs.c
 

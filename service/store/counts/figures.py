@@ -13,7 +13,9 @@ from service.store import tables
 from service.store.counts import tallies
 from service.store.counts.tallies import Key
 from service.store.engine import clock, reading
-from service.wire.schemas import OPEN, Result, Revision
+from service.wire.history import Revision
+from service.wire.job import OPEN
+from service.wire.results import Result
 
 j = tables.jobs.c
 q = tables.venue_quality.c

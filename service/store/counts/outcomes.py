@@ -7,8 +7,9 @@ from datetime import datetime
 from typing import get_args
 
 from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Amounts, total
+from service.wire.job import JobError, Kind, Status
 from service.wire.problems import KINDS, type_of
-from service.wire.schemas import FieldResult, IntrinsicsResult, JobError, Kind, LocateResult, Result, Status
+from service.wire.results import AnyResult, Result
 
 # As in `timings_s` of a result.
 STAGES = ("decode", "segmentation", "evolution", "refinement", "quality", "preview")
@@ -49,7 +50,7 @@ class End:
 
     kind: Kind
     status: Status
-    result: Result | IntrinsicsResult | LocateResult | FieldResult | None
+    result: AnyResult | None
     error: JobError | None
     created_at: datetime
     started_at: datetime | None

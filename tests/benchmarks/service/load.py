@@ -21,7 +21,7 @@ import numpy as np
 
 from service.client import Client
 from service.settings import MODEL_BESIDE_THE_CODE
-from service.wire.schemas import VenueIn
+from service.wire.venue import VenueIn
 from tests.benchmarks.service.poller import POLLERS
 from tests.benchmarks.service.stage import service, spread
 from tests.e2e.running import Service, wait_for

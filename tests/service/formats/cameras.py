@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 
 from service.formats.lens import Shot
-from service.wire.schemas import Camera, Intrinsics, Pose
+from service.wire.geometry import Intrinsics, Pose
+from service.wire.venue import Camera
 
 SIZE = (3072, 1728)
 RADIAL = [-0.3402, 0.1042, 0.0, 0.0, -0.012]

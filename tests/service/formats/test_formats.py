@@ -13,7 +13,7 @@ import pytest
 from service.formats import colmap, freed, opencv, opentrackio, plain, soccernet
 from service.formats.lens import Shot
 from service.wire.problems import Problem
-from service.wire.schemas import Camera
+from service.wire.venue import Camera
 from tests.service.formats.cameras import (
     ALL_OF_OPENCV_8,
     RADIAL,

@@ -1,6 +1,7 @@
 """ST maps, made by their program as the service runs it, read by OpenEXR and followed as a compositor would."""
 
 import io
+import sys
 import zipfile
 
 import cv2
@@ -11,8 +12,9 @@ import pytest
 from service.formats.lens import Shot
 from service.formats.table import formats
 from service.settings import Settings
+from service.wire.geometry import Intrinsics
 from service.wire.problems import Problem
-from service.wire.schemas import Camera, Intrinsics
+from service.wire.venue import Camera
 from tests.service.formats.cameras import ALL_OF_OPENCV_8, RADIAL, WITH_TILT, shot
 
 SIZE = (192, 108)
@@ -41,6 +43,14 @@ def read_maps(shot, form, tmp_path):
             assert not st[..., 2].any()
             maps[name] = st[..., :2].astype(float)
     return maps["undistort.exr"], maps["distort.exr"]
+
+
+def test_without_openexr_it_is_told_what_to_install():
+    program = "import sys; sys.modules['OpenEXR'] = None; from worker.programs.stmap import main; main(sys.argv[1])"
+    settings = Settings(map_program=[sys.executable, "-P", "-c", program])
+    with pytest.raises(Problem, match=r"pip install 'esc-calibration\[exr\]'") as told:
+        formats(settings)["st-map"].document([small([])])
+    assert told.value.kind == "extra-missing"
 
 
 def pixels_of(st):

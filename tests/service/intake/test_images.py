@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from service.intake import images
 from service.settings import Settings
 from service.wire.problems import Problem
-from service.wire.schemas import VENUE_EXAMPLE, VenueIn
+from service.wire.venue import VENUE_EXAMPLE, VenueIn
 
 CAMERA = VenueIn.model_validate(VENUE_EXAMPLE).stored().cameras[0].model_copy(update={"image_size": [48, 32]})
 NOISE = np.random.default_rng(1).integers(0, 255, (32, 48, 3), dtype=np.uint8)

@@ -2,7 +2,7 @@ import pytest
 
 from service.intake.sources import permitted
 from service.settings import Settings
-from service.wire.schemas import without_credentials
+from service.wire.addresses import without_credentials
 
 LAN = ["*.cams.lan", "10.1.0.0/16", "fd00::/8"]
 

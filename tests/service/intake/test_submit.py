@@ -12,7 +12,7 @@ from service.routes import calibrate
 from service.settings import Settings
 from service.store.jobs import Origin
 from service.wire.problems import Problem
-from service.wire.schemas import VenueIn
+from service.wire.venue import VenueIn
 from tests.e2e.running import png, venue
 from tests.homes import files, in_both_homes
 

@@ -1,8 +1,8 @@
 """Alarms of venues: each begins once and is over once, in both homes."""
 
 from service.store.counts.figures import look
-from service.wire.schemas import Alarms as Rules
-from service.wire.schemas import JobError
+from service.wire.health import Alarms as Rules
+from service.wire.job import JobError
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway
 from worker.duties.alarms import Alarms

@@ -8,7 +8,7 @@ import sqlalchemy as sa
 from service.store.counts.figures import look
 from service.store.counts.outcomes import ENDED, ERRORS, STAGES, End
 from service.store.counts.tallies import STAGE, Buckets, add, read
-from service.wire.schemas import JobError
+from service.wire.job import JobError
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock, result
 

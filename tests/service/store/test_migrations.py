@@ -18,7 +18,9 @@ from service.store.jobs import Jobs, Submission
 from service.store.keys import Keys
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.wire.schemas import VENUE_EXAMPLE, Board, IntrinsicsOptions, LocateOptions, Options, Result, VenueIn
+from service.wire.options import Board, IntrinsicsOptions, LocateOptions, Options
+from service.wire.results import Result
+from service.wire.venue import VENUE_EXAMPLE, VenueIn
 from tests.homes import in_both_homes
 
 REVISIONS = [script.revision for script in ScriptDirectory(str(MIGRATIONS)).walk_revisions()]

@@ -4,7 +4,8 @@ import pytest
 
 from service.store.jobs import MovedOn, NoPoses
 from service.store.revisions import NoSuchRevision, RevisionUnfit
-from service.wire.schemas import FieldOfPlay, Intrinsics
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Intrinsics
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway, result
 

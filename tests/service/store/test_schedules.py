@@ -5,8 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from service.store.schedules import Schedules
-from service.wire.schedule import NoSchedule, next_time
-from service.wire.schemas import Schedule
+from service.wire.schedule import NoSchedule, Schedule, next_time
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway
 

@@ -14,7 +14,8 @@ from service.store.ids import new_id
 from service.store.jobs import Jobs
 from service.store.venues import Venues
 from service.store.workers import Workers
-from service.wire.schemas import VENUE_EXAMPLE, Intrinsics, VenueIn
+from service.wire.geometry import Intrinsics
+from service.wire.venue import VENUE_EXAMPLE, VenueIn
 from tests.homes import in_both_homes, on_servers
 from tests.worker.stock import Stock, result
 

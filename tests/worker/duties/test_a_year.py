@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from service.wire import motion
-from service.wire.schemas import Alarms as Rules
-from service.wire.schemas import VenueIn
+from service.store import movement
+from service.wire.health import Alarms as Rules
+from service.wire.venue import VenueIn
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame
 from tests.worker.stock import Stock, anyway
 from worker.calibration.scene.camera import Camera, Intrinsics
@@ -115,7 +115,7 @@ class Year:
         """How far (px) the worst stored camera is from where it really is."""
         now = self.home.venues.get("v")
         pairs = zip(stored(self.truth()).cameras, now.cameras, strict=True)
-        return max(motion.moved(now.field, truth, held).pixels for truth, held in pairs)
+        return max(movement.moved(now.field, truth, held).pixels for truth, held in pairs)
 
     def told(self) -> list[tuple[str, str | None, str]]:
         return [(e.data.rule, e.data.camera, e.type.removeprefix("alarm.")) for e in self.home.alarms_told()]

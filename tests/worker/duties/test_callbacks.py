@@ -12,7 +12,7 @@ import pytest
 import sqlalchemy as sa
 
 from service.settings import Settings
-from service.wire.schemas import Alarms
+from service.wire.health import Alarms
 from tests.homes import in_both_homes
 from tests.worker.receiver import Dripping, Endless, NulSaying, Receiver, Silent
 from tests.worker.stock import Stock, anyway

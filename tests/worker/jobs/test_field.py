@@ -3,7 +3,8 @@
 import pytest
 
 from service.settings import Settings
-from service.wire.schemas import FieldOptions, VenueIn
+from service.wire.options import FieldOptions
+from service.wire.venue import VenueIn
 from worker.jobs.field import solve
 from worker.jobs.wire import Failure
 

@@ -9,12 +9,14 @@ import pytest
 
 from service.settings import Settings
 from service.store.jobs import picture_file
-from service.wire.schemas import Options, VenueIn
+from service.wire.options import Options
+from service.wire.venue import VenueIn
 from tests.worker.stock import Stock
 from worker.calibration import calibrate as engine
 from worker.calibration.finish.diagnosis import Suspicion
 from worker.calibration.judge.quality import Sigma
 from worker.calibration.scene.camera import Pose
+from worker.calibration.see.view import ViewCondition
 from worker.jobs import job, pictures, wire
 from worker.message import Message
 
@@ -61,10 +63,13 @@ def asked(monkeypatch):
                 camera.id,
                 camera.intrinsics,
                 Pose(camera.pose.rotation, camera.pose.position + [0.05, 0, 0]),
+                ViewCondition(True, None, None, "The field can be seen.", None),
                 Sigma(float("inf"), 0.1),
                 Sigma(0.01, 0.02),
                 engine.Movement(0.0, 0.05, float("nan")),
                 0.9,
+                0.95,
+                0.2,
                 None,
             )
             for camera in cameras

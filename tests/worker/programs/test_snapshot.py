@@ -13,7 +13,7 @@ import pytest
 from service.intake.snapshots import Snapshots
 from service.settings import Settings
 from service.wire.problems import Problem
-from service.wire.schemas import VenueIn
+from service.wire.venue import VenueIn
 from tests.e2e.running import venue
 
 SIZE = (64, 48)

@@ -15,6 +15,7 @@ from worker.calibration.scene.camera import Array, Camera, inside, rotation_angl
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.evidence import Evidence
+from worker.calibration.see.view import ViewCondition
 
 TOLERANCE_PX = 3.0
 """How far from its edge a line still counts as explained, in pixels of a 4K frame."""
@@ -33,7 +34,7 @@ class Gate:
 
     least_agreement: float = 0.6
     agreement_loss: float = 0.05
-    largest_residual_px: float = 2.0
+    largest_residual_px: float = 2.8
     residual_floor_px: float = 1.8
     largest_sigma_deg: float = 0.2
     largest_sigma_m: float = 0.5
@@ -88,6 +89,7 @@ class CameraQuality:
     """What the gate looks at, of one camera."""
 
     camera: Camera
+    view: ViewCondition
     iou: float
     evidence: Evidence
     evidence_before: Evidence
@@ -164,11 +166,13 @@ def rejection(
 
 
 def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
+    if not quality.view.usable:
+        return quality.view.words
     moved, seen = quality.moved, quality.evidence
     if seen.agreement < gate.least_agreement:
         return (
-            f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is seen where it should "
-            f"be, at least {gate.least_share(seen):.0%} are needed and {seen.by_chance:.0%} would be seen anywhere; "
+            f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it ought "
+            f"to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen anywhere); "
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
         )
     if quality.residual_px is None or quality.repeatability is None:

@@ -24,6 +24,7 @@ from worker.calibration.calibrate import (
     qualities_of,
     require_markings_in_view,
     segment_all,
+    view_of,
 )
 from worker.calibration.finish.refinement import SEARCH_PX, Refined, Sight, refine
 from worker.calibration.finish.uncertainty import Determined
@@ -127,7 +128,8 @@ def fit_field(
         journey.at("refinement", 0.9)
         by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
         stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
-        qualities = qualities_of(pitch, cameras, refined, sight)
+        views = [view_of(frames[camera.id], pitch, camera) for camera in cameras]
+        qualities = qualities_of(pitch, cameras, refined, sight, views)
         journey.at("refinement", 1.0)
     gate = Gate()
     rejected = (

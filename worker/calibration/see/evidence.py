@@ -24,6 +24,10 @@ BESIDE_PX = 40.0
 """How far to each side chance is given its tries, in pixels of a 4K frame; never less than 24 px."""
 LEAST_BEYOND_CHANCE = 0.3
 """How much more of a marking than by chance has to be found for it to be seen at all, 0..1."""
+LEAST_LENGTH_PX = 15.0
+"""Of a marking, for it to be seen at all: on less, chance is not rare enough."""
+LEAST_ROOM = 0.5
+"""Where chance finds more than the other half, finding the rest says nothing more."""
 MARKING = 0.5
 """Probability from which the network sees a marking."""
 
@@ -56,7 +60,7 @@ class Evidence:
     @property
     def agreement(self) -> float:
         """The share found beyond chance: 1 where all lines are found, 0 where no more than anywhere (Cohen, 1960)."""
-        return (self.share - self.by_chance) / max(1.0 - self.by_chance, 0.05)
+        return (self.share - self.by_chance) / max(1.0 - self.by_chance, LEAST_ROOM)
 
     def of(self, marking: int) -> Evidence:
         """That of one marking."""
@@ -65,9 +69,13 @@ class Evidence:
 
     def seen(self) -> NDArray[np.intp]:
         """The markings that are found clearly more often than chance would: what else fits them is no line."""
-        markings = np.unique(self.marking)
-        beyond = [self.of(marking).share - self.of(marking).by_chance for marking in markings]
-        return np.asarray(markings[np.array(beyond) >= LEAST_BEYOND_CHANCE])
+        return np.array([marking for marking in np.unique(self.marking) if self.of(marking).is_seen], dtype=np.intp)
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether these pieces, of one marking, are more than chance would find."""
+        long_enough = self.weight.sum() >= LEAST_LENGTH_PX
+        return bool(long_enough and self.share - self.by_chance >= LEAST_BEYOND_CHANCE)
 
 
 def _mean(values: Array | NDArray[np.bool_], weight: Array) -> float:

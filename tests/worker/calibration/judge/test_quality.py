@@ -1,6 +1,6 @@
 """Quality without ground truth, and the gate."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
@@ -8,6 +8,8 @@ import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings
 from worker.calibration.judge.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
+from worker.calibration.see.evidence import Evidence
+from worker.calibration.see.view import ViewCondition, ViewFigures
 
 
 @cache
@@ -19,8 +21,30 @@ def scene():
 PAIR = [(scene()[0], scene()[0])]
 
 
+def seen(share: float, by_chance: float = 0.2) -> Evidence:
+    """That much of a hundred pieces of one line."""
+    pieces = np.arange(100)
+    found = pieces < 100 * share
+    return Evidence(pieces, np.zeros(100, int), np.ones(100), found, np.full(100, by_chance))
+
+
+FIGURES = ViewFigures(*[0.5] * len(fields(ViewFigures)))
+IN_VIEW = ViewCondition(True, None, None, "The field can be seen.", FIGURES)
+FOGGED = ViewCondition(False, "fogged", "far half", "Fogged (far half): most likely fog.", FIGURES)
+
+
 def good():
-    return CameraQuality(scene()[0], 0.9, 0.3, 0.2, Sigma(0.5, 0.1), Sigma(0.01, 0.01), Movement(0.5, 0.1, 12.0))
+    return CameraQuality(
+        scene()[0],
+        IN_VIEW,
+        0.9,
+        seen(0.95),
+        seen(0.3),
+        0.2,
+        Sigma(0.5, 0.1),
+        Sigma(0.01, 0.01),
+        Movement(0.5, 0.1, 12.0),
+    )
 
 
 def test_the_true_pose_explains_the_markings():
@@ -64,7 +88,11 @@ def test_a_good_result_passes_the_gate():
 @pytest.mark.parametrize(
     ("change", "cause"),
     [
-        ({"iou": 0.1}, "do not fit this pitch"),
+        (
+            {"evidence": seen(0.4)},
+            "40% of their length is where it ought to be, at least 68% are needed (20% is seen anywhere)",
+        ),
+        ({"view": FOGGED, "evidence": seen(0.1)}, "Fogged (far half)"),
         ({"residual_px": None}, "fewer than 30 points"),
         ({"repeatability": None}, "fewer than 30 points"),
         ({"residual_px": 9.0}, "px from where the pose puts them"),
@@ -72,7 +100,7 @@ def test_a_good_result_passes_the_gate():
         ({"repeatability": Sigma(0.01, 2.0)}, "do not determine"),
         ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
         ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
-        ({"iou_before": 0.99}, "stored pose fits the frame better"),
+        ({"evidence": seen(0.8), "evidence_before": seen(0.95)}, "stored pose fits the frame better"),
     ],
 )
 def test_the_gate_names_the_camera_and_the_cause(change, cause):
@@ -91,7 +119,10 @@ def test_cameras_that_should_overlap_and_cannot_be_compared_do_not_pass():
 
 
 def test_every_bad_camera_is_named():
-    left, right = replace(good(), iou=0.1), replace(good(), camera=replace(scene()[0], id="right"), residual_px=9.0)
+    left, right = (
+        replace(good(), evidence=seen(0.1)),
+        replace(good(), camera=replace(scene()[0], id="right"), residual_px=9.0),
+    )
     reason = rejection([left, right], [], None, Gate())
     assert "camera left: " in reason
     assert "camera right: " in reason

@@ -1,11 +1,11 @@
-"""What the service says a camera moved, against the engine and OpenCV."""
+"""What the service says a camera moved, against the engine."""
 
-import cv2
 import numpy as np
 import pytest
 
-from service.wire import motion
-from service.wire.schemas import FieldOfPlay, Intrinsics, Pose, PosedCamera
+from service.store import movement
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Intrinsics, Pose, PosedCamera
 from worker.calibration.judge.quality import Movement
 from worker.jobs.wire import camera_of, pitch_of
 
@@ -21,31 +21,27 @@ LENSES = {
 }
 
 
-def camera(lens="barrel", turned=(0, 0, 0), by=(0, 0, 0)) -> PosedCamera:
+def camera(lens="barrel", turned=(0, 0, 0), by=(0, 0, 0), skew=0.0) -> PosedCamera:
     rotation, position = np.array([1.675, 0.372, -0.462]) + turned, np.array([-1.48, -49.49, 7.84]) + by
     return PosedCamera(
         id="left",
         image_size=[3072, 1728],
         intrinsics=Intrinsics(
             model="fisheye" if lens == "fisheye" else "opencv",
-            matrix=[[2122.4, 0, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
+            matrix=[[2122.4, skew, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
             distortion=LENSES[lens],
         ),
         pose=Pose.at(rotation.tolist(), position.tolist()),
     )
 
 
+@pytest.mark.parametrize("skew", [0.0, 12.0])
 @pytest.mark.parametrize("lens", LENSES)
-def test_points_of_the_pitch_are_where_opencv_has_them(lens):
-    shot = camera(lens)
-    points = np.array([[x, y, 0.0] for x in (-30, -10, 0) for y in (-20, 0, 30)])
-    pose, (matrix, distortion) = shot.pose, (np.array(shot.intrinsics.matrix), np.array(shot.intrinsics.distortion))
-    project = cv2.fisheye.projectPoints if lens == "fisheye" else cv2.projectPoints
-    arguments = (points[:, None], np.array(pose.rotation), np.array(pose.translation), matrix, distortion)
-    pixels, _ = project(*arguments)
-    projection = motion._Projection(shot)
-    found = [projection.pixel((x, y)) for x, y, _ in points]
-    np.testing.assert_allclose(found, pixels.reshape(-1, 2), atol=1e-6)
+def test_points_of_the_pitch_are_where_the_engine_has_them(lens, skew):
+    shot = camera(lens, skew=skew)
+    points = np.array([[x, y] for x in (-30.0, -10, 0) for y in (-20, 0, 30)])
+    expected = camera_of(shot).project(np.column_stack([points, np.zeros(len(points))]))
+    np.testing.assert_allclose(movement._pixels(shot, points), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("lens", ["none", "barrel", "fisheye"])
@@ -54,7 +50,7 @@ def test_points_of_the_pitch_are_where_opencv_has_them(lens):
 )
 def test_a_movement_is_what_the_engine_calls_one(lens, turned, by):
     before, after = camera(lens), camera(lens, turned, by)
-    told = motion.moved(FIELD, before, after)
+    told = movement.moved(FIELD, before, after)
     expected = Movement.between(pitch_of(FIELD), camera_of(before), camera_of(after))
     assert told.rotation_deg == pytest.approx(expected.rotation_deg, abs=1e-9)
     assert told.position_m == pytest.approx(expected.position_m)
@@ -65,9 +61,9 @@ def test_a_movement_is_what_the_engine_calls_one(lens, turned, by):
 def test_what_cannot_be_compared_in_pixels_is_not():
     there = camera()
     sky = camera(turned=(-1.5, 0, 0))
-    assert motion.moved(FIELD, sky, there).pixels is None
+    assert movement.moved(FIELD, sky, there).pixels is None
     small = there.model_copy(update={"image_size": [1536, 864]})
-    assert motion.moved(FIELD, small, there).pixels is None
+    assert movement.moved(FIELD, small, there).pixels is None
 
 
 def test_a_point_that_a_lens_formula_folds_back_into_the_picture_is_not_in_view():
@@ -75,6 +71,6 @@ def test_a_point_that_a_lens_formula_folds_back_into_the_picture_is_not_in_view(
     shot = camera().model_copy(
         update={"intrinsics": Intrinsics(matrix=camera().intrinsics.matrix, distortion=[-0.34, 0, 0, 0])}
     )
-    projection = motion._Projection(shot)
-    assert projection.pixel((40.0, -49.0)) is None
-    assert projection.pixel((-20.0, 0.0)) is not None
+    beside, before = movement._pixels(shot, np.array([[40.0, -49.0], [-20.0, 0.0]]))
+    assert np.isnan(beside).all()
+    assert np.isfinite(before).all()

@@ -11,10 +11,12 @@ from service.intake.submit import Enqueue, Intake, frame_paths
 from service.store.ids import new_id
 from service.store.jobs import Jobs, Origin, Submission
 from service.store.venues import Venues
-from service.wire.schemas import Job, Options, Venue
+from service.wire.job import Job
+from service.wire.options import Options
+from service.wire.venue import Venue
 
 
-class Unattended:
+class FromSources:
     """Fetches and submits."""
 
     def __init__(self, venues: Venues, jobs: Jobs, snapshots: Snapshots, intake: Intake) -> None:

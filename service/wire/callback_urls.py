@@ -8,6 +8,7 @@ from typing import Any
 import httpx
 
 from service.settings import Settings
+from service.wire.addresses import ip_of
 from service.wire.problems import Problem
 
 # Global unicast (RFC 4291, 2.4); around it are loopback, link-local, site-local, multicast and the IPv4-compatible.
@@ -25,7 +26,7 @@ def check(url: str, settings: Settings) -> None:
         raise _refusal("Give an https address; http needs ESC_CALLBACK_ALLOW_HTTP=true.", got=parsed.scheme)
     if parsed.userinfo:
         raise _refusal("Give it without user name and password; the signature says who calls.")
-    if _is_address(parsed.host) and not settings.callback_allow_private and not is_public(parsed.host):
+    if ip_of(parsed.host) and not settings.callback_allow_private and not is_public(parsed.host):
         raise _refusal("It is not on the public internet; that needs ESC_CALLBACK_ALLOW_PRIVATE=true.", got=parsed.host)
 
 
@@ -38,14 +39,6 @@ def is_public(address: str) -> bool:
             return ip in GLOBAL_V6 and ip.is_global
         ip = inner
     return ip.is_global and not ip.is_multicast
-
-
-def _is_address(host: str) -> bool:
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    return True
 
 
 def _refusal(detail: str, **parts: Any) -> Problem:

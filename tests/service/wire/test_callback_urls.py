@@ -4,22 +4,22 @@ import pytest
 from pydantic import ValidationError
 
 from service.settings import Settings
-from service.wire import callbacks
+from service.wire import callback_urls
+from service.wire.options import Options
 from service.wire.problems import Problem
-from service.wire.schemas import Options
 
 SECRET = "whsec_" + b64encode(bytes(32)).decode()
 
 
 def check(url: str, **settings) -> None:
-    callbacks.check(Options(callback_url=url).callback_url, Settings(**({"webhook_secret": SECRET} | settings)))
+    callback_urls.check(Options(callback_url=url).callback_url, Settings(**({"webhook_secret": SECRET} | settings)))
 
 
 @pytest.mark.parametrize(
     "address", ["8.8.8.8", "2606:4700::1111", "::ffff:8.8.8.8", "64:ff9b::808:808", "2002:808:808::"]
 )
 def test_public_addresses_are(address):
-    assert callbacks.is_public(address)
+    assert callback_urls.is_public(address)
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_public_addresses_are(address):
     ],
 )
 def test_all_others_are_not(address):
-    assert not callbacks.is_public(address)
+    assert not callback_urls.is_public(address)
 
 
 def test_an_https_address_is_taken():

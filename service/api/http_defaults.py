@@ -9,7 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 FOR_BROWSERS = {"X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin"}
 
 
-class Conventions:
+class HttpDefaults:
     """ASGI middleware, around all others."""
 
     def __init__(self, app: ASGIApp) -> None:

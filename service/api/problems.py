@@ -1,0 +1,94 @@
+"""How problems leave: every error of the application becomes the answer that RFC 9457 describes."""
+
+from __future__ import annotations
+
+import json
+
+import structlog
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.routing import iter_route_contexts
+from pydantic import ValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import Response
+from starlette.routing import compile_path
+
+from service.wire.problems import KINDS, MEDIA_TYPE, Problem
+
+log = structlog.get_logger()
+
+
+def answer(problem: Problem) -> Response:
+    """The HTTP answer. Escaped to ASCII: a client's lone surrogates must not break it."""
+    content = json.dumps(problem.members(), ensure_ascii=True).encode("ascii")
+    return Response(content, KINDS[problem.kind].status, problem.headers, MEDIA_TYPE)
+
+
+def invalid(error: ValidationError | RequestValidationError, *inside: str) -> Problem:
+    """What a schema found, each finding with the place it was found at."""
+    findings = [
+        {"where": ".".join(str(step) for step in (*inside, *finding["loc"])), "message": finding["msg"]}
+        for finding in error.errors()
+    ]
+    first = findings[0]
+    return Problem("invalid-request", f"{first['where']}: {first['message']}", errors=findings)
+
+
+def not_json(request: Request) -> Problem:
+    """The same answer wherever a document comes as something else."""
+    got = request.headers.get("content-type", "")[:200]
+    return Problem("not-json", "Send it with Content-Type: application/json.", got=got)
+
+
+def install(app: FastAPI) -> None:
+    """Let every error of `app` leave as a problem."""
+
+    @app.exception_handler(Problem)
+    async def problem(_: Request, error: Problem) -> Response:
+        return answer(error)
+
+    @app.exception_handler(RequestValidationError)
+    async def validation(request: Request, error: RequestValidationError) -> Response:
+        if any(finding["type"] == "json_invalid" for finding in error.errors()):
+            return answer(Problem("malformed-request", "The body is not JSON."))
+        if isinstance(error.body, bytes):
+            return answer(not_json(request))
+        return answer(invalid(error))
+
+    @app.exception_handler(HTTPException)
+    async def http(request: Request, error: HTTPException) -> Response:
+        if error.status_code < 400:
+            return Response(status_code=error.status_code, headers=error.headers)
+        return answer(_from_http(request, error))
+
+    @app.exception_handler(ClientDisconnect)
+    async def gone(_: Request, __: Exception) -> Response:
+        return answer(Problem("malformed-request", "The request broke off."))
+
+    @app.exception_handler(Exception)
+    async def unexpected(_: Request, error: Exception) -> Response:
+        log.error("unexpected error", exc_info=error)
+        return answer(Problem("internal-error", "This is a fault of the service; its log has the details."))
+
+
+def _from_http(request: Request, error: HTTPException) -> Problem:
+    match error.status_code:
+        case 404:
+            return Problem("not-found", f"Nothing is at {request.url.path}; /docs lists what there is.")
+        case 405:
+            allowed = ", ".join(sorted(_methods_at(request)))
+            return Problem("method-not-allowed", f"Here work {allowed}.", headers={"Allow": allowed})
+        case 413:
+            return Problem("body-too-large", str(error.detail), headers=error.headers)
+        case _:
+            return Problem("malformed-request", str(error.detail), headers=error.headers)
+
+
+def _methods_at(request: Request) -> set[str]:
+    """What works at this address; the router itself names the methods of one of its routes."""
+    path = request.scope["path"]
+    routes = iter_route_contexts(request.app.routes)
+    here = [route for route in routes if route.path is not None and compile_path(route.path)[0].match(path)]
+    methods = {method for route in here for method in route.methods or ()}
+    return methods | {"HEAD"} if "GET" in methods else methods

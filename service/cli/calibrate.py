@@ -1,0 +1,88 @@
+"""`esc calibrate`, `snapshot` and `run`: from frames to poses, by a service or without one."""
+
+from __future__ import annotations
+
+import secrets
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.cli.arguments import LOCAL, ApiKey, Frames, OneCamera, OptionsText, Url, checked, files_of, options_of
+from service.cli.local import checked_files, engine_settings, failure_told
+from service.cli.printing import bar, err, followed, gate, say, verdict
+from service.client import Client
+from service.intake.images import PNG_START
+from service.wire.venue import VenueIn
+
+
+def calibrate(
+    venue: Annotated[str, typer.Argument()],
+    frames: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[CAMERA=FILE...]", help="Repeat a camera to fuse its frames. None: from the sources."),
+    ] = None,
+    options: OptionsText = "{}",
+    wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end.")] = False,
+    key: Annotated[str | None, typer.Option("--idempotency-key", help="The same key is the same job.")] = None,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the quality gate, 75 busy.
+
+    Without frames the service fetches them from the sources of the cameras.
+    """
+    files, chosen = files_of(frames or []), options_of(options)
+    with Client(url, api_key) as client:
+        job = client.calibrate(venue, files, chosen.model_dump(mode="json", exclude_unset=True), key)
+        if not wait:
+            say({"job": job.id, "url": client.url_of(job.links["self"])})
+            return
+        job = followed(client, job)
+    say(job)
+    raise typer.Exit(verdict(job))
+
+
+def snapshot(
+    venue: Annotated[str, typer.Argument()],
+    camera: OneCamera = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder.")] = Path(),
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Save what the cameras show now, fetched by the service from their sources; prints CAMERA=FILE for each."""
+    with Client(url, api_key) as client:
+        cameras = [camera] if camera else [one.id for one in client.venue(venue).cameras]
+        output.mkdir(parents=True, exist_ok=True)
+        for one in cameras:
+            frame = client.snapshot(venue, one)
+            file = output / f"{one}.{'png' if frame.startswith(PNG_START) else 'jpg'}"
+            file.write_bytes(frame)
+            print(f"{one}={file}")
+
+
+def run(
+    venue: Annotated[Path, typer.Argument(metavar="VENUE.json", exists=True, dir_okay=False)],
+    frames: Frames,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for result.json and the pictures.")],
+    options: OptionsText = "{}",
+) -> None:
+    """The same calibration without a server. Exit codes as of `calibrate`."""
+    settings, chosen = engine_settings(), options_of(options)
+    if chosen.callback_url is not None:
+        err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")
+    from service.store.jobs import picture_file
+    from worker.jobs import job
+
+    stored = checked(VenueIn, venue.read_text(), str(venue)).stored()
+    if chosen.seed is None:
+        chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
+    files = checked_files(stored, frames, settings)
+    with failure_told(), bar() as show:
+        outcome = job.solve(stored, files, chosen, settings, lambda step: show(step, ""))
+    output.mkdir(parents=True, exist_ok=True)
+    (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
+    for name, picture in outcome.pictures.items():
+        (output / picture_file(name)).write_bytes(picture)
+    say(outcome.result)
+    raise typer.Exit(gate(outcome.result))

@@ -1,0 +1,182 @@
+"""`esc intrinsics`, `pose` and `field fit`: what comes before the first calibration."""
+
+from __future__ import annotations
+
+import json
+import re
+import secrets
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.arguments import LOCAL, ApiKey, Frames, Url, checked, files_of
+from service.cli.local import checked_files, engine_settings, failure_told
+from service.cli.printing import (
+    REJECTED,
+    USAGE,
+    bar,
+    err,
+    fail,
+    followed,
+    say,
+    tell_field,
+    tell_lens,
+    tell_pose,
+    verdict,
+)
+from service.client import Client
+from service.intake import images
+from service.wire.base import ID_PATTERN
+from service.wire.geometry import LensFile, LensModel, PoseIn
+from service.wire.options import ClickedPoints, FieldOptions, IntrinsicsOptions
+from service.wire.results import FieldResult
+from service.wire.venue import CameraIn, Site, Venue, VenueIn
+
+field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue.")
+
+
+def intrinsics(
+    photos: Annotated[list[Path], typer.Argument(metavar="PHOTO...", exists=True, dir_okay=False)],
+    board: Annotated[str, typer.Option("--board", metavar="9x6", help="Inner corners, where four squares meet.")],
+    square: Annotated[float, typer.Option("--square", metavar="METRES", help="Side of a square.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the lens.")],
+    charuco: Annotated[
+        str | None, typer.Option("--charuco", metavar="4X4_50:0.022", help="Dictionary and side of a marker, m.")
+    ] = None,
+    model: Annotated[LensModel, typer.Option("--model", help="Of lens.")] = "opencv",
+    picture: Annotated[Path | None, typer.Option("--picture", help="Where the corners are: .jpg.")] = None,
+) -> None:
+    """The lens of a camera from photos of a board. Exit: 0 found (read the warnings), 1 not, 2 usage."""
+    settings = engine_settings()
+    options = _lens_options(board, square, charuco, model)
+    from worker.jobs import intrinsics
+
+    files = {str(path): path.read_bytes() for path in photos}
+    with failure_told(), bar() as show:
+        for name, data in files.items():
+            images.check_photo(name, data, settings)
+        outcome = intrinsics.solve(files, options, lambda step: show(step, ""))
+    output.write_text(outcome.result.model_dump_json(indent=2) + "\n")
+    if picture is not None:
+        picture.write_bytes(outcome.pictures["coverage"])
+    tell_lens(outcome.result)
+
+
+def pose(
+    site: Annotated[Path, typer.Argument(metavar="SITE.json", exists=True, dir_okay=False, help="Id, name, field.")],
+    points: Annotated[
+        Path, typer.Argument(metavar="POINTS.json", exists=True, dir_okay=False, help="Clicked points by camera.")
+    ],
+    lenses: Annotated[list[str], typer.Argument(metavar="CAMERA=LENS.json...", help="As esc intrinsics writes it.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the venue, for venue put and run.")],
+    frame: Annotated[
+        list[str] | None, typer.Option("--frame", metavar="CAMERA=FILE", help="What the points were clicked in.")
+    ] = None,
+    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+) -> None:
+    """First poses of cameras from clicked points, as a venue. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
+    engine_settings()
+    place = checked(Site, site.read_text(), str(site))
+    clicks = checked(ClickedPoints, points.read_text(), str(points)).root
+    given = {camera: checked(LensFile, path.read_text(), str(path)) for camera, (path, *_) in files_of(lenses).items()}
+    seen = {camera: path.read_bytes() for camera, (path, *_) in files_of(frame or []).items()}
+    for camera in given.keys() - clicks.keys():
+        fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
+    from worker.jobs import locate
+    from worker.jobs.wire import lens_of
+
+    found = {camera.id: camera for camera in place.cameras}
+    results = []
+    for camera, lens in given.items():
+        engine_lens = lens_of(lens.intrinsics, lens.image_size)
+        with failure_told():
+            outcome = locate.locate(camera, place.field, engine_lens, clicks[camera], seen.get(camera), lambda _: None)
+        result = outcome.result
+        results.append(result)
+        tell_pose(result)
+        if pictures is not None:
+            pictures.mkdir(parents=True, exist_ok=True)
+            (pictures / f"points_{camera}.jpg").write_bytes(outcome.pictures["points"])
+        stands = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
+        if result.accepted:
+            found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
+    print(json.dumps([result.model_dump(mode="json") for result in results], indent=2))
+    if not all(result.accepted for result in results):
+        raise typer.Exit(REJECTED)
+    venue = VenueIn(id=place.id, name=place.name, field=place.field, cameras=list(found.values()))
+    output.write_text(venue.model_dump_json(indent=2, exclude_none=True) + "\n")
+
+
+@field_app.command("fit")
+def fit_field(
+    venue: Annotated[str, typer.Argument(metavar="VENUE", help="A venue's file, or the id of one that is stored.")],
+    frames: Frames,
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the venue with its fitted field.")],
+    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Absent: one is chosen.")] = None,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Length, width and ridge of a pitch from frames of its cameras. Exit codes as of `calibrate`.
+
+    A venue's file is fitted here, a stored venue by its service. What is stored stays as it is until `venue put`.
+    """
+    options = FieldOptions(seed=secrets.randbelow(2**31) if seed is None else seed)
+    if Path(venue).is_file():
+        stored, result, drawn = _fit_here(Path(venue), frames, options)
+    else:
+        stored, result, drawn = _fit_there(venue, frames, options, url, api_key)
+    if pictures is not None:
+        pictures.mkdir(parents=True, exist_ok=True)
+        for name, picture in drawn.items():
+            (pictures / f"{name}.jpg").write_bytes(picture)
+    say(result)
+    tell_field(result)
+    if not result.accepted:
+        err.print(f"Rejected: {result.rejected_because}")
+        raise typer.Exit(REJECTED)
+    fitted = stored.with_poses({camera.id: camera.pose for camera in result.cameras})
+    fitted = fitted.model_copy(update={"field": result.field})
+    output.write_text(fitted.sent().model_dump_json(indent=2, exclude_none=True) + "\n")
+
+
+def _fit_here(file: Path, frames: list[str], options: FieldOptions) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    settings = engine_settings()
+    from worker.jobs import field
+
+    stored = checked(VenueIn, file.read_text(), str(file)).stored()
+    files = checked_files(stored, frames, settings)
+    with failure_told(), bar() as show:
+        outcome = field.solve(stored, files, options, settings, lambda step: show(step, ""))
+    return stored, outcome.result, outcome.pictures
+
+
+def _fit_there(
+    venue: str, frames: list[str], options: FieldOptions, url: str, api_key: str | None
+) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    files = files_of(frames)
+    if not re.fullmatch(ID_PATTERN, venue):
+        fail(f"There is no file {venue}, and it is no id of a venue", USAGE)
+    with Client(url, api_key) as client:
+        stored = client.venue(venue)
+        job = client.fit_field(venue, files, options.model_dump(mode="json", exclude_unset=True))
+        job = followed(client, job)
+        if not isinstance(job.result, FieldResult):
+            raise typer.Exit(verdict(job))
+        drawn = {f"overlay_{camera.id}": client.picture(job, f"overlay/{camera.id}") for camera in stored.cameras}
+    return stored, job.result, {name: picture for name, picture in drawn.items() if picture is not None}
+
+
+def _lens_options(board: str, square: float, charuco: str | None, model: LensModel) -> IntrinsicsOptions:
+    counted = re.fullmatch(r"(\d+)[x×](\d+)", board)
+    if counted is None:
+        fail(f"{board!r} is not COLUMNSxROWS, for instance 9x6", USAGE)
+    described: dict[str, Any] = {"columns": int(counted[1]), "rows": int(counted[2]), "square_m": square}
+    if charuco is not None:
+        dictionary, _, marker = charuco.partition(":")
+        try:
+            described["charuco"] = {"dictionary": dictionary, "marker_m": float(marker)}
+        except ValueError:
+            fail(f"{charuco!r} is not DICTIONARY:METRES, for instance 4X4_50:0.022", USAGE)
+    return checked(IntrinsicsOptions, json.dumps({"board": described, "model": model}), "the board")

@@ -1,0 +1,160 @@
+"""What commands print: results and progress, and what went wrong, as lines with an exit code."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+from pydantic import BaseModel
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from service.client import Client
+from service.wire.job import Job
+from service.wire.job import Progress as Step
+from service.wire.results import FieldResult, IntrinsicsResult, LocateResult, Result
+
+ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
+err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+
+
+def say(what: BaseModel | dict[str, str]) -> None:
+    """Print an answer, as JSON."""
+    print(what.model_dump_json(indent=2) if isinstance(what, BaseModel) else json.dumps(what, indent=2))
+
+
+def hand_out(document: bytes, output: Path | None) -> None:
+    """Write a file of another tool's format to where it is wanted."""
+    if output is None:
+        sys.stdout.buffer.write(document)
+    else:
+        output.write_bytes(document)
+
+
+def fail(message: str, code: int) -> NoReturn:
+    """End with a line on standard error."""
+    err.print(message)
+    sys.exit(code)
+
+
+def in_words(headline: str, members: Mapping[str, Any]) -> str:
+    """A problem with the parts of it that say what is wrong."""
+    lines = [headline]
+    lines += [f"  {part}: {json.dumps(members[part])}" for part in ("expected", "got") if part in members]
+    lines += [f"  {finding.get('where')}: {finding.get('message')}" for finding in members.get("errors", [])]
+    return "\n".join(lines)
+
+
+def hint(status: int) -> str:
+    """What to do about an answer that is the same whatever was asked."""
+    match status:
+        case 401:
+            return "\n  Set ESC_API_KEY to a key of this service. On its machine: esc key add NAME --scope calibrate"
+        case 403:
+            return "\n  Set ESC_API_KEY to a key that may. On the machine of the service: esc key list"
+        case _:
+            return ""
+
+
+# How a job ended
+
+
+def verdict(job: Job) -> int:
+    """The exit code for a job that has ended, and a line for whoever looks."""
+    if isinstance(job.result, Result):
+        return gate(job.result)
+    if job.status == "cancelled":
+        err.print(f"Job {job.id} was cancelled before it had a result.")
+    if job.error is not None:
+        err.print(f"{job.error.title}: {job.error.detail}")
+    return FAILED
+
+
+def gate(result: Result) -> int:
+    """The exit code for what a calibration found."""
+    if result.accepted:
+        return ACCEPTED
+    err.print(f"Rejected: {result.rejected_because}")
+    return REJECTED
+
+
+def tell_lens(result: IntrinsicsResult) -> None:
+    """What a person looks at first."""
+    used = sum(photo.fate == "used" for photo in result.photos)
+    err.print(
+        f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px"
+    )
+    (fx, _, cx), (_, fy, cy), _ = result.intrinsics.matrix
+    err.print(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
+    for photo in result.photos:
+        told = {
+            "used": None,
+            "no-board": "shows no board",
+            "wrong-size": "has another size",
+            "hurts": f"hurts: the others foretell it to {photo.left_out_px or 0:.1f} px only; left out",
+        }[photo.fate]
+        for words in (told, "is blurred" if photo.blurred else None):
+            if words:
+                err.print(f"  {photo.name} {words}")
+    for warning in result.warnings:
+        err.print(f"Warning: {warning}")
+
+
+def tell_pose(result: LocateResult) -> None:
+    """Where a camera stands, and which clicks are doubted."""
+    x, y, z = result.pose.position
+    err.print(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
+    for point in result.points:
+        if point.doubted:
+            off = "out of view" if point.residual_px is None else f"{point.residual_px:.0f} px off"
+            why = ""
+            if point.exchanged_with is not None:
+                why = f"; its label and that of {point.exchanged_with} are exchanged"
+            elif point.looks_like is not None:
+                why = f"; it is on {point.looks_like}"
+            err.print(f"  {point.world} is {off}{why}")
+    for warning in result.warnings:
+        err.print(f"  {warning[0].upper()}{warning[1:]}.")
+    if result.rejected_because is not None:
+        err.print(f"  Rejected: {result.rejected_because}")
+
+
+def tell_field(result: FieldResult) -> None:
+    """Each measure of a pitch, or why it cannot be told."""
+    for measure in result.measures:
+        what = measure.name.removesuffix("_m").replace("_", " ")
+        if measure.known:
+            err.print(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m (given {measure.given:.3f})")
+        else:
+            err.print(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
+
+
+# How far a job is
+
+
+def followed(client: Client, job: Job) -> Job:
+    """A job at its end; how far it is, is shown meanwhile."""
+    with bar() as show:
+        return client.follow(job, lambda job: show(job.progress, _waiting(job)))
+
+
+@contextmanager
+def bar() -> Iterator[Callable[[Step | None, str], None]]:
+    """A line that shows how far a calibration is, where somebody looks at the terminal."""
+    columns = (TextColumn("{task.description:<14}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    with Progress(*columns, TimeElapsedColumn(), console=err, disable=not err.is_terminal) as progress:
+        line = progress.add_task("waiting", total=1.0)
+
+        def show(step: Step | None, otherwise: str) -> None:
+            fraction, name = (step.fraction, step.stage) if step else (0.0, otherwise)
+            progress.update(line, completed=fraction, description=name)
+
+        yield show
+
+
+def _waiting(job: Job) -> str:
+    return f"queued, {job.queue_position}." if job.queue_position else "starting"

@@ -1,0 +1,61 @@
+"""`esc up`, `serve` and `worker`: a service, or a part of one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated
+
+import typer
+
+from service.cli.arguments import Data, Host, Port, settings_of
+from service.cli.printing import FAILED, USAGE, fail
+from service.settings import Settings
+
+
+def up(data: Data = None, host: Host = None, port: Port = None) -> None:
+    """API and one worker on this machine, with nothing else beside them."""
+    _serve(settings_of(data=data, host=host, port=port), with_worker=True)
+
+
+def serve(data: Data = None, host: Host = None, port: Port = None) -> None:
+    """The API alone; `esc worker` computes, here or on other machines."""
+    _serve(settings_of(data=data, host=host, port=port), with_worker=False)
+
+
+def worker(
+    data: Data = None, name: Annotated[str | None, typer.Option("--name", help="Unique and stable.")] = None
+) -> None:
+    """A worker alone."""
+    from worker import process
+
+    try:
+        with database_told():
+            process.run(settings_of(data=data, worker_name=name))
+    except process.AlreadyRunning as error:
+        fail(str(error), USAGE)
+
+
+def _serve(settings: Settings, *, with_worker: bool) -> None:
+    from service import serving
+
+    try:
+        with database_told():
+            serving.serve(settings, with_worker=with_worker)
+    except serving.CannotListen as error:
+        fail(str(error), USAGE)
+
+
+@contextmanager
+def database_told() -> Iterator[None]:
+    """What is wrong with the database is a line: it is wrong at the start, or not of this program's making."""
+    import sqlalchemy as sa
+
+    from service.store.engine import UnsupportedDatabase
+
+    try:
+        yield
+    except UnsupportedDatabase as error:
+        fail(str(error), USAGE)
+    except (sa.exc.DBAPIError, OSError) as error:
+        fail(f"The database cannot be used: {getattr(error, 'orig', error)}", FAILED)

@@ -1,0 +1,299 @@
+"""A typed client of the HTTP interface, blocking (`Client`, which `esc` speaks with) and not (`AsyncClient`).
+
+    with Client("http://127.0.0.1:8000", api_key) as client:
+        job = client.follow(client.calibrate("demo", {"left": [path]}, {}), print)
+
+    async with AsyncClient("http://127.0.0.1:8000", api_key) as client:
+        venue = await client.venue("demo")
+
+Both have the same methods. A service that refuses raises `Refused`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from functools import wraps
+from pathlib import Path
+from types import MethodType, TracebackType
+from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
+
+import httpx
+
+from service.wire.base import OPTIONS_PART, FormatName
+from service.wire.health import VenueHealth
+from service.wire.history import History, Revision
+from service.wire.job import Job
+from service.wire.venue import Venue, VenueIn, Venues
+
+# Longer than the longest poll.
+TIMEOUT_S = 75
+# How long a service may be away from somebody who follows a job: a restart, a database that comes back.
+PATIENCE_S = 60.0
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+class Refused(Exception):  # noqa: N818
+    """The service answered with a problem; `members` are its JSON object."""
+
+    def __init__(self, status: int, members: Mapping[str, Any]) -> None:
+        super().__init__(f"{members.get('title', 'Refused')}: {members.get('detail', '')}")
+        self.status = status
+        self.members = members
+
+    @property
+    def busy(self) -> bool:
+        """Whether trying again later can help."""
+        return self.status in (409, 429, 503)
+
+
+class AsyncClient:
+    """One service, by its URL; each call is awaited."""
+
+    def __init__(self, url: str, api_key: str | None = None) -> None:
+        self._http = httpx.AsyncClient(**_connection(url, api_key))
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self._http.aclose()
+
+    def url_of(self, path: str) -> str:
+        """The address of something the service linked to."""
+        return str(self._http.base_url.join(path))
+
+    # Venues
+
+    async def put_venue(self, venue: VenueIn) -> Venue:
+        """Create or replace a venue."""
+        content = venue.model_dump(mode="json", exclude_none=True)
+        return Venue.model_validate_json(await self._ask("PUT", f"/venues/{venue.id}", json=content))
+
+    async def venue(self, venue_id: str) -> Venue:
+        """A venue with its stored poses."""
+        return Venue.model_validate_json(await self._ask("GET", f"/venues/{venue_id}"))
+
+    async def venues(self) -> list[Venue]:
+        """All venues."""
+        page = Venues.model_validate_json(await self._ask("GET", "/venues"))
+        found = page.venues
+        while page.next_cursor is not None:
+            page = Venues.model_validate_json(await self._ask("GET", "/venues", params={"cursor": page.next_cursor}))
+            found += page.venues
+        return found
+
+    async def delete_venue(self, venue_id: str) -> None:
+        """Forget a venue."""
+        await self._ask("DELETE", f"/venues/{venue_id}")
+
+    async def venue_health(self, venue_id: str) -> VenueHealth:
+        """How a venue is doing: its alarms, the drift of its cameras, its schedule."""
+        return VenueHealth.model_validate_json(await self._ask("GET", f"/venues/{venue_id}/health"))
+
+    async def history(self, venue_id: str, most: int | None = None) -> list[Revision]:
+        """Every change of a venue's poses, newest first; `most`: so many of them."""
+        address = f"/venues/{venue_id}/history"
+        page = History.model_validate_json(await self._ask("GET", address))
+        found = page.revisions
+        while page.next_cursor is not None and (most is None or len(found) < most):
+            page = History.model_validate_json(await self._ask("GET", address, params={"cursor": page.next_cursor}))
+            found += page.revisions
+        return found[:most]
+
+    async def restore(self, venue_id: str, revision: int) -> Venue:
+        """Let the poses of a revision hold again."""
+        answer = await self._ask("POST", f"/venues/{venue_id}/restore", json={"revision": revision})
+        return Venue.model_validate_json(answer)
+
+    async def venue_poses(self, venue_id: str, form: FormatName, camera: str | None = None) -> bytes:
+        """The poses that hold now, of one camera or all, as a file of another tool's format."""
+        return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera))
+
+    async def snapshot(self, venue_id: str, camera: str) -> bytes:
+        """What a camera shows now, a JPEG or PNG from its source."""
+        return await self._ask("GET", f"/venues/{venue_id}/cameras/{camera}/snapshot")
+
+    # Jobs
+
+    async def calibrate(
+        self,
+        venue_id: str,
+        files: Mapping[str, Sequence[Path]],
+        options: Mapping[str, Any],
+        idempotency_key: str | None = None,
+    ) -> Job:
+        """Submit frames, or none: then they are fetched. The job may be an older one if the content is the same."""
+        sent = _upload(files, options, idempotency_key)
+        return Job.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
+
+    async def fit_field(
+        self,
+        venue_id: str,
+        files: Mapping[str, Sequence[Path]],
+        options: Mapping[str, Any],
+        idempotency_key: str | None = None,
+    ) -> Job:
+        """Submit frames by which to fit the measures of a venue's pitch; the venue stays as it is."""
+        sent = _upload(files, options, idempotency_key)
+        return Job.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/field/fit", **sent))
+
+    async def job(self, job_id: str, wait_s: float = 0) -> Job:
+        """A job, at its end or after `wait_s`."""
+        params = {"wait": wait_s} if wait_s else {}
+        return Job.model_validate_json(await self._ask("GET", f"/jobs/{job_id}", params=params))
+
+    async def cancel(self, job_id: str) -> Job:
+        """End a job."""
+        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/cancel"))
+
+    async def accept(self, job_id: str) -> Job:
+        """Let the poses that a calibration found hold, whatever the gate said."""
+        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/accept"))
+
+    async def reject(self, job_id: str) -> Job:
+        """Put back what was before the poses of a calibration."""
+        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/reject"))
+
+    async def job_poses(self, job_id: str, form: FormatName, camera: str | None = None) -> bytes:
+        """The poses that a job found, of one camera or all, as a file of another tool's format."""
+        return await self._ask("GET", f"/jobs/{job_id}/poses", params=_wanted(form, camera))
+
+    async def picture(self, of: Job, name: str) -> bytes | None:
+        """A picture by the name of its link; None where the job made no such one."""
+        return await self._ask("GET", of.links[name]) if name in of.links else None
+
+    async def follow(self, followed: Job, show: Callable[[Job], None], every_s: float = 0.5) -> Job:
+        """Wait for the end of a job, showing what it does meanwhile. The service may be away for a minute."""
+        heard = time.monotonic()
+        while followed.open:
+            show(followed)
+            try:
+                followed = await self.job(followed.id, wait_s=every_s)
+                heard = time.monotonic()
+            except (httpx.TransportError, Refused) as error:
+                passing = isinstance(error, httpx.TransportError) or error.busy
+                if not passing or time.monotonic() - heard > PATIENCE_S:
+                    raise
+                await self._pause(every_s)
+        return followed
+
+    # How it travels
+
+    async def _ask(self, method: str, path: str, **more: Any) -> bytes:
+        """The body of an answer, if it is what was asked for; raises `Refused`."""
+        response = await self._send(method, path, **more)
+        if response.is_success:
+            return response.content
+        try:
+            members = response.json()
+        except ValueError:
+            members = {"title": f"HTTP {response.status_code}", "detail": response.text[:500]}
+        raise Refused(response.status_code, members if isinstance(members, dict) else {})
+
+    async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
+        return await self._http.request(method, path, **more)
+
+    async def _pause(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+
+
+class _Blocking(AsyncClient):
+    """The same over a connection that blocks: its coroutines never wait, and so end at their first step."""
+
+    def __init__(self, url: str, api_key: str | None) -> None:
+        self.http = httpx.Client(**_connection(url, api_key))
+
+    async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
+        return self.http.request(method, path, **more)
+
+    async def _pause(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+
+class _Method(Generic[P, T]):
+    """A method of `AsyncClient` as one of `Client`."""
+
+    def __init__(self, method: Callable[Concatenate[AsyncClient, P], Coroutine[Any, Any, T]]) -> None:
+        self._method = method
+
+    def __get__(self, client: Client, owner: type) -> Callable[P, T]:
+        """Bind it."""
+        awaited = MethodType(self._method, client._calls)
+
+        @wraps(awaited)
+        def method(*arguments: P.args, **named: P.kwargs) -> T:
+            try:
+                awaited(*arguments, **named).send(None)
+            except StopIteration as end:
+                result: T = end.value
+                return result
+            raise AssertionError("a blocking connection waited")
+
+        return method
+
+
+class Client:
+    """One service, by its URL; each call waits for its answer."""
+
+    def __init__(self, url: str, api_key: str | None = None) -> None:
+        self._calls = _Blocking(url, api_key)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._calls.http.close()
+
+    def url_of(self, path: str) -> str:
+        """The address of something the service linked to."""
+        return str(self._calls.http.base_url.join(path))
+
+    put_venue = _Method(AsyncClient.put_venue)
+    venue = _Method(AsyncClient.venue)
+    venues = _Method(AsyncClient.venues)
+    delete_venue = _Method(AsyncClient.delete_venue)
+    venue_health = _Method(AsyncClient.venue_health)
+    history = _Method(AsyncClient.history)
+    restore = _Method(AsyncClient.restore)
+    venue_poses = _Method(AsyncClient.venue_poses)
+    snapshot = _Method(AsyncClient.snapshot)
+    calibrate = _Method(AsyncClient.calibrate)
+    fit_field = _Method(AsyncClient.fit_field)
+    job = _Method(AsyncClient.job)
+    cancel = _Method(AsyncClient.cancel)
+    accept = _Method(AsyncClient.accept)
+    reject = _Method(AsyncClient.reject)
+    job_poses = _Method(AsyncClient.job_poses)
+    picture = _Method(AsyncClient.picture)
+    follow = _Method(AsyncClient.follow)
+
+
+def _connection(url: str, api_key: str | None) -> dict[str, Any]:
+    headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
+    return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S}
+
+
+def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:
+    return {"format": form} | ({"camera": camera} if camera else {})
+
+
+def _upload(
+    files: Mapping[str, Sequence[Path]], options: Mapping[str, Any], idempotency_key: str | None
+) -> dict[str, Any]:
+    parts: list[tuple[str, tuple[str, bytes, str]]] = [
+        (camera, (path.name, path.read_bytes(), "application/octet-stream"))
+        for camera, several in files.items()
+        for path in several
+    ]
+    # Never without a part: a form of none is none.
+    if options or not parts:
+        parts.append((OPTIONS_PART, ("options.json", json.dumps(options).encode(), "application/json")))
+    return {"files": parts, "headers": {"Idempotency-Key": idempotency_key} if idempotency_key else {}}

@@ -1,0 +1,112 @@
+"""How far a camera moved: degrees, metres, and pixels of the pitch in its picture.
+
+For history and alarms, which the service writes itself: `quality.Movement` of the engine, on fewer points and a flat
+pitch. Lenses are OpenCV's own, which takes its time to load: import this where a movement is wanted.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fields.shapes import Arc, Line, Shape, Spot
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import LensModel, Moved, PosedCamera
+
+Array = NDArray[np.float64]
+# Of all markings together; as many more as there are markings.
+POINTS = 150
+# How far from the axis a lens is looked at (tangent), and how finely, to find where its formula turns back.
+WIDEST, STEP = 6.0, 0.02
+
+
+def moved(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> Moved:
+    """From one state of a camera to another. `pixels`: None where no marking was in view, or sizes differ."""
+    return Moved(
+        rotation_deg=_turned_deg(_rotation(before), _rotation(after)),
+        position_m=math.dist(before.pose.position, after.pose.position),
+        pixels=_shift_px(field, before, after) if before.image_size == after.image_size else None,
+    )
+
+
+def _turned_deg(before: Array, after: Array) -> float:
+    """The angle between two rotation matrices (3, 3)."""
+    turn = after @ before.T
+    # From the sine as well: the cosine of a small angle says nothing about it.
+    twice_sine = np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    return math.degrees(math.atan2(twice_sine, np.trace(turn) - 1))
+
+
+def _rotation(camera: PosedCamera) -> Array:
+    """World to camera (3, 3)."""
+    return np.asarray(cv2.Rodrigues(np.array(camera.pose.rotation, dtype=float))[0], dtype=float)
+
+
+def _shift_px(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> float | None:
+    """The mean over the markings that were in view."""
+    points = _points(field)
+    was, now = _pixels(before, points), _pixels(after, points)
+    in_view = ((was >= 0) & (was <= np.array(before.image_size) - 1)).all(axis=1) & np.isfinite(now).all(axis=1)
+    return float(np.linalg.norm(now - was, axis=1)[in_view].mean()) if in_view.any() else None
+
+
+def _points(field: FieldOfPlay) -> Array:
+    """Places on the markings of a field (N, 2), evenly along them."""
+    shapes = field.plan.markings(field.size)
+    spacing = sum(shape.length for shape in shapes if not isinstance(shape, Spot)) / POINTS
+    return np.concatenate([_along(shape, spacing) for shape in shapes])
+
+
+def _along(shape: Shape, spacing: float) -> Array:
+    match shape:
+        case Line():
+            pieces = [np.array(piece) for piece in pairwise(shape.points)]
+            return np.concatenate([a + _shares(math.dist(a, b), spacing) * (b - a) for a, b in pieces])
+        case Arc():
+            angle = shape.start + _shares(shape.length, spacing) * (shape.end - shape.start)
+            return shape.centre + shape.radius * np.hstack([np.cos(angle), np.sin(angle)])
+        case Spot():
+            return np.array([shape.centre])
+
+
+def _shares(length: float, spacing: float) -> Array:
+    """The middles of equal pieces of 0..1, (N, 1)."""
+    pieces = max(1, round(length / spacing)) if spacing else 1
+    return ((np.arange(pieces) + 0.5) / pieces)[:, None]
+
+
+def _pixels(camera: PosedCamera, points: Array) -> Array:
+    """Where points of the ground (N, 2) are in the picture; NaN behind the camera and where no lens formula holds."""
+    on_ground = np.column_stack([points, np.zeros(len(points))])
+    seen_from_camera = on_ground @ _rotation(camera).T + camera.pose.translation
+    across, depth = np.hypot(*seen_from_camera.T[:2]), seen_from_camera[:, 2]
+    lens = camera.intrinsics
+    distortion = np.array(lens.distortion or [0.0] * 4)
+    held = (depth > 0) & (across <= _turning_back(lens.model, distortion) * depth)
+    pixels = np.full(points.shape, np.nan)
+    if held.any():
+        matrix = np.array(lens.matrix)
+        pixels[held] = _distorted(lens.model, distortion, seen_from_camera[held]) @ matrix[:2, :2].T + matrix[:2, 2]
+    return pixels
+
+
+def _turning_back(model: LensModel, distortion: Array) -> float:
+    """The distance from the axis (tangent) from which a lens formula takes points back towards the middle."""
+    distances = np.arange(0.0, WIDEST, STEP)
+    rays = np.column_stack([distances, np.zeros_like(distances), np.ones_like(distances)])
+    radial = distortion.copy()
+    if model == "opencv":
+        radial[2:4] = radial[8:] = 0.0
+    growing = np.diff(_distorted(model, radial, rays)[:, 0]) > 0
+    return math.inf if growing.all() else float(distances[np.argmin(growing)])
+
+
+def _distorted(model: LensModel, distortion: Array, rays: Array) -> Array:
+    """Rays (N, 3) to image coordinates (N, 2) for a camera matrix of 1: OpenCV knows no skew."""
+    project = cv2.fisheye.projectPoints if model == "fisheye" else cv2.projectPoints
+    places, _ = project(rays[:, None], np.zeros(3), np.zeros(3), np.eye(3), distortion)
+    return np.asarray(places, dtype=float).reshape(-1, 2)

@@ -1,0 +1,204 @@
+"""The pitch: a sport's template or markings of one's own, its measures and its roof."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    ValidationInfo,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
+
+from fields.shapes import COLOUR_PATTERN, WHITE
+from fields.template import NAMES, Extent, Template, load
+from service.wire.base import Name, Number, Wire
+from service.wire.geometry import Row
+
+Place = Annotated[list[Annotated[Number, Field(ge=-200, le=200)]], Field(min_length=2, max_length=2)]
+Length = Annotated[Number, Field(gt=0, le=400)]
+PaintWidth = Annotated[Number, Field(ge=0.01, le=1)]
+Colour = Annotated[str, StringConstraints(pattern=COLOUR_PATTERN)]
+# Further than this beside the field nothing counts as a marking of it.
+BESIDE_M = 2.0
+
+
+class ArcIn(Wire):
+    """Counter-clockwise, seen from above, around `centre` from `start` to `end`, all on the middle of the paint."""
+
+    centre: Place
+    start: Place
+    end: Place
+
+    @model_validator(mode="after")
+    def _round(self) -> Self:
+        first, last = math.dist(self.centre, self.start), math.dist(self.centre, self.end)
+        if first == 0 or abs(first - last) > 0.01:
+            raise ValueError(f"start is {first:.2f} m from the centre, end {last:.2f} m: one radius is needed")
+        return self
+
+
+class CircleIn(Wire):
+    """A full circle, `radius_m` to the middle of the paint."""
+
+    centre: Place
+    radius_m: Length
+
+
+class SpotIn(Wire):
+    """A disc of paint."""
+
+    centre: Place
+    diameter_m: PaintWidth
+
+
+class MarkingIn(Wire):
+    """One thing painted, exactly one of `line`, `arc`, `circle` and `spot`; places are x, y from the centre, m."""
+
+    name: Annotated[Name, Field(min_length=1)]
+    line: Annotated[list[Place], Field(min_length=2, max_length=200)] | None = None
+    arc: ArcIn | None = None
+    circle: CircleIn | None = None
+    spot: SpotIn | None = None
+    width_m: PaintWidth | None = Field(None, description="Of the paint; absent: the field's `line_width_m`.")
+    colour: Colour = Field(
+        WHITE,
+        description="Of the paint: white, yellow, black, blue, red, green, orange or `#rrggbb`.",
+        examples=["yellow", "#0a5fa8"],
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        if sum(shape is not None for shape in (self.line, self.arc, self.circle, self.spot)) != 1:
+            raise ValueError(f"marking {self.name} must be exactly one of line, arc, circle and spot")
+        if self.line and any(a == b for a, b in pairwise(self.line)):
+            raise ValueError(f"marking {self.name} has the same point twice in a row")
+        return self
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """As `fields.template` reads it."""
+        entry: dict[str, Any] = {"name": self.name, "colour": self.colour}
+        entry |= {} if self.width_m is None else {"width": self.width_m}
+        if self.circle:
+            return entry | {"circle": {"centre": self.circle.centre, "radius": self.circle.radius_m}}
+        if self.spot:
+            return entry | {"spot": {"centre": self.spot.centre, "diameter": self.spot.diameter_m}}
+        return entry | ({"arc": self.arc.model_dump()} if self.arc else {"line": self.line})
+
+
+class Layout(Wire):
+    """Markings of one's own in place of a template's name, and names for points of them."""
+
+    markings: Annotated[list[MarkingIn], Field(min_length=1, max_length=500)]
+    points: Annotated[dict[Annotated[Name, Field(min_length=1)], Place], Field(max_length=1000)] = Field({})
+
+
+def _is_a_template(name: str) -> str:
+    if name not in NAMES:
+        raise ValueError(f"{name} is none of the templates {', '.join(NAMES)}, nor markings of your own")
+    return name
+
+
+TemplateName = Annotated[str, AfterValidator(_is_a_template), WithJsonSchema({"type": "string", "enum": list(NAMES)})]
+# Of a field, and what a template calls them.
+USUAL = {"length_m": "length", "width_m": "width", "line_width_m": "line"}
+
+
+def _usual_need_not_be_given(schema: dict[str, Any]) -> None:
+    schema["required"] = [name for name in schema["required"] if name not in USUAL]
+
+
+class FieldOfPlay(Wire):
+    """The pitch. `ridge`: the two ends of the roof's ridge (same y, same z), absent or null = flat."""
+
+    model_config = ConfigDict(json_schema_extra=_usual_need_not_be_given)
+
+    template: Annotated[
+        Annotated[TemplateName, Tag("name")] | Annotated[Layout, Tag("layout")],
+        Discriminator(lambda given: "name" if isinstance(given, str) else "layout"),
+    ] = Field("football", description="The name of a sport's template, or markings of your own.")
+    length_m: Length = Field(description="Along x; absent: the template's.")
+    width_m: Length = Field(description="Along y; absent: the template's.")
+    line_width_m: PaintWidth = Field(description="Absent: the template's.")
+    measures_m: dict[str, Number] = Field({}, description="What else a template leaves open, by name.")
+    ridge: Annotated[list[Row], Field(min_length=2, max_length=2)] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_usual(cls, given: Any) -> Any:
+        template = given.get("template", "football") if isinstance(given, dict) else None
+        if not isinstance(template, str) or template not in NAMES:
+            return given
+        return {name: load(template).size[measure].default for name, measure in USUAL.items()} | given
+
+    @field_validator(*USUAL)
+    @classmethod
+    def _as_the_sport_has_it(cls, given: float, info: ValidationInfo) -> float:
+        template = info.data.get("template")
+        if isinstance(template, str) and info.field_name:
+            _must_lie(given, load(template).size[USUAL[info.field_name]], template)
+        return given
+
+    @field_validator("measures_m")
+    @classmethod
+    def _are_left_open(cls, given: dict[str, float], info: ValidationInfo) -> dict[str, float]:
+        template = info.data.get("template")
+        extents = load(template).size if isinstance(template, str) else {}
+        others = {name: extent for name, extent in extents.items() if name not in USUAL.values()}
+        for name, measure in given.items():
+            if name not in others:
+                raise ValueError(f"{name} is not among what the template leaves open: {', '.join(others) or 'nothing'}")
+            _must_lie(measure, others[name], f"{template}, {name}")
+        return given
+
+    @model_validator(mode="after")
+    def _a_field(self) -> Self:
+        for shape in self.plan.markings(self.size):
+            x, y = shape.reach
+            if x > self.length_m / 2 + BESIDE_M or y > self.width_m / 2 + BESIDE_M:
+                raise ValueError(
+                    f"{shape.name} leaves the {self.length_m:g} x {self.width_m:g} m of the field, "
+                    "whose centre is the origin"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _a_roof(self) -> Self:
+        if self.ridge is None:
+            return self
+        (x1, y1, z1), (x2, y2, z2) = self.ridge
+        if y1 != y2 or z1 != z2:
+            raise ValueError("both ends of the ridge need the same y and the same z")
+        if max(abs(x1), abs(x2)) >= self.length_m / 2 or abs(y1) >= self.width_m / 2:
+            raise ValueError("the ridge must lie inside the pitch")
+        if not 0 <= z1 <= 3:
+            raise ValueError("the ridge must be 0 to 3 m high")
+        return self
+
+    @property
+    def plan(self) -> Template:
+        """Markings and named points."""
+        if isinstance(self.template, str):
+            return load(self.template)
+        entries = [marking.entry for marking in self.template.markings]
+        return Template(marking=entries, points=self.template.points)
+
+    @property
+    def size(self) -> dict[str, float]:
+        """What the plan is drawn by."""
+        return {"length": self.length_m, "width": self.width_m, "line": self.line_width_m, **self.measures_m}
+
+
+def _must_lie(given: float, extent: Extent, what: str) -> None:
+    if not extent.least <= given <= extent.most:
+        raise ValueError(f"{what}: {extent.least:g} to {extent.most:g} m, not {given:g}")

@@ -1,0 +1,158 @@
+"""Poses, lenses and how far a camera moved.
+
+World: right-handed, metres, origin at the pitch centre on z = 0, x along the touchline, y across the pitch, z up.
+Cameras are OpenCV's: x right, y down, z forward, pixel centres at integers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, Field, model_validator
+
+from service.wire.base import OPTIONS_PART, Id, Number, Whole, Wire
+
+LensModel = Literal["opencv", "fisheye"]
+DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
+LARGEST_SIDE = 16384
+# A position and a translation that are less apart say the same: more is not lost by writing them down.
+AGREEING_M = 1e-6
+Metres = Annotated[Number, Field(ge=-2000, le=2000)]
+Radians = Annotated[Number, Field(ge=-10, le=10)]
+Position = Annotated[list[Metres], Field(min_length=3, max_length=3)]
+Rotation = Annotated[list[Radians], Field(min_length=3, max_length=3)]
+Row = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Side = Annotated[Whole, Field(ge=32, le=LARGEST_SIDE)]
+
+
+class PoseIn(Wire):
+    """Where a camera stands and looks: `rotation` with `position`, `translation`, or both where they agree."""
+
+    rotation: Rotation = Field(description="Rodrigues vector, rad, world to camera.")
+    position: Position | None = Field(None, description="Camera centre in the world, m.")
+    translation: Position | None = Field(None, description="OpenCV's tvec = -R·position, m.")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if self.position is None and self.translation is None:
+            raise ValueError("give position or translation")
+        if self.position is not None and self.translation is not None:
+            apart = math.dist(Pose.at(self.rotation, self.position).translation, self.translation)
+            if apart > AGREEING_M:
+                raise ValueError(
+                    f"translation is {apart:.3g} m from -R·position: leave out the one that is not meant to hold"
+                )
+        return self
+
+
+class Pose(Wire):
+    """Where a camera stands and looks, in both conventions."""
+
+    rotation: list[float] = Field(description="Rodrigues vector, rad, world to camera.")
+    position: list[float] = Field(description="Camera centre in the world, m.")
+    translation: list[float] = Field(description="OpenCV's tvec = -R·position, m.")
+
+    @classmethod
+    def at(cls, rotation: list[float], position: list[float]) -> Pose:
+        """From rotation vector and camera centre."""
+        translation = [-component for component in rotated(rotation, position)]
+        return cls(rotation=rotation, position=position, translation=translation)
+
+    @classmethod
+    def of(cls, pose: PoseIn) -> Pose:
+        """From a pose as it was sent, which stays to the last digit what it was when it was read."""
+        if pose.translation is None:
+            assert pose.position is not None
+            return cls.at(pose.rotation, pose.position)
+        backwards = rotated([-component for component in pose.rotation], pose.translation)
+        position = pose.position or [-component for component in backwards]
+        return cls(rotation=pose.rotation, position=position, translation=pose.translation)
+
+
+def rotated(rotation: list[float], vector: list[float]) -> list[float]:
+    """A vector turned by a Rodrigues vector (rad): Rodrigues' formula."""
+    angle = math.hypot(*rotation)
+    if angle == 0.0:
+        return list(vector)
+    ax, ay, az = (component / angle for component in rotation)
+    x, y, z = vector
+    cos, sin = math.cos(angle), math.sin(angle)
+    along = (ax * x + ay * y + az * z) * (1 - cos)
+    return [
+        x * cos + (ay * z - az * y) * sin + ax * along,
+        y * cos + (az * x - ax * z) * sin + ay * along,
+        z * cos + (ax * y - ay * x) * sin + az * along,
+    ]
+
+
+class Intrinsics(Wire):
+    """The lens: OpenCV's camera matrix in pixels and its distortion coefficients in OpenCV's order."""
+
+    model: LensModel = Field("opencv", description="`fisheye`: OpenCV's fisheye module (Kannala-Brandt).")
+    matrix: Annotated[list[Row], Field(min_length=3, max_length=3)]
+    distortion: Annotated[list[Annotated[Number, Field(ge=-1000, le=1000)]], Field(max_length=14)] = Field(
+        description="0, 4, 5, 8, 12 or 14 numbers; of a fisheye 0 or 4."
+    )
+
+    @model_validator(mode="after")
+    def _a_lens(self) -> Self:
+        (fx, _, _), (lower, fy, _), last = self.matrix
+        if lower != 0 or last != [0, 0, 1]:
+            raise ValueError("matrix must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]")
+        if fx <= 0 or fy <= 0:
+            raise ValueError("focal lengths must be above 0 pixels")
+        if len(self.distortion) not in DISTORTION_LENGTHS[self.model]:
+            *most, last_length = DISTORTION_LENGTHS[self.model]
+            expected = f"{', '.join(map(str, most))} or {last_length}"
+            raise ValueError(f"distortion must have {expected} numbers with the model {self.model}")
+        return self
+
+
+class UnposedCamera(Wire):
+    """What a camera is, but for its pose."""
+
+    id: Id
+    image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] = Field(description="Width, height in pixels.")
+    intrinsics: Intrinsics
+
+    @model_validator(mode="after")
+    def _plausible(self) -> Self:
+        if self.id == OPTIONS_PART:
+            raise ValueError("a camera cannot be called 'options': that is a part of the upload")
+        (fx, _, cx), (_, fy, cy), _ = self.intrinsics.matrix
+        width, height = self.image_size
+        for focal, centre, size in ((fx, cx, width), (fy, cy, height)):
+            # From wider than any fisheye to longer than any broadcast lens; a matrix of another resolution shows here.
+            if not 0.1 * size <= focal <= 200 * size or not -size <= centre <= 2 * size:
+                raise ValueError(f"the camera matrix does not belong to an image of {width}x{height} pixels")
+        return self
+
+
+class PosedCamera(UnposedCamera):
+    """A camera as it stands: its lens, and where it is and looks."""
+
+    pose: Pose
+
+
+class LensFile(BaseModel):
+    """The part of the file of a lens, as `esc intrinsics` writes it, that a camera needs."""
+
+    image_size: Annotated[list[Side], Field(min_length=2, max_length=2)]
+    intrinsics: Intrinsics
+
+
+class Moved(Wire):
+    """From the stored pose to the new one; `pixels`: mean shift of the visible pitch."""
+
+    rotation_deg: float
+    position_m: float
+    pixels: float | None
+
+
+class Movement(Wire):
+    """How a camera stands against others of its states; null: there was none, or it is not known."""
+
+    moved: Moved | None = Field(description="Since the revision before.")
+    drift: Moved | None = Field(description="Since the revision `drift_since`.")
+    drift_since: int = Field(description="The last revision in which the camera was put where it is: the first pose.")

@@ -1,0 +1,117 @@
+"""A job: its state, how far it is, and what is told of its end."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import ConfigDict, Field
+
+from service.wire.base import Wire
+from service.wire.results import AnyResult
+
+
+class Progress(Wire):
+    """How far a running job has come: `fraction` 0..1 of the whole."""
+
+    stage: Literal["segmentation", "evolution", "refinement", "preview", "detection", "fit"]
+    fraction: float = Field(ge=0, le=1)
+    generation: int | None = None
+    loss: float | None = None
+
+
+class JobError(Wire):
+    """Why a job failed: the members of a problem (RFC 9457)."""
+
+    type: str
+    title: str
+    detail: str
+    camera: str | None = None
+
+
+class CallbackState(Wire):
+    """How far the telling of a job's end has come, once it has ended; `callback_url` in the options asked for it."""
+
+    state: Literal["waiting", "delivered", "given-up"]
+    attempts: int = Field(description="Begun so far.")
+    last_error: str | None = Field(description="Why the last attempt that failed did.")
+    next_attempt_at: datetime | None = Field(description="Null unless waiting.")
+
+
+Kind = Literal["calibration", "intrinsics", "locate", "field"]
+Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]
+OPEN: tuple[Status, ...] = ("queued", "running")
+
+
+class Job(Wire):
+    """What a worker computes: its state, how far it is, and in the end its result, of its kind, or its error."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "id": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D",
+                    "kind": "calibration",
+                    "venue": "tsukuba",
+                    "status": "running",
+                    "progress": {"stage": "evolution", "fraction": 0.42, "generation": 37, "loss": 0.31},
+                    "queue_position": None,
+                    "attempt": 1,
+                    "created_at": "2026-11-21T10:00:00Z",
+                    "started_at": "2026-11-21T10:00:01Z",
+                    "finished_at": None,
+                    "error": None,
+                    "result": None,
+                    "callback": None,
+                    "venue_revision": None,
+                    "links": {"self": "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"},
+                }
+            ]
+        }
+    )
+
+    id: str
+    kind: Kind = "calibration"
+    venue: str | None = Field(description="Null for the intrinsics of a lens, which belong to no venue.")
+    status: Status
+    progress: Progress | None
+    queue_position: int | None = Field(description="1 = next; null unless queued.")
+    attempt: int = Field(description="How often the job was begun; above 1 after a crash of its worker.")
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    error: JobError | None
+    result: AnyResult | None
+    callback: CallbackState | None = Field(
+        None, description="Null before the end, without `callback_url`, and in what a `callback_url` gets."
+    )
+    venue_revision: int | None = Field(
+        None, description="The revision of the venue that its poses became, by themselves or by hand; null: none."
+    )
+    links: dict[str, str]
+
+    @property
+    def open(self) -> bool:
+        """Whether anything can still change."""
+        return self.status in OPEN
+
+
+class JobEvent(Wire):
+    """What a `callback_url` gets, at least once: a job has ended. Its id is the `webhook-id` of every attempt."""
+
+    type: Literal["job.succeeded", "job.failed", "job.cancelled"]
+    timestamp: datetime = Field(description="When the job ended.")
+    data: Job
+
+    @classmethod
+    def of(cls, job: Job) -> JobEvent:
+        """The event of an ended job."""
+        told = job.model_copy(update={"callback": None})
+        return cls.model_validate({"type": f"job.{job.status}", "timestamp": job.finished_at, "data": told})
+
+
+class Jobs(Wire):
+    """A page of jobs, newest first. `next_cursor`: null on the last page."""
+
+    jobs: list[Job]
+    next_cursor: str | None = None

@@ -1,0 +1,224 @@
+"""What each kind of job finds, and what it is worth."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from service.wire.base import Id, Wire
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Intrinsics, Moved, Pose, Row
+from service.wire.options import Coordinates, Landmark
+
+
+class Sigma(Wire):
+    """One standard deviation of a pose."""
+
+    rotation_deg: float
+    position_m: float
+
+
+class View(Wire):
+    """Whether a camera's frame could be used, and what is wrong with it if not."""
+
+    usable: bool
+    cause: Literal["dark", "fogged", "blinded", "snow", "out-of-focus", "blocked"] | None = None
+    where: str | None = Field(None, description="Which part of the visible field.")
+    detail: str
+
+
+class CameraResult(Wire):
+    """One camera's answer."""
+
+    id: Id
+    pose: Pose
+    intrinsics: Intrinsics | None = Field(None, description="With fit_focal_length: those the pose belongs to.")
+    sigma: Sigma | None
+    repeatability: Sigma | None = Field(
+        None, description="The part of sigma that the lens and the field, the same the next time, have no part in."
+    )
+    moved: Moved
+    iou: float | None
+    found: float | None = Field(
+        None, description="Share 0..1 of the visible markings' length that is seen where the pose puts it."
+    )
+    by_chance: float | None = Field(None, description="Share 0..1 of that length that would be seen anywhere.")
+    residual_px: float | None
+    view: View | None = None
+
+
+class Provenance(Wire):
+    """What it takes to compute the same numbers again."""
+
+    software: str
+    model_sha256: str
+    seed: int
+    options: dict[str, Any]
+
+
+class Suspicion(Wire):
+    """A number of a camera's lens, or of the field (camera null), that the lines contradict.
+
+    It seems to be larger than the venue says by `deviation` ± `sigma`, in the unit that `quantity` ends on.
+    """
+
+    camera: Id | None
+    quantity: str
+    deviation: float
+    sigma: float
+    detail: str
+
+
+class Result(Wire):
+    """Poses and what they are worth. Stitch errors: 1 px is 10 cm on the pitch; one camera has none."""
+
+    accepted: bool
+    rejected_because: str | None
+    cameras: list[CameraResult]
+    ridge: list[Row] | None = Field(None, description="With fit_ridge: as it was found.")
+    diagnosis: list[Suspicion] = Field([], description="What the lines say is wrong with what the venue says.")
+    stitch_error_px: float | None
+    stitch_error_before_px: float | None
+    stitch_error_limit_px: float | None = Field(None, description="What the gate lets pass at most.")
+    loss: float | None
+    generations: int
+    timings_s: dict[str, float]
+    provenance: Provenance
+
+
+class PhotoResult(Wire):
+    """What became of a photo. `left_out_px`: how well a lens that was fitted without it foretells its corners (rms)."""
+
+    name: str
+    fate: Literal["used", "no-board", "wrong-size", "hurts"]
+    rms_px: float | None
+    left_out_px: float | None
+    blurred: bool
+
+
+class CoverageResult(Wire):
+    """How much of the picture the board reached; `empty`: the ninths of it without any corner."""
+
+    share: float
+    empty: list[str]
+
+
+class LensTrial(Wire):
+    """A lens that was tried, by its free numbers; rms of the photos it was fitted to and of those it was not."""
+
+    terms: list[str]
+    rms_px: float
+    left_out_px: float
+
+
+class IntrinsicsResult(Wire):
+    """A lens from photos of a board, and what it is worth.
+
+    `sigma`: one standard deviation of each number if every corner were an independent witness; `spread`: by leaving
+    out photos, which is nearer to the truth. `warnings` say what to photograph next.
+    """
+
+    image_size: list[int]
+    intrinsics: Intrinsics
+    terms: list[str]
+    rms_px: float
+    left_out_px: float
+    sigma: dict[str, float]
+    spread: dict[str, float]
+    coverage: CoverageResult
+    photos: list[PhotoResult]
+    trials: list[LensTrial]
+    warnings: list[str]
+    timings_s: dict[str, float]
+    software: str
+
+
+class PointResult(Wire):
+    """What became of a click. `exchanged_with`: the point whose label explains it, and it theirs.
+
+    `looks_like`: the named point it is on instead. `residual_px`: null where the camera cannot see its point.
+    """
+
+    world: Landmark | Coordinates
+    residual_px: float | None
+    doubted: bool
+    exchanged_with: Landmark | Coordinates | None
+    looks_like: str | None
+
+
+class LensGain(Wire):
+    """Numbers of the lens that were fitted to the points because the one given does not fit them.
+
+    `left_out_px`: rms of points, each where a fit to the others puts it. `evidence`: the gain in BIC; 10 is strong.
+    """
+
+    given: Intrinsics
+    free: list[str]
+    sigma: dict[str, float]
+    rms_before_px: float
+    rms_px: float
+    left_out_before_px: float
+    left_out_px: float
+    evidence: float
+
+
+class LocateSigma(Wire):
+    """One standard deviation of a first pose; `pixels`: of where it puts the clicked points."""
+
+    rotation_deg: float
+    position_m: float
+    pixels: float
+
+
+class LocateResult(Wire):
+    """A first pose. `accepted`: a calibration can begin with it; `intrinsics` are those that it holds with."""
+
+    accepted: bool
+    rejected_because: str | None
+    camera: Id
+    image_size: list[int]
+    intrinsics: Intrinsics
+    pose: Pose
+    rms_px: float
+    sigma: LocateSigma
+    points: list[PointResult]
+    lens: LensGain | None
+    warnings: list[str]
+    timings_s: dict[str, float]
+    software: str
+
+
+class MeasureResult(Wire):
+    """A measure of the pitch, metres: as the venue has it (`given`) and as the lines have it (`value` ± `sigma`).
+
+    `open`: one standard deviation of what it might have been before. `known`: whether the lines tell it; if not,
+    `detail` says why, and the fitted field keeps what was given.
+    """
+
+    name: Literal["length_m", "width_m", "ridge_height_m", "ridge_length_m"]
+    given: float
+    value: float
+    sigma: float
+    open: float
+    known: bool
+    detail: str
+
+
+class FieldResult(Wire):
+    """A pitch with the measures that its lines tell, and the cameras as they stand around it.
+
+    `accepted`: it may replace the one that the venue has; nothing is replaced by itself.
+    """
+
+    accepted: bool
+    rejected_because: str | None
+    field: FieldOfPlay
+    measures: list[MeasureResult]
+    cameras: list[CameraResult]
+    stitch_error_px: float | None
+    timings_s: dict[str, float]
+    provenance: Provenance
+
+
+AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult

@@ -1,0 +1,173 @@
+"""A venue as it is sent and as it is kept: a pitch and the cameras around it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from service.wire.addresses import HIDDEN, SourceUrl, without_credentials
+from service.wire.base import Id, Name, Wire
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import Pose, PosedCamera, PoseIn, UnposedCamera
+from service.wire.health import Alarms
+from service.wire.schedule import Schedule
+
+
+class CameraIn(UnposedCamera):
+    """A camera of a venue as it is sent."""
+
+    pose: PoseIn
+    source: SourceUrl | None = Field(
+        None,
+        description="Where its frames can be fetched: the address of a JPEG or PNG, or an RTSP stream. User and "
+        f"password are not shown again: `{HIDDEN}@` stands for them, and sent back keeps them.",
+        examples=["http://user:password@10.1.0.7/snapshot.jpg"],
+    )
+
+    @model_validator(mode="after")
+    def _above_the_pitch(self) -> Self:
+        height = Pose.of(self.pose).position[2]
+        if height <= 0:
+            raise ValueError(
+                f"camera {self.id} stands at z = {height:.6g} m: z points up, and a camera must be above the pitch"
+            )
+        return self
+
+
+class Camera(PosedCamera):
+    """A camera of a venue with its stored pose."""
+
+    source: str | None = Field(None, description="Where its frames can be fetched.")
+
+    @property
+    def posed(self) -> PosedCamera:
+        """What a calibration says of it, and nothing else."""
+        return PosedCamera(id=self.id, image_size=self.image_size, intrinsics=self.intrinsics, pose=self.pose)
+
+
+VENUE_EXAMPLE: dict[str, Any] = {
+    "id": "tsukuba",
+    "name": "University pitch",
+    "field": {
+        "template": "football",
+        "length_m": 105.0,
+        "width_m": 68.0,
+        "line_width_m": 0.12,
+        "ridge": [[-18.5, 0.0, 0.2367], [18.5, 0.0, 0.2367]],
+    },
+    "cameras": [
+        {
+            "id": "left",
+            "image_size": [3072, 1728],
+            "intrinsics": {
+                "matrix": [[2122.4, 0, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
+                "distortion": [-0.3402, 0.1042, 0, 0, 0],
+            },
+            "pose": {"rotation": [1.675, 0.372, -0.462], "position": [-1.48, -49.49, 7.84]},
+        }
+    ],
+}
+
+
+class _Place(Wire):
+    id: Id
+    name: Name = ""
+    field: FieldOfPlay
+
+
+class Site(_Place):
+    """The file of a venue before its cameras have poses: the pitch, and the cameras that are known."""
+
+    cameras: list[CameraIn] = Field([])
+
+
+class VenueIn(_Place):
+    """A venue as it is sent."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
+
+    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
+    alarms: Alarms | None = None
+    schedule: Schedule | None = None
+
+    @model_validator(mode="after")
+    def _can_be_fetched(self) -> Self:
+        blind = [camera.id for camera in self.cameras if camera.source is None]
+        if self.schedule is not None and blind:
+            raise ValueError(f"a schedule needs a source of every camera, and {', '.join(blind)} has none")
+        return self
+
+    @model_validator(mode="after")
+    def _cameras_differ(self) -> Self:
+        ids = [camera.id for camera in self.cameras]
+        if len(set(ids)) < len(ids):
+            raise ValueError("two cameras have the same id")
+        return self
+
+    @property
+    def credentials(self) -> dict[str, str | None]:
+        """User and password of each camera's source, as they were sent."""
+        return {c.id: without_credentials(c.source)[1] for c in self.cameras if c.source is not None}
+
+    def stored(self) -> Venue:
+        """The venue with poses in both conventions."""
+        cameras = [
+            Camera(
+                id=c.id,
+                image_size=c.image_size,
+                intrinsics=c.intrinsics,
+                pose=Pose.of(c.pose),
+                source=None if c.source is None else without_credentials(c.source)[0],
+            )
+            for c in self.cameras
+        ]
+        given = {"alarms": self.alarms, "schedule": self.schedule}
+        return Venue(id=self.id, name=self.name, field=self.field, cameras=cameras, **given)
+
+
+class Venue(_Place):
+    """A venue with the poses that hold now."""
+
+    cameras: list[Camera]
+    alarms: Alarms | None = None
+    schedule: Schedule | None = None
+
+    @property
+    def poses(self) -> dict[str, Pose]:
+        """Where each camera stands and looks, by its id."""
+        return {camera.id: camera.pose for camera in self.cameras}
+
+    @property
+    def posed(self) -> list[PosedCamera]:
+        """What calibrations say of the cameras, and nothing else."""
+        return [camera.posed for camera in self.cameras]
+
+    def with_poses(self, poses: dict[str, Pose]) -> Venue:
+        """The same venue, cameras moved."""
+        cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
+        return self.model_copy(update={"cameras": cameras})
+
+    def sent(self) -> VenueIn:
+        """The venue as one sends it."""
+        once = {"cameras": {"__all__": {"pose": {"translation"}}}}
+        return VenueIn.model_validate(self.model_dump(exclude=once))
+
+    def stands_like(self, other: Venue) -> bool:
+        """Whether the cameras of both are the same and stand alike, with the ridge that their poses belong to."""
+        return self.posed == other.posed and self.field.ridge == other.field.ridge
+
+    def calibrates_like(self, other: Venue) -> bool:
+        """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
+        return self.field == other.field and self.posed == other.posed
+
+    def films_like(self, other: Venue) -> bool:
+        """Whether frames of the one are frames of the other: same pitch and lenses, wherever the cameras stand."""
+        return self.calibrates_like(other.with_poses(self.poses))
+
+
+class Venues(Wire):
+    """A page of venues, by id. `next_cursor`: null on the last page."""
+
+    venues: list[Venue]
+    next_cursor: str | None = None

@@ -1,0 +1,39 @@
+import pytest
+from pydantic import ValidationError
+
+from service.wire.geometry import Pose
+from service.wire.venue import VENUE_EXAMPLE, VenueIn
+
+
+def test_the_documented_venue_is_one():
+    assert VenueIn.model_validate(VENUE_EXAMPLE).stored().cameras[0].id == "left"
+
+
+@pytest.mark.parametrize("length", [0, 4, 5, 8, 12, 14])
+def test_the_distortions_of_opencv_are_taken(length):
+    document = VENUE_EXAMPLE | {"cameras": [dict(VENUE_EXAMPLE["cameras"][0])]}
+    matrix = VENUE_EXAMPLE["cameras"][0]["intrinsics"]["matrix"]
+    document["cameras"][0]["intrinsics"] = {"matrix": matrix, "distortion": [0.01] * length}
+    assert len(VenueIn.model_validate(document).cameras[0].intrinsics.distortion) == length
+
+
+def test_a_matrix_of_another_resolution_is_noticed():
+    document = VENUE_EXAMPLE | {"cameras": [VENUE_EXAMPLE["cameras"][0] | {"image_size": [640, 360]}]}
+    with pytest.raises(ValidationError, match="does not belong to an image of 640x360"):
+        VenueIn.model_validate(document)
+
+
+@pytest.mark.parametrize("place", ["position", "translation"])
+@pytest.mark.parametrize("height", [0.0, -7.84])
+def test_a_camera_under_the_pitch_is_named(place, height):
+    pose = Pose.at([1.675, 0.372, -0.462], [-1.48, -49.49, height - 1e-9])
+    camera = VENUE_EXAMPLE["cameras"][0] | {"pose": pose.model_dump(include={"rotation", place})}
+    document = VENUE_EXAMPLE | {"cameras": [camera]}
+    with pytest.raises(ValidationError, match=r"camera left stands at .* z points up, .* above the pitch"):
+        VenueIn.model_validate(document)
+
+
+def test_cameras_have_names_of_their_own():
+    document = VENUE_EXAMPLE | {"cameras": VENUE_EXAMPLE["cameras"] * 2}
+    with pytest.raises(ValidationError, match="same id"):
+        VenueIn.model_validate(document)

@@ -1,0 +1,84 @@
+"""How much of the expected lines a frame shows, beside what chance would find."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings
+from worker.calibration.see.evidence import Evidence, evidence_of
+
+
+@cache
+def scene():
+    one = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
+    return one, paint_markings(CROWNED, one)
+
+
+def floor(level: float, paint: float, noise: float = 3.0) -> np.ndarray:
+    """Lines of one brightness on a floor of another, with the sensor's noise."""
+    _, share = scene()
+    grain = np.random.default_rng(1).normal(0, noise, share.shape)
+    return (level + (paint - level) * share + grain).astype(np.float32)
+
+
+def blind() -> np.ndarray:
+    return np.zeros_like(scene()[1])
+
+
+def test_lines_are_seen_where_the_true_pose_puts_them():
+    one, paint = scene()
+    seen = evidence_of(CROWNED.line_points(), one, floor(90, 200), paint)
+    assert seen.agreement > 0.9
+
+
+def test_a_wrong_pose_finds_hardly_more_than_chance():
+    one, paint = scene()
+    seen = evidence_of(CROWNED.line_points(), moved(one, (0.03, 0.02, 0)), floor(90, 200), paint)
+    assert seen.agreement < 0.3
+
+
+@pytest.mark.parametrize(("level", "paint"), [(120, 230), (230, 60)], ids=["white on grey", "black on light"])
+def test_a_ridge_alone_is_witness_enough(level, paint):
+    one, _ = scene()
+    assert evidence_of(CROWNED.line_points(), one, floor(level, paint), blind()).agreement > 0.85
+
+
+def test_the_network_alone_is_witness_enough():
+    one, paint = scene()
+    assert evidence_of(CROWNED.line_points(), one, floor(90, 90), paint).agreement > 0.8
+
+
+def test_noise_shows_no_lines():
+    one, _ = scene()
+    seen = evidence_of(CROWNED.line_points(), one, floor(90, 90, noise=20), blind())
+    assert abs(seen.agreement) < 0.15
+    assert len(seen.seen()) <= 1
+
+
+def test_a_bright_picture_without_lines_is_no_evidence():
+    one, _ = scene()
+    everywhere = np.ones_like(blind())
+    assert evidence_of(CROWNED.line_points(), one, floor(90, 90), everywhere).agreement < 0.1
+
+
+def test_a_marking_that_is_not_there_is_not_seen():
+    one, _ = scene()
+    names = [marking.name for marking in CROWNED.markings()]
+    frame = floor(90, 200)
+    lines = CROWNED.line_points()
+    halfway = lines[lines.marking == names.index("halfway line")]
+    pixels = one.project(halfway.position)
+    for x, y in np.rint(pixels[np.isfinite(pixels).all(axis=1)]).astype(int):
+        frame[max(y - 8, 0) : y + 9, max(x - 8, 0) : x + 9] = 90
+    seen = evidence_of(lines, one, frame, blind())
+    assert names.index("halfway line") not in seen.seen()
+    assert names.index("centre circle") in seen.seen()
+
+
+def test_agreement_is_one_where_all_is_found_and_zero_where_no_more_than_by_chance():
+    pieces = np.arange(4)
+    everything = Evidence(pieces, pieces, np.ones(4), np.ones(4, bool), np.full(4, 0.5))
+    half = Evidence(pieces, pieces, np.ones(4), pieces < 2, np.full(4, 0.5))
+    assert everything.agreement == pytest.approx(1)
+    assert half.agreement == pytest.approx(0)
