@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from service.wire.schemas import FieldOfPlay
+from service.wire.field import FieldOfPlay
 from worker.calibration.scene.camera import LENSES, Camera, Frame, Pose, rotation_matrices, rotation_vectors
 from worker.calibration.scene.field import Field
 from worker.jobs.wire import pitch_of

@@ -70,6 +70,7 @@ def camera_row(result: CameraResult) -> dict:
         "position": result.pose.position.tolist(),
         "found": result.found,
         "by_chance": result.by_chance,
+        "cause": result.view.cause,
         "residual_px": result.residual_px,
         "sigma_m": result.sigma.position_m if result.sigma else None,
         "sigma_deg": result.sigma.rotation_deg if result.sigma else None,

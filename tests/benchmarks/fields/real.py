@@ -42,9 +42,9 @@ def _seeing(chosen: Sequence[Case], engine: Engine) -> Iterator[str]:
     yield ""
     yield (
         "| source | frames | network: recall (least) | precision | evidence: found (least) | by chance "
-        "| beyond chance | precision | network, s (core-s) | evidence, s (core-s) |"
+        "| beyond chance | precision | view, s (core-s) | network, s (core-s) | evidence, s (core-s) |"
     )
-    yield "|---" * 10 + "|"
+    yield "|---" * 11 + "|"
     for source, rows in sources.items():
         recall, found, chance = ([row[name] for row in rows] for name in ("recall", "found", "by_chance"))
         precision = [row["precision"] for row in rows if row["precision"] is not None]
@@ -55,7 +55,7 @@ def _seeing(chosen: Sequence[Case], engine: Engine) -> Iterator[str]:
             f"| {np.mean(precision) if precision else np.nan:.3f} "
             f"| {np.mean(found):.3f} ({min(found):.2f}) | {np.mean(chance):.3f} | {np.mean(beyond):.3f} "
             f"| {np.mean(right):.3f} "
-            f"| {_times(rows, 'network_s')} | {_times(rows, 'evidence_s')} |"
+            f"| {_times(rows, 'view_s')} | {_times(rows, 'network_s')} | {_times(rows, 'evidence_s')} |"
         )
     yield ""
     yield "| source | marking | network: recall | evidence: found |"

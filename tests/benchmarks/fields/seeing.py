@@ -16,6 +16,7 @@ from worker.calibration.scene.field import LinePoints
 from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.line_measurement import brightness_of
 from worker.calibration.see.segmentation import reachable_regions, whole_frame
+from worker.calibration.see.view import look_at
 
 SAMPLE_M = 0.1
 AROUND_M = 0.5
@@ -37,6 +38,7 @@ def seen(case: Case, segment: Segment) -> dict:
     regions = reachable_regions(case.pitch, case.camera, reach)
     everywhere = segment(frame, whole_frame(case.camera.intrinsics.size))
     response, network = _timed(lambda: segment(frame, regions) / np.float32(255))
+    _, view = _timed(lambda: look_at(frame, case.pitch, case.camera))
     sure = _sure(case, case.pitch.line_points())
     evidence, witness = _timed(lambda: evidence_of(sure, case.camera, brightness_of(frame), response))
     names = [marking.name for marking in case.pitch.markings()]
@@ -49,6 +51,7 @@ def seen(case: Case, segment: Segment) -> dict:
         "found": evidence.share,
         "by_chance": evidence.by_chance,
         "found_by_marking": by_marking,
+        "view_s": view,
         "network_s": network,
         "evidence_s": witness,
     }

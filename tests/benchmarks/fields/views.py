@@ -14,17 +14,12 @@ import numpy as np
 
 from tests.benchmarks.fields.cases import Case, cases, started
 from tests.benchmarks.fields.engine import Engine, camera_row, found_camera
-from tests.benchmarks.fields.judging import reasons
+from tests.benchmarks.fields.judging import reasons, share
 from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
 from tests.benchmarks.truth import apart
 from worker.calibration.judge.quality import Gate
 from worker.calibration.scene.camera import Camera, Frame, Pose, inside, rotation_vectors
 from worker.calibration.scene.field import Field
-
-try:
-    from worker.calibration.see.view import look_at
-except ImportError:
-    look_at = None
 
 OTHER = "another field's frame"
 MIRRORED = "mirrored"
@@ -88,21 +83,20 @@ def _table(kind: str, views: Sequence[View], options: argparse.Namespace, engine
                 "deg": options.turn,
                 "cm": options.shift,
                 "model": engine.name,
-                "looked": look_at is not None,
             }
             row = engine.rows.remembered(key, lambda v=view, n=name, o=other: _judged(v, n, o, options, engine))
             rows[name].append(row)
     yield f"{kind}; stored poses {options.turn:g}° and {options.shift:g} cm off; near: within 30 cm and 1°."
     yield ""
-    yield "| picture | views | accepted | of these near | causes named | refused because |"
-    yield "|---|---|---|---|---|---|"
+    yield "| picture | views | accepted | of these near | cause named right | causes | refused because |"
+    yield "|---|---|---|---|---|---|---|"
     for name, judged in rows.items():
-        causes = Counter(row["cause"] or "none" for row in judged)
-        named = ", ".join(f"{number} x {cause}" for cause, number in causes.most_common()) if look_at else "not looked"
+        causes = Counter(row.get("cause") or "none" for row in judged)
         accepted = [row for row in judged if row["accepted"]]
+        right = share([row.get("cause") == CAUSES[name] for row in judged]) if name in CAUSES else ""
         yield (
-            f"| {name} | {len(judged)} | {len(accepted)} | {sum(row['near'] for row in accepted)} | {named} "
-            f"| {reasons(judged)} |"
+            f"| {name} | {len(judged)} | {len(accepted)} | {sum(row['near'] for row in accepted)} | {right} "
+            f"| {', '.join(f'{number} x {cause}' for cause, number in causes.most_common())} | {reasons(judged)} |"
         )
     yield ""
     for name, judged in rows.items():
@@ -119,13 +113,12 @@ def _judged(view: View, name: str, other: View | None, options: argparse.Namespa
     if options.pictures:
         cv2.imwrite(str(options.pictures / f"{view.name} {name}.jpg"), frame)
     stored = started([view.camera], view.name, 0, options.turn, options.shift / 100)
-    cause = look_at(frame, view.pitch, stored[0]).cause if look_at else None
     answer = engine(view.pitch, stored, {view.camera.id: [frame]}, 0)
-    row = {**answer.row, "cause": cause}
+    row = answer.row
     if answer.said is not None:
         result = answer.said.cameras[0]
         metres, degrees = apart(found_camera(view.camera, result), view.camera)
-        near = name in UNUSABLE and metres <= SAME_M and degrees <= SAME_DEG
+        near = name in CAUSES and metres <= SAME_M and degrees <= SAME_DEG
         row |= {"shift_m": metres, "turn_deg": degrees, "near": near, **camera_row(result)}
     return row
 
@@ -203,16 +196,14 @@ def _blocked(view: View) -> Frame:
     return frame
 
 
-UNUSABLE: dict[str, Callable[[View], Frame]] = {
+SPOILED: dict[str, Callable[[View], Frame]] = {
+    MIRRORED: _mirrored,
+    "upside down": _upside_down,
+    "enlarged by 1.5": _enlarged,
     "fogged": _fogged,
     "darkened to 5 %": _darkened,
     "defocused": _defocused,
     "blocked": _blocked,
 }
-"""Pictures of the right field that show too little of it."""
-SPOILED: dict[str, Callable[[View], Frame]] = {
-    MIRRORED: _mirrored,
-    "upside down": _upside_down,
-    "enlarged by 1.5": _enlarged,
-    **UNUSABLE,
-}
+CAUSES = {"fogged": "fogged", "darkened to 5 %": "dark", "defocused": "out-of-focus", "blocked": "blocked"}
+"""What is to be said of the pictures of the right field that show too little of it."""
