@@ -30,8 +30,9 @@ check: setup
 bench-real: setup
 	$(BIN)/python -m tests.benchmarks.real_pair
 
+# One BLAS thread, as the worker sets it.
 bench-fields: setup
-	$(BIN)/python -m tests.benchmarks.fields
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.fields
 
 bench-segmentation: $(VENV)/.train
 	$(BIN)/python -m tests.benchmarks.segmentation
