@@ -6,7 +6,8 @@
 Sections: `real` (frames with known cameras, where they are), `rendered` (every template on grounds and in colours of
 all kinds, from the paper's Start errors), `views` (pictures that cannot be used or show something else: none may be
 accepted). Every run is written to a file and not run again, so that long ones can be continued; another model is run
-anew, and after a change of the engine or of the renderer the file has to be removed.
+anew, and after a change of the engine or of the renderer the file has to be removed. Times are the worker's only with
+OPENBLAS_NUM_THREADS=1, as `make` sets it.
 """
 
 from __future__ import annotations
