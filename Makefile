@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check bench bench-real bench-segmentation bench-service bench-rate train lock clean
+.PHONY: setup demo test check bench bench-real bench-fields bench-segmentation bench-service bench-rate train lock clean
 
 setup: $(VENV)/.installed
 
@@ -29,6 +29,10 @@ check: setup
 
 bench-real: setup
 	$(BIN)/python -m tests.benchmarks.real_pair
+
+# One BLAS thread, as the worker sets it.
+bench-fields: setup
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.fields
 
 bench-segmentation: $(VENV)/.train
 	$(BIN)/python -m tests.benchmarks.segmentation

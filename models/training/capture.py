@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.training.noise import Plane
+from worker.calibration.scene.camera import Array
 
 
 @dataclass(frozen=True)
@@ -52,19 +53,30 @@ class Capture:
         if self.denoising:
             frame = cv2.bilateralFilter(frame, 5, self.denoising, 3) if self.denoising > 8 else cv2.medianBlur(frame, 3)
         if self.shrunk < 1:
-            small = cv2.resize(frame, None, fx=self.shrunk, fy=self.shrunk, interpolation=cv2.INTER_AREA)
+            # By its size: a factor would be taken as it is, and put the far edge beside itself.
+            size = (round(width * self.shrunk), round(height * self.shrunk))
+            small = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
             frame = cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC)
         _, packed = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, self.quality])
         return cv2.imdecode(packed, cv2.IMREAD_COLOR)
 
 
 def random_capture(rng: np.random.Generator) -> Capture:
-    """Any camera in any light."""
+    """Any camera in any light, for a crop from anywhere in its frame."""
+    return _random(rng, _crop_fringe)
+
+
+def random_frame_capture(rng: np.random.Generator) -> Capture:
+    """Any camera in any light, for its whole frame."""
+    return _random(rng, _frame_fringe)
+
+
+def _random(rng: np.random.Generator, fringe: Callable[[np.random.Generator], Callable[[Plane], Plane]]) -> Capture:
     optics: list[Callable[[Plane], Plane]] = [_blur(rng)]
     for chance, effect in (
         (0.25, _half_out_of_focus),
         (0.05, _shake),
-        (0.3, _fringe),
+        (0.3, fringe),
         (0.12, _veil),
         (0.08, _glare),
         (0.06, _drops),
@@ -128,16 +140,35 @@ def _shake(rng: np.random.Generator) -> Callable[[Plane], Plane]:
     return lambda light: cv2.filter2D(light, -1, kernel / kernel.sum())
 
 
-def _fringe(rng: np.random.Generator) -> Callable[[Plane], Plane]:
+def _crop_fringe(rng: np.random.Generator) -> Callable[[Plane], Plane]:
     """Blue and red beside green, as lenses put them towards the edges of the frame."""
     move, share = rng.normal(0, 1.3, 2), float(rng.uniform(-0.8, 0.4))
 
+    def shift(_size: tuple[int, int], part: float) -> Array:
+        return np.array([[1, 0, part * move[0]], [0, 1, part * move[1]]])
+
+    return _apart(shift, share)
+
+
+def _frame_fringe(rng: np.random.Generator) -> Callable[[Plane], Plane]:
+    """Blue and red in another size than green, by up to some pixels at the edges."""
+    grown, share = float(rng.normal(0, 1.3)), float(rng.uniform(-0.8, 0.4))
+
+    def scale(size: tuple[int, int], part: float) -> Array:
+        factor = part * grown / (max(size) / 2)
+        return np.array([[1 + factor, 0, -factor * (size[0] - 1) / 2], [0, 1 + factor, -factor * (size[1] - 1) / 2]])
+
+    return _apart(scale, share)
+
+
+def _apart(move: Callable[[tuple[int, int], float], Array], red: float) -> Callable[[Plane], Plane]:
+    """Blue moved by what `move` says (2, 3) for a picture (width, height), and red by a part of it."""
+
     def effect(light: Plane) -> Plane:
+        size = (light.shape[1], light.shape[0])
         planes = [np.ascontiguousarray(light[..., channel]) for channel in range(3)]
-        for channel, part in ((0, 1.0), (2, share)):
-            shift = np.array([[1, 0, part * move[0]], [0, 1, part * move[1]]])
-            size = planes[channel].shape[::-1]
-            planes[channel] = cv2.warpAffine(planes[channel], shift, size, borderMode=cv2.BORDER_REPLICATE)
+        for channel, part in ((0, 1.0), (2, red)):
+            planes[channel] = cv2.warpAffine(planes[channel], move(size, part), size, borderMode=cv2.BORDER_REPLICATE)
         return np.dstack(planes)
 
     return effect

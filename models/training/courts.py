@@ -1,6 +1,7 @@
 """Crops of courts that exist nowhere: cheap, endlessly varied, never shown twice.
 
     crop = random_court(np.random.default_rng(7), 224)
+    frame = render_court(pitch, camera, np.random.default_rng(7))
 
 The counterpart of `render.py`, which shows one kind of field in detail: here the ground, the paint and the camera are
 anything, and nothing is made to be pretty. A crop takes about 25 ms.
@@ -8,6 +9,7 @@ anything, and nothing is made to be pretty. A crop takes about 25 ms.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,19 +17,28 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.capture import random_capture
+from fields.shapes import COLOURS, WHITE
+from models.training.capture import Capture, random_capture, random_frame_capture
 from models.training.clutter import backdrop, draw_clutter
 from models.training.colours import Colour, hsv, random_colour
-from models.training.floors import random_floor
-from models.training.layouts import PAINTS, Layout, Stripe, random_layout
+from models.training.floors import Floor, random_floor
+from models.training.layouts import PAINTS, Layout, Stripe, field_layout, random_layout
 from models.training.noise import Noise, Patch, Plane, smooth_step
-from worker.calibration.scene.camera import Array
+from models.training.views import FieldView, View, Window
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.field import Field
 
 NEAREST_M = 0.3
 FINER = 4
 """Paint is drawn at so many times the picture's detail, each way."""
 THINNEST_PX = 1.5
 """As wide as a line is at least in the target: far ones are fractions of a pixel."""
+STEP_PX = 16
+"""A line across the picture bends every so many pixels with the lens, sixteen times at least."""
+PAINT_SHARES = (0.6, 0.1, 0.08, 0.08, 0.07, 0.07)
+"""How often paint is white, yellow, black, blue, red, or of any colour."""
+LEAST_CONTRAST = 0.2
+"""In the channel that shows it best, 0..1, between paint and the ground that somebody chose it for."""
 FAINTEST = 0.02
 """Contrast, in 0..1, below which nobody is asked to see a line, and none is blamed for seeing it."""
 
@@ -45,47 +56,55 @@ class Court:
     asked: Plane
 
 
-@dataclass(frozen=True)
-class Window:
-    """A pinhole camera of its own for one crop: pixel = K R (X - centre), bent by `bend` about `pivot`."""
-
-    centre: Array
-    rotation: Array
-    focal: float
-    principal: Array
-    bend: float
-    pivot: Array
-
-    def project(self, xy: Array) -> tuple[Array, Array]:
-        """Pixels (n, 2) and depths (n,) of points (n, 2) on the ground."""
-        seen = (np.column_stack([xy, np.zeros(len(xy))]) - self.centre) @ self.rotation.T
-        depth = seen[:, 2]
-        pixel = self.focal * seen[:, :2] / np.maximum(depth, 1e-3)[:, None] + self.principal
-        away = pixel - self.pivot
-        return self.pivot + away * (1 + self.bend * (away**2).sum(axis=1, keepdims=True)), depth
-
-    def patch(self, size: int) -> Patch:
-        """Where pixels look on the ground, the bend left out."""
-        row, column = np.mgrid[0:size, 0:size].astype(np.float32)
-        rays = np.stack([(column - self.principal[0]), (row - self.principal[1]), np.full_like(row, self.focal)], -1)
-        rays = rays @ self.rotation
-        down = rays[..., 2] < -1e-3 * self.focal
-        reach = np.where(down, -self.centre[2] / np.minimum(rays[..., 2], -1e-3 * self.focal), 0)
-        x, y = (np.float32(self.centre[i] + reach * rays[..., i]) for i in (0, 1))
-        return Patch(x, y, np.float32(reach * np.linalg.norm(rays, axis=-1)), down)
-
-
 def random_court(rng: np.random.Generator, size: int) -> Court:
     """A crop of `size` px of a ground, a camera and a moment that exist nowhere else."""
     layout = random_layout(rng)
     window = _random_window(rng, layout, size)
-    patch = window.patch(size)
-    bare = _ground(rng, window, patch, layout, size)
-    painted, target = _painted(rng, window, patch, layout.stripes, bare, size)
+    return _taken(rng, Subject(window, layout, random_floor, _random_paints, random_capture), size)
+
+
+def render_court(pitch: Field, camera: Camera, rng: np.random.Generator, floor: Floor = random_floor) -> Court:
+    """The whole frame of a camera, as wide as it is high, that looks at a field on a `floor` that it might lie on.
+
+    Lines lie where `Camera.project` puts them. They have their markings' colours; those that are to be white are white
+    four times of five, and never what cannot be told from the ground.
+    """
+    width, height = camera.intrinsics.size
+    if width != height:
+        raise ValueError(f"courts are rendered as wide as they are high, this frame has {width} x {height} pixels")
+    layout, colours = field_layout(pitch)
+
+    def paints(rng: np.random.Generator, ground: Colour) -> list[Colour]:
+        return [_paint_of(rng, colour, ground) for colour in colours]
+
+    return _taken(rng, Subject(FieldView(pitch, camera), layout, floor, paints, random_frame_capture), width)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is in a picture, and how it is drawn at random what is open of it.
+
+    `paints`: the colours of paint by their numbers, on a ground of some colour.
+    """
+
+    view: View
+    layout: Layout
+    floor: Floor
+    paints: Callable[[np.random.Generator, Colour], Sequence[Colour]]
+    capture: Callable[[np.random.Generator], Capture]
+
+
+def _taken(rng: np.random.Generator, subject: Subject, size: int) -> Court:
+    """A layout on a ground, with what stands around and in front of it."""
+    view = subject.view
+    patch = view.patch(size)
+    bare = _ground(rng, subject, patch, size)
+    colours = subject.paints(rng, np.median(bare[patch.seen], axis=0) if patch.seen.any() else bare.mean(axis=(0, 1)))
+    painted, target = _painted(rng, subject, patch, bare, colours, size)
     scene = _lit(rng, patch, np.stack([bare, painted]))
     hidden = np.where(patch.seen, 0, 1).astype(np.float32)
     behind = backdrop(rng, size) if not patch.seen.all() else None
-    pixels_per_metre = window.focal / max(float(np.median(patch.depth[patch.seen])) if patch.seen.any() else 50, 1)
+    pixels_per_metre = view.focal / max(float(np.median(patch.depth[patch.seen])) if patch.seen.any() else 50, 1)
     state = rng.bit_generator.state
     for picture in scene:
         if behind is not None:
@@ -93,7 +112,7 @@ def random_court(rng: np.random.Generator, size: int) -> Court:
         # The same things in front of both pictures.
         rng.bit_generator.state = state
         draw_clutter(rng, picture, hidden, pixels_per_metre)
-    capture = random_capture(rng)
+    capture = subject.capture(rng)
     without, with_paint = (capture.seen(picture) for picture in scene)
     contrast = cv2.dilate(np.abs(with_paint - without).max(axis=-1), np.ones((3, 3)))
     target = target * (1 - hidden)
@@ -129,20 +148,19 @@ def _random_window(rng: np.random.Generator, layout: Layout, size: int) -> Windo
     )  # fmt: skip
 
 
-def _ground(rng: np.random.Generator, window: Window, patch: Patch, layout: Layout, size: int) -> Plane:
+def _ground(rng: np.random.Generator, subject: Subject, patch: Patch, size: int) -> Plane:
     """The court's floor, another one beyond some line of the field, and areas of other colours, edge on line."""
-    ground = random_floor(rng, patch)
+    view, layout = subject.view, subject.layout
+    ground = subject.floor(rng, patch)
     if rng.random() < 0.6:
         beyond = layout.half + (0 if rng.random() < 0.5 else rng.uniform(0, 5, 2))
-        inner = _covered(window, [_rectangle(-beyond, beyond)], size)
+        inner = _covered(view, [_rectangle(-beyond, beyond)], size)
         outer = random_floor(rng, patch) if rng.random() < 0.7 else ground * random_colour(rng, 0.3) * np.float32(1.3)
         ground = outer + inner[..., None] * (ground - outer)
     corners = np.concatenate([stripe.points for stripe in layout.stripes])
     for _ in range(rng.integers(0, 4) if rng.random() < 0.4 else 0):
         ends = corners[rng.integers(len(corners), size=2)]
-        area = _covered(window, [_rectangle(ends.min(axis=0), ends.max(axis=0))], size) * np.float32(
-            rng.uniform(0.4, 1)
-        )
+        area = _covered(view, [_rectangle(ends.min(axis=0), ends.max(axis=0))], size) * np.float32(rng.uniform(0.4, 1))
         colour = random_colour(rng, 0.1)
         ground = ground + area[..., None] * (
             ground.mean() * 1.5 * colour - ground if rng.random() < 0.5 else colour - ground
@@ -155,12 +173,12 @@ def _rectangle(low: Array, high: Array) -> Array:
 
 
 def _painted(
-    rng: np.random.Generator, window: Window, patch: Patch, stripes: tuple[Stripe, ...], bare: Plane, size: int
+    rng: np.random.Generator, subject: Subject, patch: Patch, bare: Plane, colours: Sequence[Colour], size: int
 ) -> tuple[Plane, Plane]:
     """The ground with its paint, and the target (S, S)."""
     painted, outlines = bare, []
-    strips = [strip for stripe in stripes for strip in _strips(window, stripe, size)]
-    for number in range(PAINTS):
+    strips = [strip for stripe in subject.layout.stripes for strip in _strips(subject.view, stripe, size)]
+    for number, colour in enumerate(colours):
         chosen = [strip for strip in strips if strip.paint == number]
         if not chosen:
             continue
@@ -168,16 +186,31 @@ def _painted(
         wear = Noise.draw(rng, {0.02: 0.3, 0.1: 0.4, 0.5: 0.4, 3.0: 0.4}).at(patch)
         opacity = 1 - float(rng.beta(1, 3)) * smooth_step(wear, -0.5, 2.0)
         opacity = opacity * np.float32(rng.uniform(0.55, 1))
-        colour = random_paint(rng)
         painted = painted + (share * opacity)[..., None] * (colour - painted)
         outlines += [strip.outline(THINNEST_PX) for strip in chosen]
     return painted.astype(np.float32), _covered_px(outlines, size)
 
 
+def _random_paints(rng: np.random.Generator, _ground: Colour) -> list[Colour]:
+    return [random_paint(rng) for _ in range(PAINTS)]
+
+
+def _paint_of(rng: np.random.Generator, named: str, ground: Colour) -> Colour:
+    """Paint as it is called, as far as it can be told from a `ground` that it would be chosen for."""
+    colour = paint(rng, named if named != WHITE or rng.random() < 0.8 else str(rng.choice(COLOURS)))
+    while np.abs(colour - ground).max() < LEAST_CONTRAST:
+        colour = paint(rng, str(rng.choice(COLOURS)))
+    return colour
+
+
 def random_paint(rng: np.random.Generator) -> Colour:
     """White with a cast more often than not; yellow, black, blue, red, or anything."""
-    kind = rng.choice(["white", "yellow", "black", "blue", "red", "any"], p=[0.6, 0.1, 0.08, 0.08, 0.07, 0.07])
-    match kind:
+    return paint(rng, str(rng.choice(["white", "yellow", "black", "blue", "red", "any"], p=PAINT_SHARES)))
+
+
+def paint(rng: np.random.Generator, named: str) -> Colour:
+    """Paint of a colour of `fields.shapes.COLOURS`, of `#rrggbb`, or of any, as it is called."""
+    match named:
         case "white":
             return hsv(rng.uniform(0, 360), rng.uniform(0, 0.2), rng.uniform(0.75, 1.0))
         case "yellow":
@@ -188,6 +221,12 @@ def random_paint(rng: np.random.Generator) -> Colour:
             return hsv(rng.uniform(205, 245), rng.uniform(0.4, 1.0), rng.uniform(0.3, 0.9))
         case "red":
             return hsv(rng.uniform(-12, 12), rng.uniform(0.5, 1.0), rng.uniform(0.4, 0.9))
+        case "green":
+            return hsv(rng.uniform(95, 150), rng.uniform(0.5, 1.0), rng.uniform(0.3, 0.8))
+        case "orange":
+            return hsv(rng.uniform(20, 38), rng.uniform(0.7, 1.0), rng.uniform(0.7, 1.0))
+        case str() if named.startswith("#"):
+            return np.array([int(named[at : at + 2], 16) for at in (5, 3, 1)], np.float32) / 255
         case _:
             return random_colour(rng)
 
@@ -210,15 +249,15 @@ class Strip:
         return np.concatenate([self.middle + side, (self.middle - side)[::-1]])
 
 
-def _strips(window: Window, stripe: Stripe, size: int) -> list[Strip]:
+def _strips(view: View, stripe: Stripe, size: int) -> list[Strip]:
     """The paint of a stripe that comes into the picture."""
     strips = []
-    for along in _pieces(stripe.points, window, size):
+    for along in _pieces(stripe.points, view, size):
         tangent = np.gradient(along, axis=0)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True) + 1e-12
         half = stripe.width / 2 * np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-        middle, depth = window.project(along)
-        edge, _ = window.project(along + half)
+        middle, depth = view.project(along)
+        edge, _ = view.project(along + half)
         direction = np.gradient(middle, axis=0)
         direction /= np.linalg.norm(direction, axis=1, keepdims=True) + 1e-12
         side = edge - middle
@@ -228,12 +267,12 @@ def _strips(window: Window, stripe: Stripe, size: int) -> list[Strip]:
     return strips
 
 
-def _pieces(points: Array, window: Window, size: int) -> list[Array]:
+def _pieces(points: Array, view: View, size: int) -> list[Array]:
     """The stretches (n, 2) of a polyline that come into the picture, in steps short enough to bend."""
     if len(points) > 8:
         share = np.linspace(0, len(points) - 1, 2 * len(points))
         whole = np.stack([np.interp(share, np.arange(len(points)), points[:, i]) for i in (0, 1)], axis=1)
-        runs = np.flatnonzero(_in_picture(whole, window, size))
+        runs = np.flatnonzero(_in_picture(whole, view, size))
         if len(runs) == 0:
             return []
         return [
@@ -245,31 +284,29 @@ def _pieces(points: Array, window: Window, size: int) -> list[Array]:
         # Twice, for a picture that shows a hundredth of a line.
         for _ in range(2):
             share = np.linspace(low, high, 40)
-            kept = np.flatnonzero(_in_picture(a + share[:, None] * (b - a), window, size))
+            kept = np.flatnonzero(_in_picture(a + share[:, None] * (b - a), view, size))
             if len(kept) == 0:
                 break
             low, high = share[max(kept[0] - 1, 0)], share[min(kept[-1] + 1, 39)]
         else:
-            pieces.append(a + np.linspace(low, high, 16)[:, None] * (b - a))
+            pieces.append(a + np.linspace(low, high, max(16, size // STEP_PX))[:, None] * (b - a))
     return pieces
 
 
-def _in_picture(xy: Array, window: Window, size: int) -> NDArray[np.bool_]:
-    pixel, depth = window.project(xy)
+def _in_picture(xy: Array, view: View, size: int) -> NDArray[np.bool_]:
+    pixel, depth = view.project(xy)
     return (depth > NEAREST_M) & (np.abs(pixel - size / 2) < 0.75 * size).all(axis=1)
 
 
-def _covered(window: Window, polygons: list[Array], size: int) -> Plane:
+def _covered(view: View, polygons: list[Array], size: int) -> Plane:
     """Share (S, S) of pixels inside polygons on the ground; their edges may be cut by the camera's plane."""
     strips = []
     for polygon in polygons:
         closed = np.concatenate([polygon, polygon[:1]])
         share = np.linspace(0, 1, 100)[:, None]
         dense = np.concatenate([a + share * (b - a) for a, b in pairwise(closed)])
-        seen = (np.column_stack([dense, np.zeros(len(dense))]) - window.centre) @ window.rotation.T
-        if (seen[:, 2] > 0.2).any():
-            pixel, depth = window.project(dense)
-            strips.append(pixel[depth > 0.2])
+        pixel, depth = view.project(dense)
+        strips.append(pixel[depth > 0.2])
     return _covered_px([strip for strip in strips if len(strip) > 2], size)
 
 

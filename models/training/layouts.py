@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fields.shapes import Arc, Line, Spot
 from fields.template import NAMES, load
 from worker.calibration.scene.camera import Array
+from worker.calibration.scene.field import Field
 
 PAINTS = 4
 """Colours of paint that a layout tells apart at most."""
@@ -54,6 +55,15 @@ def random_layout(rng: np.random.Generator) -> Layout:
         if paint == 0:
             half = np.abs(np.concatenate([stripe.points for stripe in stripes])).max(axis=0)
     return Layout(tuple(stripes), half)
+
+
+def field_layout(pitch: Field) -> tuple[Layout, list[str]]:
+    """The markings of one field, and the colours that their paints' numbers stand for."""
+    markings = pitch.markings()
+    colours = list(dict.fromkeys(marking.colour for marking in markings))
+    stripes = tuple(Stripe(marking.centre, marking.width, colours.index(marking.colour)) for marking in markings)
+    half = np.abs(np.concatenate([stripe.points for stripe in stripes])).max(axis=0)
+    return Layout(stripes, half), colours
 
 
 def shape_width(shape: Line | Arc | Spot) -> float:

@@ -1,0 +1,1 @@
+"""`make bench-fields`: see `__main__`."""
