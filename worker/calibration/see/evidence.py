@@ -101,16 +101,16 @@ def evidence_of(
         # Of either polarity: black lines on a light floor are lines too.
         strength = np.maximum(np.abs(looked.along) / LEAST_ALONG, network)
         near = np.abs(looked.shifts) <= tolerance
-        away = np.abs(looked.shifts) > 2 * tolerance + pieces.width_px.max(initial=0) / 2
-        # As many shifts at a time as there are around the expected place.
-        hits = _any_of(strength[:, away] >= 1, int(near.sum()))
+        away = np.abs(looked.shifts) > min(2 * tolerance + pieces.width_px.max(initial=0) / 2, beside)
+        # As many shifts at a time as there are around the expected place, and all that there are beside a wide line.
+        hits = _any_of(strength[:, away] >= 1, min(int(near.sum()), int(away.sum())))
         parts.append(
             Evidence(
                 pieces.index,
                 pieces.points.marking,
                 pieces.length_px * np.minimum(pieces.width_px, 1.0),
                 np.asarray((strength[:, near] >= 1).any(axis=1)),
-                hits.mean(axis=1) if len(hits) else np.empty(0),
+                hits.mean(axis=1),
             )
         )
     return Evidence(*(np.concatenate(column) for column in zip(*(vars(part).values() for part in parts), strict=True)))

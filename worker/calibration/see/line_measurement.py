@@ -33,6 +33,8 @@ TOGETHER_PX = 40.0
 """Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one."""
 LEAST_ALONG = 0.5
 """Mean correlation with the expected profile, over that length, from which a ridge is a line for itself."""
+DARK_SHARE, DARK_OVER_BRIGHT = 0.5, 2.0
+"""A marking is dark where so much of it is seen as a dark ridge, and so many times as much as as a bright one."""
 CENTRE_STEPS = 2
 RIDGE = 1e-6
 OFF_CENTRE_PENALTY = 0.15
@@ -174,24 +176,32 @@ def measure_lines(
 
 def _measured(seen: SeenLines, profiles: Profiles, response: NDArray[np.float32], search_px: float) -> Measurements:
     """Where the lines of one class fit best, to a fraction of a pixel, but for what speaks against it."""
-    shifts = profiles.shifts
-    preference = profiles.correlation - OFF_CENTRE_PENALTY * (shifts / search_px) ** 2
+    shifts, polarity = profiles.shifts, _polarity(profiles, seen)
+    correlation, along = polarity * profiles.correlation, polarity * profiles.along
+    preference = correlation - OFF_CENTRE_PENALTY * (shifts / search_px) ** 2
     best = np.argmax(preference, axis=1)
     at_end = (best == 0) | (best == len(shifts) - 1)
     windows = np.take_along_axis(profiles.brightness, best[:, None] + np.arange(profiles.expected.shape[1]), axis=1)
     shift = shifts[best] + _centre(windows, seen.width_px, profiles.offsets, profiles.sampling_px)
     pixel = seen.pixel + shift[:, None] * seen.normal
     row = np.arange(len(seen))
-    marking = (bilinear(response, pixel) >= LEAST_RESPONSE) | (profiles.along[row, best] >= LEAST_ALONG)
+    marking = (bilinear(response, pixel) >= LEAST_RESPONSE) | (along[row, best] >= LEAST_ALONG)
     good = (
-        ~at_end
-        & (profiles.correlation[row, best] >= LEAST_CORRELATION)
-        & marking
-        & np.isfinite(profiles.brightness).all(axis=1)
+        ~at_end & (correlation[row, best] >= LEAST_CORRELATION) & marking & np.isfinite(profiles.brightness).all(axis=1)
     )
     return Measurements(
         seen.index, seen.points, pixel, seen.normal, seen.px_per_metre, seen.px_per_metre_up, seen.length_px
     )[good]
+
+
+def _polarity(profiles: Profiles, seen: SeenLines) -> Array:
+    """1 (M, 1) for lines brighter than their ground, -1 for those of a marking that goes on as a dark ridge instead."""
+    bright, dark = (
+        np.bincount(seen.points.marking, (sign * profiles.along).max(axis=1) >= LEAST_ALONG) for sign in (1, -1)
+    )
+    pieces = np.bincount(seen.points.marking)
+    is_dark = (dark >= DARK_SHARE * pieces) & (dark > DARK_OVER_BRIGHT * bright)
+    return np.where(is_dark[seen.points.marking], -1.0, 1.0)[:, None]
 
 
 def _mean_along(correlation: Array, pieces: SeenLines, length_px: float) -> Array:
