@@ -77,7 +77,8 @@ def test_one_camera_alone_has_no_stitch_error():
 def test_black_frames_are_rejected_and_the_camera_is_named():
     dark = {"left": frames()["left"], "right": (np.zeros_like(frames()["right"][0]),)}
     found = run(pictures=dark)
-    assert found.rejected_because.startswith("camera right: ")
+    assert found.rejected_because.startswith("camera right: Dark")
+    assert "camera left" not in found.rejected_because
 
 
 def test_frames_of_another_place_are_rejected():

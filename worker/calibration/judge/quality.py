@@ -150,7 +150,9 @@ def rejection(
 
     `in_common`: the pairs of cameras whose views should register; `stitch_error_px` is None when they do not.
     """
-    reasons = [(quality.camera.id, _camera_rejection(quality, gate)) for quality in qualities]
+    unusable = [quality for quality in qualities if not quality.view.usable]
+    # Where a view cannot be used nothing was searched, and the other cameras are not to blame for where they stand.
+    reasons = [(quality.camera.id, _camera_rejection(quality, gate)) for quality in unusable or qualities]
     bad = [f"camera {name}: {reason}" for name, reason in reasons if reason is not None]
     if bad:
         return "; ".join(bad)

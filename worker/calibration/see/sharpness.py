@@ -28,6 +28,8 @@ def edge_blur_px(frame: Frame, small: NDArray[np.uint8], where: NDArray[np.bool_
     small (h, w): the grey picture reduced; where (h, w): which part of it counts.
     """
     pixel, direction = _steep_places(small, where)
+    if len(pixel) < FEWEST_EDGES:
+        return None
     scale = frame.shape[1] / small.shape[1]
     widths = []
     # A profile that is right for a sharp edge is too short for a smeared one, and the other way round.

@@ -53,13 +53,32 @@ def test_lines_are_found_where_they_are():
     off = np.sum((found.pixel - truth) * found.normal, axis=1)
     assert len(found) > 300
     assert np.abs(np.median(off)) < 0.02
-    assert np.percentile(np.abs(off), 80) < 0.1
+    assert np.percentile(np.abs(off), 75) < 0.1
 
 
-def test_a_bright_ridge_that_is_no_marking_is_not_measured():
+def test_lines_that_the_network_misses_are_measured_by_their_ridges():
     cameras, brightness, responses = scene()
     found = measure_lines(CROWNED.line_points(), cameras[0], brightness[0], np.zeros_like(responses[0]), 6.0)
-    assert len(found) == 0
+    truth = cameras[0].project(found.points.position)
+    assert len(found) > 300
+    assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
+
+
+def test_ridges_that_do_not_go_on_along_a_line_are_not_measured():
+    cameras, brightness, responses = scene()
+    noise = np.random.default_rng(3).normal(100, 20, brightness[0].shape).astype(np.float32)
+    found = measure_lines(CROWNED.line_points(), cameras[0], noise, np.zeros_like(responses[0]), 6.0)
+    seen = measure_lines(CROWNED.line_points(), cameras[0], brightness[0], responses[0], 6.0)
+    assert len(found) < 0.2 * len(seen)
+
+
+def test_lines_darker_than_their_ground_are_measured_where_they_are():
+    cameras, brightness, responses = scene()
+    negative = np.float32(255) - brightness[0]
+    found = measure_lines(CROWNED.line_points(), cameras[0], negative, np.zeros_like(responses[0]), 6.0)
+    truth = cameras[0].project(found.points.position)
+    assert len(found) > 300
+    assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
 
 
 @pytest.mark.parametrize("shift", [-3.25, 0.0, 1.5])
@@ -117,8 +136,8 @@ def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
 
 def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
     cameras, brightness, responses = scene()
-    blind = [responses[0], np.zeros_like(responses[1])]
-    refined = refine(CROWNED, cameras, Sight(brightness, blind), 0.5)
+    blind = Sight([brightness[0], np.zeros_like(brightness[1])], [responses[0], np.zeros_like(responses[1])])
+    refined = refine(CROWNED, cameras, blind, 0.5)
     np.testing.assert_array_equal(refined.cameras[1].pose.position, cameras[1].pose.position)
     assert refined.covariance[1] is None
     assert refined.residual_px[1] is None
