@@ -21,7 +21,8 @@ from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantTy
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
 from models import MODEL_PATH
-from models.training.crops import random_crop
+from models.training.courts import random_court
+from models.training.crops import CROP_SIZE, random_crop
 
 CROPS = 96
 # Worlds that training never draws.
@@ -49,7 +50,7 @@ def quantise(exported: Path, path: Path, crops: int = CROPS) -> dict[str, object
 
 
 class RenderedCrops(CalibrationDataReader):
-    """What activations are like, on rendered crops."""
+    """What activations are like, on rendered crops: courts and pitches in turn."""
 
     def __init__(self, name: str, count: int) -> None:
         self._name = name
@@ -60,7 +61,8 @@ class RenderedCrops(CalibrationDataReader):
         seed = next(self._seeds, None)
         if seed is None:
             return None
-        frame = random_crop(np.random.default_rng([SEED, seed])).frame
+        rng = np.random.default_rng([SEED, seed])
+        frame = random_crop(rng).frame if seed % 2 else random_court(rng, CROP_SIZE).frame
         return {self._name: frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255}
 
 
