@@ -332,6 +332,8 @@ def _lit(rng: np.random.Generator, patch: Patch, pictures: Plane) -> Plane:
             width = float(np.exp(rng.uniform(np.log(0.1), np.log(6))))
             shadow *= 1 - smooth_step((offset - width) / np.maximum(patch.axes[1], 0.02), -2.0, 2.0)
         pictures = pictures * (1 - np.float32(rng.uniform(0.2, 0.75)) * shadow)[..., None]
+    if rng.random() < 0.35:
+        pictures = pictures * (1 - _cast_shadows(rng, pictures.shape[1:3]))[..., None]
     if rng.random() < 0.2:
         size = pictures.shape[1]
         gloss = np.zeros((size, size), np.float32)
@@ -342,3 +344,15 @@ def _lit(rng: np.random.Generator, patch: Patch, pictures: Plane) -> Plane:
         gloss = cv2.GaussianBlur(gloss, (0, 0), float(rng.uniform(2, 25)))
         pictures = pictures + gloss[..., None] * (1 - pictures) * np.float32(0.8)
     return np.ascontiguousarray(pictures, dtype=np.float32)
+
+
+def _cast_shadows(rng: np.random.Generator, size: tuple[int, int]) -> Plane:
+    """What people take off the light (H, W), 0..1: short dark streaks, all one way, that are no lines."""
+    streaks = np.zeros(size, np.float32)
+    way, strength = rng.uniform(0, 180), float(rng.uniform(0.25, 0.7))
+    for _ in range(rng.integers(1, 7)):
+        x, y = (rng.uniform(0, 1, 2) * size[::-1]).astype(int).tolist()
+        long = float(np.exp(rng.uniform(np.log(4), np.log(60))))
+        axes = (int(long), max(1, int(long * rng.uniform(0.05, 0.25))))
+        cv2.ellipse(streaks, (x, y), axes, way + rng.normal(0, 3), 0, 360, strength, -1, cv2.LINE_AA)
+    return cv2.GaussianBlur(streaks, (0, 0), float(rng.uniform(0.5, 2)))

@@ -82,8 +82,8 @@ def wood(rng: np.random.Generator, patch: Patch) -> Plane:
     row = np.floor(across / width)
     shift = np.mod(row * 0.618, 1.0) * length
     board = np.floor((along + shift) / length)
-    table = rng.normal(0, rng.uniform(0.02, 0.12), 256).astype(np.float32)
-    fade = np.clip(1.5 - patch.axes[1] / width, 0.15, 1)
+    table = rng.normal(0, rng.uniform(0.02, 0.2), 256).astype(np.float32)
+    fade = np.clip(1.5 - patch.axes[1] / width, 0.3, 1)
     tone = table[np.mod(row * 37 + board * 101, 256).astype(int)] * fade
     joint = float(rng.uniform(0.001, 0.004))
     tone -= float(rng.uniform(0.1, 0.7)) * bands(across, width, joint, patch.axes[1])
