@@ -12,7 +12,7 @@ from service.wire.problems import KINDS, type_of
 from service.wire.results import AnyResult, Result
 
 # As in `timings_s` of a result.
-STAGES = ("decode", "segmentation", "evolution", "refinement", "quality", "preview")
+STAGES = ("decode", "view", "segmentation", "evolution", "refinement", "quality", "preview")
 # What can end a job. A program of jobs may say something else: that is `other`.
 ERRORS = (
     "broken-image",

@@ -14,7 +14,7 @@ from worker.calibration.finish.uncertainty import Deviation
 from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.evidence import Evidence
+from worker.calibration.see.evidence import LEAST_ROOM, Evidence
 from worker.calibration.see.view import ViewCondition
 
 TOLERANCE_PX = 3.0
@@ -45,7 +45,7 @@ class Gate:
 
     def least_share(self, seen: Evidence) -> float:
         """Of the markings that has to be seen, 0..1, where chance finds as much as it does."""
-        return seen.by_chance + self.least_agreement * (1 - seen.by_chance)
+        return seen.by_chance + self.least_agreement * max(1 - seen.by_chance, LEAST_ROOM)
 
 
 @dataclass(frozen=True)
