@@ -5,8 +5,9 @@ import json
 import cv2
 import numpy as np
 import pytest
-from service.wire.schemas import Camera, FieldOfPlay
 
+from service.wire.field import FieldOfPlay
+from service.wire.venue import Camera
 from tests.real.pair import FOLDER
 from tests.worker.calibration.see import spoiling
 from worker.calibration.see.view import look_at
