@@ -89,7 +89,7 @@ def show(job: Job) -> None:
             f"  rotation     {' '.join(f'{number:9.5f}' for number in camera.pose.rotation)} rad, world to camera\n"
             f"  position     {' '.join(f'{number:9.3f}' for number in camera.pose.position)} m from the pitch centre\n"
             f"  moved        {moved.rotation_deg:.2f}°, {100 * moved.position_m:.1f} cm, {moved.pixels:.0f} px\n"
-            f"  sigma        {sure}; lines fit to {residual}; markings explained {100 * camera.iou:.0f} %"
+            f"  sigma        {sure}; lines fit to {residual}; {100 * camera.found:.0f} % of the markings seen"
         )
     before, after = job.result.stitch_error_before_px, job.result.stitch_error_px
     console.print(f"Stitch error   before {_px(before)}, after [bold]{_px(after)}[/] (1 px = 10 cm on the pitch)")
