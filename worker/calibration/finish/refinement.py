@@ -86,7 +86,6 @@ def refine(
         unknowns = unknowns.around(here.pitch, here.lines)
         measured = measure_all(here.on_ground(unknowns), here.cameras, sight, search)
         before = here
-        measured = doubted(here, measured)
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
         # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
         here = _settled(here, cameras, measured, unknowns, stitch_weight)
