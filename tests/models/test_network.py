@@ -6,9 +6,14 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra `train`: pip install '.[train]'")
 
+from models import MODEL_PATH  # noqa: E402
+from models.training.courts import random_court  # noqa: E402
 from models.training.export import export, fold  # noqa: E402
 from models.training.network import UNet, focal_loss  # noqa: E402
 from models.training.quantise import quantise  # noqa: E402
+from models.training.served import load_served  # noqa: E402
+from models.training.stream import courts  # noqa: E402
+from models.training.train import Budget, Training  # noqa: E402
 
 pytestmark = [pytest.mark.train, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
 
@@ -90,3 +95,32 @@ def test_a_few_steps_learn_a_bright_stripe(network):
         optimiser.step()
         losses.append(float(loss.detach()))
     assert losses[-1] < 0.5 * losses[0]
+
+
+def test_the_served_model_is_read_back_with_its_weights():
+    batch = courts(np.random.default_rng(1), 4, 160)
+    pictures = torch.from_numpy(batch.pictures)
+    network = UNet()
+    load_served(network, MODEL_PATH, pictures)
+    with torch.no_grad():
+        again = torch.sigmoid(network.eval()(pictures)).numpy()
+    session = onnxruntime.InferenceSession(str(MODEL_PATH), providers=["CPUExecutionProvider"])
+    served = session.run(None, {"picture": batch.pictures})[0]
+    assert np.abs(again - served).mean() < 0.01
+    assert np.corrcoef(again.ravel(), served.ravel())[0, 1] > 0.95
+
+
+def test_a_training_begins_with_the_weights_that_are_kept_for_it():
+    training = Training(torch.device("cpu"), Budget(60), 0.01, 1.0)
+    training.load_weights(MODEL_PATH.parent / "training" / "courts.pt", torch.zeros(1, 3, 32, 32))
+    court = random_court(np.random.default_rng(3), 160)
+    picture = torch.from_numpy(court.frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255)
+    with torch.no_grad():
+        seen = torch.sigmoid(training.average.eval()(picture))[0, 0].numpy()
+    assert seen[court.target > 0.5].mean() > 2 * seen[court.target < 0.05].mean()
+
+
+def test_what_is_not_asked_for_costs_nothing():
+    logits, target = torch.full((1, 1, 8, 8), 4.0), torch.zeros(1, 1, 8, 8)
+    assert focal_loss(logits, target, asked=torch.zeros(1, 1, 8, 8)) == 0
+    assert focal_loss(logits, target) > 0
