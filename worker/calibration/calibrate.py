@@ -289,10 +289,9 @@ def camera_result(quality: CameraQuality) -> CameraResult:
 
 def view_of(frames: Sequence[Frame], pitch: Field, camera: Camera) -> ViewCondition:
     """The view of the first frame that can be used, or what is wrong with the first."""
-    views = [look_at(frames[0], pitch, camera)]
-    while not views[-1].usable and len(views) < len(frames):
-        views.append(look_at(frames[len(views)], pitch, camera))
-    return views[-1] if views[-1].usable else views[0]
+    first = look_at(frames[0], pitch, camera)
+    later = (look_at(frame, pitch, camera) for frame in frames[1:])
+    return first if first.usable else next((view for view in later if view.usable), first)
 
 
 def qualities_of(

@@ -14,14 +14,10 @@ from worker.calibration.finish.uncertainty import Deviation
 from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.evidence import LEAST_ROOM, Evidence
+from worker.calibration.see.evidence import LEAST_ROOM, MARKING, TOLERANCE_PX, Evidence
 from worker.calibration.see.view import ViewCondition
 
-TOLERANCE_PX = 3.0
-"""How far from its edge a line still counts as explained, in pixels of a 4K frame."""
 AROUND_PITCH_M = 1.0
-MARKING = 0.5
-"""Probability from which a pixel counts as a marking."""
 
 
 @dataclass(frozen=True)

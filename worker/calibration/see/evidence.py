@@ -19,8 +19,8 @@ from worker.calibration.see.line_measurement import LEAST_ALONG, line_profiles
 from worker.calibration.see.sampling import bilinear
 
 TOLERANCE_PX = 3.0
-"""How far from where it is expected a line is still found, in pixels of a 4K frame; never less than 2 px."""
-BESIDE_PX = 40.0
+"""How far from where it is expected a line is still found, in pixels of a 4K frame; evidence takes 2 px at least."""
+CHANCE_REACH_PX = 40.0
 """How far to each side chance is given its tries, in pixels of a 4K frame; never less than 24 px."""
 LEAST_BEYOND_CHANCE = 0.3
 """How much more of a marking than by chance has to be found for it to be seen at all, 0..1."""
@@ -29,7 +29,7 @@ LEAST_LENGTH_PX = 15.0
 LEAST_ROOM = 0.5
 """Where chance finds more than the other half, finding the rest says nothing more."""
 MARKING = 0.5
-"""Probability from which the network sees a marking."""
+"""Probability from which the network sees a marking in a pixel."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def evidence_of(
     `brightness` (H, W) see `line_measurement.brightness_of`; `response` (H, W) the segmentation in 0..1.
     """
     scale = camera.intrinsics.relative_size
-    tolerance, beside = max(TOLERANCE_PX * scale, 2.0), max(BESIDE_PX * scale, 24.0)
+    tolerance, beside = max(TOLERANCE_PX * scale, 2.0), max(CHANCE_REACH_PX * scale, 24.0)
     seen = SeenLines.from_camera(lines, camera)
     parts = []
     for looked in line_profiles(seen, brightness, tolerance + beside, scale):
