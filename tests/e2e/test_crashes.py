@@ -9,7 +9,15 @@ import time
 
 from tests.disks import filled
 from tests.e2e.books import settle
-from tests.e2e.killing import kill_api, kill_kept_worker, moment, seconds_of_a_job, seconds_of_a_submission, submitted
+from tests.e2e.killing import (
+    chance,
+    kill_api,
+    kill_kept_worker,
+    moment,
+    seconds_of_a_job,
+    seconds_of_a_submission,
+    submitted,
+)
 from tests.e2e.running import Service, alive, children, wait_for
 from tests.homes import in_both_homes, on_servers
 
@@ -69,7 +77,7 @@ def test_a_worker_on_another_machine_takes_over(start, tmp_path):
 def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothing_else(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     seconds = seconds_of_a_job(service, service.venue("alone", "accept 0.3"))
-    ended, _ = kill_kept_worker(service, service.venue("v", "accept 0.3"), moment(seconds))
+    ended, _ = kill_kept_worker(service, service.venue("v", "accept 0.3"), moment(chance(), seconds))
     assert ended["status"] == "succeeded"
     assert ended["attempt"] <= 2
     settle(service)
@@ -79,12 +87,13 @@ def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothin
 def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     seconds = seconds_of_a_submission(service, service.venue("alone"))
-    promised = kill_api(service, service.venue("v"), "key", moment(seconds))
+    drawn = chance()
+    promised = kill_api(service, service.venue("v"), "key", moment(drawn, seconds))
     job = submitted(service, "v", "key")
     assert promised in (None, job)
     assert service.end(job)["status"] == "succeeded"
     # This client does not come back.
-    promised = kill_api(service, service.venue("w"), "key", moment(seconds))
+    promised = kill_api(service, service.venue("w"), "key", moment(drawn, seconds))
     assert promised is None or service.end(promised)["status"] == "succeeded"
     settle(service)
 
