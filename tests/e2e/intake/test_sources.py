@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from service.intake.snapshots import STARTING_S
 from service.store import tables
-from tests.e2e.cameras import NetworkCamera
+from tests.e2e.intake.cameras import NetworkCamera
 from tests.e2e.running import Service, png, upload, venue, wait_for
 from tests.homes import environment
 

@@ -20,7 +20,7 @@ from service.store.keys import Keys
 from tests.e2e.running import Service, upload, venue
 
 HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
+ROOT = HERE.parents[2]
 EXAMPLES = int(os.environ.get("ESC_TEST_EXAMPLES", "0"))
 # What must have happened, or the checks were about refusals only.
 REACHED = {

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from tests.e2e.client.test_commandline import FRAMES
 from tests.e2e.running import upload
-from tests.e2e.test_commandline import FRAMES
 
 
 def fit(service, name, options=None, headers=None, files=None):
