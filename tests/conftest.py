@@ -62,7 +62,7 @@ def servers(postgres, bucket):
     return Servers(postgres, bucket)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def home(request):
     """Where a test keeps its state: the embedded home, or what `in_both_homes` says."""
     return request.getfixturevalue("servers") if getattr(request, "param", "") == "servers" else Embedded()

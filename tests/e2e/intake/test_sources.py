@@ -12,7 +12,6 @@ from service.intake.snapshots import STARTING_S
 from service.store import tables
 from tests.e2e.intake.cameras import NetworkCamera
 from tests.e2e.running import Service, png, upload, venue, wait_for
-from tests.homes import environment
 
 
 @pytest.fixture(scope="module")
@@ -26,10 +25,9 @@ FROM_HERE = {"ESC_SOURCES": '["127.0.0.0/8", "localhost"]', "ESC_SOURCE_TIMEOUT_
 
 
 @pytest.fixture(scope="module")
-def service(home, tmp_path_factory):
+def service(tmp_path_factory):
     """One that may fetch from this machine."""
-    folder = tmp_path_factory.mktemp("esc")
-    running = Service(folder, **environment(home.settings(folder)) | FROM_HERE).ready()
+    running = Service(tmp_path_factory.mktemp("esc"), **FROM_HERE).ready()
     yield running
     assert running.stop() == 0
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.e2e.observe.test_watching import families
+from tests.e2e.observe.figures import families
 from tests.e2e.running import venue
 
 ROOT = Path(__file__).parents[3]
