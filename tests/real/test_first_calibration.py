@@ -25,21 +25,21 @@ def commands() -> list[str]:
     return re.findall(r"^```sh\n(.*?)^```$", DOCUMENT.read_text(), re.MULTILINE | re.DOTALL)
 
 
-def typed(step: str, folder: Path) -> str:
-    """What a step says on standard error."""
+def typed(step: str, folder: Path) -> subprocess.CompletedProcess:
+    """A step that went well, and what it said."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         ["bash", "-e", "-c", step], cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    return done.stderr
+    return done
 
 
 @pytest.fixture(scope="module")
 def lenses(real_pair, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("lenses")
     (folder / "checkerboard").symlink_to(FOLDER / "checkerboard")
-    assert typed(commands()[0], folder).count("the principal point") >= 2
+    assert typed(commands()[0], folder).stderr.count("the principal point") >= 2
     return folder
 
 
@@ -65,8 +65,17 @@ def walked(lenses, real_pair, tmp_path_factory) -> tuple[Path, str]:
     """The folder at the end of the walk with exchanged labels, and what was said of the points."""
     folder = beginning(tmp_path_factory.mktemp("walk"), lenses, exchanged=True)
     _, *steps = commands()
-    said = [typed(step, folder) for step in steps]
-    return folder, said[0]
+    pose, *_ = [typed(step, folder) for step in steps]
+    (folder / "poses.json").write_text(pose.stdout)
+    return folder, pose.stderr
+
+
+@pytest.mark.parametrize(("side", "bare"), [("left", "right"), ("right", "left")])
+def test_the_board_is_told_to_have_missed_half_of_the_picture(lenses, side, bare):
+    found = json.loads((lenses / f"{side}.json").read_text())
+    assert found["rms_px"] < 1
+    assert bare in found["coverage"]["empty"]
+    assert "principal point" in found["warnings"][0]
 
 
 def test_exchanged_labels_are_named_and_no_others(real_pair, walked):
@@ -81,7 +90,7 @@ def test_exchanged_labels_are_named_and_no_others(real_pair, walked):
 def test_of_right_labels_none_is_called_exchanged_and_the_first_poses_are_the_same(lenses, walked, tmp_path):
     plain = beginning(tmp_path, lenses, exchanged=False)
     _, pose, *_ = commands()
-    assert exchanged_labels(typed(pose, plain)) == set()
+    assert exchanged_labels(typed(pose, plain).stderr) == set()
     cameras = [json.loads((folder / "first.json").read_text())["cameras"] for folder in (plain, walked[0])]
     for one, other in zip(*cameras, strict=True):
         assert one["pose"]["position"] == pytest.approx(other["pose"]["position"], abs=0.01)
@@ -94,7 +103,11 @@ def test_the_wrong_principal_point_of_the_right_camera_is_found(walked):
     after = json.loads((folder / "venue.json").read_text())["cameras"][1]["intrinsics"]["matrix"]
     off, left = (np.hypot(m[0][2] - 1515.9, m[1][2] - 876.6) for m in (before, after))
     assert off > 150
+    # The folder's own fit of both cameras and the roof together has (1516, 877).
     assert left < 40
+    _, right = json.loads((folder / "poses.json").read_text())
+    assert right["lens"]["rms_before_px"] > 5 * right["lens"]["rms_px"]
+    assert right["lens"]["left_out_px"] < right["lens"]["left_out_before_px"] / 3
 
 
 def test_the_height_of_the_ridge_is_found_and_its_length_declared_unknowable(walked):

@@ -222,7 +222,7 @@ def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):
 
 @on_servers
 def test_a_silent_bucket_refuses_uploads_and_ends_no_job(service, home, name):
-    job = service.submit(service.venue(f"{name}-running", "accept 1")).json()["id"]
+    job = service.submit(service.venue("beside-a-silent-bucket", "accept 1")).json()["id"]
     service.venue(name)
     service.running(job)
     with home.bucket_away():
