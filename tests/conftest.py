@@ -5,7 +5,9 @@ import os
 
 import pytest
 
+from service.store.engine import connect, migrate
 from tests.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
+from tests.worker.stock import Stock
 
 # What tests can do without, and how to enable those that cannot.
 PARTS = {
@@ -72,3 +74,20 @@ def servers(postgres, bucket):
 def home(request):
     """Where a test keeps its state: the embedded home, or what `in_both_homes` says."""
     return request.getfixturevalue("servers") if getattr(request, "param", "") == "servers" else Embedded()
+
+
+@pytest.fixture
+def engine(home, tmp_path):
+    """A database of the test's own."""
+    engine = connect(home.database_url(tmp_path))
+    migrate(engine)
+    yield engine
+    engine.dispose()
+
+
+@pytest.fixture
+def stock(home, tmp_path):
+    """A database and files of the test's own, and what fills them."""
+    stock = Stock(tmp_path, **home.settings(tmp_path))
+    yield stock
+    stock.engine.dispose()

@@ -11,6 +11,9 @@ from tests.e2e.commands import esc_here
 from tests.e2e.running import Service, png
 from tests.homes import Servers, environment
 
+# Cameras of the tests are servers on this machine.
+FROM_HERE = {"ESC_SOURCES": '["127.0.0.0/8", "localhost"]'}
+
 
 @pytest.fixture(scope="session")
 def service_of_a_folder(tmp_path_factory):
@@ -24,7 +27,7 @@ def service_on_servers(servers, tmp_path_factory):
 
 
 def shared(folder, **settings):
-    running = Service(folder, **settings).ready()
+    running = Service(folder, **settings | FROM_HERE).ready()
     yield running
     assert running.stop() == 0
 
@@ -58,8 +61,9 @@ def unusual(tmp_path_factory):
         "ESC_MAX_FRAME_MB": "0.001",
         "ESC_MAX_BODY_MB": "0.01",
         "ESC_FREED_AXES": "y -x z -pan+90 tilt roll",
+        "ESC_SOURCE_TIMEOUT_S": "1",
     }
-    running = Service(tmp_path_factory.mktemp("unusual"), "serve", **settings)
+    running = Service(tmp_path_factory.mktemp("unusual"), "serve", **settings | FROM_HERE)
     yield running
     assert running.stop() == 0
 

@@ -23,7 +23,7 @@ from service.wire.results import CameraResult, Provenance, Result
 from service.wire.venue import VenueIn
 from tests.e2e.running import venue
 from tests.homes import in_both_homes, on_servers
-from tests.worker.stock import Stock, anyway, result
+from tests.worker.stock import anyway, result
 
 LIMIT = 3
 SHIFTED = [0.0, -55.0, 9.0]
@@ -134,8 +134,8 @@ def test_the_poses_move_only_with_the_job_that_ends_with_them(stock, running, mo
     assert (stock.jobs.get(running.job_id).status, moved) == ("succeeded", True)
 
 
-def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(servers, tmp_path, monkeypatch):
-    stock = Stock(tmp_path, **servers.settings(tmp_path))
+@on_servers
+def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(stock, monkeypatch):
     wrong = type("Wrong", (datetime,), {"now": lambda zone: datetime.now(zone) + timedelta(days=3)})
     with monkeypatch.context() as patch:
         patch.setattr("service.store.engine.datetime", wrong)
@@ -148,18 +148,15 @@ def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(servers, 
     now, ended = datetime.now(UTC), stock.jobs.get(job.id)
     for moment in (job.created_at, ended.finished_at, stock.expiry.now(), stock.deliveries.now()):
         assert abs(now - moment) < timedelta(minutes=10)
-    stock.engine.dispose()
 
 
-def test_workers_are_not_dead_because_the_clock_of_their_machine_is_wrong(servers, tmp_path, monkeypatch):
-    engine = connect(servers.database_url(tmp_path))
-    migrate(engine)
+@on_servers
+def test_workers_are_not_dead_because_the_clock_of_their_machine_is_wrong(engine, monkeypatch):
     late = type("Late", (datetime,), {"now": lambda zone: datetime.now(zone) - timedelta(hours=1)})
     with monkeypatch.context() as patch:
         patch.setattr("service.store.engine.datetime", late)
         Workers(engine).enter("w", None)
     assert Workers(engine).silent(10) == []
-    engine.dispose()
 
 
 @on_servers

@@ -10,7 +10,7 @@ from service.store.counts.figures import look
 from service.store.counts.tallies import STAGE, Buckets, add, read
 from service.wire.job import JobError
 from tests.homes import in_both_homes
-from tests.worker.stock import Stock, result
+from tests.worker.stock import result
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 TIMES = Buckets("t", (1, 5))
@@ -64,9 +64,8 @@ def test_an_error_that_nobody_knows_makes_no_new_series():
         assert end(error=known)[ENDED, ("failed", "", kind)] == 1
 
 
-def test_a_stage_that_nobody_knows_makes_no_new_series(tmp_path):
-    home = Stock(tmp_path)
-    odd = result(home.venue("v"), accepted=True).model_copy(update={"timings_s": {"decode": 0.2, "magic": 1.0}})
+def test_a_stage_that_nobody_knows_makes_no_new_series(stock):
+    odd = result(stock.venue("v"), accepted=True).model_copy(update={"timings_s": {"decode": 0.2, "magic": 1.0}})
     stages = {labels[0] for metric, labels in end(status="succeeded", result=odd) if metric == f"{STAGE.metric}_bucket"}
     assert stages == {"decode"} < set(STAGES)
 
@@ -80,20 +79,19 @@ def test_a_clock_that_was_set_back_makes_no_negative_times():
     assert min(early.values()) >= 0
 
 
-def test_a_look_reads_no_table_from_end_to_end_that_grows_with_jobs_or_venues(tmp_path):
-    home = Stock(tmp_path)
-    home.ended("v", NOON, callback_url="https://example.com/")
-    home.submitted("w")
+def test_a_look_reads_no_table_from_end_to_end_that_grows_with_jobs_or_venues(stock):
+    stock.ended("v", NOON, callback_url="https://example.com/")
+    stock.submitted("w")
     asked = []
 
-    @sa.event.listens_for(home.engine, "before_cursor_execute")
+    @sa.event.listens_for(stock.engine, "before_cursor_execute")
     def _(connection, cursor, statement, parameters, context, many):
         asked.append((statement, parameters))
 
-    seen = look(home.engine, 10)
+    seen = look(stock.engine, 10)
     assert (seen.callbacks_waiting, [waiting.jobs for waiting in seen.queue.values()], seen.running) == (1, [1], 0)
     selects = [(statement, values) for statement, values in asked if statement.startswith("SELECT")]
-    with home.engine.connect() as connection:
+    with stock.engine.connect() as connection:
         steps = [
             row[-1]
             for statement, values in selects

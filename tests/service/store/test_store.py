@@ -13,7 +13,7 @@ from service.store.workers import Workers
 from service.wire.geometry import Intrinsics
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
 from tests.homes import in_both_homes, on_servers
-from tests.worker.stock import Stock, result
+from tests.worker.stock import result
 
 
 @in_both_homes
@@ -106,8 +106,7 @@ def test_a_bucket_that_does_not_answer_is_asked_for_as_long_as_its_caller_is_pat
     assert gives_up_in_time(monkeypatch, "http://127.0.0.1:1")
 
 
-def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(tmp_path):
-    stock = Stock(tmp_path)
+def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(stock):
     job_id = stock.submitted("v")
     assert stock.jobs.posed(job_id) is None
     task = stock.attempts.begin(job_id)

@@ -19,13 +19,6 @@ def ago(**time) -> datetime:
 
 
 @pytest.fixture
-def stock(home, tmp_path):
-    stock = Stock(tmp_path, **home.settings(tmp_path))
-    yield stock
-    stock.engine.dispose()
-
-
-@pytest.fixture
 def forgotten():
     """What the queue was asked to forget."""
     return []

@@ -3,13 +3,11 @@ import shutil
 import subprocess
 import sys
 
-from tests.worker.stock import Stock
 from worker.message import Message
 
 
-def test_frames_that_the_store_does_not_hand_out_fail_the_job_in_its_words(tmp_path):
-    home = Stock(tmp_path)
-    task = home.attempts.begin(home.submitted("v"))
+def test_frames_that_the_store_does_not_hand_out_fail_the_job_in_its_words(stock, tmp_path):
+    task = stock.attempts.begin(stock.submitted("v"))
     shutil.rmtree(tmp_path / "blobs/frames")
     (tmp_path / "blobs/frames").write_bytes(b"no folder")
     program = [sys.executable, "-m", "worker.jobs.job"]
