@@ -27,7 +27,8 @@ def service_on_servers(servers, tmp_path_factory):
 
 
 def shared(folder, **settings):
-    running = Service(folder, **settings | FROM_HERE).ready()
+    # A camera that sends without end is to be found out soon, one that a busy machine delays is to be waited for.
+    running = Service(folder, **settings | FROM_HERE, ESC_MAX_FRAME_MB="2", ESC_SOURCE_TIMEOUT_S="30").ready()
     yield running
     assert running.stop() == 0
 
