@@ -96,6 +96,14 @@ class Service:
             headers=headers,
         )
 
+    def submitted(self, venue_id: str, shade: int = 0, headers: dict | None = None, **options) -> str:
+        """The job that a submission is."""
+        return self.submit(venue_id, shade, headers, **options).raise_for_status().json()["id"]
+
+    def calibrated(self, venue_id: str, shade: int = 0, headers: dict | None = None, **options) -> dict:
+        """The job of a submission at its end."""
+        return self.end(self.submitted(venue_id, shade, headers, **options))
+
     def job(self, job_id: str, wait: float = 0) -> dict:
         return self.http.get(f"/jobs/{job_id}", params={"wait": wait}).raise_for_status().json()
 

@@ -26,7 +26,7 @@ def years(stub):
 def ended(stub):
     """A job that was accepted, and one that was rejected."""
     return {
-        name: stub.end(stub.submit(stub.venue(name, behaviour)).json()["id"])
+        name: stub.calibrated(stub.venue(name, behaviour))
         for name, behaviour in (("fine", "accept"), ("poor", "reject"), ("broken", "fail"))
     }
 
@@ -139,7 +139,7 @@ def test_frames_dropped_on_the_page_find_their_cameras_by_their_names(stub, fram
 
 def test_what_the_service_refuses_is_said_where_it_was_asked(stub, frames, visit):
     venue = stub.venue("busy-page", "hang")
-    first = stub.submit(venue).json()["id"]
+    first = stub.submitted(venue)
     page = visit(stub.url, f"/ui/venues/{venue}/calibrate", forgiven=("409",))
     for camera in ("left", "right"):
         page.locator(f"[data-camera={camera}] input[type=file]").set_input_files(frames[camera])
@@ -151,7 +151,7 @@ def test_what_the_service_refuses_is_said_where_it_was_asked(stub, frames, visit
 
 
 def test_a_running_job_is_followed_and_cancelled(stub, visit):
-    job = stub.submit(stub.venue("followed", "accept 60")).json()["id"]
+    job = stub.submitted(stub.venue("followed", "accept 60"))
     stub.running(job)
     page = visit(stub.url, f"/ui/jobs/{job}")
     expect(page.locator(".stages [aria-current]")).to_have_text("evolution")
@@ -164,7 +164,7 @@ def test_a_running_job_is_followed_and_cancelled(stub, visit):
 
 def test_the_page_of_a_venue_shows_what_runs_and_then_its_end(stub, visit):
     venue = stub.venue("soon", "accept 60")
-    job = stub.submit(venue).json()["id"]
+    job = stub.submitted(venue)
     stub.running(job)
     page = visit(stub.url, f"/ui/venues/{venue}")
     expect(page.locator("section.live")).to_contain_text("evolution")
@@ -196,7 +196,7 @@ def test_jobs_are_filtered(stub, ended, visit):
 
 
 def test_the_list_of_jobs_follows_what_happens(stub, visit):
-    job = stub.submit(stub.venue("listed", "accept 60")).json()["id"]
+    job = stub.submitted(stub.venue("listed", "accept 60"))
     stub.running(job)
     page = visit(stub.url, "/ui/jobs?venue=listed")
     expect(page.locator("tbody .badge")).to_have_text("Running")

@@ -67,8 +67,7 @@ def test_without_wait_the_job_is_told(service, esc, name):
 
 
 def test_a_busy_service_is_told_apart(service, esc, name):
-    service.venue(name, "hang")
-    job = service.submit(name, 1).json()["id"]
+    job = service.submitted(service.venue(name, "hang"), 1)
     busy = esc("calibrate", name, *FRAMES, "--wait")
     assert (busy.returncode, job in busy.stderr) == (75, True)
     service.http.post(f"/jobs/{job}/cancel")
@@ -173,7 +172,7 @@ def test_a_worker_alone_serves_an_api_alone(start):
     service = start("serve")
     command = [sys.executable, "-m", "service.cli", "worker", "--name", "alone"]
     worker = subprocess.Popen(command, env=service.environment, stderr=service.log)
-    job = service.submit(service.venue("v")).json()["id"]
+    job = service.submitted(service.venue("v"))
     assert service.end(job)["status"] == "succeeded"
     worker.send_signal(signal.SIGTERM)
     assert worker.wait(30) == 0

@@ -76,9 +76,9 @@ def traced(tmp_path_factory):
     collector = Collector()
     sent = {"OTEL_EXPORTER_OTLP_ENDPOINT": collector.url, "OTEL_BSP_SCHEDULE_DELAY": "100"}
     service = Service(tmp_path_factory.mktemp("traced"), **sent).ready()
-    job = service.submit(service.venue("v"), headers={"traceparent": f"00-{TRACE}-{PARENT}-01"}).json()["id"]
+    job = service.submitted(service.venue("v"), headers={"traceparent": f"00-{TRACE}-{PARENT}-01"})
     service.end(job)
-    service.end(service.submit(service.venue("w", "crash")).json()["id"])
+    service.calibrated(service.venue("w", "crash"))
     assert service.stop() == 0
     wait_for(lambda: len([span for span in collector.of("esc-worker") if span.name == "job"]) == 2)
     yield collector.of, job
@@ -127,7 +127,7 @@ def test_a_job_that_fails_is_a_span_that_failed(traced):
 def test_a_collector_that_is_away_holds_nothing_up(start):
     away = {"OTEL_EXPORTER_OTLP_ENDPOINT": "http://127.0.0.1:9", "OTEL_EXPORTER_OTLP_TIMEOUT": "1"}
     service = start("up", OTEL_BSP_SCHEDULE_DELAY="100", **away).ready()
-    assert service.end(service.submit(service.venue("v")).json()["id"])["status"] == "succeeded"
+    assert service.calibrated(service.venue("v"))["status"] == "succeeded"
     assert service.stop() == 0
 
 

@@ -16,7 +16,7 @@ def log(service):
 
 def test_what_a_worker_did_is_told_by_the_api(service, name):
     before = figures(service)
-    service.end(service.submit(service.venue(name)).json()["id"])
+    service.calibrated(service.venue(name))
     found = figures(service)
     accepted = ("error", ""), ("status", "succeeded"), ("verdict", "accepted")
     assert found["esc_jobs_ended_total", *accepted] == before["esc_jobs_ended_total", *accepted] + 1
@@ -46,7 +46,7 @@ def test_what_callers_send_makes_no_new_series(service):
 
 
 def test_a_held_answer_is_timed_apart(service, name):
-    service.end(service.submit(service.venue(name)).json()["id"])
+    service.calibrated(service.venue(name))
     routes = {dict(key[1:])["route"] for key in figures(service) if key[0] == "esc_http_request_duration_seconds_count"}
     assert "/jobs/{job_id}?wait" in routes
 
@@ -87,7 +87,7 @@ def test_what_a_request_is_called_stays(service):
 def test_the_worker_calls_a_job_what_its_request_was_called(service, name):
     trace = "4bf92f3577b34da6a3ce929d0e0e4736"
     names = {"X-Request-ID": "night-run-7", "traceparent": f"00-{trace}-00f067aa0ba902b7-01"}
-    job = service.submit(service.venue(name), headers=names).json()["id"]
+    job = service.submitted(service.venue(name), headers=names)
     service.end(job)
     lines = wait_for(
         lambda: (

@@ -9,7 +9,7 @@ from tests.e2e.running import venue
 
 
 def test_the_same_frames_and_options_are_another_job_from_the_poses_that_hold_now(service, name):
-    first = service.end(service.submit(service.venue(name), seed=5, dry_run=True).json()["id"])
+    first = service.calibrated(service.venue(name), seed=5, dry_run=True)
     answer = service.http.post(f"/jobs/{first['id']}/again")
     assert (answer.status_code, answer.headers["Location"]) == (202, f"/jobs/{answer.json()['id']}")
     again = service.end(answer.json()["id"])
@@ -18,7 +18,7 @@ def test_the_same_frames_and_options_are_another_job_from_the_poses_that_hold_no
 
 
 def test_who_asks_twice_gets_one_job(service, name):
-    first = service.end(service.submit(service.venue(name)).json()["id"])
+    first = service.calibrated(service.venue(name))
     service.venue(name, "hang")
     one, other = (service.http.post(f"/jobs/{first['id']}/again") for _ in range(2))
     assert (one.status_code, other.status_code) == (202, 200)
@@ -27,7 +27,7 @@ def test_who_asks_twice_gets_one_job(service, name):
 
 
 def test_frames_that_are_gone_are_asked_for_again(service, name):
-    job = service.end(service.submit(service.venue(name)).json()["id"])["id"]
+    job = service.calibrated(service.venue(name))["id"]
     with service.database() as connection:
         gone = sa.update(tables.jobs).where(tables.jobs.c.id == job).values(frames_deleted_at=datetime.now(UTC))
         connection.execute(gone)
@@ -36,7 +36,7 @@ def test_frames_that_are_gone_are_asked_for_again(service, name):
 
 
 def test_frames_of_a_venue_that_was_changed_are_those_of_another(service, name):
-    job = service.end(service.submit(service.venue(name)).json()["id"])["id"]
+    job = service.calibrated(service.venue(name))["id"]
     changed = venue(name) | {"field": {"length_m": 100, "width_m": 68}}
     service.http.put(f"/venues/{name}", json=changed).raise_for_status()
     answer = service.http.post(f"/jobs/{job}/again")

@@ -86,8 +86,7 @@ def test_a_camera_that_is_none_is_refused_with_those_there_are(service, name):
 
 
 def test_a_job_gives_the_poses_it_found_whatever_holds_now(service, name):
-    service.venue(name, "reject")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "reject"))
     service.end(job)
     before = poses(service, f"/venues/{name}", "json").json()["cameras"][0]["pose"]
     found = poses(service, f"/jobs/{job}", "json")
@@ -97,16 +96,14 @@ def test_a_job_gives_the_poses_it_found_whatever_holds_now(service, name):
 
 
 def test_a_job_without_a_result_has_no_poses(service, name):
-    service.venue(name, "fail")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "fail"))
     service.end(job)
     answer = poses(service, f"/jobs/{job}", "json")
     assert (answer.status_code, answer.json()["type"]) == (404, "/problems/poses-not-found")
 
 
 def test_the_command_line_writes_the_file(service, esc, name, tmp_path):
-    service.venue(name)
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name))
     service.end(job)
     written = esc("venue", "poses", name, "--format", "opencv", "--camera", "left", "-o", "left.yml")
     assert written.returncode == 0, written.stderr

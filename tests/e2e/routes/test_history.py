@@ -14,7 +14,7 @@ def positions(service, name):
 
 
 def test_the_history_comes_in_pages_and_is_not_sent_twice(service, name):
-    job = service.end(service.submit(service.venue(name)).json()["id"])
+    job = service.calibrated(service.venue(name))
     assert job["venue_revision"] == 2
     first = history(service, name, limit=1)
     rest = history(service, name, limit=1, cursor=first.json()["next_cursor"])
@@ -33,7 +33,7 @@ def test_the_history_comes_in_pages_and_is_not_sent_twice(service, name):
 
 def test_a_revision_is_restored_if_the_venue_is_the_one_that_was_seen(service, name):
     old = service.http.get(f"/venues/{service.venue(name)}").headers["etag"]
-    service.end(service.submit(name).json()["id"])
+    service.calibrated(name)
     path = f"/venues/{name}/restore"
     refused = service.http.post(path, json={"revision": 1}, headers={"If-Match": old})
     assert (refused.status_code, refused.json()["type"]) == (412, "/problems/venue-changed")
@@ -60,7 +60,7 @@ def test_what_cannot_be_restored_is_refused_with_the_reason(service, name):
 
 
 def test_a_rejected_result_is_accepted_by_hand_and_rejected_again(service, name):
-    job = service.end(service.submit(service.venue(name, "reject")).json()["id"])["id"]
+    job = service.calibrated(service.venue(name, "reject"))["id"]
     unchanged = service.http.get(f"/jobs/{job}").headers["etag"]
     accepted = service.http.post(f"/jobs/{job}/accept")
     assert (accepted.status_code, accepted.json()["venue_revision"]) == (200, 2)
@@ -74,20 +74,19 @@ def test_a_rejected_result_is_accepted_by_hand_and_rejected_again(service, name)
 
 
 def test_deciding_too_late_or_about_nothing_is_refused(service, name):
-    job = service.end(service.submit(service.venue(name)).json()["id"])["id"]
-    service.end(service.submit(name, shade=1).json()["id"])
+    job = service.calibrated(service.venue(name))["id"]
+    service.calibrated(name, shade=1)
     late = service.http.post(f"/jobs/{job}/reject")
     assert (late.status_code, late.json()["type"]) == (409, "/problems/venue-moved-on")
     assert (late.json()["got"], "revision 3 (calibrated)" in late.json()["detail"]) == (3, True)
-    service.venue(name, "fail")
-    failed = service.end(service.submit(name).json()["id"])["id"]
+    failed = service.calibrated(service.venue(name, "fail"))["id"]
     for decision in ("accept", "reject"):
         answer = service.http.post(f"/jobs/{failed}/{decision}")
         assert (answer.status_code, answer.json()["type"]) == (404, "/problems/poses-not-found")
 
 
 def test_the_command_line_goes_back_too(service, esc, name):
-    job = service.end(service.submit(service.venue(name, "reject")).json()["id"])["id"]
+    job = service.calibrated(service.venue(name, "reject"))["id"]
     assert f'"id": "{job}"' in esc("job", "accept", job).stdout
     newest, oldest = (line.split("\t") for line in esc("venue", "history", name).stdout.splitlines())
     assert (newest[0], newest[2:4]) == ("2", ["accepted", job])

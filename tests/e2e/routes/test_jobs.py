@@ -16,8 +16,7 @@ BUSY_S = 10
 
 @in_both_homes
 def test_a_job_goes_from_frames_to_poses_and_pictures(service, name):
-    service.venue(name)
-    answer = service.submit(name, generations=12)
+    answer = service.submit(service.venue(name), generations=12)
     job = answer.json()
     assert (answer.status_code, answer.headers["location"]) == (202, f"/jobs/{job['id']}")
     assert int(answer.headers["retry-after"]) > 0
@@ -36,7 +35,7 @@ def test_a_job_goes_from_frames_to_poses_and_pictures(service, name):
 @in_both_homes
 def test_an_accepted_result_moves_the_stored_poses(service, name):
     tag = service.http.get(f"/venues/{service.venue(name)}").headers["etag"]
-    result = service.end(service.submit(name).json()["id"])["result"]
+    result = service.calibrated(name)["result"]
     answer = service.http.get(f"/venues/{name}")
     assert answer.headers["etag"] != tag
     assert [c["pose"] for c in answer.json()["cameras"]] == [c["pose"] for c in result["cameras"]]
@@ -46,36 +45,32 @@ def test_an_accepted_result_moves_the_stored_poses(service, name):
 def test_any_other_result_leaves_them_untouched(service, name, behaviour, options):
     service.venue(name, behaviour)
     before = service.http.get(f"/venues/{name}")
-    job = service.end(service.submit(name, **options).json()["id"])
+    job = service.calibrated(name, **options)
     assert job["status"] == ("failed" if behaviour == "fail" else "succeeded")
     answer = service.http.get(f"/venues/{name}")
     assert (answer.json(), answer.headers["etag"]) == (before.json(), before.headers["etag"])
 
 
 def test_a_rejection_gives_its_reason_and_its_pictures(service, name):
-    service.venue(name, "reject")
-    job = service.end(service.submit(name).json()["id"])
+    job = service.calibrated(service.venue(name, "reject"))
     assert (job["result"]["accepted"], job["result"]["rejected_because"]) == (False, "the lines do not fit")
     assert service.http.get(job["links"]["overlay/left"]).status_code == 200
 
 
 def test_only_pictures_that_were_made_are_linked(service, name):
-    service.venue(name, "reject")
-    job = service.end(service.submit(name).json()["id"])
+    job = service.calibrated(service.venue(name, "reject"))
     assert {"birdseye", "overlay/left", "overlay/right"} <= set(job["links"])
     assert "preview" not in job["links"]
     assert service.http.get(f"/jobs/{job['id']}/preview.jpg").status_code == 404
 
 
 def test_a_job_that_succeeded_is_wholly_done(service, name):
-    service.venue(name, "accept 0.5")
-    job = service.end(service.submit(name).json()["id"])
+    job = service.calibrated(service.venue(name, "accept 0.5"))
     assert (job["status"], job["progress"]["fraction"]) == ("succeeded", 1.0)
 
 
 def test_a_failure_names_the_camera_and_the_cause(service, name):
-    service.venue(name, "fail")
-    job = service.end(service.submit(name).json()["id"])
+    job = service.calibrated(service.venue(name, "fail"))
     assert (job["error"]["type"], job["error"]["camera"]) == ("/problems/no-markings-in-view", "left")
     picture = service.http.get(f"/jobs/{job['id']}/preview.jpg")
     assert (picture.status_code, picture.json()["type"]) == (404, "/problems/picture-not-found")
@@ -83,8 +78,7 @@ def test_a_failure_names_the_camera_and_the_cause(service, name):
 
 @in_both_homes
 def test_a_venue_changed_meanwhile_keeps_its_new_poses(service, name):
-    service.venue(name, "accept 1")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "accept 1"))
     service.running(job)
     changed = venue(name)
     changed["cameras"][0]["pose"]["position"] = [0, -60, 9]
@@ -108,9 +102,8 @@ def test_venues_have_one_camera_or_several(service, name, cameras):
 
 
 def test_the_seed_is_the_callers_or_one_is_chosen_and_told(service, name):
-    service.venue(name)
-    assert service.end(service.submit(name, seed=7).json()["id"])["result"]["provenance"]["seed"] == 7
-    assert service.end(service.submit(name, 1).json()["id"])["result"]["provenance"]["seed"] >= 0
+    assert service.calibrated(service.venue(name), seed=7)["result"]["provenance"]["seed"] == 7
+    assert service.calibrated(name, 1)["result"]["provenance"]["seed"] >= 0
 
 
 # One active job per venue, and the same content once
@@ -118,8 +111,7 @@ def test_the_seed_is_the_callers_or_one_is_chosen_and_told(service, name):
 
 @in_both_homes
 def test_the_same_frames_give_the_running_job_back_and_others_a_conflict(service, name):
-    service.venue(name, "accept 2")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "accept 2"))
     again = service.submit(name)
     assert (again.status_code, again.json()["id"]) == (200, job)
     for other in (service.submit(name, 1), service.submit(name, generations=9)):
@@ -129,13 +121,13 @@ def test_the_same_frames_give_the_running_job_back_and_others_a_conflict(service
         assert "retry-after" in other.headers
     assert service.http.delete(f"/venues/{name}").json()["job"] == job
     assert service.end(job)["status"] == "succeeded"
-    assert service.submit(name).json()["id"] != job
+    assert service.submitted(name) != job
 
 
 def test_an_idempotency_key_stands_for_one_job_even_after_its_end(service, name):
     service.venue(name)
     key = {"Idempotency-Key": "2026-11-21T10:00"}
-    job = service.submit(name, headers=key).json()["id"]
+    job = service.submitted(name, headers=key)
     service.end(job)
     again = service.submit(name, headers=key)
     assert (again.status_code, again.json()["id"], again.json()["status"]) == (200, job, "succeeded")
@@ -146,7 +138,7 @@ def test_an_idempotency_key_stands_for_one_job_even_after_its_end(service, name)
 
 def test_a_key_belongs_to_its_venue(service, name):
     key = {"Idempotency-Key": "k"}
-    jobs = {service.submit(service.venue(f"{name}-{n}"), headers=key).json()["id"] for n in range(2)}
+    jobs = {service.submitted(service.venue(f"{name}-{n}"), headers=key) for n in range(2)}
     assert len(jobs) == 2
 
 
@@ -184,14 +176,12 @@ def test_a_key_that_comes_twice_at_once_is_one_job_whatever_came_with_it(service
 
 
 def test_the_answer_waits_for_the_end(service, name):
-    service.venue(name, "accept 0.5")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "accept 0.5"))
     assert service.job(job, wait=20)["status"] == "succeeded"
 
 
 def test_but_no_longer_than_asked(service, name):
-    service.venue(name, "hang")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "hang"))
     begun = time.monotonic()
     assert service.job(job, wait=0.5)["status"] in ("queued", "running")
     assert 0.4 < time.monotonic() - begun < 0.5 + BUSY_S
@@ -199,16 +189,14 @@ def test_but_no_longer_than_asked(service, name):
 
 
 def test_progress_is_shown(service, name):
-    service.venue(name, "accept 2")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "accept 2"))
     progress = wait_for(lambda: (p := service.job(job)["progress"]) and p["stage"] == "evolution" and p)
     assert progress == {"stage": "evolution", "fraction": 0.5, "generation": 7, "loss": 0.3}
     service.end(job)
 
 
 def test_an_unchanged_job_is_not_sent_again(service, name):
-    service.venue(name)
-    job = service.end(service.submit(name).json()["id"])["id"]
+    job = service.calibrated(service.venue(name))["id"]
     tag = service.http.get(f"/jobs/{job}").headers["etag"]
     answer = service.http.get(f"/jobs/{job}", headers={"If-None-Match": f'"other", {tag}'})
     assert (answer.status_code, answer.content, answer.headers["etag"]) == (304, b"", tag)
@@ -217,8 +205,7 @@ def test_an_unchanged_job_is_not_sent_again(service, name):
 
 @in_both_homes
 def test_events_tell_the_progress_and_the_end(service, name):
-    service.venue(name, "accept 1")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "accept 1"))
     with service.http.stream("GET", f"/jobs/{job}/events") as answer:
         assert answer.headers["content-type"].startswith("text/event-stream")
         lines = [line.partition(": ") for line in answer.iter_lines()]
@@ -232,7 +219,7 @@ def test_events_tell_the_progress_and_the_end(service, name):
 
 @in_both_homes
 def test_who_saw_the_end_and_connects_again_is_told_that_there_is_no_more(service, name):
-    job = service.end(service.submit(service.venue(name)).json()["id"])["id"]
+    job = service.calibrated(service.venue(name))["id"]
     lines = [line.partition(": ") for line in service.http.get(f"/jobs/{job}/events").text.splitlines()]
     (number,) = [value for field, _, value in lines if field == "id"]
     again = service.http.get(f"/jobs/{job}/events", headers={"Last-Event-ID": number})
@@ -242,7 +229,7 @@ def test_who_saw_the_end_and_connects_again_is_told_that_there_is_no_more(servic
 
 
 def test_everybody_who_listens_hears_the_end(service, name):
-    job = service.submit(service.venue(name, "hang")).json()["id"]
+    job = service.submitted(service.venue(name, "hang"))
     service.running(job)
     everybody = 30
     listening = Semaphore(0)
@@ -268,7 +255,7 @@ def test_everybody_who_listens_hears_the_end(service, name):
 
 
 def test_a_picture_can_be_asked_for_without_its_bytes(service, name):
-    job = service.end(service.submit(service.venue(name)).json()["id"])
+    job = service.calibrated(service.venue(name))
     for link in ("self", "preview"):
         whole, without = service.http.get(job["links"][link]), service.http.head(job["links"][link])
         assert (without.status_code, without.content) == (200, b"")
@@ -277,19 +264,11 @@ def test_a_picture_can_be_asked_for_without_its_bytes(service, name):
     assert service.http.head("/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D").status_code == 404
 
 
-def test_a_page_goes_on_where_the_last_one_ended_whatever_came_in_between(service, name):
+def test_jobs_are_listed_newest_first_in_pages_that_go_on_whatever_came_in_between(service, name):
     service.venue(name)
-    ids = [service.end(service.submit(name, shade).json()["id"])["id"] for shade in range(3)]
+    ids = [service.calibrated(name, shade)["id"] for shade in range(3)]
     first = service.http.get("/jobs", params={"venue": name, "limit": 2}).json()
-    service.end(service.submit(name, 3).json()["id"])
-    rest = service.http.get("/jobs", params={"venue": name, "limit": 2, "cursor": first["next_cursor"]}).json()
-    assert [job["id"] for job in first["jobs"] + rest["jobs"]] == ids[::-1]
-
-
-def test_jobs_are_listed_newest_first_in_pages(service, name):
-    service.venue(name)
-    ids = [service.end(service.submit(name, shade).json()["id"])["id"] for shade in range(3)]
-    first = service.http.get("/jobs", params={"venue": name, "limit": 2}).json()
+    service.calibrated(name, 3)
     rest = service.http.get("/jobs", params={"venue": name, "limit": 2, "cursor": first["next_cursor"]}).json()
     assert [job["id"] for job in first["jobs"] + rest["jobs"]] == ids[::-1]
     assert rest["next_cursor"] is None
@@ -301,8 +280,7 @@ def test_jobs_are_listed_newest_first_in_pages(service, name):
 
 @in_both_homes
 def test_a_running_job_is_cancelled_within_two_seconds(service, name):
-    service.venue(name, "hang")
-    job = service.submit(name).json()["id"]
+    job = service.submitted(service.venue(name, "hang"))
     service.running(job)
     (process,) = service.begun(job)
     begun = time.monotonic()
@@ -315,31 +293,29 @@ def test_a_running_job_is_cancelled_within_two_seconds(service, name):
 
 @in_both_homes
 def test_a_queued_job_is_cancelled_at_once_and_never_begins(service, name):
-    busy = service.submit(service.venue(f"{name}-a", "hang")).json()["id"]
+    busy = service.submitted(service.venue(f"{name}-a", "hang"))
     service.running(busy)
-    queued = service.submit(service.venue(f"{name}-b")).json()["id"]
+    queued = service.submitted(service.venue(f"{name}-b"))
     assert service.http.post(f"/jobs/{queued}/cancel").json()["status"] == "cancelled"
     service.http.post(f"/jobs/{busy}/cancel")
-    service.end(service.submit(f"{name}-b", 1).json()["id"])
+    service.calibrated(f"{name}-b", 1)
     assert service.begun(queued) == []
 
 
 def test_a_finished_job_cannot_be_cancelled_any_more(service, name):
-    service.venue(name)
-    job = service.end(service.submit(name).json()["id"])
+    job = service.calibrated(service.venue(name))
     assert service.http.post(f"/jobs/{job['id']}/cancel").json() == job
 
 
 def test_a_job_that_takes_too_long_is_ended(service, name):
-    service.venue(name, "hang")
-    job = service.end(service.submit(name, timeout_s=1).json()["id"])
+    job = service.calibrated(service.venue(name, "hang"), timeout_s=1)
     assert (job["status"], job["error"]["type"]) == ("failed", "/problems/job-timeout")
     wait_for(lambda: not any(alive(process) for process in service.begun(job["id"])))
 
 
 @in_both_homes
 def test_live_jobs_go_first(service, name):
-    busy = service.submit(service.venue(f"{name}-a", "hang")).json()["id"]
+    busy = service.submitted(service.venue(f"{name}-a", "hang"))
     service.running(busy)
     routine = service.submit(service.venue(f"{name}-b")).json()
     live = service.submit(service.venue(f"{name}-c"), priority="live").json()
@@ -364,7 +340,6 @@ def test_nothing_is_ready_without_a_worker(unusual):
 
 @in_both_homes
 def test_the_frames_that_were_sent_are_the_frames_that_are_kept(service, name):
-    service.venue(name)
-    job = service.submit(name, 5).json()["id"]
+    job = service.submitted(service.venue(name), 5)
     service.end(job)
     assert Blobs(service.blob_url).get(f"frames/{job}/left/0") == png(*SIZE, shade=5)

@@ -130,7 +130,7 @@ def test_a_venue_may_be_of_another_sport(service, name):
     stored = service.http.put(f"/venues/{name}", json=document).json()
     assert stored["field"]["template"] == "rugby-union"
     assert stored["field"]["width_m"] == 70
-    assert service.end(service.submit(name).json()["id"])["status"] == "succeeded"
+    assert service.calibrated(name)["status"] == "succeeded"
 
 
 def test_a_venue_may_have_markings_of_its_own(service, name):
@@ -139,7 +139,7 @@ def test_a_venue_may_have_markings_of_its_own(service, name):
     stored = service.http.put(f"/venues/{name}", json=venue(name) | {"field": field}).json()
     assert stored["field"]["template"]["points"] == {"start": [-5, 0]}
     assert service.http.get(f"/venues/{name}").json() == stored
-    assert service.end(service.submit(name).json()["id"])["status"] == "succeeded"
+    assert service.calibrated(name)["status"] == "succeeded"
 
 
 def test_a_sport_that_is_none_is_refused_with_those_there_are(service, name):

@@ -46,12 +46,12 @@ def state(service, venue_id, job_id):
 
 def test_what_was_backed_up_while_it_ran_is_there_after_the_restore(start, shell):
     service = start("up").ready()
-    done = service.submit(service.venue("v")).json()["id"]
+    done = service.submitted(service.venue("v"))
     service.end(done)
-    waiting = service.submit(service.venue("open", "accept 3")).json()["id"]
+    waiting = service.submitted(service.venue("open", "accept 3"))
     before = state(service, "v", done)
     shell(commands("backup: sqlite"), service.data)
-    service.end(service.submit(service.venue("later")).json()["id"])
+    service.calibrated(service.venue("later"))
     assert service.stop() == 0
     shell(commands("restore: sqlite"), service.data)
     service.start()
@@ -60,15 +60,15 @@ def test_what_was_backed_up_while_it_ran_is_there_after_the_restore(start, shell
     assert service.http.get("/venues/later").status_code == 404
     # What was open then is computed again.
     assert service.end(waiting)["status"] == "succeeded"
-    assert service.end(service.submit("v", 1).json()["id"])["status"] == "succeeded"
+    assert service.calibrated("v", 1)["status"] == "succeeded"
 
 
 @on_servers
 def test_a_dump_and_a_copy_of_the_bucket_make_the_service_again_elsewhere(start, home, shell, tmp_path):
     service = start("up").ready()
-    done = service.submit(service.venue("v")).json()["id"]
+    done = service.submitted(service.venue("v"))
     service.end(done)
-    waiting = service.submit(service.venue("open", "accept 3")).json()["id"]
+    waiting = service.submitted(service.venue("open", "accept 3"))
     before = state(service, "v", done)
     shell(commands("backup: postgresql"), service.data, ESC_DATABASE_URL=service.database_url)
     assert service.stop() == 0
@@ -79,7 +79,7 @@ def test_a_dump_and_a_copy_of_the_bucket_make_the_service_again_elsewhere(start,
     restored = start("up", ESC_DATABASE_URL=new["database_url"], ESC_BLOB_URL=new["blob_url"]).ready()
     assert state(restored, "v", done) == before
     assert restored.end(waiting)["status"] == "succeeded"
-    assert restored.end(restored.submit("v", 1).json()["id"])["status"] == "succeeded"
+    assert restored.calibrated("v", 1)["status"] == "succeeded"
 
 
 def copy(source, target):

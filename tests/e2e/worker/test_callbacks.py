@@ -43,7 +43,7 @@ def receiver():
 
 def test_the_worker_that_is_killed_over_a_callback_sends_it_again_when_it_is_back(start, receiver):
     service = start("up", **LOCAL).ready()
-    job = service.submit(service.venue("v"), callback_url=receiver.url).json()["id"]
+    job = service.submitted(service.venue("v"), callback_url=receiver.url)
     ended = service.end(job)
     wait_for(lambda: receiver.received)
     os.kill(service.worker(), signal.SIGKILL)
@@ -70,7 +70,7 @@ def due_now(service, job: str) -> None:
 def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver, tmp_path):
     receiver.go.set()
     service = start("serve", **LOCAL)
-    job = service.submit(service.venue("v"), callback_url=receiver.url).json()["id"]
+    job = service.submitted(service.venue("v"), callback_url=receiver.url)
     service.http.post(f"/jobs/{job}/cancel")
     worker = service.worker_beside(tmp_path / "machine", "next")
     service.process.kill()
@@ -85,9 +85,9 @@ def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver, tmp_
 def test_a_receiver_that_hangs_holds_up_no_job(start, receiver):
     service = start("up", **LOCAL).ready()
     for name in ("a", "b", "c"):
-        job = service.submit(service.venue(name), callback_url=receiver.url).json()["id"]
+        job = service.submitted(service.venue(name), callback_url=receiver.url)
         assert service.end(job)["status"] == "succeeded"
-    assert service.end(service.submit(service.venue("d")).json()["id"])["status"] == "succeeded"
+    assert service.calibrated(service.venue("d"))["status"] == "succeeded"
 
 
 def test_without_a_secret_a_callback_is_refused_with_what_to_do(service, name):

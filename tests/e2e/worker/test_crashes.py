@@ -35,8 +35,7 @@ def poses(service, venue):
 
 def test_a_killed_worker_comes_back_and_its_job_ends_once(start):
     service = start().ready()
-    service.venue("v", "accept 2")
-    job = service.submit("v").json()["id"]
+    job = service.submitted(service.venue("v", "accept 2"))
     service.running(job)
     worker = service.worker()
     os.kill(worker, signal.SIGKILL)
@@ -58,7 +57,7 @@ def test_a_worker_on_another_machine_takes_over(start, tmp_path):
     service.venue("v", "accept 3")
     workers = [service.worker_beside(tmp_path / f"machine-{number}", f"worker-{number}") for number in (1, 2)]
     service.ready()
-    job = service.submit("v").json()["id"]
+    job = service.submitted("v")
     service.running(job)
     (doomed,) = (worker for worker in workers if children(worker.pid))
     (computing,) = children(doomed.pid)
@@ -111,8 +110,7 @@ def test_two_workers_of_one_name_do_not_run_on_one_machine(service):
 
 def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     service = start().ready()
-    service.venue("v", "accept 2")
-    job = service.submit("v").json()["id"]
+    job = service.submitted(service.venue("v", "accept 2"))
     service.running(job)
     worker = service.worker()
     (computing,) = service.begun(job)
@@ -126,8 +124,7 @@ def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
 
 def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
     service = start().ready()
-    service.venue("v")
-    job = service.submit("v").json()["id"]
+    job = service.submitted(service.venue("v"))
     service.kill()
     service.start()
     assert service.end(job)["status"] == "succeeded"
@@ -136,7 +133,7 @@ def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
 
 def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):
     service = start().ready()
-    job = service.submit(service.venue("v", "hang")).json()["id"]
+    job = service.submitted(service.venue("v", "hang"))
     service.running(job)
     worker = service.worker()
     (computing,) = service.begun(job)
@@ -151,16 +148,16 @@ def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):
 
 def test_a_crash_of_the_computation_costs_one_job(service, name):
     worker = service.worker()
-    crashed = service.end(service.submit(service.venue(f"{name}-bad", "crash")).json()["id"])
+    crashed = service.calibrated(service.venue(f"{name}-bad", "crash"))
     assert (crashed["status"], crashed["error"]["type"]) == ("failed", "/problems/job-crashed")
     assert "SIGSEGV" in crashed["error"]["detail"]
-    assert service.end(service.submit(service.venue(name, "chatter")).json()["id"])["status"] == "succeeded"
+    assert service.calibrated(service.venue(name, "chatter"))["status"] == "succeeded"
     assert service.worker() == worker
 
 
 def test_a_program_and_a_network_that_are_not_there_are_told(start):
     service = start("up", ESC_JOB_PROGRAM='["/nonexistent/program"]', ESC_MODEL="/nowhere/unet.onnx")
-    job = service.end(service.submit(service.venue("v")).json()["id"])
+    job = service.calibrated(service.venue("v"))
     assert (job["status"], job["attempt"], job["error"]["type"]) == ("failed", 1, "/problems/job-crashed")
     assert "No such file or directory: '/nonexistent/program'" in job["error"]["detail"]
     wait_for(lambda: service.http.get("/readyz").json()["parts"]["model"].startswith("missing at"))
@@ -170,8 +167,7 @@ def test_a_program_and_a_network_that_are_not_there_are_told(start):
 def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start, home):
     # Without a key to look up: otherwise it could not tell whether the caller may know.
     service = start("up", ESC_AUTH="off").ready()
-    service.venue("v", "accept 1")
-    job = service.submit("v").json()["id"]
+    job = service.submitted(service.venue("v", "accept 1"))
     service.running(job)
     (computing,) = service.begun(job)
     with home.database_away(service.data):
@@ -189,7 +185,7 @@ def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start,
     assert poses(service, "v") == [-0.875, -0.875]
     assert figures(service)["esc_database_up",] == 1
     # The queue has come back too.
-    assert service.end(service.submit("v", 1).json()["id"])["status"] == "succeeded"
+    assert service.calibrated("v", 1)["status"] == "succeeded"
     service.ready()
 
 
@@ -199,8 +195,7 @@ def test_a_long_absence_of_the_database_is_no_workers_death(start, home, tmp_pat
     service = start("up", ESC_TAKEOVER_AFTER_S=str(silence_s)).ready()
     other = service.worker_beside(tmp_path / "other", "other")
     wait_for(lambda: '"other"' in (service.data / "log").read_text())
-    service.venue("v", "accept 7")
-    job = service.submit("v").json()["id"]
+    job = service.submitted(service.venue("v", "accept 7"))
     service.running(job)
     with home.database_away(service.data):
         time.sleep(silence_s + 2)
@@ -212,17 +207,17 @@ def test_a_long_absence_of_the_database_is_no_workers_death(start, home, tmp_pat
 
 def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):
     service = start().ready()
-    job = service.end(service.submit(service.venue("v", "kill-worker")).json()["id"])
+    job = service.calibrated(service.venue("v", "kill-worker"))
     assert (job["status"], job["attempt"]) == ("failed", 3)
     assert job["error"]["type"] == "/problems/job-abandoned"
     assert "begun 3 times" in job["error"]["detail"]
     service.ready()
-    assert service.end(service.submit(service.venue("w")).json()["id"])["status"] == "succeeded"
+    assert service.calibrated(service.venue("w"))["status"] == "succeeded"
 
 
 @on_servers
 def test_a_silent_bucket_refuses_uploads_and_ends_no_job(service, home, name):
-    job = service.submit(service.venue("beside-a-silent-bucket", "accept 1")).json()["id"]
+    job = service.submitted(service.venue("beside-a-silent-bucket", "accept 1"))
     service.venue(name)
     service.running(job)
     with home.bucket_away():
@@ -230,7 +225,7 @@ def test_a_silent_bucket_refuses_uploads_and_ends_no_job(service, home, name):
         assert (answer.status_code, answer.json()["type"]) == (503, "/problems/unavailable")
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
-    assert service.end(service.submit(name).json()["id"])["status"] == "succeeded"
+    assert service.calibrated(name)["status"] == "succeeded"
 
 
 def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk):
@@ -238,7 +233,7 @@ def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk
     worker = service.worker()
     service.venue("v", "accept 1")
     service.venue("w")
-    job = service.submit("v").json()["id"]
+    job = service.submitted("v")
     service.running(job)
     with filled(small_disk):
         # No room for a sign of life either.
@@ -247,6 +242,6 @@ def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk
         assert (answer.status_code, answer.json()["type"]) == (503, "/problems/unavailable")
     assert service.end(job)["error"]["type"] == "/problems/job-crashed"
     service.ready()
-    assert service.end(service.submit("w").json()["id"])["status"] == "succeeded"
+    assert service.calibrated("w")["status"] == "succeeded"
     assert service.worker() == worker
     service.kill()

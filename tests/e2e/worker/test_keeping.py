@@ -24,8 +24,7 @@ def test_what_is_past_its_time_goes_and_says_so(start):
     service.venue("v", "reject")
     key = {"Idempotency-Key": "k"}
     ancient, old, young = (
-        service.end(service.submit("v", shade, headers=key if shade == 0 else None).json()["id"])["id"]
-        for shade in range(3)
+        service.calibrated("v", shade, headers=key if shade == 0 else None)["id"] for shade in range(3)
     )
     age(service, old, days=15)
     wait_for(lambda: not service.files(f"pictures/{old}") and not service.files(f"frames/{old}"))
@@ -47,8 +46,7 @@ def test_what_is_past_its_time_goes_and_says_so(start):
 
 @in_both_homes
 def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(service, name):
-    service.venue(name)
-    job = service.end(service.submit(name).json()["id"])["id"]
+    job = service.calibrated(service.venue(name))["id"]
     Blobs(service.blob_url).delete_under(f"pictures/{job}")
     gone = service.http.get(f"/jobs/{job}/birdseye.jpg")
     assert (gone.status_code, gone.json()["type"]) == (410, "/problems/picture-deleted")
@@ -57,7 +55,7 @@ def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(se
 
 
 def test_a_nearly_full_disk_refuses_uploads_and_says_what_to_do(service, name):
-    running = service.submit(service.venue(name, "accept 2")).json()["id"]
+    running = service.submitted(service.venue(name, "accept 2"))
     tight = Service(service.data, "serve", ESC_MIN_FREE_MB="1e9")
     answer = tight.submit(name, 1)
     assert (answer.status_code, answer.json()["type"]) == (507, "/problems/disk-full")
