@@ -1,36 +1,51 @@
 """Services for the tests: one per home that many tests share, and fresh ones to be killed."""
 
+import json
 import re
+import sys
 from functools import partial
 
 import pytest
 
+from service.settings import MODEL_BESIDE_THE_CODE
 from tests import disks
 from tests.disks import may_mount
 from tests.e2e.commands import esc_here
 from tests.e2e.running import Service, png
 from tests.homes import Servers, environment
 
-# Cameras of the tests are servers on this machine.
-FROM_HERE = {"ESC_SOURCES": '["127.0.0.0/8", "localhost"]'}
+# Cameras of the tests are servers on this machine. One that sends without end is to be found out soon, one that a busy
+# machine delays is to be waited for.
+FROM_HERE = {
+    "ESC_SOURCES": '["127.0.0.0/8", "localhost"]',
+    "ESC_MAX_FRAME_MB": "2",
+    "ESC_SOURCE_TIMEOUT_S": "30",
+}
 
 
 @pytest.fixture(scope="session")
 def service_of_a_folder(tmp_path_factory):
-    yield from shared(tmp_path_factory.mktemp("esc"))
+    yield from shared(tmp_path_factory.mktemp("esc"), **FROM_HERE)
 
 
 @pytest.fixture(scope="session")
 def service_on_servers(servers, tmp_path_factory):
     folder = tmp_path_factory.mktemp("esc")
-    yield from shared(folder, **environment(servers.settings(folder)))
+    yield from shared(folder, **environment(servers.settings(folder)) | FROM_HERE)
 
 
 def shared(folder, **settings):
-    # A camera that sends without end is to be found out soon, one that a busy machine delays is to be waited for.
-    running = Service(folder, **settings | FROM_HERE, ESC_MAX_FRAME_MB="2", ESC_SOURCE_TIMEOUT_S="30").ready()
+    running = Service(folder, **settings).ready()
     yield running
     assert running.stop() == 0
+
+
+@pytest.fixture(scope="session")
+def service_with_engine(tmp_path_factory):
+    """Its jobs are computed, by the real network."""
+    program = json.dumps([sys.executable, "-m", "worker.jobs.job"])
+    real = {"ESC_JOB_PROGRAM": program, "ESC_MODEL": str(MODEL_BESIDE_THE_CODE), "ESC_MAX_PHOTOS": "8"}
+    yield from shared(tmp_path_factory.mktemp("engine"), **real)
 
 
 @pytest.fixture
@@ -64,7 +79,7 @@ def unusual(tmp_path_factory):
         "ESC_FREED_AXES": "y -x z -pan+90 tilt roll",
         "ESC_SOURCE_TIMEOUT_S": "1",
     }
-    running = Service(tmp_path_factory.mktemp("unusual"), "serve", **settings | FROM_HERE)
+    running = Service(tmp_path_factory.mktemp("unusual"), "serve", **FROM_HERE | settings)
     yield running
     assert running.stop() == 0
 

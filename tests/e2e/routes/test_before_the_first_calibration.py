@@ -8,19 +8,16 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.e2e.running import Service, png
+from tests.e2e.running import png
 from tests.worker.calibration.first.test_first_pose import CAMERA, LENS, SIZE, clicks
 from tests.worker.calibration.first.test_lens_calibration import BOARD, PINHOLE, corners_seen, photograph, places
 
 WAIT = {"wait": 60}
 
 
-@pytest.fixture(scope="module")
-def service(tmp_path_factory):
-    program = json.dumps([sys.executable, "-m", "worker.jobs.job"])
-    running = Service(tmp_path_factory.mktemp("esc"), ESC_JOB_PROGRAM=program, ESC_MAX_PHOTOS="8").ready()
-    yield running
-    assert running.stop() == 0
+@pytest.fixture
+def service(service_with_engine):
+    return service_with_engine
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """The real engine and the real network behind the front door, on rendered frames of reduced size."""
 
 import json
-import sys
 from functools import cache
 
 import cv2
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 
 from models.training.render import Conditions, render_frame
-from service.settings import MODEL_BESIDE_THE_CODE
 from tests.e2e.running import Service
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose, rotation_angles_deg
 from worker.calibration.scene.field import Field
@@ -63,14 +61,9 @@ def venue(name: str, right_turn=TURNED) -> dict:
     }
 
 
-@pytest.fixture(scope="module")
-def service(tmp_path_factory):
-    program = json.dumps([sys.executable, "-m", "worker.jobs.job"])
-    running = Service(
-        tmp_path_factory.mktemp("esc"), ESC_MODEL=str(MODEL_BESIDE_THE_CODE), ESC_JOB_PROGRAM=program
-    ).ready()
-    yield running
-    assert running.stop() == 0
+@pytest.fixture
+def service(service_with_engine):
+    return service_with_engine
 
 
 def calibrated(service: Service, document: dict, files: dict[str, bytes], **options) -> dict:
