@@ -16,7 +16,7 @@ import numpy as np
 from worker.calibration.finish.estimate import Estimate
 from worker.calibration.finish.normal_equations import error_of_measurement, normal_equations
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS, Unknowns, residuals, rms_px
-from worker.calibration.finish.robust import tukey_weights
+from worker.calibration.finish.robust import tukey_slopes, tukey_weights
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.motion import POSE_NUMBERS
@@ -137,13 +137,17 @@ def judged(
     value = np.linalg.solve(information + np.diag(certainty), pull)
     nearer = -inverse @ left_over - effect @ value
 
-    everything = np.zeros_like(equations.information)
+    # A sandwich: how the pull of the residuals varies, between how the pull changes with the unknowns (Huber, 1964).
+    slopes = residuals(lines.position, cameras, measured, unknowns, here.heights, stitch_weight, tukey_slopes)
+    bread = normal_equations(slopes, unknowns).information
+    everything = np.zeros_like(bread)
     everything[np.ix_(kept, kept)] = prior
     everything[asked, asked] = certainty
-    full = np.linalg.inv(equations.information + everything)
+    full = np.linalg.inv(bread + everything)
     measurement = error_of_measurement(rows, unknowns)
     covariance = full @ (measurement + everything) @ full
-    alone = inverse @ (measurement[np.ix_(kept, kept)] + prior) @ inverse
+    part = np.linalg.inv(bread[np.ix_(kept, kept)] + prior)
+    alone = part @ (measurement[np.ix_(kept, kept)] + prior) @ part
     enough = [len(found) >= FEWEST_MEASUREMENTS for found in measured]
     return Finished(
         here.pitch,
