@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable
+from functools import cache, partial
 
 import cv2
 import numpy as np
@@ -32,9 +32,11 @@ def draw(given: Given, found: Calibration) -> dict[str, bytes]:
     pitch, before, frames = given.pitch, given.cameras, given.frames
     after = [result.camera for result in found.cameras]
     first = {camera: several[0] for camera, several in frames.items()}
+    view = cache(lambda: viewpoint(found.pitch, after, PREVIEW_WIDTH))
     parts: list[Callable[[], dict[str, bytes]]] = [
-        lambda: _preview(found.pitch, after, first),
-        lambda: _preview_before((pitch, before), (found.pitch, after), first),
+        lambda: _preview(mosaic.stitched(found.pitch, view(), after, first)),
+        # The same view by the stored poses.
+        lambda: {"preview_before": jpeg(mosaic.stitched(pitch, view(), before, first).picture)},
         lambda: {"birdseye": jpeg(mosaic.birdseye(found.pitch, after, first))},
     ]
     for old, new in zip(before, after, strict=True):
@@ -52,20 +54,9 @@ def draw(given: Given, found: Calibration) -> dict[str, bytes]:
     return pictures
 
 
-def _preview(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Picture]) -> dict[str, bytes]:
+def _preview(stitched: mosaic.Stitched) -> dict[str, bytes]:
     """One view by the new poses, and where one camera hands over to another in it."""
-    view = viewpoint(pitch, cameras, PREVIEW_WIDTH)
-    stitched = mosaic.stitched(pitch, view, cameras, frames)
     return {"preview": jpeg(stitched.picture), "seam": png(layers.seam_layer(stitched.owner))}
-
-
-def _preview_before(
-    stored: tuple[Field, Sequence[Camera]], new: tuple[Field, Sequence[Camera]], frames: Mapping[str, Picture]
-) -> dict[str, bytes]:
-    """The same view by the stored poses."""
-    view = viewpoint(*new, PREVIEW_WIDTH)
-    pitch, cameras = stored
-    return {"preview_before": jpeg(mosaic.stitched(pitch, view, cameras, frames).picture)}
 
 
 def _overlay(stored: Standing, new: Standing, frame: Picture) -> dict[str, bytes]:
