@@ -68,7 +68,7 @@ def refine(
         before = here
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
         # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
-        here = _settled(here, cameras, measured, unknowns, stitch_weight)
+        here = _down_huber(here, cameras, measured, unknowns, stitch_weight)
         measured = doubted(here, measured)
         here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
         uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
@@ -81,7 +81,7 @@ def refine(
     return _assessed(here, cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
 
 
-def _settled(
+def _down_huber(
     here: Estimate,
     found: Sequence[Camera],
     measured: Sequence[Measurements],

@@ -15,7 +15,7 @@ import numpy as np
 from worker.calibration.calibrate import METHODS, find, judge, look, sight_of
 from worker.calibration.finish.refinement import SEARCH_PX, Sight, assess, refine
 from worker.calibration.finish.uncertainty import Determined, Finished
-from worker.calibration.measures.ridge import RidgeTrials, try_ridges
+from worker.calibration.measures.ridge import TriedRidges, try_ridges
 from worker.calibration.records import Answer, Journey, Options, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
@@ -29,7 +29,7 @@ UNTOUCHED = 0.9
 """Where they leave this part, no line that it moves was measured."""
 SURE_DIP = 2.0
 """A ridge that is lower than the corners by this many sigma is no measurement of a flat pitch."""
-IN_WORDS = {
+QUANTITIES = {
     "length_m": "the pitch's length",
     "width_m": "the pitch's width",
     "ridge_height_m": "the ridge's height",
@@ -102,12 +102,12 @@ def fit_measures(
     """The finish on the pitch with those measures that the lines tell; and what they tell of every measure."""
     free = free_field(pitch)
     everything = refine(pitch, cameras, sight, stitch_weight, free, (*FIRST_SEARCH_PX, *SEARCH_PX))
-    trials = try_ridges(everything, free, sight, stitch_weight)
+    tried = try_ridges(everything, free, sight, stitch_weight)
     measures = [
-        _measure(pitch, everything.pitch, parameter, found, trials, cameras)
+        _measure(pitch, everything.pitch, parameter, found, tried, cameras)
         for parameter, found in zip(free, everything.determined, strict=True)
     ]
-    ridge = _ridge_length(pitch, trials)
+    ridge = _ridge_length(pitch, tried)
     known, still_free = _with_known(pitch, everything.pitch, free, measures, ridge)
     final = refine(known, everything.cameras, sight, stitch_weight, still_free)
     told = [
@@ -135,10 +135,10 @@ def _measure(
     fitted: Field,
     parameter: FieldParameter,
     found: Determined,
-    trials: RidgeTrials,
+    tried: TriedRidges,
     cameras: Sequence[Camera],
 ) -> Measure:
-    sigma = float(np.hypot(found.sigma, trials.spread(parameter.read)))
+    sigma = float(np.hypot(found.sigma, tried.spread(parameter.read)))
     left = sigma / parameter.expected
     known = left <= TOLD
     detail = ""
@@ -153,12 +153,12 @@ def _measure(
     return Measure(name, parameter.read(given), parameter.read(fitted), sigma, parameter.expected, known, detail)
 
 
-def _ridge_length(given: Field, trials: RidgeTrials) -> Measure:
+def _ridge_length(given: Field, tried: TriedRidges) -> Measure:
     open_m = _open_ridge_length(given)
-    shortest, longest = trials.alike
-    known = bool(trials.sigma <= TOLD * open_m)
+    shortest, longest = tried.alike
+    known = bool(tried.sigma <= TOLD * open_m)
     detail = "" if known else f"the lines fit alike with a ridge of any length from {shortest:.0f} to {longest:.0f} m"
-    return Measure("ridge_length_m", given.ridge_length, trials.best, trials.sigma, open_m, known, detail)
+    return Measure("ridge_length_m", given.ridge_length, tried.best, tried.sigma, open_m, known, detail)
 
 
 def _open_ridge_length(pitch: Field) -> float:
@@ -185,7 +185,7 @@ def _with_known(
 
 
 def _named(parameter: Parameter, cameras: Sequence[Camera]) -> str:
-    words = IN_WORDS[parameter.name]
+    words = QUANTITIES[parameter.name]
     return f"{words} of camera {cameras[parameter.camera].id}" if isinstance(parameter, LensParameter) else words
 
 
