@@ -37,8 +37,8 @@ from worker.calibration.search.search import (
     Strategy,
     search,
 )
+from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
-from worker.calibration.see.line_measurement import brightness_of
 from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import Region, reachable_regions
 from worker.calibration.see.view import ViewCondition, look_at
@@ -203,8 +203,7 @@ def calibrate(
         )
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
-        brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
-        sight = Sight(brightness, responses)
+        sight = Sight([Channels(frames[camera.id]) for camera in cameras], responses)
         finish = method.finish if usable else assess
         refined = finish(pitch, found.cameras, sight, options.stitch_weight, _free(options, pitch, cameras))
     with clock.measuring("quality"):
@@ -305,17 +304,17 @@ def qualities_of(
             view,
             markings_iou(refined.pitch, after, response),
             evidence,
-            evidence_of(lines, before, bright, response),
+            evidence_of(lines, before, channels, response),
             residual,
             _sigma(covariance),
             _sigma(repeatability),
             Movement.between(pitch, before, after),
         )
-        for before, after, view, bright, response, evidence, residual, covariance, repeatability in zip(
+        for before, after, view, channels, response, evidence, residual, covariance, repeatability in zip(
             stored,
             refined.cameras,
             views,
-            sight.brightness,
+            sight.channels,
             sight.responses,
             refined.evidence,
             refined.residual_px,

@@ -35,8 +35,7 @@ from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import FieldParameter, LensParameter, Parameter, free_field
 from worker.calibration.search.search import Strategy, search
-from worker.calibration.see.line_measurement import brightness_of
-from worker.calibration.see.sampling import median
+from worker.calibration.see.contrast import Channels
 
 FIRST_SEARCH_PX = (40.0, 24.0)
 """A pitch whose measures are guesses has its lines farther from where they are expected than one that is known."""
@@ -121,8 +120,7 @@ def fit_field(
         found = search(pitch, cameras, responses, levels, strategy, rng, journey.evolution(options.generations))
     with clock.measuring("refinement"):
         journey.at("refinement", 0.0)
-        brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
-        sight = Sight(brightness, responses)
+        sight = Sight([Channels(frames[camera.id]) for camera in cameras], responses)
         refined, measures = fit_measures(pitch, found.cameras, sight, options.stitch_weight)
     with clock.measuring("quality"):
         journey.at("refinement", 0.9)
