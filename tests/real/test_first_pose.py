@@ -8,11 +8,12 @@ import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.real.pair import FOLDER
-from worker.calibration.calibrate import Options, calibrate
+from worker.calibration.calibrate import calibrate
 from worker.calibration.first.boards import Board, find_board
 from worker.calibration.first.clicks import Clicks
 from worker.calibration.first.first_pose import first_pose
 from worker.calibration.first.lens_calibration import Photo, calibrate_lens
+from worker.calibration.records import Options
 from worker.calibration.see.segmentation import Segmenter
 
 pytestmark = pytest.mark.real
@@ -77,7 +78,7 @@ def test_a_calibration_accepts_the_first_poses_and_ends_at_the_clicked_points(re
     assert found.rejected_because is None
     for camera, result in zip(cameras, found.cameras, strict=True):
         given = clicks(real_pair, camera.id)[~beside(located[camera.id])]
-        off = camera.with_pose(result.pose).project(given.world) - given.pixel
+        off = result.camera.project(given.world) - given.pixel
         assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 4
 
 

@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 
 from tests.benchmarks.fields.cases import Case
-from worker.calibration.calibrate import CAPTURE_RAD, Segment
+from worker.calibration.calibrate import CAPTURE_RAD
+from worker.calibration.records import Segment
 from worker.calibration.scene.camera import Camera, inside
 from worker.calibration.scene.field import LinePoints
 from worker.calibration.see.contrast import Channels

@@ -12,9 +12,10 @@ import numpy as np
 
 from worker.calibration.finish.estimate import Estimate, step
 from worker.calibration.finish.normal_equations import CLUSTER_POINTS
-from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Refined, Sight, measure_all
+from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Sight, measure_all
 from worker.calibration.finish.residuals import Residuals, Unknowns, residuals
 from worker.calibration.finish.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
+from worker.calibration.finish.uncertainty import Finished
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import Ground
@@ -81,7 +82,7 @@ class RidgeTrials:
         return np.array([trial.cost for trial in self.tried])
 
 
-def try_ridges(base: Refined, free: Sequence[Parameter], sight: Sight, stitch_weight: float) -> RidgeTrials:
+def try_ridges(base: Finished, free: Sequence[Parameter], sight: Sight, stitch_weight: float) -> RidgeTrials:
     """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
     lines = base.pitch.line_points()
     measured = measure_all(lines, base.cameras, sight, ASSESSING_SEARCH_PX)

@@ -18,7 +18,7 @@ from tests.worker.calibration.synthetic import (
 )
 from worker.calibration.finish.refinement import Sight, assess, refine
 from worker.calibration.finish.robust import huber_weights, tukey_weights
-from worker.calibration.judge.quality import Gate, Sigma
+from worker.calibration.judge.quality import Gate
 from worker.calibration.judge.registration import stitch_error_px
 from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
@@ -103,7 +103,7 @@ def test_slightly_moved_cameras_come_back_to_where_they_were():
     for shift, turn in off_by(cameras, refined.cameras):
         assert shift < 0.02
         assert turn < 0.02
-    assert all(residual < 0.3 for residual in refined.residual_px)
+    assert all(one.residual_px < 0.3 for one in refined.each)
 
 
 def test_where_it_ends_does_not_depend_on_where_it_began():
@@ -121,10 +121,10 @@ def test_the_error_is_of_the_size_of_its_sigma():
     frames = [paint_frame(CROWNED, c) for c in cameras]
     noisy = [np.clip(f + rng.normal(scale=12, size=f.shape), 0, 255).astype(np.uint8) for f in frames]
     refined = refine(CROWNED, cameras, Sight([Channels([f]) for f in noisy], responses), 0.5)
-    for before, after, covariance in zip(cameras, refined.cameras, refined.covariance, strict=True):
-        error = after.pose.position - before.pose.position
-        assert (np.abs(error) < 4 * np.sqrt(np.diag(covariance)[3:])).all()
-        assert np.sqrt(np.diag(covariance)[3:]).max() < 0.1
+    for before, after in zip(cameras, refined.each, strict=True):
+        error = after.camera.pose.position - before.pose.position
+        assert (np.abs(error) < 4 * np.sqrt(np.diag(after.covariance)[3:])).all()
+        assert np.sqrt(np.diag(after.covariance)[3:]).max() < 0.1
 
 
 def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
@@ -144,9 +144,9 @@ def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
     blind = Sight([channels[0], black], [responses[0], np.zeros_like(responses[1])])
     refined = refine(CROWNED, cameras, blind, 0.5)
     np.testing.assert_array_equal(refined.cameras[1].pose.position, cameras[1].pose.position)
-    assert refined.covariance[1] is None
-    assert refined.residual_px[1] is None
-    assert refined.covariance[0] is not None
+    seeing, unseeing = refined.each
+    assert (unseeing.sigma, unseeing.repeatability, unseeing.residual_px) == (None, None, None)
+    assert seeing.sigma is not None
 
 
 def test_assessing_moves_nothing():
@@ -154,7 +154,7 @@ def test_assessing_moves_nothing():
     start = [moved(c, SMALL_TURN) for c in cameras]
     assessed = assess(CROWNED, start, Sight(channels, responses), 0.5)
     assert assessed.cameras == start
-    assert all(residual > 0.3 for residual in assessed.residual_px)
+    assert all(one.residual_px > 0.3 for one in assessed.each)
 
 
 def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
@@ -169,9 +169,9 @@ def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(disto
     one = camera("left", (-30.0, -48.0, 10.0), (-30.0, -34.0), focal=900, distortion=distortion, size=(960, 240))
     sight = Sight([Channels([paint_frame(CROWNED, one)])], [paint_markings(CROWNED, one)])
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], sight, 0.5)
-    assert refined.residual_px[0] is not None
+    assert refined.each[0].residual_px is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
-    assert Sigma.from_covariance(refined.repeatability[0]).position_m > Gate().largest_sigma_m
+    assert refined.each[0].repeatability.position_m > Gate().largest_sigma_m
 
 
 @pytest.mark.parametrize("colour", [0, 2])
@@ -236,10 +236,10 @@ def test_a_ground_that_swells_is_found_and_does_not_move_the_cameras():
         [paint_markings(uneven, c) for c in cameras],
     )
     refined = refine(CROWNED, cameras, sight, 0.5)
-    for (shift, turn), covariance in zip(off_by(cameras, refined.cameras), refined.covariance, strict=True):
+    for (shift, turn), one in zip(off_by(cameras, refined.cameras), refined.each, strict=True):
         assert shift < 0.05
         assert turn < 0.05
-        assert shift < 3 * Sigma.from_covariance(covariance).position_m
+        assert shift < 3 * one.sigma.position_m
 
 
 def deviation(refined, camera, name):
@@ -275,20 +275,16 @@ def test_a_camera_with_a_wrong_lens_is_less_sure_of_its_pose():
     cameras, channels, responses = scene()
     bent = next(p for p in lens_parameters(cameras) if p.name == "k1")
     wrong, _ = bent.applied(cameras, CROWNED, 0.01)
-    right, unsure = (
-        Sigma.from_covariance(refine(CROWNED, c, Sight(channels, responses), 0.5).covariance[0])
-        for c in (cameras, wrong)
-    )
-    assert unsure.position_m > 2 * right.position_m
+    right, unsure = (refine(CROWNED, c, Sight(channels, responses), 0.5).each[0] for c in (cameras, wrong))
+    assert unsure.sigma.position_m > 2 * right.sigma.position_m
 
 
 def test_the_same_wrong_lens_makes_the_next_pose_no_less_like_this_one():
     cameras, channels, responses = scene()
     bent = next(p for p in lens_parameters(cameras) if p.name == "k1")
     wrong, _ = bent.applied(cameras, CROWNED, 0.01)
-    refined = refine(CROWNED, wrong, Sight(channels, responses), 0.5)
-    sigma, repeatability = (Sigma.from_covariance(c[0]) for c in (refined.covariance, refined.repeatability))
-    assert repeatability.position_m < sigma.position_m / 2
+    left = refine(CROWNED, wrong, Sight(channels, responses), 0.5).each[0]
+    assert left.repeatability.position_m < left.sigma.position_m / 2
 
 
 def offsets(found, one):
