@@ -1,6 +1,6 @@
 """Whether the markings can be seen at all, near where a pose that may be some degrees off expects them.
 
-    sight = look_for_lines(grey, seen_lines, reach_px)
+    sight = look_for_lines(picture, seen_lines, reach_px)
 
 No network and no search for a pose: thin bright or dark streaks along the expected directions, in a picture of some
 thousand columns. The lines of one camera move together when it turns, so the one shift that most of them agree on is
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array
+from worker.calibration.scene.camera import Array, Frame
 from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.streaks import LEAST_CONTRAST, Grey, Streaks
+from worker.calibration.see.streaks import LEAST_CONTRAST, Streaks
 
 COARSE_PX = 6
 """Step between the shifts that are tried; what a streak reaches is widened by as much."""
@@ -54,11 +54,11 @@ class LinesInSight:
     contrast: Array
 
 
-def look_for_lines(grey: Grey, lines: SeenLines, reach_px: float) -> LinesInSight:
-    """Look for `lines` in a picture (H, W) that may be shifted by `reach_px` each way."""
+def look_for_lines(picture: Frame, lines: SeenLines, reach_px: float) -> LinesInSight:
+    """Look for `lines` in a picture (H, W, 3) that may be shifted by `reach_px` each way."""
     if len(lines) == 0:
         return LinesInSight(np.empty((0, 2)), np.empty(0, dtype=bool), np.empty(0))
-    streaks = Streaks.of(grey)
+    streaks = Streaks.of(picture)
     at: Array = lines.pixel + _common_shift(streaks, lines, reach_px)
     for _ in range(SETTLING_STEPS):
         offset, contrast, found = _match(streaks, lines, at)

@@ -31,7 +31,8 @@ def ridge_response(channels: Channels, lines: SeenLines, reach_px: float) -> NDA
     height, width = channels[GREEN].shape
     size = (min(WORKING_PX, width), max(1, round(height * min(1.0, WORKING_PX / width))))
     scale = size[0] / width
-    streaks = _of_any_colour(channels, size)
+    reduced = [cv2.resize(channels[channel], size, interpolation=cv2.INTER_AREA) for channel in (BLUE, GREEN, RED)]
+    streaks = Streaks.of(np.rint(np.dstack(reduced)).astype(np.uint8))
     level = level_of(lines.width_px * scale)
     direction = np.arctan2(lines.normal[:, 1], lines.normal[:, 0]) * DIRECTIONS / np.pi
     response = np.zeros(size[::-1], dtype=np.float32)
@@ -44,15 +45,6 @@ def ridge_response(channels: Channels, lines: SeenLines, reach_px: float) -> NDA
                 likely = cv2.resize(_likelihood(streaks.strength[which][number], which), size)
                 np.maximum(response, likely * near, out=response)
     return np.asarray(cv2.resize(response, (width, height)), dtype=np.float32)
-
-
-def _of_any_colour(channels: Channels, size: tuple[int, int]) -> Streaks:
-    """The streaks of a reduced picture, each from the channel that shows it best."""
-    looked = [
-        Streaks.of(np.asarray(cv2.resize(channels[channel], size, interpolation=cv2.INTER_AREA)).astype(np.uint8))
-        for channel in (GREEN, RED, BLUE)
-    ]
-    return Streaks(tuple(np.max(level, axis=0) for level in zip(*(one.strength for one in looked), strict=True)))
 
 
 def _likelihood(strength: NDArray[np.uint8], level: int) -> NDArray[np.float32]:

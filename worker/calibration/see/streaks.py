@@ -8,10 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array
+from worker.calibration.scene.camera import Array, Frame
 from worker.calibration.scene.visibility import SeenLines
-
-Grey = NDArray[np.uint8]
 
 DIRECTIONS = 8
 """Streaks are looked for in so many directions; between two of them little is lost."""
@@ -33,16 +31,12 @@ class Streaks:
     strength: tuple[NDArray[np.uint8], ...]
 
     @classmethod
-    def of(cls, grey: Grey) -> Streaks:
-        """Those of a picture (H, W), in all directions and widths."""
-        levels = []
-        for level in range(LEVELS):
-            small = (
-                grey
-                if level == 0
-                else cv2.resize(grey, None, fx=0.5**level, fy=0.5**level, interpolation=cv2.INTER_AREA)
-            )
-            levels.append(_streaks(np.asarray(small)))
+    def of(cls, picture: Frame) -> Streaks:
+        """Those of a picture (H, W, 3), in all directions and widths."""
+        levels = [_streaks(picture)]
+        for level in range(1, LEVELS):
+            smaller = cv2.resize(picture, None, fx=0.5**level, fy=0.5**level, interpolation=cv2.INTER_AREA)
+            levels.append(_streaks(np.asarray(smaller, dtype=np.uint8)))
         return cls(tuple(levels))
 
     def widened(self, by_px: int) -> Streaks:
@@ -70,12 +64,17 @@ class Streaks:
         return values
 
 
-def _streaks(grey: Grey) -> NDArray[np.uint8]:
-    """Strength (directions, H, W) of streaks across which the normal points at multiples of 180° / `DIRECTIONS`."""
+def _streaks(picture: Frame) -> NDArray[np.uint8]:
+    """Strength (directions, H, W) of streaks across which the normal points at multiples of 180° / `DIRECTIONS`.
+
+    In the channel that shows each best: blue paint on wood and orange paint on turf are as bright as their ground.
+    """
     border = BESIDE_PX + ALONG_PX + 2
-    height, width = grey.shape
+    height, width, _ = picture.shape
     result = np.empty((DIRECTIONS, height, width), np.uint8)
-    padded = np.pad(cv2.GaussianBlur(grey, (3, 3), 0), border, mode="edge").astype(np.uint8)
+    padded = cv2.copyMakeBorder(
+        cv2.GaussianBlur(picture, (3, 3), 0), border, border, border, border, cv2.BORDER_REPLICATE
+    )
     for number in range(DIRECTIONS):
         angle = np.pi * number / DIRECTIONS
         normal = np.array([np.cos(angle), np.sin(angle)])
@@ -86,12 +85,13 @@ def _streaks(grey: Grey) -> NDArray[np.uint8]:
         inner, one, other = (_moved(line, side * across, BESIDE_PX + 2) for side in (0, 1, -1))
         bright = cv2.min(cv2.subtract(inner, one), cv2.subtract(inner, other))
         dark = cv2.min(cv2.subtract(one, inner), cv2.subtract(other, inner))
-        result[number] = cv2.max(bright, dark)
+        blue, green, red = cv2.split(cv2.max(bright, dark))
+        result[number] = cv2.max(cv2.max(blue, green), red)
     return result
 
 
 def _moved(padded: NDArray[np.uint8], by: NDArray[np.intp], border: int) -> NDArray[np.uint8]:
-    height, width = padded.shape
+    height, width, _ = padded.shape
     return padded[border + by[1] : height - border + by[1], border + by[0] : width - border + by[0]]
 
 
