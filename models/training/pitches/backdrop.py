@@ -8,11 +8,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from models.training.colours import hsv
-from models.training.conditions import Conditions
-from models.training.lettering import writing
-from models.training.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
-from models.training.world import Wall, World
+from models.training.drawing.colours import hsv
+from models.training.drawing.lettering import writing
+from models.training.drawing.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
+from models.training.pitches.conditions import Conditions
+from models.training.pitches.world import Wall, World
 from worker.calibration.scene.field import Field
 
 OUTWARD = {"near": (0.0, -1.0), "far": (0.0, 1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}

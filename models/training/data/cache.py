@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.crops import CROP_SIZE, random_crop
+from models.training.pitches.crops import CROP_SIZE, random_crop
 
 SHARD_CROPS = 64
 

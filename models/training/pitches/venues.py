@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.training.world import SIDES
+from models.training.pitches.world import SIDES
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 

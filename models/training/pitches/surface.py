@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from models.training.colours import hsv
-from models.training.conditions import Conditions
-from models.training.lettering import Letters
-from models.training.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
-from models.training.world import World
+from models.training.drawing.colours import hsv
+from models.training.drawing.lettering import Letters
+from models.training.drawing.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
+from models.training.pitches.conditions import Conditions
+from models.training.pitches.world import World
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, Marking
 

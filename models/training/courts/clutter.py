@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.colours import random_colour
-from models.training.noise import Plane
+from models.training.drawing.colours import random_colour
+from models.training.drawing.noise import Plane
 
 FONTS = (cv2.FONT_HERSHEY_SIMPLEX, cv2.FONT_HERSHEY_DUPLEX, cv2.FONT_HERSHEY_COMPLEX)
 SHIFT = 4  # cv2 draws in 1/16 px

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from onnx import numpy_helper
 from torch import Tensor, nn
 
-from models.training.network import UNet
+from models.training.network.unet import UNet
 
 
 @torch.no_grad()

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.colours import Colour, random_colour
+from models.training.drawing.colours import Colour, random_colour
 from worker.calibration.scene.field import Field
 
 TEXEL_M = 0.04

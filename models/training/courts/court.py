@@ -3,8 +3,8 @@
     crop = random_court(np.random.default_rng(7), 224)
     frame = render_court(pitch, camera, np.random.default_rng(7))
 
-The counterpart of `render.py`, which shows one kind of field in detail: here the ground, the paint and the camera are
-anything, and nothing is made to be pretty. A crop takes about 70 ms.
+The counterpart of `pitches/render.py`, which shows one kind of field in detail: here the ground, the paint and the
+camera are anything, and nothing is made to be pretty. A crop takes about 70 ms.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fields.shapes import COLOURS, WHITE
-from models.training.capture import Capture, random_capture, random_frame_capture
-from models.training.clutter import backdrop, draw_clutter
-from models.training.colours import Colour, hsv, random_colour
-from models.training.floors import Floor, random_floor
-from models.training.layouts import PAINTS, Layout, Stripe, field_layout, random_layout
-from models.training.noise import Noise, Patch, Plane, smooth_step
-from models.training.views import FieldView, View, Window
+from models.training.courts.capture import Capture, random_capture, random_frame_capture
+from models.training.courts.clutter import backdrop, draw_clutter
+from models.training.courts.floors import Floor, random_floor
+from models.training.courts.layouts import PAINTS, Layout, Stripe, field_layout, random_layout
+from models.training.courts.views import FieldView, View, Window
+from models.training.drawing.colours import Colour, hsv, random_colour
+from models.training.drawing.noise import Noise, Patch, Plane, smooth_step
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.training.colours import Colour, hsv, random_colour
-from models.training.conditions import Conditions
-from models.training.lettering import Letters, random_letters
-from models.training.noise import Noise
+from models.training.drawing.colours import Colour, hsv, random_colour
+from models.training.drawing.lettering import Letters, random_letters
+from models.training.drawing.noise import Noise
+from models.training.pitches.conditions import Conditions
 from worker.calibration.scene.field import Field
 
 SIDES = ("near", "far", "left", "right")

@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.colours import Colour, hsv, random_colour
-from models.training.conditions import Conditions
-from models.training.world import World
+from models.training.drawing.colours import Colour, hsv, random_colour
+from models.training.pitches.conditions import Conditions
+from models.training.pitches.world import World
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 

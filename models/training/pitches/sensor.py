@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.conditions import Conditions
-from models.training.noise import Plane
+from models.training.drawing.noise import Plane
+from models.training.pitches.conditions import Conditions
 
 
 def add_air(conditions: Conditions, colour: Plane, depth: Plane) -> Plane:

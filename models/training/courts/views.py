@@ -7,8 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from models.training.noise import Patch
-from models.training.surface import ground_patch, window_rays
+from models.training.drawing.noise import Patch
+from models.training.pitches.surface import ground_patch, window_rays
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 

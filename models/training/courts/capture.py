@@ -1,7 +1,7 @@
 """Any camera there is: its light, glass, sensor and compression, drawn at random, the same for pictures side by side.
 
-`sensor.py` is the fixed pitch camera in detail. This is the world's: grey and infrared, dark, blinded, fogged, out of
-focus in half of the picture, denoised, compressed to blocks.
+`pitches/sensor.py` is the fixed pitch camera in detail. This is the world's: grey and infrared, dark, blinded, fogged,
+out of focus in half of the picture, denoised, compressed to blocks.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.noise import Plane
+from models.training.drawing.noise import Plane
 from worker.calibration.scene.camera import Array
 
 

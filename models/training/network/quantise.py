@@ -1,6 +1,6 @@
 """Eight-bit weights and activations: the exported network at two to three times the speed and a quarter of the size.
 
-    python -m models.training.quantise runs/unet/unet.onnx
+    python -m models.training.network.quantise runs/unet/unet.onnx
 
 Static quantisation of ONNX Runtime in its QDQ form: ranges from rendered crops, one scale per channel. Input and output
 stay float32. Weights have seven bits, because processors without VNNI add two products of eight bits in sixteen.
@@ -21,8 +21,8 @@ from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantTy
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
 from models import MODEL_PATH
-from models.training.courts import random_court
-from models.training.crops import CROP_SIZE, random_crop
+from models.training.courts.court import random_court
+from models.training.pitches.crops import CROP_SIZE, random_crop
 
 CROPS = 96
 # Worlds that training never draws.

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.backdrop import add_walls, shade_sky
-from models.training.conditions import Conditions
-from models.training.objects import Canvas, draw_objects
-from models.training.sensor import add_air, expose
-from models.training.surface import shade_ground, window_rays
-from models.training.world import World, build_world
+from models.training.pitches.backdrop import add_walls, shade_sky
+from models.training.pitches.conditions import Conditions
+from models.training.pitches.objects import Canvas, draw_objects
+from models.training.pitches.sensor import add_air, expose
+from models.training.pitches.surface import shade_ground, window_rays
+from models.training.pitches.world import World, build_world
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 

@@ -1,4 +1,4 @@
-"""Export to ONNX: `python -m models.training.export runs/unet/checkpoint.pt --to runs/unet/unet.onnx`.
+"""Export to ONNX: `python -m models.training.network.export runs/unet/checkpoint.pt --to runs/unet/unet.onnx`.
 
 One input, float32 N x 3 x H x W, RGB in 0..1; one output, float32 N x 1 x H x W, probability of a field marking. H and
 W are free multiples of 32; batch normalisation is folded into the convolutions.
@@ -16,7 +16,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from models.training.network import LEAK, UNet
+from models.training.network.unet import LEAK, UNet
 
 OPSET = 18
 

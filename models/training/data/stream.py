@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.cache import Crops
-from models.training.courts import random_court
+from models.training.courts.court import random_court
+from models.training.data.cache import Crops
 
 AHEAD = 8
 """Batches that wait for the network at most."""

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.training.colours import Colour, hsv
-from models.training.noise import Noise, Patch, Plane, bands, mix, smooth_step
+from models.training.drawing.colours import Colour, hsv
+from models.training.drawing.noise import Noise, Patch, Plane, bands, mix, smooth_step
 
 Floor = Callable[[np.random.Generator, Patch], Plane]
 

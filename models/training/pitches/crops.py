@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.training.render import Conditions, Rendering, render_window
-from models.training.venues import random_camera, random_field
+from models.training.pitches.render import Conditions, Rendering, render_window
+from models.training.pitches.venues import random_camera, random_field
 from worker.calibration.scene.camera import Array, Camera, inside
 from worker.calibration.scene.field import Field
 
