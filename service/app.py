@@ -17,20 +17,9 @@ from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
 from service.pages import ROUTERS as PAGES
-from service.routes import (
-    again,
-    calibrate,
-    docs,
-    documented,
-    field,
-    health,
-    intrinsics,
-    jobs,
-    locate,
-    pictures,
-    snapshot,
-    venues,
-)
+from service.routes import docs, health, jobs, pictures, snapshot, venues
+from service.routes.contract import documented
+from service.routes.submissions import again, calibrate, field, intrinsics, locate
 from service.settings import Settings
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.engine import AWAY as DATABASE_AWAY

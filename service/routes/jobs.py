@@ -12,10 +12,10 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context, InContext, JobIdPath
-from service.routes.documented import needs, problems
-from service.routes.exported import DOCUMENTS, Wanted, exported
-from service.routes.guarded import Guarded
-from service.routes.tagged import TAGGED, IfNoneMatch, unless_known
+from service.routes.contract.documented import needs, problems
+from service.routes.contract.exported import DOCUMENTS, Wanted, exported
+from service.routes.contract.guarded import Guarded
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
 from service.routes.venues import revision_unfit
 from service.store.engine import AWAY
 from service.store.jobs.decisions import MovedOn, NoPoses

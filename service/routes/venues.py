@@ -9,10 +9,10 @@ from fastapi import APIRouter, Depends, Header, Query, Response
 from service.api import etags
 from service.api.context import InContext, VenueIdPath
 from service.intake import sources
-from service.routes.documented import headers, needs, problems
-from service.routes.exported import DOCUMENTS, Wanted, exported
-from service.routes.guarded import Guarded
-from service.routes.tagged import TAGGED, IfNoneMatch, json, unless_known
+from service.routes.contract.documented import headers, needs, problems
+from service.routes.contract.exported import DOCUMENTS, Wanted, exported
+from service.routes.contract.guarded import Guarded
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_known
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 from service.wire import callback_urls
 from service.wire.base import ID_PATTERN, FormatName

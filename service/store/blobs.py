@@ -44,6 +44,18 @@ class Blobs:
         """Store an object; when this returns it survives a crash, of the machine too."""
         # In one piece: of several, those before a crash would stay in the bucket, where no list of objects shows them.
         obstore.put(self._store, path, data, use_multipart=False)
+        self._make_sure_of(path)
+
+    def copy(self, path: str, to: str) -> bool:
+        """Store an object a second time, as `put` does, without its bytes coming here; False if there is none."""
+        try:
+            obstore.copy(self._store, path, to)
+        except FileNotFoundError:
+            return False
+        self._make_sure_of(to)
+        return True
+
+    def _make_sure_of(self, path: str) -> None:
         if self._folder:
             # A bucket promises durability; a file has it only after its pages have reached the disk, and the entry of
             # each folder on the way to it, of which any may be new.

@@ -8,11 +8,10 @@ from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext, VenueIdPath
 from service.intake.submit import REFUSALS
-from service.routes import forms, submissions
-from service.routes.documented import frames_form, needs, problems, submitted
-from service.routes.guarded import Guarded
-from service.routes.submissions import IdempotencyKey, Sent
-from service.store.jobs.task import Origin
+from service.routes.contract.documented import frames_form, needs, problems, submitted
+from service.routes.contract.guarded import Guarded
+from service.routes.submissions import forms, taking
+from service.routes.submissions.taking import FromSender, Sender
 from service.wire.job import Job
 from service.wire.options import Options
 from service.wire.venue import Venue
@@ -31,7 +30,7 @@ async def calibrate(
     venue_id: VenueIdPath,
     request: Request,
     context: InContext,
-    idempotency_key: IdempotencyKey = None,
+    sender: FromSender,
 ) -> Response:
     """Submit a frame (or several) per camera, or none at all. Follow the job at `Location`.
 
@@ -42,26 +41,26 @@ async def calibrate(
         forms.require_form(request)
     stored = await run_in_threadpool(forms.expecting, context, venue_id)
     if bodiless:
-        return await run_in_threadpool(fetch, context, stored, Options(), idempotency_key, request.state.origin)
+        return await run_in_threadpool(fetch, context, stored, Options(), sender)
     async with forms.form_of(request, forms.most_frames(context, stored)) as form:
-        return await run_in_threadpool(submit, context, stored, form, idempotency_key, request.state.origin)
+        return await run_in_threadpool(submit, context, stored, form, sender)
 
 
-def submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None, origin: Origin) -> Response:
+def submit(context: Context, venue: Venue, form: FormData, sender: Sender) -> Response:
     """Make a form a job of `venue`, which is the venue as it was before the form arrived."""
     options = forms.options_of(form, Options, context.settings)
     if forms.has_no_frames(form) and any(camera.source for camera in venue.cameras):
-        return fetch(context, venue, options, idempotency_key, origin)
+        return fetch(context, venue, options, sender)
     files = forms.frames_of(venue, form, context)
-    check = submissions.of_cameras(venue.cameras, context.settings)
-    sent = Sent("calibration", venue, options, files, check, idempotency_key, origin)
-    return submissions.answer(*submissions.take(context, sent))
+    return taking.answer(*taking.take(context, venue, options, files, sender))
 
 
-def fetch(context: Context, venue: Venue, options: Options, idempotency_key: str | None, origin: Origin) -> Response:
+def fetch(context: Context, venue: Venue, options: Options, sender: Sender) -> Response:
     """Make what the cameras of `venue` show now a job."""
     try:
-        job, new = context.from_sources.calibrate(venue, options, idempotency_key, origin, context.queue.enqueue)
+        job, new = context.from_sources.calibrate(
+            venue, options, sender.idempotency_key, sender.origin, context.queue.enqueue
+        )
     except REFUSALS as refusal:
-        raise submissions.in_words(refusal, venue.id, context.settings) from None
-    return submissions.answer(job, new)
+        raise taking.in_words(refusal, venue.id, context.settings) from None
+    return taking.answer(job, new)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from io import BytesIO
-from typing import BinaryIO
-
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from service.api.context import Context, InContext
-from service.routes import forms, submissions
-from service.routes.documented import needs, problems, submitted
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import needs, problems, submitted
+from service.routes.contract.guarded import Guarded
 from service.routes.jobs import Existing
+from service.routes.submissions import forms, taking
+from service.routes.submissions.taking import FromSender, Sender
 from service.routes.venues import no_such_venue
 from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
@@ -30,7 +28,7 @@ router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
     openapi_extra=needs("calibrate"),
     responses=submitted("It is being computed") | problems(404, 409, 410, 507),
 )
-def submit_again(job: Existing, request: Request, context: InContext) -> Response:
+def submit_again(job: Existing, context: InContext, sender: FromSender) -> Response:
     """Submit what a job was made of again, with its options, as long as its frames are kept."""
     forms.require_room(context)
     before = context.submissions.of(job.id)
@@ -38,15 +36,22 @@ def submit_again(job: Existing, request: Request, context: InContext) -> Respons
         raise _gone(context, job)
     if before.venue is not None:
         _require_the_same(context, before.venue)
-    files = {name: [_read(context, job, path) for path in paths] for name, paths in before.frames.items()}
-    return submissions.answer(*submissions.enqueued(context, _renewed(before, request), files))
+    renewed = _renewed(before, sender)
+
+    def store() -> None:
+        for name, paths in before.frames.items():
+            for old, new in zip(paths, renewed.frames[name], strict=True):
+                if not context.blobs.copy(old, new):
+                    raise _gone(context, job)
+
+    return taking.answer(*taking.enqueued(context, renewed, store))
 
 
-def _renewed(before: Submission, request: Request) -> Submission:
+def _renewed(before: Submission, sender: Sender) -> Submission:
     job_id = new_id()
     old, new = frame_folder(before.job_id), frame_folder(job_id)
     frames = {name: [new + path.removeprefix(old) for path in paths] for name, paths in before.frames.items()}
-    renewed = {"job_id": job_id, "frames": frames, "idempotency_key": None, "origin": request.state.origin}
+    renewed = {"job_id": job_id, "frames": frames, "idempotency_key": None, "origin": sender.origin}
     return before.model_copy(update=renewed)
 
 
@@ -57,13 +62,6 @@ def _require_the_same(context: Context, then: Venue) -> None:
         raise no_such_venue(then.id)
     if not now.films_like(then):
         raise Problem("venue-replaced", "Its pitch, cameras or lenses were changed since; send new frames.")
-
-
-def _read(context: Context, job: Job, path: str) -> BinaryIO:
-    data = context.blobs.get(path)
-    if data is None:
-        raise _gone(context, job)
-    return BytesIO(data)
 
 
 def _gone(context: Context, job: Job) -> Problem:

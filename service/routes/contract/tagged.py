@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import Header, Response
 
 from service.api import etags
-from service.routes.documented import headers
+from service.routes.contract.documented import headers
 
 IfNoneMatch = Annotated[str | None, Header()]
 # Of `responses=`.

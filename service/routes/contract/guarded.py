@@ -10,7 +10,7 @@ from fastapi.routing import APIRoute
 
 from service.api.body_limit import is_form
 from service.api.problems import not_json
-from service.routes.documented import KEY_SCHEME, problems
+from service.routes.contract.documented import KEY_SCHEME, problems
 from service.wire.base import Scope
 
 

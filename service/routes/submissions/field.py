@@ -7,11 +7,10 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.routes import forms, submissions
-from service.routes.documented import frames_form, needs, problems, submitted
-from service.routes.guarded import Guarded
-from service.routes.submissions import IdempotencyKey, Sent
-from service.store.jobs.task import Origin
+from service.routes.contract.documented import frames_form, needs, problems, submitted
+from service.routes.contract.guarded import Guarded
+from service.routes.submissions import forms, taking
+from service.routes.submissions.taking import FromSender, Sender
 from service.wire.job import Job
 from service.wire.options import FieldOptions
 from service.wire.venue import Venue
@@ -30,7 +29,7 @@ async def fit_field(
     venue_id: VenueIdPath,
     request: Request,
     context: InContext,
-    idempotency_key: IdempotencyKey = None,
+    sender: FromSender,
 ) -> Response:
     """Fit length, width and ridge of the pitch to the frames of all cameras. The stored venue stays as it is.
 
@@ -40,12 +39,10 @@ async def fit_field(
     forms.require_form(request)
     stored = await run_in_threadpool(forms.expecting, context, venue_id)
     async with forms.form_of(request, forms.most_frames(context, stored)) as form:
-        return await run_in_threadpool(_submit, context, stored, form, idempotency_key, request.state.origin)
+        return await run_in_threadpool(_submit, context, stored, form, sender)
 
 
-def _submit(context: Context, venue: Venue, form: FormData, idempotency_key: str | None, origin: Origin) -> Response:
+def _submit(context: Context, venue: Venue, form: FormData, sender: Sender) -> Response:
     options = forms.options_of(form, FieldOptions, context.settings)
     files = forms.frames_of(venue, form, context)
-    check = submissions.of_cameras(venue.cameras, context.settings)
-    sent = Sent("field", venue, options, files, check, idempotency_key, origin)
-    return submissions.answer(*submissions.take(context, sent))
+    return taking.answer(*taking.take(context, venue, options, files, sender))

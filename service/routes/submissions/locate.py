@@ -9,13 +9,12 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.routes import forms, submissions
-from service.routes.documented import form, needs, problems, submitted
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import form, needs, problems, submitted
+from service.routes.contract.guarded import Guarded
 from service.routes.jobs import LONGEST_WAIT_S, job_answer
-from service.routes.submissions import IdempotencyKey, Sent
+from service.routes.submissions import forms, taking
+from service.routes.submissions.taking import FromSender, Sender
 from service.routes.venues import camera_of
-from service.store.jobs.task import Origin
 from service.wire.base import ID_PATTERN, OPTIONS_PART
 from service.wire.job import OPEN, Job
 from service.wire.options import LocateOptions
@@ -45,10 +44,10 @@ async def locate(
     camera: Annotated[str, Path(pattern=ID_PATTERN)],
     request: Request,
     context: InContext,
+    sender: FromSender,
     wait: Annotated[
         float, Query(ge=0, allow_inf_nan=False, description="Seconds that the answer is held, at most 60.")
     ] = 0,
-    idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Find the first pose of a camera from points of the pitch and their pixels. The stored pose stays as it is.
 
@@ -57,8 +56,7 @@ async def locate(
     forms.require_form(request)
     stored = await run_in_threadpool(forms.expecting, context, venue_id)
     async with forms.form_of(request, 1) as form:
-        origin = request.state.origin
-        job, new = await run_in_threadpool(_submit, context, stored, camera, form, idempotency_key, origin)
+        job, new = await run_in_threadpool(_submit, context, stored, camera, form, sender)
     if wait and job.open:
         await context.watch.until(job.id, lambda state: state.status not in OPEN, min(wait, LONGEST_WAIT_S))
         ended: Job | None = await run_in_threadpool(context.jobs.get, job.id)
@@ -66,14 +64,10 @@ async def locate(
     return job_answer(job, status=202 if new and job.open else 200)
 
 
-def _submit(
-    context: Context, venue: Venue, camera_id: str, form: FormData, idempotency_key: str | None, origin: Origin
-) -> tuple[Job, bool]:
+def _submit(context: Context, venue: Venue, camera_id: str, form: FormData, sender: Sender) -> tuple[Job, bool]:
     camera = camera_of(venue, camera_id)
     options = forms.options_of(form, LocateOptions, context.settings)
-    files = {camera_id: _frame(camera, form)}
-    check = submissions.of_cameras([camera], context.settings)
-    return submissions.take(context, Sent("locate", venue, options, files, check, idempotency_key, origin))
+    return taking.take(context, venue, options, {camera_id: _frame(camera, form)}, sender)
 
 
 def _frame(camera: Camera, form: FormData) -> list[UploadFile]:

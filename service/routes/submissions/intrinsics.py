@@ -9,12 +9,10 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext
-from service.intake import images
-from service.routes import forms, submissions
-from service.routes.documented import FILE, form, needs, problems, submitted
-from service.routes.guarded import Guarded
-from service.routes.submissions import IdempotencyKey, Sent
-from service.store.jobs.task import Origin
+from service.routes.contract.documented import FILE, form, needs, problems, submitted
+from service.routes.contract.guarded import Guarded
+from service.routes.submissions import forms, taking
+from service.routes.submissions.taking import FromSender, Sender
 from service.wire.base import OPTIONS_PART, PHOTOS_PART
 from service.wire.job import Job
 from service.wire.options import IntrinsicsOptions
@@ -42,25 +40,18 @@ UPLOAD = form(
 async def intrinsics(
     request: Request,
     context: InContext,
-    idempotency_key: IdempotencyKey = None,
+    sender: FromSender,
 ) -> Response:
     """Submit photos of a board: the job's result is the lens of the camera that took them, `coverage.jpg` its basis."""
     forms.require_form(request)
     await run_in_threadpool(forms.require_room, context)
     async with forms.form_of(request, context.settings.max_photos) as form:
-        return await run_in_threadpool(_submit, context, form, idempotency_key, request.state.origin)
+        return await run_in_threadpool(_submit, context, form, sender)
 
 
-def _submit(context: Context, form: FormData, idempotency_key: str | None, origin: Origin) -> Response:
+def _submit(context: Context, form: FormData, sender: Sender) -> Response:
     options = forms.options_of(form, IntrinsicsOptions, context.settings)
-    files = _photos(form, context)
-
-    def check(name: str, data: bytes) -> None:
-        images.check_photo(name, data, context.settings)
-
-    return submissions.answer(
-        *submissions.take(context, Sent("intrinsics", None, options, files, check, idempotency_key, origin))
-    )
+    return taking.answer(*taking.take(context, None, options, _photos(form, context), sender))
 
 
 def _photos(form: FormData, context: Context) -> dict[str, list[UploadFile]]:

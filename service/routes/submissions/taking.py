@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, BinaryIO
+from typing import Annotated
 
-from fastapi import Header, Response
+from fastapi import Depends, Header, Request, Response
 from starlette.datastructures import UploadFile
 
 from service.api.context import Context
@@ -19,48 +19,58 @@ from service.settings import Settings
 from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
 from service.store.jobs.submission import KeyReused, QueueFull, Submission, VenueBusy, VenueGone, VenueReplaced
-from service.store.jobs.task import AnyOptions, Origin, seeded
-from service.wire.job import Job, Kind
+from service.store.jobs.task import AnyOptions, Origin, kind_of, seeded
+from service.wire.job import Job
 from service.wire.problems import Problem
-from service.wire.venue import Camera, Venue
+from service.wire.venue import Venue
 
-IdempotencyKey = Annotated[
-    str | None,
-    Header(
-        pattern=r"^[\x21-\x7e]{1,255}$",
-        description="The same key and the same content are the same job, for as long as that job is kept.",
-    ),
-]
 # By camera, of photos by their names.
 Files = Mapping[str, Sequence[UploadFile]]
 
 
 @dataclass(frozen=True)
-class Sent:
-    """What came with a form, checked but for the content of its files, which `check(name, content)` refuses or not."""
+class Sender:
+    """Whom a job comes from, and what they call it so that it is one job if they send it twice."""
 
-    kind: Kind
-    venue: Venue | None
-    options: AnyOptions
-    files: Files
-    check: Callable[[str, bytes], None]
     idempotency_key: str | None
     origin: Origin
 
 
-def take(context: Context, sent: Sent) -> tuple[Job, bool]:
+def _sender(
+    request: Request,
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            pattern=r"^[\x21-\x7e]{1,255}$",
+            description="The same key and the same content are the same job, for as long as that job is kept.",
+        ),
+    ] = None,
+) -> Sender:
+    return Sender(idempotency_key, request.state.origin)
+
+
+FromSender = Annotated[Sender, Depends(_sender)]
+
+
+def take(context: Context, venue: Venue | None, options: AnyOptions, files: Files, sender: Sender) -> tuple[Job, bool]:
     """Check and store the files, and make them a job or find the job that they already are; says if it is new."""
-    submission = _submission(sent)
-    opened = {name: [file.file for file in several] for name, several in sent.files.items()}
-    return enqueued(context, submission, opened)
+    submission = _submission(context.settings, venue, options, files, sender)
+
+    def store() -> None:
+        for name, paths in submission.frames.items():
+            for path, upload in zip(paths, files[name], strict=True):
+                upload.file.seek(0)
+                context.blobs.put(path, upload.file.read())
+
+    return enqueued(context, submission, store)
 
 
-def enqueued(context: Context, submission: Submission, files: Mapping[str, Sequence[BinaryIO]]) -> tuple[Job, bool]:
-    """A submission as a job, or the job that it already is; says if it is new."""
+def enqueued(context: Context, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
+    """A submission as a job, or the job that it already is; says if it is new. `store` puts its frames in place."""
     # A first pose takes a second, and somebody waits for it.
     enqueue = context.queue.enqueue_light if submission.kind == "locate" else context.queue.enqueue
     try:
-        return context.intake.take(submission, files, enqueue)
+        return context.intake.take(submission, store, enqueue)
     except REFUSALS as refusal:
         raise in_words(refusal, "" if submission.venue is None else submission.venue.id, context.settings) from None
 
@@ -70,39 +80,34 @@ def answer(job: Job, new: bool) -> Response:
     return job_answer(job, status=202 if new else 200)
 
 
-def _submission(sent: Sent) -> Submission:
+def _submission(
+    settings: Settings, venue: Venue | None, options: AnyOptions, files: Files, sender: Sender
+) -> Submission:
+    kind, job_id = kind_of(options), new_id()
     # The kind too: the same frames with the same key may be those of another job.
-    content = hashlib.sha256(f"{sent.kind} {sent.options.model_dump_json()}".encode())
-    for name, several in sent.files.items():
+    content = hashlib.sha256(f"{kind} {options.model_dump_json()}".encode())
+    cameras = {camera.id: camera for camera in venue.cameras} if venue else {}
+    for name, several in files.items():
         content.update(f"\n{name}".encode())
-        for file in several:
-            data = file.file.read()
-            sent.check(name, data)
+        for upload in several:
+            data = upload.file.read()
+            if venue is None:
+                images.check_photo(name, data, settings)
+            else:
+                images.check(cameras[name], data, settings)
             content.update(hashlib.sha256(data).digest())
-    job_id = new_id()
+    # A photo may be called anything.
+    photos = {name: [f"{frame_folder(job_id)}/photos/{number}"] for number, name in enumerate(files)}
     return Submission(
         job_id=job_id,
-        kind=sent.kind,
-        venue=sent.venue,
-        options=seeded(sent.options),
-        frames=_paths(job_id, sent),
-        origin=sent.origin,
+        kind=kind,
+        venue=venue,
+        options=seeded(options),
+        frames=frame_paths(job_id, {name: len(several) for name, several in files.items()}) if venue else photos,
+        origin=sender.origin,
         content_hash=content.hexdigest(),
-        idempotency_key=sent.idempotency_key,
+        idempotency_key=sender.idempotency_key,
     )
-
-
-def _paths(job_id: str, sent: Sent) -> dict[str, list[str]]:
-    if sent.venue is None:
-        # A photo may be called anything.
-        return {name: [f"{frame_folder(job_id)}/photos/{number}"] for number, name in enumerate(sent.files)}
-    return frame_paths(job_id, {camera: len(several) for camera, several in sent.files.items()})
-
-
-def of_cameras(cameras: Sequence[Camera], settings: Settings) -> Callable[[str, bytes], None]:
-    """What refuses a file that is no frame of its camera."""
-    by_id = {camera.id: camera for camera in cameras}
-    return lambda camera, data: images.check(by_id[camera], data, settings)
 
 
 def in_words(refusal: Refusal, venue_id: str, settings: Settings) -> Problem:
