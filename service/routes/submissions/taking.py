@@ -13,8 +13,8 @@ from starlette.datastructures import UploadFile
 from service.api.context import Context
 from service.intake import images
 from service.intake.submit import REFUSALS, Refusal, frame_paths
-from service.routes.jobs import RETRY_AFTER_S, job_answer
-from service.routes.venues import no_such_venue
+from service.routes.jobs import job_answer
+from service.routes.venues import RETRY_AFTER_S, no_such_venue, venue_busy
 from service.settings import Settings
 from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
@@ -116,12 +116,7 @@ def in_words(refusal: Refusal, venue_id: str, settings: Settings) -> Problem:
         case KeyReused():
             return Problem("idempotency-key-reused", "Use a new key for new frames.", job=refusal.job_id)
         case VenueBusy():
-            return Problem(
-                "venue-busy",
-                f"Wait for job {refusal.job_id} of the same venue or cancel it.",
-                headers={"Retry-After": str(RETRY_AFTER_S), "Location": f"/jobs/{refusal.job_id}"},
-                job=refusal.job_id,
-            )
+            return venue_busy(refusal.job_id)
         case VenueGone():
             return no_such_venue(venue_id)
         case VenueReplaced():

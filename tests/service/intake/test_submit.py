@@ -101,7 +101,7 @@ def test_frames_that_are_submitted_again_are_copied_by_the_store(context, read, 
     context.decisions.cancel(first.id)
     with monkeypatch.context() as patch:
         patch.setattr(context.blobs, "get", lambda path: pytest.fail(f"{path} was downloaded"))
-        assert again.submit_again(first, context, Sender(None, Origin())).status_code == 202
+        assert again.submit(context, first, Origin()).status_code == 202
     old, new = (context.submissions.of(job.id).frames for job in (first, context.jobs.page("v", None, None, 1)[0]))
     assert old.keys() == new.keys()
     for camera, paths in new.items():
@@ -115,6 +115,6 @@ def test_frames_that_are_gone_from_the_store_become_no_job(context, read, form):
     (left, *_) = context.submissions.of(first.id).frames["left"]
     context.blobs.delete_under(left.rpartition("/")[0])
     with pytest.raises(Problem, match="send new ones"):
-        again.submit_again(first, context, Sender(None, Origin()))
+        again.submit(context, first, Origin())
     assert len(context.jobs.page("v", None, None, 10)) == 1
     assert {path.split("/")[1] for path in files(context.settings.home_blob_url)} == {first.id}
