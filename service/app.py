@@ -20,7 +20,7 @@ from service.api.http_defaults import HttpDefaults
 from service.pages import ROUTERS as PAGES
 from service.routes import docs, health, jobs, pictures, snapshot, venues
 from service.routes.contract import documented
-from service.routes.submissions import again, calibrate, field, intrinsics, locate
+from service.routes.submissions import again, frames, intrinsics, locate
 from service.settings import Settings
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.engine import AWAY as DATABASE_AWAY
@@ -55,7 +55,7 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_alarms(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, again, pictures, health, docs):
+    for routes in (venues, snapshot, frames, intrinsics, locate, jobs, again, pictures, health, docs):
         app.include_router(routes.router)
     for router in PAGES:
         app.include_router(router)

@@ -17,13 +17,13 @@ from service.routes.venues import no_such_venue
 from service.settings import Settings
 from service.wire import callback_urls
 from service.wire.base import OPTIONS_PART
-from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.wire.options import Handling
 from service.wire.problems import Problem
 from service.wire.venue import Venue
 
 LONGEST_OPTIONS = 64 * 1024
 PARTS_TOO_MANY = 100
-Chosen = TypeVar("Chosen", Options, IntrinsicsOptions, LocateOptions, FieldOptions)
+Chosen = TypeVar("Chosen", bound=Handling)
 
 
 def require_form(request: Request) -> None:

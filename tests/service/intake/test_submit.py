@@ -8,10 +8,11 @@ from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context
 from service.intake import submit
-from service.routes.submissions import again, calibrate
+from service.routes.submissions import again, frames
 from service.routes.submissions.taking import Sender
 from service.settings import Settings
 from service.store.jobs.task import Origin
+from service.wire.options import Options
 from service.wire.problems import Problem
 from service.wire.venue import VenueIn
 from tests.e2e.running import png, venue
@@ -46,7 +47,7 @@ def uploaded():
 
 def refused(context, read, form):
     with pytest.raises(Problem) as problem:
-        calibrate.submit(context, read, form, Sender(None, Origin()))
+        frames.submit(context, read, form, Options, Sender(None, Origin()))
     assert files(context.settings.home_blob_url) == []
     return problem.value.members()
 
@@ -54,7 +55,7 @@ def refused(context, read, form):
 def test_a_job_begins_from_the_poses_that_were_found_during_the_upload(context, read, form):
     moved = read.cameras[0].pose.model_copy(update={"position": [0.0, -60.0, 9.0]})
     context.venues.put(read.with_poses({"left": moved}), lambda _: None)
-    assert calibrate.submit(context, read, form, Sender(None, Origin())).status_code == 202
+    assert frames.submit(context, read, form, Options, Sender(None, Origin())).status_code == 202
     (job,) = context.jobs.page("v", None, None, 10)
     assert context.attempts.begin(job.id).venue == context.venues.get("v")
 
@@ -87,16 +88,16 @@ def test_frames_are_on_the_list_of_what_goes_until_they_are_a_job(context, read,
     with monkeypatch.context() as patch:
         patch.setattr(context.submissions, "submit", killed)
         with pytest.raises(KeyboardInterrupt):
-            calibrate.submit(context, read, form, Sender(None, Origin()))
+            frames.submit(context, read, form, Options, Sender(None, Origin()))
     (folder,) = {path.rsplit("/", 2)[0] for path in files(context.settings.home_blob_url)}
     assert context.expiry.leftovers(datetime.now(UTC), 10) == []
     assert context.expiry.leftovers(later, 10) == [folder]
-    assert calibrate.submit(context, read, uploaded(), Sender(None, Origin())).status_code == 202
+    assert frames.submit(context, read, uploaded(), Options, Sender(None, Origin())).status_code == 202
     assert context.expiry.leftovers(later, 10) == [folder]
 
 
 def test_frames_that_are_submitted_again_are_copied_by_the_store(context, read, form, monkeypatch):
-    calibrate.submit(context, read, form, Sender(None, Origin()))
+    frames.submit(context, read, form, Options, Sender(None, Origin()))
     (first,) = context.jobs.page("v", None, None, 10)
     context.decisions.cancel(first.id)
     with monkeypatch.context() as patch:
@@ -109,7 +110,7 @@ def test_frames_that_are_submitted_again_are_copied_by_the_store(context, read, 
 
 
 def test_frames_that_are_gone_from_the_store_become_no_job(context, read, form):
-    calibrate.submit(context, read, form, Sender(None, Origin()))
+    frames.submit(context, read, form, Options, Sender(None, Origin()))
     (first,) = context.jobs.page("v", None, None, 10)
     context.decisions.cancel(first.id)
     (left, *_) = context.submissions.of(first.id).frames["left"]
