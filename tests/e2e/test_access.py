@@ -15,7 +15,7 @@ from fastapi.routing import iter_route_contexts
 from service.api.auth import BELIEVED_FOR_S
 from service.app import create_app
 from service.pages.shown import SIGN_IN, Page
-from service.routes.guarded import Guarded
+from service.routes.contract.guarded import Guarded
 from service.settings import Settings
 from service.store.engine import connect, migrate
 from service.store.keys import Keys

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from models.training.render import Conditions, render_frame
+from models.training.pitches.render import Conditions, render_frame
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.e2e.running import Service
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose, rotation_angles_deg

@@ -72,9 +72,8 @@ def _streaks(picture: Frame) -> NDArray[np.uint8]:
     border = BESIDE_PX + ALONG_PX + 2
     height, width, _ = picture.shape
     result = np.empty((DIRECTIONS, height, width), np.uint8)
-    padded = cv2.copyMakeBorder(
-        cv2.GaussianBlur(picture, (3, 3), 0), border, border, border, border, cv2.BORDER_REPLICATE
-    )
+    around = ((border, border), (border, border), (0, 0))
+    padded = np.pad(cv2.GaussianBlur(picture, (3, 3), 0), around, mode="edge").astype(np.uint8)
     for number in range(DIRECTIONS):
         angle = np.pi * number / DIRECTIONS
         normal = np.array([np.cos(angle), np.sin(angle)])
