@@ -3,8 +3,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 import threading
 from base64 import b64encode
 from datetime import UTC, datetime
@@ -14,8 +12,8 @@ import sqlalchemy as sa
 
 from service.settings import Settings
 from service.store import tables
+from tests.e2e.commands import esc_here
 from tests.e2e.running import wait_for
-from tests.homes import in_both_homes
 from tests.worker.receiver import Receiver
 from worker.duties import webhook
 
@@ -43,7 +41,6 @@ def receiver():
     hook.close()
 
 
-@in_both_homes
 def test_the_worker_that_is_killed_over_a_callback_sends_it_again_when_it_is_back(start, receiver):
     service = start("up", **LOCAL).ready()
     job = service.submit(service.venue("v"), callback_url=receiver.url).json()["id"]
@@ -70,19 +67,19 @@ def due_now(service, job: str) -> None:
         connection.execute(sa.update(d).where(d.c.id == job).values(due_at=datetime(2026, 1, 1, tzinfo=UTC)))
 
 
-@in_both_homes
-def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver):
+def test_an_end_that_no_worker_saw_is_told_by_the_next_one(start, receiver, tmp_path):
     receiver.go.set()
     service = start("serve", **LOCAL)
     job = service.submit(service.venue("v"), callback_url=receiver.url).json()["id"]
     service.http.post(f"/jobs/{job}/cancel")
-    service.kill()
-    service.start()
-    worker = subprocess.Popen([sys.executable, "-m", "service.cli", "worker"], env=service.environment)
-    wait_for(lambda: receiver.received)
+    worker = service.worker_beside(tmp_path / "machine", "next")
+    service.process.kill()
+    try:
+        wait_for(lambda: receiver.received)
+    finally:
+        worker.kill()
+        worker.wait()
     assert json.loads(receiver.received[0].body)["type"] == "job.cancelled"
-    worker.kill()
-    worker.wait()
 
 
 def test_a_receiver_that_hangs_holds_up_no_job(start, receiver):
@@ -103,8 +100,7 @@ def test_without_a_secret_a_callback_is_refused_with_what_to_do(service, name):
 
 
 def test_a_secret_that_is_none_is_refused_at_the_start(tmp_path):
-    command = [sys.executable, "-m", "service.cli", "up", "--data", str(tmp_path), "--port", "0"]
-    refused = subprocess.run(command, env=os.environ | {"ESC_WEBHOOK_SECRET": "topsecret"}, capture_output=True)
+    refused = esc_here(tmp_path, "up", "--port", "0", ESC_DATA=str(tmp_path), ESC_WEBHOOK_SECRET="topsecret")
     assert refused.returncode == 2
-    assert b"ESC_WEBHOOK_SECRET: " in refused.stderr
-    assert b"topsecret" not in refused.stderr
+    assert "ESC_WEBHOOK_SECRET: " in refused.stderr
+    assert "topsecret" not in refused.stderr

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.blobs import Blobs
 from tests.e2e.books import queued
-from tests.e2e.running import wait_for
+from tests.e2e.running import Service, wait_for
 from tests.homes import in_both_homes
 
 
@@ -56,11 +56,10 @@ def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(se
     assert (never.status_code, never.json()["type"]) == (404, "/problems/picture-not-found")
 
 
-def test_a_nearly_full_disk_refuses_uploads_and_says_what_to_do(start):
-    roomy = start().ready()
-    running = roomy.submit(roomy.venue("a", "accept 3")).json()["id"]
-    tight = start("serve", ESC_MIN_FREE_MB="1e9")
-    answer = tight.submit("a", 1)
+def test_a_nearly_full_disk_refuses_uploads_and_says_what_to_do(service, name):
+    running = service.submit(service.venue(name, "accept 2")).json()["id"]
+    tight = Service(service.data, "serve", ESC_MIN_FREE_MB="1e9")
+    answer = tight.submit(name, 1)
     assert (answer.status_code, answer.json()["type"]) == (507, "/problems/disk-full")
     assert "ESC_KEEP_FRAMES_DAYS" in answer.json()["detail"]
     ready = tight.http.get("/readyz")
@@ -68,6 +67,7 @@ def test_a_nearly_full_disk_refuses_uploads_and_says_what_to_do(start):
     assert ready.json()["parts"]["disk"].endswith("1000000000 needed: uploads are refused")
     assert tight.end(running)["status"] == "succeeded"
     assert tight.http.get(f"/jobs/{running}/preview.jpg").status_code == 200
+    tight.kill()
 
 
 def test_the_free_room_is_a_metric(service):

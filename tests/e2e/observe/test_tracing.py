@@ -10,7 +10,7 @@ from itertools import pairwise
 import pytest
 from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
 
-from tests.e2e.running import wait_for
+from tests.e2e.running import Service, wait_for
 
 TRACE = "4bf92f3577b34da6a3ce929d0e0e4736"
 PARENT = "00f067aa0ba902b7"
@@ -67,10 +67,21 @@ class Collector:
         return [span for name, span in list(self.spans) if name == service]
 
 
-@pytest.fixture
-def collector():
+@pytest.fixture(scope="module")
+def traced(tmp_path_factory):
+    """What is collected of a service that a caller with a trace asked for a job, and another for one that crashed.
+
+    Gives the spans of a service by its name, and the first job.
+    """
     collector = Collector()
-    yield collector
+    sent = {"OTEL_EXPORTER_OTLP_ENDPOINT": collector.url, "OTEL_BSP_SCHEDULE_DELAY": "100"}
+    service = Service(tmp_path_factory.mktemp("traced"), **sent).ready()
+    job = service.submit(service.venue("v"), headers={"traceparent": f"00-{TRACE}-{PARENT}-01"}).json()["id"]
+    service.end(job)
+    service.end(service.submit(service.venue("w", "crash")).json()["id"])
+    assert service.stop() == 0
+    wait_for(lambda: len([span for span in collector.of("esc-worker") if span.name == "job"]) == 2)
+    yield collector.of, job
     collector.server.shutdown()
     collector.server.server_close()
 
@@ -79,21 +90,11 @@ def attributes(span):
     return {a.key: a.value.string_value or a.value.int_value for a in span.attributes}
 
 
-def test_a_trace_goes_from_the_caller_through_the_request_to_the_stages_of_the_job(start, collector):
-    service = start("up", OTEL_EXPORTER_OTLP_ENDPOINT=collector.url, OTEL_BSP_SCHEDULE_DELAY="100").ready()
-    service.venue("v")
-    job = service.submit("v", headers={"traceparent": f"00-{TRACE}-{PARENT}-01"}).json()["id"]
-    service.end(job)
-    assert service.stop() == 0
-    ours = wait_for(
-        lambda: (
-            (found := [span for span in collector.of("esc-worker") if span.trace_id.hex() == TRACE])
-            and "job" in {span.name for span in found}
-            and found
-        )
-    )
+def test_a_trace_goes_from_the_caller_through_the_request_to_the_stages_of_the_job(traced):
+    spans_of, job = traced
+    ours = [span for span in spans_of("esc-worker") if span.trace_id.hex() == TRACE]
     (request,) = [
-        span for span in collector.of("esc-api") if span.trace_id.hex() == TRACE and span.parent_span_id.hex() == PARENT
+        span for span in spans_of("esc-api") if span.trace_id.hex() == TRACE and span.parent_span_id.hex() == PARENT
     ]
     assert request.name == "POST /venues/{venue_id}/calibrate"
     (whole,) = [span for span in ours if span.name == "job"]
@@ -114,18 +115,18 @@ def test_a_trace_goes_from_the_caller_through_the_request_to_the_stages_of_the_j
     assert whole.start_time_unix_nano <= stages[0].start_time_unix_nano
     assert stages[-1].end_time_unix_nano <= whole.end_time_unix_nano
     # Looks of machines are no spans.
-    assert not {"GET /readyz", "GET /metrics", "GET /livez"} & {span.name for span in collector.of("esc-api")}
+    assert not {"GET /readyz", "GET /metrics", "GET /livez"} & {span.name for span in spans_of("esc-api")}
 
 
-def test_a_job_that_fails_is_a_span_that_failed(start, collector):
-    service = start("up", OTEL_EXPORTER_OTLP_ENDPOINT=collector.url, OTEL_BSP_SCHEDULE_DELAY="100").ready()
-    service.end(service.submit(service.venue("v", "crash")).json()["id"])
-    (whole,) = wait_for(lambda: [span for span in collector.of("esc-worker") if span.name == "job"])
+def test_a_job_that_fails_is_a_span_that_failed(traced):
+    spans_of, _ = traced
+    (whole,) = [span for span in spans_of("esc-worker") if span.name == "job" and attributes(span)["esc.venue"] == "w"]
     assert (whole.status.code, attributes(whole)["error.type"]) == (2, "/problems/job-crashed")
 
 
 def test_a_collector_that_is_away_holds_nothing_up(start):
-    service = start("up", OTEL_EXPORTER_OTLP_ENDPOINT="http://127.0.0.1:9", OTEL_BSP_SCHEDULE_DELAY="100").ready()
+    away = {"OTEL_EXPORTER_OTLP_ENDPOINT": "http://127.0.0.1:9", "OTEL_EXPORTER_OTLP_TIMEOUT": "1"}
+    service = start("up", OTEL_BSP_SCHEDULE_DELAY="100", **away).ready()
     assert service.end(service.submit(service.venue("v")).json()["id"])["status"] == "succeeded"
     assert service.stop() == 0
 

@@ -7,14 +7,26 @@ import subprocess
 import sys
 import time
 
+from service.serving import GRACE_S
 from tests.disks import filled
 from tests.e2e.books import settle
-from tests.e2e.killing import kill_api, kill_kept_worker, moment, seconds_of_a_job, seconds_of_a_submission, submitted
+from tests.e2e.killing import (
+    chance,
+    kill_api,
+    kill_kept_worker,
+    moment,
+    seconds_of_a_job,
+    seconds_of_a_submission,
+    submitted,
+)
+from tests.e2e.observe.figures import figures
 from tests.e2e.running import Service, alive, children, wait_for
 from tests.homes import in_both_homes, on_servers
 
 # Beyond the silence: until a worker looks, takes the job out of the queue and begins.
 TAKING_OVER_S = 5
+# What open requests get to end in, and after them the worker.
+STOPPING_S = 2 * GRACE_S + 10
 
 
 def poses(service, venue):
@@ -69,7 +81,7 @@ def test_a_worker_on_another_machine_takes_over(start, tmp_path):
 def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothing_else(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     seconds = seconds_of_a_job(service, service.venue("alone", "accept 0.3"))
-    ended, _ = kill_kept_worker(service, service.venue("v", "accept 0.3"), moment(seconds))
+    ended, _ = kill_kept_worker(service, service.venue("v", "accept 0.3"), moment(chance(), seconds))
     assert ended["status"] == "succeeded"
     assert ended["attempt"] <= 2
     settle(service)
@@ -79,18 +91,18 @@ def test_a_worker_killed_at_any_moment_of_its_job_costs_it_an_attempt_and_nothin
 def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     seconds = seconds_of_a_submission(service, service.venue("alone"))
-    promised = kill_api(service, service.venue("v"), "key", moment(seconds))
+    drawn = chance()
+    promised = kill_api(service, service.venue("v"), "key", moment(drawn, seconds))
     job = submitted(service, "v", "key")
     assert promised in (None, job)
     assert service.end(job)["status"] == "succeeded"
     # This client does not come back.
-    promised = kill_api(service, service.venue("w"), "key", moment(seconds))
+    promised = kill_api(service, service.venue("w"), "key", moment(drawn, seconds))
     assert promised is None or service.end(promised)["status"] == "succeeded"
     settle(service)
 
 
-def test_two_workers_of_one_name_do_not_run_on_one_machine(start):
-    service = start().ready()
+def test_two_workers_of_one_name_do_not_run_on_one_machine(service):
     command = [sys.executable, "-m", "service.cli", "worker", "--name", socket.gethostname()]
     second = subprocess.run(command, env=service.environment, capture_output=True, timeout=30)
     assert second.returncode == 2
@@ -112,7 +124,6 @@ def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
     assert poses(service, "v") == [-0.875, -0.875]
 
 
-@in_both_homes
 def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
     service = start().ready()
     service.venue("v")
@@ -125,37 +136,40 @@ def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
 
 def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):
     service = start().ready()
-    service.venue("v", "hang")
-    job = service.submit("v").json()["id"]
+    job = service.submit(service.venue("v", "hang")).json()["id"]
     service.running(job)
     worker = service.worker()
     (computing,) = service.begun(job)
     with service.http.stream("GET", f"/jobs/{job}/events") as events:
-        next(events.iter_lines())
+        lines = events.iter_lines()
+        assert next(lines) == "event: progress"
+        begun = time.monotonic()
         assert service.stop() == 0
+        assert time.monotonic() - begun < STOPPING_S
     wait_for(lambda: not alive(worker) and not alive(computing))
 
 
-def test_a_crash_of_the_computation_costs_one_job(start):
-    service = start().ready()
+def test_a_crash_of_the_computation_costs_one_job(service, name):
     worker = service.worker()
-    crashed = service.end(service.submit(service.venue("bad", "crash")).json()["id"])
+    crashed = service.end(service.submit(service.venue(f"{name}-bad", "crash")).json()["id"])
     assert (crashed["status"], crashed["error"]["type"]) == ("failed", "/problems/job-crashed")
     assert "SIGSEGV" in crashed["error"]["detail"]
-    assert service.end(service.submit(service.venue("good", "chatter")).json()["id"])["status"] == "succeeded"
+    assert service.end(service.submit(service.venue(name, "chatter")).json()["id"])["status"] == "succeeded"
     assert service.worker() == worker
 
 
-def test_a_program_that_cannot_be_started_fails_the_job_and_says_so(start):
-    service = start("up", ESC_JOB_PROGRAM='["/nonexistent/program"]').ready()
+def test_a_program_and_a_network_that_are_not_there_are_told(start):
+    service = start("up", ESC_JOB_PROGRAM='["/nonexistent/program"]', ESC_MODEL="/nowhere/unet.onnx")
     job = service.end(service.submit(service.venue("v")).json()["id"])
     assert (job["status"], job["attempt"], job["error"]["type"]) == ("failed", 1, "/problems/job-crashed")
     assert "No such file or directory: '/nonexistent/program'" in job["error"]["detail"]
+    wait_for(lambda: service.http.get("/readyz").json()["parts"]["model"].startswith("missing at"))
 
 
 @in_both_homes
-def test_a_job_goes_on_while_the_database_is_away(start, home):
-    service = start().ready()
+def test_while_the_database_is_away_the_service_says_so_and_a_job_goes_on(start, home):
+    # Without a key to look up: otherwise it could not tell whether the caller may know.
+    service = start("up", ESC_AUTH="off").ready()
     service.venue("v", "accept 1")
     job = service.submit("v").json()["id"]
     service.running(job)
@@ -164,11 +178,19 @@ def test_a_job_goes_on_while_the_database_is_away(start, home):
         wait_for(lambda: not alive(computing))
         wait_for(lambda: "the database is away, trying again" in (service.data / "log").read_text())
         assert service.http.get(f"/jobs/{job}").status_code == 503
+        assert figures(service)["esc_database_up",] == 0
+        parts = wait_for(
+            lambda: (seen := service.http.get("/readyz").json()["parts"])["database"].startswith("cannot") and seen
+        )
+        assert set(parts) == {"database", "blobs", "disk", "worker", "model"}
+        assert service.http.get("/livez").status_code == 200
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
     assert poses(service, "v") == [-0.875, -0.875]
+    assert figures(service)["esc_database_up",] == 1
     # The queue has come back too.
     assert service.end(service.submit("v", 1).json()["id"])["status"] == "succeeded"
+    service.ready()
 
 
 @on_servers
@@ -199,18 +221,16 @@ def test_a_job_that_kills_its_worker_is_given_up_after_three_attempts(start):
 
 
 @on_servers
-def test_a_silent_bucket_refuses_uploads_and_ends_no_job(start, home):
-    service = start().ready()
-    service.venue("v", "accept 1")
-    service.venue("w")
-    job = service.submit("v").json()["id"]
+def test_a_silent_bucket_refuses_uploads_and_ends_no_job(service, home, name):
+    job = service.submit(service.venue("beside-a-silent-bucket", "accept 1")).json()["id"]
+    service.venue(name)
     service.running(job)
     with home.bucket_away():
-        answer = service.submit("w")
+        answer = service.submit(name)
         assert (answer.status_code, answer.json()["type"]) == (503, "/problems/unavailable")
     ended = service.end(job)
     assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
-    assert service.end(service.submit("w").json()["id"])["status"] == "succeeded"
+    assert service.end(service.submit(name).json()["id"])["status"] == "succeeded"
 
 
 def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk):

@@ -14,13 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from service.settings import Settings
-from service.store.engine import connect, migrate
-from service.store.keys import Keys
-from tests.e2e.running import Service, upload, venue
+from tests.e2e.running import Service, keys_in, upload, venue
 
 HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
+ROOT = HERE.parents[2]
 EXAMPLES = int(os.environ.get("ESC_TEST_EXAMPLES", "0"))
 # What must have happened, or the checks were about refusals only.
 REACHED = {
@@ -48,10 +45,7 @@ def guarded(tmp_path):
     """A service that asks for keys and has a calibrated venue or two; its client has a key."""
     folder = tmp_path / "esc"
     folder.mkdir()
-    engine = connect(Settings(data=folder).home_database_url)
-    migrate(engine)
-    key = Keys(engine).add("ops", "admin")
-    engine.dispose()
+    key = keys_in(folder).add("ops", "admin")
     service = Service(folder, ESC_RATE_PER_S="100000", ESC_RATE_BURST="100000").ready()
     service.http.headers["Authorization"] = f"Bearer {key}"
     yield service

@@ -10,9 +10,8 @@ import sqlalchemy as sa
 
 from service.intake.snapshots import STARTING_S
 from service.store import tables
-from tests.e2e.cameras import NetworkCamera
+from tests.e2e.intake.cameras import NetworkCamera
 from tests.e2e.running import Service, png, upload, venue, wait_for
-from tests.homes import environment
 
 
 @pytest.fixture(scope="module")
@@ -26,10 +25,9 @@ FROM_HERE = {"ESC_SOURCES": '["127.0.0.0/8", "localhost"]', "ESC_SOURCE_TIMEOUT_
 
 
 @pytest.fixture(scope="module")
-def service(home, tmp_path_factory):
+def service(tmp_path_factory):
     """One that may fetch from this machine."""
-    folder = tmp_path_factory.mktemp("esc")
-    running = Service(folder, **environment(home.settings(folder)) | FROM_HERE).ready()
+    running = Service(tmp_path_factory.mktemp("esc"), **FROM_HERE).ready()
     yield running
     assert running.stop() == 0
 
@@ -140,7 +138,8 @@ def test_a_source_that_is_too_slow_is_given_up(hasty, camera, name, path):
         answer = hasty.http.post(f"/venues/{name}/calibrate")
     assert (answer.status_code, answer.json()["camera"]) == (502, "left"), answer.text
     assert "within 1 s" in answer.json()["detail"]
-    assert time.monotonic() - begun < 1 + STARTING_S + 1
+    # And what a busy machine may add.
+    assert time.monotonic() - begun < 1 + STARTING_S + 10
     assert "pass" not in answer.text + (hasty.data / "log").read_text()
 
 

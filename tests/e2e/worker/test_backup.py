@@ -12,7 +12,7 @@ from obstore.store import from_url
 
 from tests.homes import on_servers, postgres_binaries
 
-PAGE = (Path(__file__).parents[2] / "docker" / "README.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docker" / "README.md").read_text()
 
 
 def commands(title):

@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from tests.e2e.running import upload
-from tests.e2e.test_commandline import FRAMES
+from tests.e2e.running import FRAMES, upload
 
 
 def fit(service, name, options=None, headers=None, files=None):
@@ -60,7 +59,7 @@ def test_esc_fits_the_field_of_a_stored_venue(service, esc, name, tmp_path, beha
     assert (tmp_path / "fitted.json").exists() == (code == 0)
     if code == 0:
         assert "length: 104.250 ± 0.050 m (given 105.000)" in done.stderr
-        assert "width: unknowable from these frames, no line is in view (kept 68.000)" in done.stderr
+        assert "width: unknowable from these frames, no line seen (kept 68.000)" in done.stderr
         assert (tmp_path / "seen" / "overlay_left.jpg").exists()
         assert esc("venue", "put", "fitted.json").returncode == 0
         assert service.http.get(f"/venues/{name}").json()["field"]["length_m"] == 104.25

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.e2e.observe.figures import families
 from tests.e2e.running import venue
-from tests.e2e.test_watching import families
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ALERTS = ROOT / "docker" / "prometheus" / "alerts.yaml"
 DASHBOARD = json.loads((ROOT / "docker" / "grafana" / "esc.json").read_text())
 PANELS = [panel for panel in DASHBOARD["panels"] if panel["type"] != "row"]
