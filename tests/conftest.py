@@ -29,6 +29,12 @@ def pytest_configure(config):
         raise pytest.UsageError(f"ESC_TEST_REQUIRE names {', '.join(sorted(unknown))}; known are {known}")
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config):
+    """One more than there are cores: tests of the whole service wait longer than they compute."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 @pytest.fixture(scope="session")
 def missing():
     """Call it with a part that is not there: the test is skipped, or fails where the part is required."""
@@ -62,7 +68,7 @@ def servers(postgres, bucket):
     return Servers(postgres, bucket)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def home(request):
     """Where a test keeps its state: the embedded home, or what `in_both_homes` says."""
     return request.getfixturevalue("servers") if getattr(request, "param", "") == "servers" else Embedded()

@@ -26,8 +26,8 @@ BUCKET = "esc-tests"
 # Nothing of a test's database must survive a power cut.
 HASTY = ("fsync=off", "synchronous_commit=off", "full_page_writes=off")
 # On a test: which home, or homes, it runs in. What it builds, it builds in the home that the fixture `home` gives.
-in_both_homes = pytest.mark.parametrize("home", ["embedded", "servers"], indirect=True, scope="session")
-on_servers = pytest.mark.parametrize("home", ["servers"], indirect=True, scope="session")
+in_both_homes = pytest.mark.parametrize("home", ["embedded", "servers"], indirect=True)
+on_servers = pytest.mark.parametrize("home", ["servers"], indirect=True)
 
 
 class Embedded:

@@ -1,23 +1,38 @@
-"""Services for the tests: one that many tests share, and fresh ones to be killed."""
+"""Services for the tests: one per home that many tests share, and fresh ones to be killed."""
 
 import re
-import subprocess
-import sys
+from functools import partial
 
 import pytest
 
 from tests import disks
 from tests.disks import may_mount
+from tests.e2e.commands import esc_here
 from tests.e2e.running import Service, png
-from tests.homes import environment
+from tests.homes import Servers, environment
 
 
 @pytest.fixture(scope="session")
-def service(home, tmp_path_factory):
+def service_of_a_folder(tmp_path_factory):
+    yield from shared(tmp_path_factory.mktemp("esc"))
+
+
+@pytest.fixture(scope="session")
+def service_on_servers(servers, tmp_path_factory):
     folder = tmp_path_factory.mktemp("esc")
-    running = Service(folder, **environment(home.settings(folder))).ready()
+    yield from shared(folder, **environment(servers.settings(folder)))
+
+
+def shared(folder, **settings):
+    running = Service(folder, **settings).ready()
     yield running
     assert running.stop() == 0
+
+
+@pytest.fixture
+def service(request, home):
+    """The service that tests share; what they leave in it is theirs by its name."""
+    return request.getfixturevalue("service_on_servers" if isinstance(home, Servers) else "service_of_a_folder")
 
 
 @pytest.fixture
@@ -33,6 +48,20 @@ def start(home, tmp_path):
     yield start
     for one in started:
         one.kill()
+
+
+@pytest.fixture(scope="session")
+def unusual(tmp_path_factory):
+    """An API without a worker whose settings are none of the defaults: for what depends on a single one of them."""
+    settings = {
+        "ESC_QUEUE_LIMIT": "2",
+        "ESC_MAX_FRAME_MB": "0.001",
+        "ESC_MAX_BODY_MB": "0.01",
+        "ESC_FREED_AXES": "y -x z -pan+90 tilt roll",
+    }
+    running = Service(tmp_path_factory.mktemp("unusual"), "serve", **settings)
+    yield running
+    assert running.stop() == 0
 
 
 @pytest.fixture
@@ -54,10 +83,4 @@ def esc(service, tmp_path):
     """Run `esc`; files of the test are in the folder it runs in."""
     for side in ("left", "right"):
         (tmp_path / f"{side}.png").write_bytes(png())
-
-    def esc(*arguments, url=service.url):
-        command = [sys.executable, "-m", "service.cli", *arguments]
-        environment = service.environment | {"ESC_URL": url}
-        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=60)
-
-    return esc
+    return partial(esc_here, tmp_path, **service.environment | {"ESC_URL": service.url})

@@ -2,6 +2,7 @@
 
 import os
 import random
+import secrets
 import signal
 import sys
 import threading
@@ -16,6 +17,8 @@ from tests.e2e.running import Service, children, wait_for
 
 # Beyond the time that something takes when nobody disturbs it: the last moments of it are of interest too.
 A_LITTLE_LONGER = 1.1
+# Set to the number that a failed run printed, the moments are drawn as they were then.
+SEED = "ESC_TEST_SEED"
 
 
 @dataclass(frozen=True)
@@ -28,9 +31,16 @@ class Death:
     to_takeover_s: float | None
 
 
-def moment(of_s: float) -> float:
-    """A random one, counted from the beginning of what takes `of_s`. Printed: pytest shows it when a test fails."""
-    after_s = random.uniform(0, A_LITTLE_LONGER * of_s)
+def chance() -> random.Random:
+    """What moments are drawn from, with a seed that is printed: pytest shows it when a test fails."""
+    seed = int(os.environ.get(SEED) or secrets.randbits(32))
+    print(f"{SEED}={seed}", file=sys.stderr)
+    return random.Random(seed)
+
+
+def moment(chance: random.Random, of_s: float) -> float:
+    """A random one, counted from the beginning of what takes `of_s`."""
+    after_s = chance.uniform(0, A_LITTLE_LONGER * of_s)
     print(f"kill after {after_s:.4f} s", file=sys.stderr)
     return after_s
 
@@ -62,10 +72,10 @@ def kill_kept_worker(service: Service, venue: str, after_s: float) -> tuple[dict
 
 
 def kill_worker_of_several(service: Service, workers: dict[str, Popen], venue: str, after_s: float) -> Death:
-    """Kill the worker that computes the job, or any, at a moment of a job; it stays dead until the job has ended."""
+    """Kill the worker that computes the job, or the first, at a moment of a job; it stays dead until the job ended."""
     job = service.submit(venue).raise_for_status().json()["id"]
     time.sleep(after_s)
-    name = next((name for name, process in workers.items() if children(process.pid)), random.choice(list(workers)))
+    name = next((name for name, process in workers.items() if children(process.pid)), next(iter(workers)))
     workers[name].kill()
     killed = time.monotonic()
     workers[name].wait()

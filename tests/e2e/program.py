@@ -1,44 +1,47 @@
-"""Stands in for the program that computes a job: does what the name of the venue says, and no geometry."""
+"""Stands in for the program that computes a job: does what the name of the venue says, and no geometry.
 
+It reads and writes plain JSON: the models of the messages take a quarter of a second to import, for each job anew.
+"""
+
+import json
 import os
 import signal
 import sys
 import time
+from pathlib import Path
 
 from service import lifeline
-from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.jobs.files import picture_folder
-from service.store.jobs.task import Task
-from service.wire.geometry import Moved, Pose
-from service.wire.job import JobError, Progress
-from service.wire.results import CameraResult, FieldResult, MeasureResult, Provenance, Result
-from worker.message import Message
 
 JPEG = b"\xff\xd8\xff\xd9"
-SHIFT_M = 0.125
+# Where cameras end, of the way from the middle of the pitch to where they were. Their translation shrinks alike.
+NEARER = 0.875
 MEASURES = [
-    MeasureResult(name="length_m", given=105, value=104.25, sigma=0.05, open=5, known=True, detail=""),
-    MeasureResult(name="width_m", given=68, value=67, sigma=5, open=5, known=False, detail="no line is in view"),
+    {"name": "length_m", "given": 105, "value": 104.25, "sigma": 0.05, "open": 5, "known": True, "detail": ""},
+    {"name": "width_m", "given": 68, "value": 67, "sigma": 5, "open": 5, "known": False, "detail": "no line seen"},
 ]
 
 
-def say(**message):
-    print(Message(**message).line(), flush=True)
+def say(**message) -> None:
+    print(json.dumps(message), flush=True)
+
+
+def fail(kind: str, detail: str, camera: str | None = None) -> None:
+    say(error={"type": f"/problems/{kind}", "title": "", "detail": detail, "camera": camera})
 
 
 def main() -> None:
     lifeline.end_with_parent()
-    settings = Settings()
-    task = Task.model_validate_json(sys.stdin.buffer.read())
-    behaviour, _, seconds = task.venue.name.partition(" ")
-    with (settings.data / "begun").open("a") as begun:
-        begun.write(f"{task.job_id} {os.getpid()}\n")
-    say(progress=Progress(stage="segmentation", fraction=0.1))
+    task = json.load(sys.stdin)
+    behaviour, _, seconds = task["venue"]["name"].partition(" ") if task["venue"] else ("", "", "")
+    with (Path(os.environ["ESC_DATA"]) / "begun").open("a") as begun:
+        begun.write(f"{task['job_id']} {os.getpid()}\n")
+    say(progress={"stage": "segmentation", "fraction": 0.1})
     end = time.monotonic() + float(seconds or 0)
     while time.monotonic() < end:
         time.sleep(0.05)
-        say(progress=Progress(stage="evolution", fraction=0.5, generation=7, loss=0.3))
+        say(progress={"stage": "evolution", "fraction": 0.5, "generation": 7, "loss": 0.3})
     match behaviour:
         case "hang":
             time.sleep(3600)
@@ -50,43 +53,52 @@ def main() -> None:
         case "chatter":
             print("this is not a message", flush=True)
         case "fail":
-            say(error=JobError(type="/problems/no-markings-in-view", title="", detail="It is black.", camera="left"))
+            fail("no-markings-in-view", "It is black.", "left")
             return
-    if task.kind not in ("calibration", "field"):
-        say(error=JobError(type="/problems/no-pose", title="", detail="This program only moves cameras."))
+    if task["kind"] not in ("calibration", "field"):
+        fail("no-pose", "This program only moves cameras.")
         return
-    blobs = Blobs(settings.home_blob_url)
-    pictures = ["preview", "birdseye", *(f"overlay_{camera.id}" for camera in task.venue.cameras)]
+    cameras = task["venue"]["cameras"]
+    pictures = ["preview", "birdseye", *(f"overlay_{camera['id']}" for camera in cameras)]
     if behaviour == "reject":
         pictures.remove("preview")
+    blobs = Blobs(os.environ["ESC_BLOB_URL"])
     for name in pictures:
-        blobs.put(f"{picture_folder(task.job_id, task.run_token)}/{name}.jpg", JPEG)
-    cameras = [
-        CameraResult(
-            id=camera.id,
-            pose=Pose.at(camera.pose.rotation, [camera.pose.position[0] + SHIFT_M, *camera.pose.position[1:]]),
-            sigma=None,
-            moved=Moved(rotation_deg=0, position_m=SHIFT_M, pixels=1.0),
-            iou=0.9,
-            residual_px=1.0,
-        )
-        for camera in task.venue.cameras
-    ]
+        blobs.put(f"{picture_folder(task['job_id'], task['run_token'])}/{name}.jpg", JPEG)
     common = {
         "accepted": behaviour != "reject",
         "rejected_because": "the lines do not fit" if behaviour == "reject" else None,
-        "cameras": cameras,
+        "cameras": [found(camera) for camera in cameras],
         "stitch_error_px": 0.2,
         "timings_s": {"decode": 0.1},
-        "provenance": Provenance(
-            software="0", model_sha256="0", seed=task.options.seed, options=task.options.model_dump()
-        ),
+        "provenance": {
+            "software": "0",
+            "model_sha256": "0",
+            "seed": task["options"]["seed"],
+            "options": task["options"],
+        },
     }
-    if task.kind == "field":
-        field = task.venue.field.model_copy(update={"length_m": 104.25})
-        say(result=FieldResult(field=field, measures=MEASURES, **common), pictures=pictures[2:])
+    if task["kind"] == "field":
+        field = task["venue"]["field"] | {"length_m": 104.25}
+        say(result=common | {"field": field, "measures": MEASURES}, pictures=pictures[2:])
     else:
-        say(result=Result(stitch_error_before_px=10.0, loss=0.1, generations=10, **common), pictures=pictures)
+        say(
+            result=common | {"stitch_error_before_px": 10.0, "loss": 0.1, "generations": 10},
+            pictures=pictures,
+        )
+
+
+def found(camera: dict) -> dict:
+    pose = camera["pose"]
+    nearer = {place: [NEARER * component for component in pose[place]] for place in ("position", "translation")}
+    return {
+        "id": camera["id"],
+        "pose": pose | nearer,
+        "sigma": None,
+        "moved": {"rotation_deg": 0, "position_m": 6.4, "pixels": 1.0},
+        "iou": 0.9,
+        "residual_px": 1.0,
+    }
 
 
 if __name__ == "__main__":

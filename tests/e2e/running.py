@@ -16,12 +16,16 @@ import httpx
 import sqlalchemy as sa
 
 from service import lifeline
-from service.store.engine import connect, writing
+from service.settings import Settings
+from service.store.engine import connect, migrate, writing
+from service.store.keys import Keys
 from tests.homes import files
 
 PROGRAM = [sys.executable, str(Path(__file__).parent / "program.py")]
 DEADLINE_S = 90
 SIZE = (64, 48)
+# Of `esc`, for the files that the fixture of this name writes.
+FRAMES = ("left=left.png", "right=right.png")
 
 
 class Service:
@@ -163,6 +167,13 @@ def png_of(header: bytes, rows: bytes) -> bytes:
 def upload(shade: int = 0, cameras: tuple[str, ...] = ("left", "right")) -> list:
     """Frames that differ by their shade."""
     return [(camera, (f"{camera}.png", png(shade=shade))) for camera in cameras]
+
+
+def keys_in(data: Path) -> Keys:
+    """The keys of the service of a folder, which need not have been started yet."""
+    engine = connect(Settings(data=data).home_database_url)
+    migrate(engine)
+    return Keys(engine)
 
 
 def wait_for(condition: Callable, deadline_s: float = DEADLINE_S):

@@ -71,7 +71,7 @@ def test_a_rejected_result_is_accepted_by_hand(stub, ended, visit):
     expect(page.get_by_text("The poses from before still hold")).to_be_visible()
     page.get_by_role("button", name="Accept anyway").click()
     expect(page.get_by_text("These poses hold now")).to_be_visible()
-    assert stub.http.get("/venues/poor").json()["cameras"][0]["pose"]["position"][0] == -1.0 + 0.125
+    assert stub.http.get("/venues/poor").json()["cameras"][0]["pose"]["position"][0] == -0.875
 
 
 def test_the_chart_has_the_results_the_movements_and_the_line_of_the_gate(stub, years, visit):

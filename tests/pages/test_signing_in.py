@@ -5,8 +5,7 @@ import pytest
 from playwright.sync_api import expect
 
 from service.pages.shown import local
-from tests.e2e.running import Service, venue, wait_for
-from tests.e2e.test_access import keys_in
+from tests.e2e.running import Service, keys_in, venue, wait_for
 from tests.pages.browsing import grave
 
 REFUSED = ("401", "403")

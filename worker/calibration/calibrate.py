@@ -43,8 +43,9 @@ from worker.calibration.search.search import (
     Strategy,
     search,
 )
+from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
-from worker.calibration.see.line_measurement import brightness_of
+from worker.calibration.see.ridge_response import ridge_response
 from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.view import ViewCondition, look_at
@@ -57,17 +58,21 @@ FEWEST_VISIBLE_POINTS = 60
 
 @dataclass(frozen=True)
 class Method:
-    """What a preset does: the levels of its search, the shape of the ground, and how it ends."""
+    """What a preset does: the levels of its search, the shape of the ground, and how it ends.
+
+    `ridges`: whether they are followed where what the network sees leads nowhere.
+    """
 
     levels: Sequence[Level]
     flat: bool
+    ridges: bool
     finish: Callable[..., Finished]
 
 
 METHODS: Mapping[Preset, Method] = {
-    "esc": Method(COARSE_TO_FINE, flat=False, finish=refine),
-    "paper": Method(ON_THE_GROUND, flat=False, finish=assess),
-    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, finish=assess),
+    "esc": Method(COARSE_TO_FINE, flat=False, ridges=True, finish=refine),
+    "paper": Method(ON_THE_GROUND, flat=False, ridges=False, finish=assess),
+    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, ridges=False, finish=assess),
 }
 """`esc`: the default. `paper`: the paper to the letter. `scpr`: its predecessor, flat and without a stitch term."""
 
@@ -91,16 +96,11 @@ def calibrate(
     pitch = pitch.flat() if options.flat or method.flat else pitch
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey)
-    found = find(pitch, cameras, seen, method.levels, options, journey)
-    with journey.measuring("refinement"):
-        journey.at("refinement", 0.0)
-        sight = sight_of(cameras, frames, seen)
-        finish = method.finish if seen.usable else assess
-        finished = finish(pitch, found.cameras, sight, options.stitch_weight, _free(options, pitch, cameras))
+    found, finished = settle(method, pitch, cameras, seen, options, journey)
     with journey.measuring("quality"):
         journey.at("refinement", 0.6)
-        answer = judge(pitch, cameras, seen.views, sight, finished, journey)
-        stitch_before = _stitch_error_px(pitch, cameras, sight)
+        answer = judge(pitch, cameras, seen, finished, journey)
+        stitch_before = _stitch_error_px(pitch, cameras, seen.sight)
         journey.at("refinement", 1.0)
     return Calibration(
         **vars(answer),
@@ -113,10 +113,10 @@ def calibrate(
 
 @dataclass(frozen=True)
 class Seen:
-    """What the cameras see: `views`, whether their frames can be used; `responses` (H, W), their segmentations 0..1."""
+    """What the cameras see: `views`, whether their frames can be used, and the `sight` of the search and the finish."""
 
     views: Sequence[ViewCondition]
-    responses: Sequence[Response]
+    sight: Sight
 
     @property
     def usable(self) -> bool:
@@ -137,39 +137,54 @@ def look(
         views = [view_of(frames[camera.id], pitch, camera) for camera in cameras]
     with journey.measuring("segmentation"):
         responses = segment_all(pitch, cameras, frames, segment, journey)
-    return Seen(views, responses)
+    return Seen(views, Sight([Channels(frames[camera.id]) for camera in cameras], responses))
 
 
-def find(
-    pitch: Field, cameras: Sequence[Camera], seen: Seen, levels: Sequence[Level], options: Options, journey: Journey
-) -> Found:
-    """Search for all cameras from their stored poses.
+def settle(
+    method: Method, pitch: Field, cameras: Sequence[Camera], seen: Seen, options: Options, journey: Journey
+) -> tuple[Found, Finished]:
+    """Search for all cameras from their stored poses, and finish.
 
-    What cannot be seen is not searched for: the stored poses are judged as they are, beside what is wrong.
+    What cannot be seen is not searched for: the stored poses are judged as they are, beside what is wrong. Where the
+    poses that the network leads to do not explain the frames, ridges are followed in its place, and the better is kept.
     """
-    with journey.measuring("evolution"):
-        if not seen.usable:
-            return Found(list(cameras), np.inf, 0)
-        strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
-        rng = np.random.default_rng(options.seed)
-        on_generation = journey.evolution(options.generations)
-        return search(pitch, cameras, seen.responses, levels, strategy, rng, on_generation)
+    free = _free(options, pitch, cameras)
+    if not seen.usable:
+        with journey.measuring("refinement"):
+            stored = assess(pitch, cameras, seen.sight, options.stitch_weight, free)
+        return Found(list(cameras), np.inf, 0), stored
+
+    def settled_by(responses: Sequence[Response]) -> tuple[Found, Finished]:
+        with journey.measuring("evolution"):
+            strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
+            rng = np.random.default_rng(options.seed)
+            on_generation = journey.evolution(options.generations)
+            found = search(pitch, cameras, responses, method.levels, strategy, rng, on_generation)
+        with journey.measuring("refinement"):
+            journey.at("refinement", 0.0)
+            return found, method.finish(pitch, found.cameras, seen.sight, options.stitch_weight, free)
+
+    first = settled_by(seen.sight.responses)
+    lost = [left.evidence.agreement < Gate().least_agreement for left in first[1].each]
+    if not (method.ridges and any(lost)):
+        return first
+    with journey.measuring("ridges"):
+        responses = _with_ridges(pitch, cameras, seen.sight, lost)
+    return max(first, settled_by(responses), key=lambda end: min(left.evidence.agreement for left in end[1].each))
 
 
-def sight_of(cameras: Sequence[Camera], frames: Mapping[str, Sequence[Frame]], seen: Seen) -> Sight:
-    """What the finish looks at."""
-    brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
-    return Sight(brightness, seen.responses)
+def _with_ridges(pitch: Field, cameras: Sequence[Camera], sight: Sight, lost: Sequence[bool]) -> list[Response]:
+    """The responses (H, W) to search by, of ridges for the cameras that are `lost` by those of the network."""
+    lines = pitch.line_points()
+    return [
+        ridge_response(channels, SeenLines.from_camera(lines, camera), CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
+        if is_lost
+        else response
+        for camera, channels, response, is_lost in zip(cameras, sight.channels, sight.responses, lost, strict=True)
+    ]
 
 
-def judge(
-    pitch: Field,
-    stored: Sequence[Camera],
-    views: Sequence[ViewCondition],
-    sight: Sight,
-    finished: Finished,
-    journey: Journey,
-) -> Answer:
+def judge(pitch: Field, stored: Sequence[Camera], seen: Seen, finished: Finished, journey: Journey) -> Answer:
     """What the finished cameras are worth beside the `stored` ones on the `pitch` they were stored for."""
     lines = pitch.line_points()
     results = [
@@ -177,14 +192,14 @@ def judge(
             **vars(after),
             view=view,
             iou=markings_iou(finished.pitch, after.camera, response),
-            evidence_before=evidence_of(lines, before, bright, response),
+            evidence_before=evidence_of(lines, before, channels, response),
             moved=Movement.between(pitch, before, after.camera),
         )
-        for before, after, view, bright, response in zip(
-            stored, finished.each, views, sight.brightness, sight.responses, strict=True
+        for before, after, view, channels, response in zip(
+            stored, finished.each, seen.views, seen.sight.channels, seen.sight.responses, strict=True
         )
     ]
-    stitch = _stitch_error_px(finished.pitch, finished.cameras, sight)
+    stitch = _stitch_error_px(finished.pitch, finished.cameras, seen.sight)
     rejected = rejection(results, pairs_in_common(finished.pitch, finished.cameras), stitch, Gate())
     rejected = rejected or ridge_rejection(finished.pitch, Gate())
     return Answer(finished.pitch, results, rejected, stitch, journey.seconds)

@@ -109,20 +109,23 @@ class Journey:
         self.report = report
         self.stop = stop
         self.seconds: dict[str, float] = {}
+        self.fraction = 0.0
 
     @contextmanager
     def measuring(self, stage: str) -> Iterator[None]:
         """Measure how long that takes which is done inside."""
         begin = time.perf_counter()
         yield
-        self.seconds[stage] = time.perf_counter() - begin
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin
 
     def at(self, stage: Stage, share: float, generation: int | None = None, loss: float | None = None) -> None:
         """Report `share` 0..1 of `stage`; raise `Stopped` when asked to stop."""
         if self.stop():
             raise Stopped
         begin, end = SHARE_OF_JOB[stage]
-        self.report(Progress(stage, begin + share * (end - begin), generation, loss))
+        # A second search does not take back what has been reported.
+        self.fraction = max(self.fraction, begin + share * (end - begin))
+        self.report(Progress(stage, self.fraction, generation, loss))
 
     def evolution(self, total: int) -> Callable[[int, float], None]:
         """What a search of at most `total` generations calls after each one."""

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 
 from fields.template import load
-from models.training.courts import render_court
-from models.training.floors import Floor, clay, concrete, grass, hard_court, ice, random_floor, sand, wood
+from models.training.courts.court import render_court
+from models.training.courts.floors import Floor, clay, concrete, grass, hard_court, ice, random_floor, sand, wood
 from tests.benchmarks.fields.engine import Engine, camera_row
 from tests.benchmarks.fields.judging import caught, far_off, overconfident, reasons, share
 from tests.benchmarks.scenes import started

@@ -17,6 +17,7 @@ from service.store import tables
 from tests.benchmarks.service.stage import SERVERS, homes, service, spread
 from tests.e2e.books import settle
 from tests.e2e.killing import (
+    chance,
     kill_api,
     kill_kept_worker,
     kill_worker_of_several,
@@ -51,13 +52,14 @@ def table(options: argparse.Namespace) -> list[str]:
 
 def _kept_workers(home: Home, moments: int) -> str:
     ends, seconds = [], []
+    drawn = chance()
     with service(home) as running:
         running.ready()
         whole = seconds_of_a_job(running, running.venue("alone", COMPUTES))
         for number in range(moments):
             # One that died young is started again ever later: that is another matter.
             time.sleep(YOUNG_S)
-            ended, after_s = kill_kept_worker(running, running.venue(f"v{number}", COMPUTES), moment(whole))
+            ended, after_s = kill_kept_worker(running, running.venue(f"v{number}", COMPUTES), moment(drawn, whole))
             ends.append(ended)
             seconds.append(after_s)
         settle(running)
@@ -66,6 +68,7 @@ def _kept_workers(home: Home, moments: int) -> str:
 
 def _workers_of_two(home: Home, moments: int) -> str:
     ends, seconds, takeovers = [], [], []
+    drawn = chance()
     with service(home, "serve") as running:
         names = ("one", "two")
         workers = {name: running.worker_beside(_machine(running, name), name) for name in names}
@@ -74,7 +77,9 @@ def _workers_of_two(home: Home, moments: int) -> str:
             whole = seconds_of_a_job(running, running.venue("alone", COMPUTES))
             for number in range(moments):
                 wait_for(lambda: _alive(running) == set(names))
-                death = kill_worker_of_several(running, workers, running.venue(f"v{number}", COMPUTES), moment(whole))
+                death = kill_worker_of_several(
+                    running, workers, running.venue(f"v{number}", COMPUTES), moment(drawn, whole)
+                )
                 ends.append(death.job)
                 seconds.append(death.to_end_s)
                 if death.to_takeover_s is not None:
@@ -91,12 +96,13 @@ def _workers_of_two(home: Home, moments: int) -> str:
 
 def _apis(home: Home, moments: int) -> str:
     ends, seconds, kept = [], [], 0
+    drawn = chance()
     with service(home) as running:
         running.ready()
         whole = seconds_of_a_submission(running, running.venue("alone"))
         for number in range(moments):
             venue = running.venue(f"v{number}")
-            promised = kill_api(running, venue, "key", moment(whole))
+            promised = kill_api(running, venue, "key", moment(drawn, whole))
             begun = time.monotonic()
             if promised is None and number % 2:
                 continue  # a client that does not come back

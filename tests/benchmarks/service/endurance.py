@@ -20,9 +20,9 @@ from service.settings import MODEL_BESIDE_THE_CODE
 from service.store import tables
 from tests.benchmarks.service.load import ENGINE
 from tests.benchmarks.service.stage import service
-from tests.e2e import test_real_engine as reduced
 from tests.e2e.books import everything_in, queued, settle
 from tests.e2e.running import Service, wait_for
+from tests.e2e.worker import test_real_engine as reduced
 from tests.homes import Embedded
 
 KEEP_S = 20

@@ -99,7 +99,7 @@ def gives_up_in_time(monkeypatch, address):
     begun = time.monotonic()
     with pytest.raises(BaseError):
         Blobs("s3://bucket", patience_s=1).put("frames/a/left/0", b"1")
-    return 1 < time.monotonic() - begun < 10
+    return 1 < time.monotonic() - begun < 20
 
 
 def test_a_bucket_that_does_not_answer_is_asked_for_as_long_as_its_caller_is_patient(monkeypatch):

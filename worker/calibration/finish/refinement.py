@@ -19,6 +19,7 @@ from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
 from worker.calibration.scene.parameters import Parameter
+from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
 from worker.calibration.see.line_measurement import Measurements, measure_lines
 
@@ -38,11 +39,9 @@ SETTLED_M = 5e-5
 
 @dataclass(frozen=True)
 class Sight:
-    """What a finish looks at: per camera `brightness` (H, W) of its frame (`line_measurement.brightness_of`), and
-    `responses` (H, W), its segmentation in 0..1.
-    """
+    """What a finish looks at: per camera the `channels` of its frame and `responses` (H, W), the segmentation 0..1."""
 
-    brightness: Sequence[NDArray[np.float32]]
+    channels: Sequence[Channels]
     responses: Sequence[NDArray[np.float32]]
 
 
@@ -120,16 +119,16 @@ def assess(
 def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
     """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
     return [
-        measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.relative_size)
-        for camera, bright, response in zip(cameras, sight.brightness, sight.responses, strict=True)
+        measure_lines(lines, camera, channels, response, search_px * camera.intrinsics.relative_size)
+        for camera, channels, response in zip(cameras, sight.channels, sight.responses, strict=True)
     ]
 
 
 def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Finished:
     """Cameras that need not agree, each on a ground of its own."""
     ends = [
-        refine(pitch, [camera], Sight([bright], [response]), 0.0)
-        for camera, bright, response in zip(cameras, sight.brightness, sight.responses, strict=True)
+        refine(pitch, [camera], Sight([channels], [response]), 0.0)
+        for camera, channels, response in zip(cameras, sight.channels, sight.responses, strict=True)
     ]
     deviations = [deviation for end in ends for deviation in end.deviations if deviation.camera is not None]
     return Finished(pitch, [end.each[0] for end in ends], deviations, [])
@@ -140,8 +139,8 @@ def _assessed(
 ) -> Finished:
     lines = here.on_ground(unknowns)
     evidence = [
-        evidence_of(lines, camera, bright, response)
-        for camera, bright, response in zip(here.cameras, sight.brightness, sight.responses, strict=True)
+        evidence_of(lines, camera, channels, response)
+        for camera, channels, response in zip(here.cameras, sight.channels, sight.responses, strict=True)
     ]
     measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.

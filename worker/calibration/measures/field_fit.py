@@ -12,7 +12,7 @@ from typing import Literal, cast
 
 import numpy as np
 
-from worker.calibration.calibrate import METHODS, find, judge, look, sight_of
+from worker.calibration.calibrate import METHODS, judge, look, settle
 from worker.calibration.finish.refinement import SEARCH_PX, Sight, assess, refine
 from worker.calibration.finish.uncertainty import Determined, Finished
 from worker.calibration.measures.ridge import TriedRidges, try_ridges
@@ -82,15 +82,13 @@ def fit_field(
     """
     options, journey = Options(seed=seed), Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey)
-    found = find(pitch, cameras, seen, METHODS["esc"].levels, options, journey)
-    with journey.measuring("refinement"):
-        journey.at("refinement", 0.0)
-        sight = sight_of(cameras, frames, seen)
+    found, _ = settle(METHODS["esc"], pitch, cameras, seen, options, journey)
+    with journey.measuring("measures"):
         fit = fit_measures if seen.usable else leave_measures
-        finished, measures = fit(pitch, found.cameras, sight, options.stitch_weight)
+        finished, measures = fit(pitch, found.cameras, seen.sight, options.stitch_weight)
     with journey.measuring("quality"):
         journey.at("refinement", 0.9)
-        answer = judge(pitch, cameras, seen.views, sight, finished, journey)
+        answer = judge(pitch, cameras, seen, finished, journey)
         journey.at("refinement", 1.0)
     answer = replace(answer, rejected_because=answer.rejected_because or _implausible(finished.pitch))
     return FieldFit(**vars(answer), measures=measures)

@@ -11,7 +11,7 @@ from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.finish.refinement import Sight
 from worker.calibration.measures.field_fit import fit_field, fit_measures
 from worker.calibration.scene.field import Field
-from worker.calibration.see.line_measurement import brightness_of
+from worker.calibration.see.contrast import Channels
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.timeout(600)
 def fitted(truth, cameras, given):
     """The pitch that the lines of `truth` make of a `given` one, by cameras a little off, and its measures by name."""
     sight = Sight(
-        [brightness_of(paint_frame(truth, c)).astype(np.float32) for c in cameras],
+        [Channels([paint_frame(truth, c)]) for c in cameras],
         [paint_markings(truth, c) for c in cameras],
     )
     start = [moved(c, (0.0008, -0.0006, 0.0005), (0.02, -0.03, 0.02)) for c in cameras]

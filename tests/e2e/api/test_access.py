@@ -1,0 +1,316 @@
+"""Keys against a real server: who gets in where."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+
+import httpx
+import pytest
+from fastapi.routing import iter_route_contexts
+
+from service.app import create_app
+from service.pages.shown import SIGN_IN, Page
+from service.routes.contract.guarded import Guarded
+from service.settings import Settings
+from tests.e2e.commands import esc_here, esc_process
+from tests.e2e.running import Service, keys_in, png, upload, venue, wait_for
+
+SCOPES = ("read", "calibrate", "admin")
+# What the service can do is no secret.
+OPEN = {"/livez", "/readyz", "/problems/{kind}", "/docs", "/docs/rapidoc-min.js", "/docs/LICENSE.txt"}
+# The way to sign in, and what it is drawn with.
+OPEN |= {"/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
+NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "DELETE": "admin"}
+# Pages that show nothing but how to change something, and a question that takes a body.
+OTHERWISE = {"/ui/venues/{venue_id}/calibrate": "calibrate", "/ui/new-venue": "admin", "/ui/new-venue/plan": "read"}
+JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"
+
+
+def bearer(key):
+    return {"Authorization": f"Bearer {key}"}
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory):
+    """A key of each scope, and the folder they are for."""
+    folder = tmp_path_factory.mktemp("guarded")
+    store = keys_in(folder)
+    return folder, {scope: store.add(scope, scope) for scope in SCOPES}
+
+
+@pytest.fixture(scope="module")
+def guarded(keys):
+    """A service that has keys."""
+    running = Service(keys[0])
+    yield running
+    assert running.stop() == 0
+
+
+@pytest.fixture(scope="module")
+def key(keys):
+    return keys[1]
+
+
+@pytest.fixture(scope="module")
+def routes(tmp_path_factory):
+    """Every method and path of the application."""
+    app = create_app(Settings(data=tmp_path_factory.mktemp("routes")))
+    yield list(iter_route_contexts(app.routes))
+    app.state.context.queue.close()
+    app.state.context.engine.dispose()
+
+
+def esc(folder, *arguments, **environment):
+    return esc_here(folder, *arguments, **os.environ | {"ESC_DATA": str(folder)} | environment)
+
+
+def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
+    for route in routes:
+        if not isinstance(route.original_route, Guarded):
+            assert route.path == "/openapi.json", f"{route.path} is not guarded"
+            continue
+        (method,) = route.methods
+        needed = None if route.path in OPEN else OTHERWISE.get(route.path, NEEDED[method])
+        path = route.path.replace(":path", "").format(
+            job_id=JOB, venue_id="nowhere", camera="left", kind="not-found", of_edition="0", path="page.css"
+        )
+        for caller in (None, *SCOPES):
+            answer = guarded.http.request(method, path, headers=bearer(key[caller]) if caller else {})
+            if needed is None or (caller and SCOPES.index(caller) >= SCOPES.index(needed)):
+                expected = "let in"
+            else:
+                expected = 403 if caller else 401
+            got = answer.status_code if answer.status_code in (401, 403) else "let in"
+            if (method, path) == ("POST", SIGN_IN):
+                # Its key is in the form, and there was none.
+                got = "let in"
+            if isinstance(route.original_route, Page) and answer.headers.get("location", "").startswith(SIGN_IN):
+                got = 401
+            assert (method, route.path, caller, got) == (method, route.path, caller, expected)
+
+
+def test_the_document_says_which_scope_a_route_needs(guarded):
+    document = guarded.http.get("/openapi.json").json()
+    assert document["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
+    assert document["paths"]["/venues/{venue_id}"]["put"]["security"] == [{"key": ["admin"]}]
+    assert {"401", "403", "429"} <= document["paths"]["/venues/{venue_id}"]["put"]["responses"].keys()
+    assert document["paths"]["/livez"]["get"]["security"] == []
+
+
+def test_refusals_are_problems_that_name_the_way_in(guarded, key):
+    missing = guarded.http.get("/jobs")
+    assert (missing.status_code, missing.headers["content-type"]) == (401, "application/problem+json")
+    assert (missing.headers["www-authenticate"], missing.json()["type"]) == ("Bearer", "/problems/key-missing")
+    unknown = guarded.http.get("/jobs", headers=bearer("esc_unknown"))
+    assert unknown.headers["www-authenticate"] == 'Bearer error="invalid_token"'
+    assert (unknown.status_code, unknown.json()["type"]) == (401, "/problems/key-unknown")
+    small = guarded.http.put("/venues/v", json=venue("v"), headers=bearer(key["calibrate"]))
+    assert (small.status_code, small.json()["type"]) == (403, "/problems/scope-too-small")
+    assert (small.json()["expected"], small.json()["got"]) == ("admin", "calibrate")
+
+
+def test_a_body_is_not_looked_at_before_the_key(guarded):
+    answer = guarded.http.put("/venues/v", content=b"{", headers={"Content-Type": "application/json"})
+    assert answer.status_code == 401
+
+
+def test_from_the_venue_to_the_pose_with_the_keys_that_suffice(guarded, key, name):
+    guarded.http.put(f"/venues/{name}", json=venue(name), headers=bearer(key["admin"])).raise_for_status()
+    sent = guarded.http.post(f"/venues/{name}/calibrate", files=upload(), headers=bearer(key["calibrate"]))
+    assert sent.status_code == 202
+    with guarded.http.stream("GET", f"/jobs/{sent.json()['id']}/events", headers=bearer(key["read"])) as events:
+        assert "event: end" in events.read().decode()
+
+
+def test_the_command_line_sends_its_key_and_helps_without_one(guarded, key, name, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name)))
+    for side in ("left", "right"):
+        # Too large for the buffers of a socket: what refuses it must read it, or its answer is lost.
+        (tmp_path / f"{side}.png").write_bytes(png() + bytes(30_000_000))
+
+    def call(*arguments, api_key=""):
+        return esc(tmp_path, *arguments, ESC_URL=guarded.url, ESC_API_KEY=api_key)
+
+    put = call("venue", "put", "venue.json", api_key=key["admin"] + "\n")
+    assert put.returncode == 0, put.stderr
+    small = call("venue", "put", "venue.json", api_key=key["calibrate"])
+    assert (small.returncode, "a key of scope admin; calibrate has calibrate" in small.stderr) == (1, True)
+    for wrong in ("", "esc_unknown"):
+        refused = call("calibrate", name, "left=left.png", "right=right.png", "--wait", api_key=wrong)
+        assert refused.returncode == 1
+        assert "Set ESC_API_KEY" in refused.stderr
+        assert "esc_unknown" not in refused.stderr
+    odd = call("venue", "list", api_key="zwei Wörter")
+    assert (odd.returncode, "without spaces" in odd.stderr, "Wörter" in odd.stderr) == (2, True, False)
+
+
+def test_keys_are_made_listed_and_removed_on_the_machine_of_the_service(start):
+    service = start("serve")
+    assert service.http.get("/jobs").status_code == 200
+    made = esc(service.data, "key", "add", "cron", "--scope", "calibrate", "--days", "30")
+    key = made.stdout.strip()
+    assert (made.returncode, key.startswith("esc_")) == (0, True)
+    wait_for(lambda: service.http.get("/jobs").status_code == 401)
+    assert service.http.get("/jobs", headers=bearer(key)).status_code == 200
+    assert service.stop() == 0
+
+    name, scope, made_at, used_at, until = esc(service.data, "key", "list").stdout.strip().split("\t")
+    assert (name, scope) == ("cron", "calibrate")
+    assert made_at <= used_at < until
+    again = esc(service.data, "key", "add", "cron", "--scope", "read")
+    assert (again.returncode, "There is a key cron already" in again.stderr) == (2, True)
+    removed = esc(service.data, "key", "remove", "cron")
+    assert (removed.returncode, "No key is left" in removed.stderr) == (0, True)
+    assert esc(service.data, "key", "remove", "cron").returncode == 1
+    assert key not in (service.data / "log").read_text()
+
+
+def test_a_key_that_is_removed_opens_nothing_for_long(guarded):
+    key = esc(guarded.data, "key", "add", "cron", "--scope", "read").stdout.strip()
+    assert guarded.http.get("/jobs", headers=bearer(key)).status_code == 200
+    assert esc(guarded.data, "key", "remove", "cron").returncode == 0
+    wait_for(lambda: guarded.http.get("/jobs", headers=bearer(key)).status_code == 401)
+
+
+@pytest.mark.parametrize("arguments", [("Bad name", "--scope", "read"), ("x", "--scope", "all"), ("x",)])
+def test_a_key_needs_a_name_and_a_scope(tmp_path, arguments):
+    assert esc(tmp_path, "key", "add", *arguments).returncode == 2
+
+
+def test_beyond_this_machine_nobody_listens_without_keys(tmp_path):
+    alone = esc_process(tmp_path, "serve", "--host", "0.0.0.0", "--port", "0", ESC_DATA=str(tmp_path))
+    assert (alone.returncode, "esc key add NAME --scope admin" in alone.stderr) == (2, True)
+
+
+@pytest.fixture(scope="module")
+def beyond(tmp_path_factory):
+    """A service that other machines reach, where a key may not ask often; its address, and its keys."""
+    folder = tmp_path_factory.mktemp("beyond")
+    keys = keys_in(folder)
+    keys.add("first", "admin")
+    running = Service(folder, "serve", "--host", "0.0.0.0", ESC_RATE_PER_S="0.5", ESC_RATE_BURST="5")
+    yield f"http://127.0.0.1:{httpx.URL(running.url).port}", keys
+    assert running.stop() == 0
+
+
+def test_beyond_this_machine_a_key_is_asked_for(beyond):
+    url, keys = beyond
+    assert httpx.get(f"{url}/jobs").status_code == 401
+    assert httpx.get(f"{url}/jobs", headers=bearer(keys.add("ops", "admin"))).status_code == 200
+    assert httpx.get(f"{url}/livez").status_code == 200
+
+
+def test_a_key_that_asks_too_often_waits(beyond):
+    url, keys = beyond
+    hasty = bearer(keys.add("hasty", "read"))
+    passed = 0
+    while (answer := httpx.get(f"{url}/jobs", headers=hasty)).status_code == 200:
+        passed += 1
+    assert passed >= 5
+    assert (answer.status_code, answer.json()["type"]) == (429, "/problems/rate-limited")
+    assert int(answer.headers["retry-after"]) in (1, 2)
+    assert httpx.get(f"{url}/livez").status_code == 200
+    wait_for(lambda: httpx.get(f"{url}/jobs", headers=hasty).status_code == 200)
+
+
+def test_where_a_proxy_decides_who_may_call_it_can_be_switched_off(start, tmp_path):
+    keys_in(tmp_path / "esc").add("ops", "admin")
+    service = start("serve", "--host", "0.0.0.0", ESC_AUTH="off")
+    assert httpx.get(f"http://127.0.0.1:{httpx.URL(service.url).port}/jobs").status_code == 200
+    assert "ESC_AUTH=off" in (service.data / "log").read_text()
+
+
+def test_the_log_names_the_key_and_does_not_hold_it(guarded, key):
+    for caller in (*key.values(), "esc_guessed"):
+        guarded.http.get("/jobs", headers=bearer(caller))
+    log = (guarded.data / "log").read_text()
+    named = {line.get("key") for line in map(json.loads, log.splitlines()) if line.get("event") == "request"}
+    assert set(SCOPES) <= named
+    for secret in (*key.values(), "esc_guessed"):
+        assert secret not in log
+
+
+# Pages that the browsers of this machine show
+
+
+@pytest.fixture(scope="module")
+def open_to_all(tmp_path_factory):
+    """A service without keys, called by its address, by localhost and by one name."""
+    running = Service(tmp_path_factory.mktemp("open"), "serve", ESC_ALLOWED_HOSTS='["esc.truck.lan"]')
+    yield running
+    assert running.stop() == 0
+
+
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1:8000", "localhost", "LOCALHOST:1", "[::1]:80", "10.0.0.7", "esc.truck.lan"]
+)
+def test_a_service_without_keys_answers_to_its_own_names(open_to_all, host):
+    assert open_to_all.http.get("/jobs", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8000", "localhost.evil.example", "127.0.0.1.nip.io", "[", ""]
+)
+def test_and_to_no_other_name_that_was_made_to_point_to_it(open_to_all, host):
+    answer = open_to_all.http.get("/jobs", headers={"Host": host})
+    assert (answer.status_code, answer.json()["type"]) == (421, "/problems/host-unknown")
+    assert "ESC_ALLOWED_HOSTS" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("origin", ["https://evil.example", "http://127.0.0.1:1", "null", "http://[", ""])
+def test_pages_of_other_origins_change_nothing(open_to_all, origin):
+    for method, path in (("PUT", "/venues/v"), ("DELETE", "/venues/v"), ("POST", "/venues/v/calibrate")):
+        answer = open_to_all.http.request(method, path, headers={"Origin": origin})
+        assert (answer.status_code, answer.json()["type"]) == (403, "/problems/origin-foreign")
+
+
+def test_pages_of_the_service_may(open_to_all):
+    for origin in (open_to_all.url, "https://esc.truck.lan"):
+        answer = open_to_all.http.put("/venues/v", json=venue("v"), headers={"Origin": origin})
+        assert answer.is_success
+
+
+def test_no_answer_may_be_embedded_or_guessed_at_elsewhere(open_to_all):
+    for path in ("/jobs", "/docs", "/nowhere"):
+        headers = open_to_all.http.get(path).headers
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["cross-origin-resource-policy"] == "same-origin"
+        assert "access-control-allow-origin" not in headers
+
+
+def test_a_key_is_enough_under_any_name(guarded, key):
+    elsewhere = {"Host": "esc.example.com", "Origin": "https://planner.example.com"}
+    assert guarded.http.get("/jobs", headers=bearer(key["read"]) | elsewhere).status_code == 200
+
+
+# The documentation, in a truck without internet
+
+
+def test_the_documentation_needs_nothing_from_elsewhere(open_to_all):
+    page = open_to_all.http.get("/docs")
+    assert page.headers["content-security-policy"].startswith("default-src 'none'; script-src 'self'")
+    assert "://" not in page.text
+    (script,) = re.findall(r'src="([^"]+)"', page.text)
+    answer = open_to_all.http.get(script)
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "text/javascript; charset=utf-8")
+    assert "MIT License" in open_to_all.http.get("/docs/LICENSE.txt").text
+
+
+def test_a_browser_without_internet_draws_it(open_to_all, tmp_path, missing):
+    browser = shutil.which("chromium") or missing("browser")
+    shown = subprocess.run(
+        [
+            *(browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
+            *(f"--user-data-dir={tmp_path}", "--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1"),
+            *("--window-size=1200,4000", "--virtual-time-budget=10000", f"--print-to-pdf={tmp_path}/docs.pdf"),
+            *("--enable-logging=stderr", f"{open_to_all.url}/docs"),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert "Content Security Policy" not in shown.stderr
+    asked = [json.loads(line) for line in (open_to_all.data / "log").read_text().splitlines()]
+    assert "/openapi.json" in [one.get("path") for one in asked]

@@ -1,0 +1,84 @@
+"""The OpenAPI document against the service: schemathesis with all its checks, keys asked for.
+
+ESC_TEST_EXAMPLES=500 tries so many requests of each kind instead of a few, from another seed every time.
+"""
+
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.running import Service, keys_in, upload, venue
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[2]
+EXAMPLES = int(os.environ.get("ESC_TEST_EXAMPLES", "0"))
+# What must have happened, or the checks were about refusals only.
+REACHED = {
+    ("PUT", "/venues/*", 201),
+    ("PUT", "/venues/*", 412),
+    ("DELETE", "/venues/*", 204),
+    ("POST", "/venues/*/calibrate", 202),
+    ("POST", "/venues/*/cameras/left/locate", 202),
+    ("GET", "/jobs/*", 200),
+    ("GET", "/jobs/*/events", 200),
+    ("GET", "/jobs/*/poses", 200),
+    ("GET", "/jobs/*/poses", 422),
+    ("GET", "/venues/*/poses", 200),
+    ("GET", "/venues/*/history", 200),
+    ("POST", "/venues/*/restore", 200),
+    ("GET", "/jobs/*/preview.jpg", 200),
+    ("GET", "/jobs/*/overlay/left.jpg", 200),
+    ("POST", "/jobs/*/cancel", 200),
+    ("POST", "/jobs/*/reject", 200),
+}
+
+
+@pytest.fixture
+def guarded(tmp_path):
+    """A service that asks for keys and has a calibrated venue or two; its client has a key."""
+    folder = tmp_path / "esc"
+    folder.mkdir()
+    key = keys_in(folder).add("ops", "admin")
+    service = Service(folder, ESC_RATE_PER_S="100000", ESC_RATE_BURST="100000").ready()
+    service.http.headers["Authorization"] = f"Bearer {key}"
+    yield service
+    service.kill()
+
+
+@pytest.mark.timeout(300 + EXAMPLES * 10)
+def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_path):
+    venues, doomed = [f"v{n}" for n in range(9)], [f"d{n}" for n in range(9)]
+    for name in venues + doomed:
+        guarded.http.put(f"/venues/{name}", json=venue(name)).raise_for_status()
+    answers = [guarded.http.post(f"/venues/{name}/calibrate", files=upload()) for name in venues[:4]]
+    jobs = [guarded.end(answer.json()["id"])["id"] for answer in answers]
+    for name, values in {"venues": venues, "doomed": doomed, "jobs": jobs}.items():
+        (tmp_path / f"{name}.txt").write_text("".join(f'"{value}"\n' for value in values))
+    shutil.copy(HERE / "schemathesis.toml", tmp_path)
+
+    seed = random.randrange(2**32) if EXAMPLES else 1
+    command = ["run", f"{guarded.url}/openapi.json", "--checks", "all", "--seed", seed]
+    command += ["--max-examples", EXAMPLES or 20, "--header", f"Authorization: {guarded.http.headers['Authorization']}"]
+    told = subprocess.run(
+        [Path(sys.executable).parent / "schemathesis", *map(str, command)],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "120"},
+        capture_output=True,
+        text=True,
+    )
+    assert told.returncode == 0, told.stdout + told.stderr
+    log = (guarded.data / "log").read_text()
+    assert "Traceback" not in log
+    requests = [entry for entry in map(json.loads, log.splitlines()) if entry.get("event") == "request"]
+    reached = {
+        (one["method"], re.sub("/(venues|jobs)/[^/]+", r"/\1/*", one["path"]), one["status"]) for one in requests
+    }
+    assert REACHED - reached == set()
+    assert [one for one in requests if one["status"] >= 500] == []

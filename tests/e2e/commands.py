@@ -1,0 +1,44 @@
+"""`esc`: in this process, or in one of its own."""
+
+import io
+import os
+import subprocess
+import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from pathlib import Path
+from subprocess import CompletedProcess
+from unittest.mock import patch
+
+from service.cli.main import main
+from service.observe import logs
+
+
+def esc_here(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:
+    """What a process of this command, in this folder and with this environment, would have said.
+
+    It spares each call the second in which a new interpreter imports everything. Not for what serves: that would go on
+    holding its socket and its database.
+    """
+    out, err = io.TextIOWrapper(io.BytesIO()), io.StringIO()
+    code = 0
+    with (
+        chdir(folder),
+        patch.dict(os.environ, environment, clear=True),
+        patch.object(sys, "argv", ["esc", *arguments]),
+        # The logs of this process are those of the tests.
+        patch.object(logs, "configure"),
+        redirect_stdout(out),
+        redirect_stderr(err),
+    ):
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code or 0
+    out.flush()
+    return CompletedProcess(arguments, code, out.buffer.getvalue().decode(errors="replace"), err.getvalue())
+
+
+def esc_process(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:
+    """The same in a process of its own, with this beside the environment of the tests."""
+    command = [sys.executable, "-m", "service.cli", *arguments]
+    return subprocess.run(command, cwd=folder, env=os.environ | environment, capture_output=True, text=True, timeout=60)

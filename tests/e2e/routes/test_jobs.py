@@ -1,0 +1,370 @@
+import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Semaphore
+
+import httpx
+import pytest
+
+from service.store.blobs import Blobs
+from tests.e2e.running import DEADLINE_S, SIZE, alive, png, upload, venue, wait_for
+from tests.homes import in_both_homes
+
+# What a busy machine may add to what is promised.
+BUSY_S = 10
+
+
+@in_both_homes
+def test_a_job_goes_from_frames_to_poses_and_pictures(service, name):
+    service.venue(name)
+    answer = service.submit(name, generations=12)
+    job = answer.json()
+    assert (answer.status_code, answer.headers["location"]) == (202, f"/jobs/{job['id']}")
+    assert int(answer.headers["retry-after"]) > 0
+    assert (job["status"], job["venue"], job["result"]) == ("queued", name, None)
+
+    job = service.end(job["id"])
+    assert (job["status"], job["attempt"], job["error"]) == ("succeeded", 1, None)
+    assert job["result"]["accepted"]
+    assert job["result"]["provenance"]["options"]["generations"] == 12
+    assert [camera["id"] for camera in job["result"]["cameras"]] == ["left", "right"]
+    for link in ("preview", "birdseye", "overlay/left", "overlay/right"):
+        picture = service.http.get(job["links"][link])
+        assert (picture.status_code, picture.headers["content-type"]) == (200, "image/jpeg")
+
+
+@in_both_homes
+def test_an_accepted_result_moves_the_stored_poses(service, name):
+    tag = service.http.get(f"/venues/{service.venue(name)}").headers["etag"]
+    result = service.end(service.submit(name).json()["id"])["result"]
+    answer = service.http.get(f"/venues/{name}")
+    assert answer.headers["etag"] != tag
+    assert [c["pose"] for c in answer.json()["cameras"]] == [c["pose"] for c in result["cameras"]]
+
+
+@pytest.mark.parametrize(("behaviour", "options"), [("reject", {}), ("fail", {}), ("accept", {"dry_run": True})])
+def test_any_other_result_leaves_them_untouched(service, name, behaviour, options):
+    service.venue(name, behaviour)
+    before = service.http.get(f"/venues/{name}")
+    job = service.end(service.submit(name, **options).json()["id"])
+    assert job["status"] == ("failed" if behaviour == "fail" else "succeeded")
+    answer = service.http.get(f"/venues/{name}")
+    assert (answer.json(), answer.headers["etag"]) == (before.json(), before.headers["etag"])
+
+
+def test_a_rejection_gives_its_reason_and_its_pictures(service, name):
+    service.venue(name, "reject")
+    job = service.end(service.submit(name).json()["id"])
+    assert (job["result"]["accepted"], job["result"]["rejected_because"]) == (False, "the lines do not fit")
+    assert service.http.get(job["links"]["overlay/left"]).status_code == 200
+
+
+def test_only_pictures_that_were_made_are_linked(service, name):
+    service.venue(name, "reject")
+    job = service.end(service.submit(name).json()["id"])
+    assert {"birdseye", "overlay/left", "overlay/right"} <= set(job["links"])
+    assert "preview" not in job["links"]
+    assert service.http.get(f"/jobs/{job['id']}/preview.jpg").status_code == 404
+
+
+def test_a_job_that_succeeded_is_wholly_done(service, name):
+    service.venue(name, "accept 0.5")
+    job = service.end(service.submit(name).json()["id"])
+    assert (job["status"], job["progress"]["fraction"]) == ("succeeded", 1.0)
+
+
+def test_a_failure_names_the_camera_and_the_cause(service, name):
+    service.venue(name, "fail")
+    job = service.end(service.submit(name).json()["id"])
+    assert (job["error"]["type"], job["error"]["camera"]) == ("/problems/no-markings-in-view", "left")
+    picture = service.http.get(f"/jobs/{job['id']}/preview.jpg")
+    assert (picture.status_code, picture.json()["type"]) == (404, "/problems/picture-not-found")
+
+
+@in_both_homes
+def test_a_venue_changed_meanwhile_keeps_its_new_poses(service, name):
+    service.venue(name, "accept 1")
+    job = service.submit(name).json()["id"]
+    service.running(job)
+    changed = venue(name)
+    changed["cameras"][0]["pose"]["position"] = [0, -60, 9]
+    service.http.put(f"/venues/{name}", json=changed).raise_for_status()
+    result = service.end(job)["result"]
+    assert (result["accepted"], result["rejected_because"]) == (False, "the venue was changed while the job ran")
+    assert service.http.get(f"/venues/{name}").json()["cameras"][0]["pose"]["position"] == [0, -60, 9]
+
+
+def test_frames_of_a_camera_may_repeat(service, name):
+    service.venue(name)
+    answer = service.http.post(f"/venues/{name}/calibrate", files=[*upload(1), *upload(2)])
+    assert service.end(answer.json()["id"])["status"] == "succeeded"
+
+
+@pytest.mark.parametrize("cameras", [("only",), ("a", "b", "c")])
+def test_venues_have_one_camera_or_several(service, name, cameras):
+    service.venue(name, cameras=cameras)
+    answer = service.http.post(f"/venues/{name}/calibrate", files=upload(cameras=cameras))
+    assert len(service.end(answer.json()["id"])["result"]["cameras"]) == len(cameras)
+
+
+def test_the_seed_is_the_callers_or_one_is_chosen_and_told(service, name):
+    service.venue(name)
+    assert service.end(service.submit(name, seed=7).json()["id"])["result"]["provenance"]["seed"] == 7
+    assert service.end(service.submit(name, 1).json()["id"])["result"]["provenance"]["seed"] >= 0
+
+
+# One active job per venue, and the same content once
+
+
+@in_both_homes
+def test_the_same_frames_give_the_running_job_back_and_others_a_conflict(service, name):
+    service.venue(name, "accept 2")
+    job = service.submit(name).json()["id"]
+    again = service.submit(name)
+    assert (again.status_code, again.json()["id"]) == (200, job)
+    for other in (service.submit(name, 1), service.submit(name, generations=9)):
+        assert other.status_code == 409
+        assert (other.json()["type"], other.json()["job"]) == ("/problems/venue-busy", job)
+        assert service.http.get(other.headers["location"]).json()["id"] == job
+        assert "retry-after" in other.headers
+    assert service.http.delete(f"/venues/{name}").json()["job"] == job
+    assert service.end(job)["status"] == "succeeded"
+    assert service.submit(name).json()["id"] != job
+
+
+def test_an_idempotency_key_stands_for_one_job_even_after_its_end(service, name):
+    service.venue(name)
+    key = {"Idempotency-Key": "2026-11-21T10:00"}
+    job = service.submit(name, headers=key).json()["id"]
+    service.end(job)
+    again = service.submit(name, headers=key)
+    assert (again.status_code, again.json()["id"], again.json()["status"]) == (200, job, "succeeded")
+    other = service.submit(name, 1, headers=key)
+    assert (other.status_code, other.json()["type"]) == (422, "/problems/idempotency-key-reused")
+    assert other.json()["job"] == job
+
+
+def test_a_key_belongs_to_its_venue(service, name):
+    key = {"Idempotency-Key": "k"}
+    jobs = {service.submit(service.venue(f"{name}-{n}"), headers=key).json()["id"] for n in range(2)}
+    assert len(jobs) == 2
+
+
+@pytest.mark.parametrize("key", ["", "a b", "x" * 256, "\xe9"])
+def test_a_key_that_is_none_is_refused(service, name, key):
+    service.venue(name)
+    headers = {"Idempotency-Key": key.encode("latin-1")}
+    assert service.submit(name, headers=headers).status_code == 422
+
+
+@in_both_homes
+def test_many_submissions_at_once_are_one_job(service, name):
+    service.venue(name, "accept 1")
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda _: service.submit(name), range(8)))
+    assert sorted(answer.status_code for answer in answers) == [200] * 7 + [202]
+    job = {answer.json()["id"] for answer in answers}
+    assert len(job) == 1
+    assert len(service.files(f"frames/{next(iter(job))}")) == 2
+
+
+@in_both_homes
+def test_a_key_that_comes_twice_at_once_is_one_job_whatever_came_with_it(service, name):
+    service.venue(name, "accept 1")
+    key = {"Idempotency-Key": "k"}
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda number: service.submit(name, number % 2, headers=key), range(8)))
+    assert sorted(answer.status_code for answer in answers) == [200] * 3 + [202] + [422] * 4
+    refused = {answer.json()["type"] for answer in answers if answer.status_code == 422}
+    assert refused == {"/problems/idempotency-key-reused"}
+    assert len({answer.json()["id"] for answer in answers if answer.status_code < 300}) == 1
+
+
+# Following a job
+
+
+def test_the_answer_waits_for_the_end(service, name):
+    service.venue(name, "accept 0.5")
+    job = service.submit(name).json()["id"]
+    assert service.job(job, wait=20)["status"] == "succeeded"
+
+
+def test_but_no_longer_than_asked(service, name):
+    service.venue(name, "hang")
+    job = service.submit(name).json()["id"]
+    begun = time.monotonic()
+    assert service.job(job, wait=0.5)["status"] in ("queued", "running")
+    assert 0.4 < time.monotonic() - begun < 0.5 + BUSY_S
+    service.http.post(f"/jobs/{job}/cancel")
+
+
+def test_progress_is_shown(service, name):
+    service.venue(name, "accept 2")
+    job = service.submit(name).json()["id"]
+    progress = wait_for(lambda: (p := service.job(job)["progress"]) and p["stage"] == "evolution" and p)
+    assert progress == {"stage": "evolution", "fraction": 0.5, "generation": 7, "loss": 0.3}
+    service.end(job)
+
+
+def test_an_unchanged_job_is_not_sent_again(service, name):
+    service.venue(name)
+    job = service.end(service.submit(name).json()["id"])["id"]
+    tag = service.http.get(f"/jobs/{job}").headers["etag"]
+    answer = service.http.get(f"/jobs/{job}", headers={"If-None-Match": f'"other", {tag}'})
+    assert (answer.status_code, answer.content, answer.headers["etag"]) == (304, b"", tag)
+    assert "retry-after" not in answer.headers
+
+
+@in_both_homes
+def test_events_tell_the_progress_and_the_end(service, name):
+    service.venue(name, "accept 1")
+    job = service.submit(name).json()["id"]
+    with service.http.stream("GET", f"/jobs/{job}/events") as answer:
+        assert answer.headers["content-type"].startswith("text/event-stream")
+        lines = [line.partition(": ") for line in answer.iter_lines()]
+    events = [value for field, _, value in lines if field == "event"]
+    bodies = [json.loads(value) for field, _, value in lines if field == "data"]
+    assert events[-1] == "end"
+    assert set(events[:-1]) == {"progress"}
+    assert bodies[-1]["status"] == "succeeded"
+    assert any(body["progress"] and body["progress"]["stage"] == "evolution" for body in bodies)
+
+
+@in_both_homes
+def test_who_saw_the_end_and_connects_again_is_told_that_there_is_no_more(service, name):
+    job = service.end(service.submit(service.venue(name)).json()["id"])["id"]
+    lines = [line.partition(": ") for line in service.http.get(f"/jobs/{job}/events").text.splitlines()]
+    (number,) = [value for field, _, value in lines if field == "id"]
+    again = service.http.get(f"/jobs/{job}/events", headers={"Last-Event-ID": number})
+    assert (again.status_code, again.content) == (204, b"")
+    missed_it = service.http.get(f"/jobs/{job}/events", headers={"Last-Event-ID": "1"})
+    assert "event: end" in missed_it.text
+
+
+def test_everybody_who_listens_hears_the_end(service, name):
+    job = service.submit(service.venue(name, "hang")).json()["id"]
+    service.running(job)
+    everybody = 30
+    listening = Semaphore(0)
+
+    def listen(_):
+        with httpx.stream("GET", f"{service.url}/jobs/{job}/events", timeout=DEADLINE_S) as events:
+            lines = events.iter_lines()
+            assert next(lines) == "event: progress"
+            listening.release()
+            return [line for line in lines if line.startswith("event")]
+
+    def cancel():
+        for _ in range(everybody):
+            assert listening.acquire(timeout=DEADLINE_S)
+        service.http.post(f"/jobs/{job}/cancel").raise_for_status()
+
+    with ThreadPoolExecutor(everybody + 1) as pool:
+        cancelled = pool.submit(cancel)
+        heard = list(pool.map(listen, range(everybody)))
+        cancelled.result()
+    for events in heard:
+        assert events.count("event: end") == 1
+
+
+def test_a_picture_can_be_asked_for_without_its_bytes(service, name):
+    job = service.end(service.submit(service.venue(name)).json()["id"])
+    for link in ("self", "preview"):
+        whole, without = service.http.get(job["links"][link]), service.http.head(job["links"][link])
+        assert (without.status_code, without.content) == (200, b"")
+        for field in ("content-type", "content-length", "etag", "cache-control"):
+            assert without.headers.get(field) == whole.headers.get(field)
+    assert service.http.head("/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D").status_code == 404
+
+
+def test_a_page_goes_on_where_the_last_one_ended_whatever_came_in_between(service, name):
+    service.venue(name)
+    ids = [service.end(service.submit(name, shade).json()["id"])["id"] for shade in range(3)]
+    first = service.http.get("/jobs", params={"venue": name, "limit": 2}).json()
+    service.end(service.submit(name, 3).json()["id"])
+    rest = service.http.get("/jobs", params={"venue": name, "limit": 2, "cursor": first["next_cursor"]}).json()
+    assert [job["id"] for job in first["jobs"] + rest["jobs"]] == ids[::-1]
+
+
+def test_jobs_are_listed_newest_first_in_pages(service, name):
+    service.venue(name)
+    ids = [service.end(service.submit(name, shade).json()["id"])["id"] for shade in range(3)]
+    first = service.http.get("/jobs", params={"venue": name, "limit": 2}).json()
+    rest = service.http.get("/jobs", params={"venue": name, "limit": 2, "cursor": first["next_cursor"]}).json()
+    assert [job["id"] for job in first["jobs"] + rest["jobs"]] == ids[::-1]
+    assert rest["next_cursor"] is None
+    assert service.http.get("/jobs", params={"venue": name, "status": "failed"}).json()["jobs"] == []
+
+
+# Ending a job early
+
+
+@in_both_homes
+def test_a_running_job_is_cancelled_within_two_seconds(service, name):
+    service.venue(name, "hang")
+    job = service.submit(name).json()["id"]
+    service.running(job)
+    (process,) = service.begun(job)
+    begun = time.monotonic()
+    answer = service.http.post(f"/jobs/{job}/cancel")
+    assert (answer.status_code, answer.json()["status"]) == (200, "cancelled")
+    wait_for(lambda: not alive(process))
+    assert time.monotonic() - begun < 2 + BUSY_S
+    assert service.http.post(f"/jobs/{job}/cancel").json() == service.job(job)
+
+
+@in_both_homes
+def test_a_queued_job_is_cancelled_at_once_and_never_begins(service, name):
+    busy = service.submit(service.venue(f"{name}-a", "hang")).json()["id"]
+    service.running(busy)
+    queued = service.submit(service.venue(f"{name}-b")).json()["id"]
+    assert service.http.post(f"/jobs/{queued}/cancel").json()["status"] == "cancelled"
+    service.http.post(f"/jobs/{busy}/cancel")
+    service.end(service.submit(f"{name}-b", 1).json()["id"])
+    assert service.begun(queued) == []
+
+
+def test_a_finished_job_cannot_be_cancelled_any_more(service, name):
+    service.venue(name)
+    job = service.end(service.submit(name).json()["id"])
+    assert service.http.post(f"/jobs/{job['id']}/cancel").json() == job
+
+
+def test_a_job_that_takes_too_long_is_ended(service, name):
+    service.venue(name, "hang")
+    job = service.end(service.submit(name, timeout_s=1).json()["id"])
+    assert (job["status"], job["error"]["type"]) == ("failed", "/problems/job-timeout")
+    wait_for(lambda: not any(alive(process) for process in service.begun(job["id"])))
+
+
+@in_both_homes
+def test_live_jobs_go_first(service, name):
+    busy = service.submit(service.venue(f"{name}-a", "hang")).json()["id"]
+    service.running(busy)
+    routine = service.submit(service.venue(f"{name}-b")).json()
+    live = service.submit(service.venue(f"{name}-c"), priority="live").json()
+    assert live["queue_position"] < service.job(routine["id"])["queue_position"]
+    service.http.post(f"/jobs/{busy}/cancel")
+    assert service.end(live["id"])["finished_at"] < service.end(routine["id"])["started_at"]
+
+
+def test_a_full_queue_says_so_and_when_to_come_again(unusual):
+    answers = [unusual.submit(unusual.venue(f"venue-{number}")) for number in range(3)]
+    assert [answer.status_code for answer in answers] == [202, 202, 429]
+    assert (answers[2].json()["type"], answers[2].headers["retry-after"]) == ("/problems/queue-full", "30")
+    assert len(unusual.files("frames")) == 2 * len(("left", "right"))
+    for answer in answers[:2]:
+        unusual.http.post(f"/jobs/{answer.json()['id']}/cancel").raise_for_status()
+
+
+def test_nothing_is_ready_without_a_worker(unusual):
+    answer = unusual.http.get("/readyz")
+    assert (answer.status_code, answer.json()["parts"]["worker"]) == (503, "none gave a sign of life")
+
+
+@in_both_homes
+def test_the_frames_that_were_sent_are_the_frames_that_are_kept(service, name):
+    service.venue(name)
+    job = service.submit(name, 5).json()["id"]
+    service.end(job)
+    assert Blobs(service.blob_url).get(f"frames/{job}/left/0") == png(*SIZE, shade=5)

@@ -1,0 +1,76 @@
+"""A service that runs for months: what is past its time goes, and says so where somebody asks for it."""
+
+from datetime import UTC, datetime, timedelta
+
+import sqlalchemy as sa
+
+from service.store import tables
+from service.store.blobs import Blobs
+from tests.e2e.books import queued
+from tests.e2e.running import Service, wait_for
+from tests.homes import in_both_homes
+
+
+def age(service, job: str, days: float) -> None:
+    """Let a job have ended so many days ago."""
+    ended = datetime.now(UTC) - timedelta(days=days)
+    with service.database() as connection:
+        connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job).values(finished_at=ended))
+
+
+@in_both_homes
+def test_what_is_past_its_time_goes_and_says_so(start):
+    service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
+    service.venue("v", "reject")
+    key = {"Idempotency-Key": "k"}
+    ancient, old, young = (
+        service.end(service.submit("v", shade, headers=key if shade == 0 else None).json()["id"])["id"]
+        for shade in range(3)
+    )
+    age(service, old, days=15)
+    wait_for(lambda: not service.files(f"pictures/{old}") and not service.files(f"frames/{old}"))
+    answer = service.http.get(f"/jobs/{old}/birdseye.jpg")
+    assert (answer.status_code, answer.json()["type"]) == (410, "/problems/picture-deleted")
+    assert "14 days" in answer.json()["detail"]
+    assert service.job(old)["result"]["rejected_because"] == "the lines do not fit"
+    assert "birdseye" not in service.job(old)["links"]
+    assert service.http.get(f"/jobs/{young}/birdseye.jpg").status_code == 200
+
+    age(service, ancient, days=401)
+    gone = wait_for(lambda: (answer := service.http.get(f"/jobs/{ancient}")).status_code == 404 and answer)
+    assert gone.json()["type"] == "/problems/job-not-found"
+    with service.database() as connection:
+        assert {ancient, old, young} & queued(connection).keys() == {old, young}
+    # The key went with its job.
+    assert service.submit("v", headers=key).status_code == 202
+
+
+@in_both_homes
+def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(service, name):
+    service.venue(name)
+    job = service.end(service.submit(name).json()["id"])["id"]
+    Blobs(service.blob_url).delete_under(f"pictures/{job}")
+    gone = service.http.get(f"/jobs/{job}/birdseye.jpg")
+    assert (gone.status_code, gone.json()["type"]) == (410, "/problems/picture-deleted")
+    never = service.http.get(f"/jobs/{job}/overlay/middle.jpg")
+    assert (never.status_code, never.json()["type"]) == (404, "/problems/picture-not-found")
+
+
+def test_a_nearly_full_disk_refuses_uploads_and_says_what_to_do(service, name):
+    running = service.submit(service.venue(name, "accept 2")).json()["id"]
+    tight = Service(service.data, "serve", ESC_MIN_FREE_MB="1e9")
+    answer = tight.submit(name, 1)
+    assert (answer.status_code, answer.json()["type"]) == (507, "/problems/disk-full")
+    assert "ESC_KEEP_FRAMES_DAYS" in answer.json()["detail"]
+    ready = tight.http.get("/readyz")
+    assert ready.status_code == 503
+    assert ready.json()["parts"]["disk"].endswith("1000000000 needed: uploads are refused")
+    assert tight.end(running)["status"] == "succeeded"
+    assert tight.http.get(f"/jobs/{running}/preview.jpg").status_code == 200
+    tight.kill()
+
+
+def test_the_free_room_is_a_metric(service):
+    (line,) = [line for line in service.http.get("/metrics").text.splitlines() if line.startswith("esc_disk_free")]
+    assert float(line.split()[1]) > 0
+    assert service.http.get("/readyz").json()["parts"]["disk"] == "ok"
