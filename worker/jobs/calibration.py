@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 
 from service.settings import Settings
 from service.wire.job import Progress
@@ -39,21 +40,8 @@ def solve(
 
 
 def _engine_options(options: Options) -> engine.Options:
-    given = options.model_dump(
-        include={
-            "preset",
-            "seed",
-            "generations",
-            "parents",
-            "offspring",
-            "stitch_weight",
-            "flat",
-            "fit_focal_length",
-            "fit_ridge",
-        },
-        exclude_none=True,
-    )
-    return engine.Options(**given)
+    asked = {field.name for field in fields(engine.Options)}
+    return engine.Options(**options.model_dump(include=asked, exclude_none=True))
 
 
 def _result(
