@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
@@ -17,25 +18,15 @@ from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
 from service.pages import ROUTERS as PAGES
-from service.routes import (
-    again,
-    calibrate,
-    docs,
-    documented,
-    field,
-    health,
-    intrinsics,
-    jobs,
-    locate,
-    pictures,
-    snapshot,
-    venues,
-)
+from service.routes import docs, health, jobs, pictures, snapshot, venues
+from service.routes.contract import documented
+from service.routes.submissions import again, frames, intrinsics, locate
 from service.settings import Settings
 from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.engine import AWAY as DATABASE_AWAY
 from service.wire.problems import Problem
 
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 log = structlog.get_logger()
 
 
@@ -64,7 +55,7 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_alarms(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, snapshot, calibrate, intrinsics, locate, field, jobs, again, pictures, health, docs):
+    for routes in (venues, snapshot, frames, intrinsics, locate, jobs, again, pictures, health, docs):
         app.include_router(routes.router)
     for router in PAGES:
         app.include_router(router)
@@ -85,11 +76,18 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 
 def _answer_outages(app: FastAPI) -> None:
-    """A database or a bucket that is away is no mistake of the service: 503, try again."""
+    """A database or a bucket that is away, or a full disk, is no mistake of the service: 503, try again."""
 
     async def away(_: Request, error: Exception) -> Response:
         log.error("storage is away", exc_info=error)
         return problems.answer(Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}))
 
+    async def no_room(request: Request, error: Exception) -> Response:
+        # Where an upload is spooled.
+        if isinstance(error, OSError) and error.errno in DISK_FULL:
+            return await away(request, error)
+        raise error
+
     for error in (*DATABASE_AWAY, *BLOBS_AWAY):
         app.add_exception_handler(error, away)
+    app.add_exception_handler(OSError, no_room)

@@ -37,17 +37,16 @@ T = TypeVar("T")
 
 
 class Refused(Exception):  # noqa: N818
-    """The service answered with a problem; `members` are its JSON object."""
+    """The service answered with a problem: `members` are its JSON object.
 
-    def __init__(self, status: int, members: Mapping[str, Any]) -> None:
+    `busy`: trying the same again later can help. Of conflicts, those that the service gives a time for (Retry-After).
+    """
+
+    def __init__(self, status: int, members: Mapping[str, Any], retry_after: str | None = None) -> None:
         super().__init__(f"{members.get('title', 'Refused')}: {members.get('detail', '')}")
         self.status = status
         self.members = members
-
-    @property
-    def busy(self) -> bool:
-        """Whether trying again later can help."""
-        return self.status in (409, 429, 503)
+        self.busy = status in (429, 503) or (status == 409 and retry_after is not None)
 
 
 class AsyncClient:
@@ -194,7 +193,8 @@ class AsyncClient:
             members = response.json()
         except ValueError:
             members = {"title": f"HTTP {response.status_code}", "detail": response.text[:500]}
-        raise Refused(response.status_code, members if isinstance(members, dict) else {})
+        retry_after = response.headers.get("retry-after")
+        raise Refused(response.status_code, members if isinstance(members, dict) else {}, retry_after)
 
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
         return await self._http.request(method, path, **more)

@@ -27,7 +27,7 @@ class Home(Stores):
         self.disk = Disk(settings)
         self.snapshots = Snapshots(settings)
         self.intake = Intake(settings, self.submissions, self.expiry, self.blobs)
-        self.from_sources = FromSources(self.venues, self.submissions, self.snapshots, self.intake)
+        self.from_sources = FromSources(self.venues, self.submissions, self.snapshots, self.blobs, self.intake)
 
     def close(self) -> None:
         """Let the database go."""

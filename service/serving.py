@@ -51,8 +51,7 @@ def serve(settings: Settings, *, with_worker: bool) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, server.handle_exit)
     with KeptWorker(settings) if with_worker else nullcontext():
-        host, port = listener.getsockname()[:2]
-        print(f"ESC listens on http://{host}:{port}", flush=True)
+        print(f"ESC listens on http://{_authority(*listener.getsockname()[:2])}", flush=True)
         server.run(sockets=[listener])
     tracing.flush()
 
@@ -78,7 +77,12 @@ def _listen(settings: Settings) -> socket.socket:
             backlog=2048,
         )
     except OSError as error:
-        raise CannotListen(f"Cannot listen on {settings.host}:{settings.port}: {error.strerror}.") from None
+        raise CannotListen(f"Cannot listen on {_authority(settings.host, settings.port)}: {error.strerror}.") from None
+
+
+def _authority(host: str, port: int) -> str:
+    """Host and port as in a URL, where an IPv6 address is in brackets."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 class _Server(uvicorn.Server):

@@ -96,7 +96,9 @@ class Settings(BaseSettings):
     )
 
     # The worker.
-    worker_name: str = Field(default_factory=socket.gethostname, description="Unique per worker and stable.")
+    worker_name: str = Field(
+        default_factory=socket.gethostname, max_length=200, description="Unique per worker and stable."
+    )
     jobs_at_once: int = Field(1, ge=1)
     provider: Literal["cpu", "cuda", "openvino"] = Field(
         "cpu", description="What runs the network; all but `cpu` need their own build of ONNX Runtime."
@@ -158,6 +160,13 @@ class Settings(BaseSettings):
                         f"{pattern} is neither a host's name, such as *.cams.lan, nor a network such as 10.1.0.0/16"
                     ) from None
         return patterns
+
+    @field_validator("worker_name")
+    @classmethod
+    def _can_name_a_file(cls, name: str) -> str:
+        if not name or "/" in name or not name.isprintable():
+            raise ValueError(f"{name!r} names a file too: expected is a word without `/`, such as worker-1")
+        return name
 
     @field_validator("freed_axes")
     @classmethod

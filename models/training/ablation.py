@@ -14,10 +14,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from models.training.cache import start_workers
+from models.training.data.cache import start_workers
 from models.training.evaluate import rendered
-from models.training.export import export, load
-from models.training.network import LEAK
+from models.training.network.export import export, load
+from models.training.network.unet import LEAK
 from worker.calibration.see.segmentation import Segmenter
 
 FOLDER = Path("runs/ablation")

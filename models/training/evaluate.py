@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import MODEL_PATH
-from models.training.conditions import NAMED
-from models.training.crops import random_crop, random_view
-from models.training.noise import Plane
-from models.training.render import Conditions, Rendering
-from models.training.surface import ground_patch, marking_distance, marking_shares, window_rays
+from models.training.drawing.noise import Plane
+from models.training.pitches.conditions import NAMED
+from models.training.pitches.crops import random_crop, random_view
+from models.training.pitches.render import Conditions, Rendering
+from models.training.pitches.surface import ground_patch, marking_distance, marking_shares, window_rays
 from worker.calibration.scene.camera import LENSES, Camera, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Segmenter, whole_frame

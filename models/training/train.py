@@ -24,12 +24,12 @@ from torch import Tensor
 from tqdm import tqdm
 
 from models import MODEL_PATH
-from models.training.cache import SHARD_CROPS, Crops, start_workers
-from models.training.export import export
-from models.training.network import LEAK, UNet, focal_loss
-from models.training.quantise import quantise
-from models.training.served import load_served
-from models.training.stream import Batch, Stream
+from models.training.data.cache import SHARD_CROPS, Crops, start_workers
+from models.training.data.stream import Batch, Stream
+from models.training.network.export import export
+from models.training.network.quantise import quantise
+from models.training.network.served import load_served
+from models.training.network.unet import LEAK, UNet, focal_loss
 
 EPOCH_STEPS = 100
 WARM_UP_EPOCHS = 2

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import io
 
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Enqueue, Intake, frame_paths
+from service.store.blobs import Blobs
 from service.store.ids import new_id
 from service.store.jobs.submission import Submission, Submissions
 from service.store.jobs.task import Origin, seeded
@@ -19,10 +19,13 @@ from service.wire.venue import Venue
 class FromSources:
     """Fetches and submits."""
 
-    def __init__(self, venues: Venues, submissions: Submissions, snapshots: Snapshots, intake: Intake) -> None:
+    def __init__(
+        self, venues: Venues, submissions: Submissions, snapshots: Snapshots, blobs: Blobs, intake: Intake
+    ) -> None:
         self._venues = venues
         self._submissions = submissions
         self._snapshots = snapshots
+        self._blobs = blobs
         self._intake = intake
 
     def calibrate(
@@ -39,14 +42,18 @@ class FromSources:
             return known, False
         frames = self._snapshots.take(venue.cameras, self._venues.credentials(venue.id))
         job_id = new_id()
-        paths = frame_paths(job_id, dict.fromkeys(frames, 1))
         submission = Submission(
             job_id=job_id,
             venue=venue,
             options=seeded(options),
-            frames=paths,
+            frames=frame_paths(job_id, dict.fromkeys(frames, 1)),
             origin=origin,
             content_hash=sent,
             idempotency_key=key,
         )
-        return self._intake.take(submission, {camera: [io.BytesIO(data)] for camera, data in frames.items()}, enqueue)
+
+        def store() -> None:
+            for camera, (path,) in submission.frames.items():
+                self._blobs.put(path, frames[camera])
+
+        return self._intake.take(submission, store, enqueue)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from datetime import timedelta
-from typing import BinaryIO
 
 import sqlalchemy as sa
 
@@ -22,6 +21,7 @@ from service.store.jobs.submission import (
     VenueReplaced,
 )
 from service.wire.job import Job
+from service.wire.problems import Problem
 
 # Longer than any upload takes from its first stored frame to its job.
 UPLOAD_GRACE = timedelta(hours=1)
@@ -39,12 +39,10 @@ class Intake:
         self._expiry = expiry
         self._blobs = blobs
 
-    def take(
-        self, submission: Submission, files: Mapping[str, Sequence[BinaryIO]], enqueue: Enqueue
-    ) -> tuple[Job, bool]:
+    def take(self, submission: Submission, store: Callable[[], None], enqueue: Enqueue) -> tuple[Job, bool]:
         """Store the files of a checked submission and make it a job, or find the job it already is; says if it is new.
 
-        Raises one of `REFUSALS`.
+        `store` puts them where the submission says. Raises one of `REFUSALS`, and a `Problem` that `store` raises.
         """
         venue_id = None if submission.venue is None else submission.venue.id
         try:
@@ -55,21 +53,15 @@ class Intake:
                 return known, False
             # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
             self._expiry.expect_upload(submission.job_id, UPLOAD_GRACE)
-            self._store(submission, files)
+            store()
             job, new = self._submissions.submit(submission, self._settings.queue_limit, enqueue)
-        except REFUSALS:
+        except (*REFUSALS, Problem):
             self._blobs.delete_under(frame_folder(submission.job_id))
             raise
         if not new:
             self._blobs.delete_under(frame_folder(submission.job_id))
         # After any other error the frames stay: whether the transaction was committed is then not known.
         return job, new
-
-    def _store(self, submission: Submission, files: Mapping[str, Sequence[BinaryIO]]) -> None:
-        for name, several in files.items():
-            for path, file in zip(submission.frames[name], several, strict=True):
-                file.seek(0)
-                self._blobs.put(path, file.read())
 
 
 def frame_paths(job_id: str, counts: Mapping[str, int]) -> dict[str, list[str]]:

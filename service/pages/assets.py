@@ -9,9 +9,9 @@ from pathlib import Path
 
 from fastapi import APIRouter, Response
 
-from service.routes.documented import FOR_ALL
-from service.routes.guarded import Guarded
-from service.routes.tagged import IfNoneMatch, unless_known
+from service.routes.contract.documented import FOR_ALL
+from service.routes.contract.guarded import Guarded
+from service.routes.contract.tagged import IfNoneMatch, unless_known
 from service.wire.problems import Problem
 
 FILES = Path(__file__).parent / "static"

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from service.api.context import InContext
 from service.pages.shown import Page, page
-from service.routes.documented import needs
+from service.routes.contract.documented import needs
 from service.routes.venues import ExistingVenue
 
 router = APIRouter(route_class=Page, include_in_schema=False)

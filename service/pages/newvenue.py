@@ -12,8 +12,8 @@ from fields.template import NAMES
 from service.api.clicked_pose import clicked_pose
 from service.api.context import InContext
 from service.pages.shown import Page, page
-from service.routes.documented import needs
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import needs
+from service.routes.contract.guarded import Guarded
 from service.wire.clicked_pose import ClickedCamera, ClickedPose
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import LensModel

@@ -18,7 +18,7 @@ from starlette.responses import HTMLResponse, RedirectResponse
 from service.api.auth import COOKIE, SCOPES, page_token
 from service.pages import words
 from service.pages.assets import address
-from service.routes.guarded import Guarded
+from service.routes.contract.guarded import Guarded
 from service.store.engine import AWAY
 from service.store.keys import Key
 from service.wire.base import Scope

@@ -12,8 +12,8 @@ from starlette.responses import RedirectResponse
 from service.api.auth import COOKIE
 from service.api.context import InContext
 from service.pages.shown import HEADERS, SIGN_IN, Page, local, page
-from service.routes.documented import FOR_ALL
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import FOR_ALL
+from service.routes.contract.guarded import Guarded
 from service.wire.problems import KINDS, Problem
 
 LONGEST_FORM = 8192

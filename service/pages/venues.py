@@ -10,8 +10,8 @@ from fastapi import APIRouter, Query, Request, Response
 from service.api.context import Context, InContext, VenueIdPath
 from service.pages.shown import Page, page
 from service.pages.sparkline import Sparkline, sparkline
-from service.routes.documented import needs
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import needs
+from service.routes.contract.guarded import Guarded
 from service.routes.venues import ExistingVenue
 from service.store.counts.past_calibrations import PastCalibration
 from service.store.revisions import TAKEN

@@ -7,8 +7,8 @@ from pathlib import Path
 from fastapi import APIRouter
 from starlette.responses import FileResponse
 
-from service.routes.documented import FOR_ALL
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import FOR_ALL
+from service.routes.contract.guarded import Guarded
 
 router = APIRouter(prefix="/docs", route_class=Guarded, include_in_schema=False)
 

@@ -9,8 +9,8 @@ from prometheus_client import generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
 from service.api.context import InContext
-from service.routes.documented import FOR_ALL, needs, problems
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import FOR_ALL, needs, problems
+from service.routes.contract.guarded import Guarded
 from service.wire.health import Health
 from service.wire.problems import KINDS, Problem, type_of
 

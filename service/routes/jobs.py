@@ -12,11 +12,11 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context, InContext, JobIdPath
-from service.routes.documented import needs, problems
-from service.routes.exported import DOCUMENTS, Wanted, exported
-from service.routes.guarded import Guarded
-from service.routes.tagged import TAGGED, IfNoneMatch, unless_known
-from service.routes.venues import revision_unfit
+from service.routes.contract.documented import needs, problems
+from service.routes.contract.exported import DOCUMENTS, Wanted, exported
+from service.routes.contract.guarded import Guarded
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
+from service.routes.venues import RETRY_AFTER_S, revision_unfit
 from service.store.engine import AWAY
 from service.store.jobs.decisions import MovedOn, NoPoses
 from service.store.jobs.reading import State
@@ -28,7 +28,6 @@ from service.wire.problems import Problem
 log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
-RETRY_AFTER_S = 2
 LONGEST_WAIT_S = 60
 # An event at least this often, so that a client sees the queue move.
 EVENT_AT_LEAST_EVERY_S = 10

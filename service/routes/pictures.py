@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Response
 
 from service.api.context import Context, InContext
-from service.routes.documented import needs, problems
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import needs, problems
+from service.routes.contract.guarded import Guarded
 from service.routes.jobs import Existing
 from service.store.jobs.files import picture_file
 from service.store.jobs.reading import Pictures

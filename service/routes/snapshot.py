@@ -8,8 +8,8 @@ from fastapi import APIRouter, Depends, Path, Response
 
 from service.api.context import InContext
 from service.intake.images import PNG_START
-from service.routes.documented import needs, problems
-from service.routes.guarded import Guarded
+from service.routes.contract.documented import needs, problems
+from service.routes.contract.guarded import Guarded
 from service.routes.venues import ExistingVenue, camera_of
 from service.wire.base import ID_PATTERN
 from service.wire.venue import Camera

@@ -9,10 +9,10 @@ from fastapi import APIRouter, Depends, Header, Query, Response
 from service.api import etags
 from service.api.context import InContext, VenueIdPath
 from service.intake import sources
-from service.routes.documented import headers, needs, problems
-from service.routes.exported import DOCUMENTS, Wanted, exported
-from service.routes.guarded import Guarded
-from service.routes.tagged import TAGGED, IfNoneMatch, json, unless_known
+from service.routes.contract.documented import headers, needs, problems
+from service.routes.contract.exported import DOCUMENTS, Wanted, exported
+from service.routes.contract.guarded import Guarded
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_known
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 from service.wire import callback_urls
 from service.wire.base import ID_PATTERN, FormatName
@@ -22,11 +22,23 @@ from service.wire.problems import Problem
 from service.wire.venue import Camera, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
+# While a job is open.
+RETRY_AFTER_S = 2
 
 
 def no_such_venue(venue_id: str) -> Problem:
     """The same answer wherever a venue is named."""
     return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
+
+
+def venue_busy(job_id: str) -> Problem:
+    """The same answer wherever a venue's active job is in the way."""
+    return Problem(
+        "venue-busy",
+        f"Wait for job {job_id} of the same venue or cancel it.",
+        headers={"Retry-After": str(RETRY_AFTER_S), "Location": f"/jobs/{job_id}"},
+        job=job_id,
+    )
 
 
 def camera_of(venue: Venue, camera_id: str) -> Camera:
@@ -203,12 +215,7 @@ def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[
         if before is None:
             raise no_such_venue(venue_id)
         if active_job is not None:
-            raise Problem(
-                "venue-busy",
-                "Wait for the job or cancel it.",
-                headers={"Location": f"/jobs/{active_job}"},
-                job=active_job,
-            )
+            raise venue_busy(active_job)
         _require_match(if_match, before)
 
     context.venues.delete(venue_id, allow)

@@ -14,7 +14,7 @@ from service.store import tables
 from service.store.counts import tallies
 from service.store.counts.figures import note
 from service.store.deliveries import add_alarm_delivery
-from service.store.engine import clock, reading
+from service.store.engine import clock
 from service.store.revisions import TAKEN, first_revision_at, newest_revision
 from service.store.schedules import schedule_of
 from service.wire.health import Alarm, AlarmEvent, AlarmRule, Alarms, VenueAlarm, VenueHealth
@@ -75,13 +75,6 @@ def health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
 def forget_alarms(connection: sa.Connection, venue_id: str) -> None:
     """The venue is gone, and nobody is told of its alarms any more."""
     connection.execute(sa.delete(tables.alarms).where(a.venue == venue_id))
-
-
-def venues_with_alarms_due(engine: sa.Engine, limit: int) -> list[str]:
-    """Up to `limit` venues of which a time has passed that an alarm goes by."""
-    with reading(engine) as connection:
-        query = sa.select(q.venue).where(q.alarm_due_at <= clock(connection)).order_by(q.alarm_due_at).limit(limit)
-        return list(connection.scalars(query))
 
 
 def _rings(connection: sa.Connection, venue: Venue, now: datetime) -> tuple[dict[Key, str], datetime | None]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,11 +18,25 @@ from obstore.store import LocalStore, ObjectStore, from_url
 if TYPE_CHECKING:
     from obstore.store import BackoffConfig, ClientConfig, RetryConfig
 
+
+class FolderAway(Exception):  # noqa: N818
+    """The folder of the files cannot be written or read, the machine says why."""
+
+
 # What is raised while a bucket is away, or a disk full: trying again later can help.
-AWAY = (BaseError, OSError)
+AWAY = (BaseError, FolderAway)
 # For one answer of a bucket to one request.
 ANSWER_S = 30.0
 TRUE = ("1", "true", "on", "yes", "y")
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """The machine's errors are told apart from those of anything else that opens files or starts programs."""
+    try:
+        yield
+    except OSError as error:
+        raise FolderAway(str(error)) from error
 
 
 class Blobs:
@@ -40,10 +55,24 @@ class Blobs:
             else from_url(url, client_options=_within(patience_s), retry_config=_for(patience_s))
         )
 
+    @_told()
     def put(self, path: str, data: bytes) -> None:
         """Store an object; when this returns it survives a crash, of the machine too."""
         # In one piece: of several, those before a crash would stay in the bucket, where no list of objects shows them.
         obstore.put(self._store, path, data, use_multipart=False)
+        self._make_sure_of(path)
+
+    @_told()
+    def copy(self, path: str, to: str) -> bool:
+        """Store an object a second time, as `put` does, without its bytes coming here; False if there is none."""
+        try:
+            obstore.copy(self._store, path, to)
+        except FileNotFoundError:
+            return False
+        self._make_sure_of(to)
+        return True
+
+    def _make_sure_of(self, path: str) -> None:
         if self._folder:
             # A bucket promises durability; a file has it only after its pages have reached the disk, and the entry of
             # each folder on the way to it, of which any may be new.
@@ -52,6 +81,7 @@ class Blobs:
             for folder in place.parents[: len(Path(path).parts)]:
                 _sync(folder)
 
+    @_told()
     def get(self, path: str) -> bytes | None:
         """An object, or None if there is none."""
         try:
@@ -59,6 +89,7 @@ class Blobs:
         except FileNotFoundError:
             return None
 
+    @_told()
     def delete_under(self, prefix: str) -> None:
         """Remove the folder `prefix` with every object in it."""
         if self._folder:

@@ -14,7 +14,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.counts import tallies
-from service.store.engine import clock, reading, serialise, writing
+from service.store.engine import Repository, reading, serialise, writing
 from service.store.ids import new_id
 from service.wire.health import AlarmEvent
 from service.wire.job import CallbackState
@@ -34,16 +34,8 @@ class Delivery:
     event: AlarmEvent | None
 
 
-class Deliveries:
+class Deliveries(Repository):
     """The deliveries in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
-
-    def now(self) -> datetime:
-        """The time that deliveries are due by."""
-        with reading(self._engine) as connection:
-            return clock(connection)
 
     def attempt(self, now: datetime, again_at: datetime, limit: int) -> list[Delivery]:
         """Up to `limit` that are due; due again at `again_at` unless their end is written down before."""

@@ -116,6 +116,18 @@ def clock(connection: sa.Connection) -> datetime:
     return datetime.now(UTC)
 
 
+class Repository:
+    """What is kept in a database about one subject, with all SQL about it."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def now(self) -> datetime:
+        """The time that all processes go by, see `clock`."""
+        with reading(self._engine) as connection:
+            return clock(connection)
+
+
 def migrate(engine: sa.Engine) -> None:
     """Bring the schema up to date; of several processes that start together one does it.
 

@@ -15,7 +15,7 @@ from datetime import datetime, timedelta
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.engine import clock, reading, serialise, writing
+from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.jobs.files import frame_folder, pictures_folder
 from service.store.revisions import TAKEN
 
@@ -33,16 +33,8 @@ LAST_ACCEPTED = (
 NOT_THE_LAST_ACCEPTED = j.id != sa.func.coalesce(LAST_ACCEPTED, "")
 
 
-class Expiry:
+class Expiry(Repository):
     """What the database knows to be past its time."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
-
-    def now(self) -> datetime:
-        """The time by which jobs end and things are due."""
-        with reading(self._engine) as connection:
-            return clock(connection)
 
     def expire_frames(self, ended_before: datetime, now: datetime, limit: int) -> int:
         """Let up to `limit` jobs that ended before a moment, the oldest first, have no frames; says how many."""

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 
 import sqlalchemy as sa
 
-from service.store.engine import reading, serialise, writing
+from service.store.engine import Repository, reading, serialise, writing
 from service.store.tables import api_keys
 from service.wire.base import Scope
 
@@ -54,11 +54,8 @@ def hash_of(key: str) -> str:
     return hashlib.sha256(key.encode()).hexdigest()
 
 
-class Keys:
+class Keys(Repository):
     """The keys in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def add(self, name: str, scope: Scope, expires_at: datetime | None = None) -> str:
         """Make a key and return it: the only time that it can be seen."""

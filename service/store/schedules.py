@@ -12,7 +12,7 @@ from datetime import datetime
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.engine import clock, reading, serialise, writing
+from service.store.engine import Repository, clock, reading, serialise, writing
 from service.wire.schedule import ScheduleState, next_time
 from service.wire.venue import Venue
 
@@ -30,16 +30,8 @@ class Firing:
     time_zone: str
 
 
-class Schedules:
+class Schedules(Repository):
     """The schedules in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
-
-    def now(self) -> datetime:
-        """The time that they fire by."""
-        with reading(self._engine) as connection:
-            return clock(connection)
 
     def fire(self, now: datetime, again_at: datetime, limit: int) -> list[Firing]:
         """Up to `limit` that are due; fired again at `again_at` unless they are done with before."""

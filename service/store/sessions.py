@@ -7,18 +7,15 @@ from datetime import UTC, datetime, timedelta
 
 import sqlalchemy as sa
 
-from service.store.engine import reading, writing
+from service.store.engine import Repository, reading, writing
 from service.store.keys import Key, hash_of
 from service.store.tables import api_keys, sessions
 
 s = sessions.c
 
 
-class Sessions:
+class Sessions(Repository):
     """The sessions in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def begin(self, key: Key, lasts: timedelta) -> str:
         """Begin a session of the owner of a key and return its token. Those that are over are forgotten."""

@@ -7,22 +7,20 @@ from collections.abc import Callable
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.alarms import forget_alarms, health_of, settle_alarms, venues_with_alarms_due
+from service.store.alarms import forget_alarms, health_of, settle_alarms
 from service.store.counts.figures import forget_quality, note_restored
-from service.store.engine import clock, reading, serialise, writing
+from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
 from service.store.schedules import forget_schedule, plan
 from service.wire.health import VenueHealth
 from service.wire.history import Cause, Revision
+from service.wire.job import OPEN
 from service.wire.results import Result
 from service.wire.venue import Venue
 
 
-class Venues:
+class Venues(Repository):
     """The venues in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def get(self, venue_id: str) -> Venue | None:
         """One venue."""
@@ -83,7 +81,10 @@ class Venues:
 
     def with_alarms_due(self, limit: int) -> list[str]:
         """Up to `limit` venues of which a time has passed that an alarm goes by."""
-        return venues_with_alarms_due(self._engine, limit)
+        due_at = tables.venue_quality.c.alarm_due_at
+        with reading(self._engine) as connection:
+            query = sa.select(tables.venue_quality.c.venue).where(due_at <= clock(connection))
+            return list(connection.scalars(query.order_by(due_at).limit(limit)))
 
     def health(self, venue_id: str) -> VenueHealth | None:
         """How a venue is doing."""
@@ -94,11 +95,8 @@ class Venues:
         """Forget a venue and its poses unless `allow` raises at the sight of it or of its active job."""
         with writing(self._engine) as connection:
             serialise(connection, venue_lock(venue_id))
-            active = connection.scalar(
-                sa.select(tables.jobs.c.id).where(
-                    tables.jobs.c.venue == venue_id, tables.jobs.c.status.in_(["queued", "running"])
-                )
-            )
+            j = tables.jobs.c
+            active = connection.scalar(sa.select(j.id).where(j.venue == venue_id, j.status.in_(OPEN)))
             allow(find_venue(connection, venue_id), active)
             forget_revisions(connection, venue_id)
             forget_alarms(connection, venue_id)

@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
-from service.store.engine import clock, reading, writing
+from service.store.engine import Repository, clock, reading, writing
 from service.store.tables import workers
 
 
@@ -19,11 +19,8 @@ class SeenWorker:
     model_sha256: str | None
 
 
-class Workers:
+class Workers(Repository):
     """The workers in the database. Their times are the database's: the clocks of several machines differ."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def enter(self, name: str, model_sha256: str | None) -> None:
         """A worker starts."""

@@ -22,7 +22,8 @@ from tests.benchmarks import plots
 from tests.benchmarks.methods import METHODS, SLOW, THREADS, Seen, engine
 from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, VENUES, Scene, scene, started
 from tests.benchmarks.truth import Errors, apart, errors
-from worker.calibration.calibrate import Options, Progress, calibrate
+from worker.calibration.calibrate import calibrate
+from worker.calibration.records import Options, Progress
 from worker.calibration.scene.camera import Camera
 
 ROWS = FOLDER / "rows.jsonl"
@@ -178,7 +179,7 @@ def _ratios(venue: str, light: str) -> dict[str, list[float]]:
     said = engine()(seen, seen.scene.cameras, 0).said
     assert said is not None
     for result, true in zip(said.cameras, seen.scene.cameras, strict=True):
-        shift, turn = apart(true.with_pose(result.pose), true)
+        shift, turn = apart(true.with_pose(result.camera.pose), true)
         if result.sigma:
             found["position"].append(shift / result.sigma.position_m)
             found["rotation"].append(turn / result.sigma.rotation_deg)

@@ -13,7 +13,8 @@ import numpy as np
 from models import MODEL_PATH
 from tests.benchmarks.scenes import Scene
 from tests.benchmarks.truth import apart_by_homography_px, overlapping
-from worker.calibration.calibrate import Calibration, Options, calibrate
+from worker.calibration.calibrate import calibrate
+from worker.calibration.records import Calibration, Options
 from worker.calibration.scene.camera import Camera, Frame, Pose, inside
 from worker.calibration.search.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD, genome_of, with_genome
 from worker.calibration.see.segmentation import Region, Segmenter, whole_frame
@@ -151,7 +152,7 @@ def engine(**options: object) -> Method:
     def run(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
         asked = replace(Options(seed=seed), **options)
         said = calibrate(seen.scene.pitch, cameras, seen.scene.frames, seen.segment, asked)
-        poses = [camera.with_pose(result.pose) for camera, result in zip(cameras, said.cameras, strict=True)]
+        poses = [camera.with_pose(result.camera.pose) for camera, result in zip(cameras, said.cameras, strict=True)]
         return Answer(poses, said.timings_s["evolution"] + said.timings_s["refinement"], said)
 
     return run

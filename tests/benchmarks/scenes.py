@@ -15,8 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from models.training.conditions import Conditions
-from models.training.render import render_frame
+from models.training.pitches.conditions import Conditions
+from models.training.pitches.render import render_frame
 from tests.demo.render import outdated
 from worker.calibration.scene.camera import Camera, Frame, Intrinsics, Pose
 from worker.calibration.scene.field import Field

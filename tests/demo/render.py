@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from models.training.render import Conditions, render_frame
+from models.training.pitches.render import Conditions, render_frame
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose, rotation_matrices, rotation_vectors
 from worker.calibration.scene.field import Field
 

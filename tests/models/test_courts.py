@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fields.template import load
-from models.training.courts import paint, random_court, render_court
-from models.training.floors import hard_court
-from models.training.layouts import field_layout
+from models.training.courts.court import paint, random_court, render_court
+from models.training.courts.floors import hard_court
+from models.training.courts.layouts import field_layout
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose, inside
 from worker.calibration.scene.field import Field, LinePoints
 

@@ -7,12 +7,12 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra `train`: pip install '.[train]'")
 
 from models import MODEL_PATH  # noqa: E402
-from models.training.courts import random_court  # noqa: E402
-from models.training.export import export, fold  # noqa: E402
-from models.training.network import UNet, focal_loss  # noqa: E402
-from models.training.quantise import quantise  # noqa: E402
-from models.training.served import load_served  # noqa: E402
-from models.training.stream import courts  # noqa: E402
+from models.training.courts.court import random_court  # noqa: E402
+from models.training.data.stream import courts  # noqa: E402
+from models.training.network.export import export, fold  # noqa: E402
+from models.training.network.quantise import quantise  # noqa: E402
+from models.training.network.served import load_served  # noqa: E402
+from models.training.network.unet import UNet, focal_loss  # noqa: E402
 from models.training.train import Budget, Training  # noqa: E402
 
 pytestmark = [pytest.mark.train, pytest.mark.filterwarnings("ignore::DeprecationWarning")]

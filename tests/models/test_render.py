@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from models.training.conditions import LIGHTS, NAMED
-from models.training.crops import random_view
-from models.training.render import Conditions, render_frame, render_window
-from models.training.venues import random_camera, random_field
+from models.training.pitches.conditions import LIGHTS, NAMED
+from models.training.pitches.crops import random_view
+from models.training.pitches.render import Conditions, render_frame, render_window
+from models.training.pitches.venues import random_camera, random_field
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose, inside
 from worker.calibration.scene.field import Field
 

@@ -3,7 +3,8 @@
 import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
-from worker.calibration.calibrate import Options, calibrate
+from worker.calibration.calibrate import calibrate
+from worker.calibration.records import Options
 from worker.calibration.see.segmentation import Segmenter
 
 pytestmark = pytest.mark.real
@@ -20,8 +21,8 @@ def test_outdated_poses_of_real_cameras_are_found_again(real_pair, segmenter, ki
         real_pair.pitch, real_pair.started(kind, number), real_pair.frames(moment), segmenter, Options(seed=number)
     )
     assert found.rejected_because is None
-    for camera in found.cameras:
-        assert real_pair.clicked_rms(camera.id, camera.pose) < 5
+    for result in found.cameras:
+        assert real_pair.clicked_rms(result.camera.id, result.camera.pose) < 5
     assert found.stitch_error_px < 1
 
 

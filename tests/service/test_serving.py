@@ -1,3 +1,4 @@
+import subprocess
 import sys
 from itertools import pairwise
 
@@ -37,3 +38,11 @@ def test_a_worker_that_cannot_be_started_is_tried_again(starts, tmp_path):
         wait_for(lambda: "no worker can be started" in [entry["event"] for entry in logs])
         (tmp_path / "away").rename(script)
         wait_for(starts)
+
+
+def test_an_ipv6_address_is_told_as_a_url_has_it(tmp_path):
+    command = [sys.executable, "-m", "service.cli", "serve", "--host", "::1", "--port", "0", "--data", str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as api:
+        line = api.stdout.readline()
+        api.terminate()
+    assert line.startswith("ESC listens on http://[::1]:")

@@ -41,3 +41,9 @@ def test_axes_of_freed_that_are_none_are_refused(axes):
 @pytest.mark.parametrize("axes", ["x y z pan tilt roll", "y -x z -pan+90 tilt-1.5 -roll"])
 def test_axes_of_freed_may_be_turned(axes):
     assert Settings(freed_axes=axes).freed_axes == axes
+
+
+@pytest.mark.parametrize("name", ["a/b", "", "a\0b"])
+def test_a_name_of_a_worker_that_can_name_no_file_is_refused(name):
+    with pytest.raises(ValidationError, match="worker_name"):
+        Settings(worker_name=name)

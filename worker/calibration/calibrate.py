@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from worker.calibration.finish.diagnosis import Suspicion, suspicions
-from worker.calibration.finish.refinement import Refined, Sight, assess, refine
+from worker.calibration.finish.diagnosis import suspicions
+from worker.calibration.finish.refinement import Sight, assess, refine
+from worker.calibration.finish.uncertainty import Finished
 from worker.calibration.judge.quality import (
-    CameraQuality,
+    CameraResult,
     Gate,
     Movement,
-    Sigma,
     believable,
     markings_iou,
     rejection,
     ridge_rejection,
 )
-from worker.calibration.judge.registration import pairs_in_common, stitch_error_px
-from worker.calibration.scene.camera import Array, Camera, Frame, Intrinsics, Pose
+from worker.calibration.judge.registration import Response, pairs_in_common, stitch_error_px
+from worker.calibration.records import (
+    Answer,
+    Calibration,
+    CalibrationError,
+    Journey,
+    Options,
+    Preset,
+    Progress,
+    Segment,
+)
+from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.scene.visibility import SeenLines
@@ -37,134 +43,38 @@ from worker.calibration.search.search import (
     Strategy,
     search,
 )
+from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
-from worker.calibration.see.line_measurement import brightness_of
+from worker.calibration.see.ridge_response import ridge_response
 from worker.calibration.see.sampling import median
-from worker.calibration.see.segmentation import Region, reachable_regions
+from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.view import ViewCondition, look_at
-
-Response = NDArray[np.float32]
-Preset = Literal["esc", "paper", "scpr"]
-Stage = Literal["segmentation", "evolution", "refinement", "preview"]
 
 CAPTURE_RAD = 0.1
 """How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
 FEWEST_VISIBLE_POINTS = 60
 """Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""
-SHARE_OF_JOB = {"segmentation": (0.0, 0.65), "evolution": (0.65, 0.85), "refinement": (0.85, 0.92)}
-"""Where on the way of a whole job each stage begins and ends; the pictures are the rest."""
-
-
-class Segment(Protocol):
-    """Probability (H, W) in 0..255 of a marking, see `segmentation.Segmenter`."""
-
-    def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
-        """Look at regions of a frame; 0 outside them."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """What a caller may choose; in the paper mu, lambda, G and the trade-off lambda of section III.
-
-    `fit_focal_length`: of each camera, as heat changes it; `fit_ridge`: its height. Both are for preset `esc`.
-    """
-
-    preset: Preset = "esc"
-    seed: int = 0
-    generations: int = 100
-    parents: int = 64
-    offspring: int = 128
-    stitch_weight: float = 0.5
-    flat: bool = False
-    fit_focal_length: bool = False
-    fit_ridge: bool = False
 
 
 @dataclass(frozen=True)
 class Method:
-    """What a preset does: the levels of its search, the shape of the ground, and how it ends."""
+    """What a preset does: the levels of its search, the shape of the ground, and how it ends.
+
+    `ridges`: whether they are followed where what the network sees leads nowhere.
+    """
 
     levels: Sequence[Level]
     flat: bool
-    finish: Callable[..., Refined]
+    ridges: bool
+    finish: Callable[..., Finished]
 
 
 METHODS: Mapping[Preset, Method] = {
-    "esc": Method(COARSE_TO_FINE, flat=False, finish=refine),
-    "paper": Method(ON_THE_GROUND, flat=False, finish=assess),
-    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, finish=assess),
+    "esc": Method(COARSE_TO_FINE, flat=False, ridges=True, finish=refine),
+    "paper": Method(ON_THE_GROUND, flat=False, ridges=False, finish=assess),
+    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, ridges=False, finish=assess),
 }
 """`esc`: the default. `paper`: the paper to the letter. `scpr`: its predecessor, flat and without a stitch term."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a calibration has come: `fraction` 0..1 of the whole job; the rest during the evolution."""
-
-    stage: Stage
-    fraction: float
-    generation: int | None = None
-    loss: float | None = None
-
-
-@dataclass(frozen=True)
-class CameraResult:
-    """One camera's answer. `sigma`, `repeatability` and `residual_px` are None where too few lines could be measured.
-
-    `view`: whether its frame could be used, and what is wrong with it if not.
-    `found`: share 0..1 of the markings' length in view that is seen where the pose puts it; `by_chance`: that is as
-    likely seen anywhere. `repeatability`: the part of sigma that is not owed to lens and field, which do not change.
-    `intrinsics`: those that the pose belongs to, which are the given ones unless the focal length was to be found.
-    """
-
-    id: str
-    intrinsics: Intrinsics
-    pose: Pose
-    view: ViewCondition
-    sigma: Sigma | None
-    repeatability: Sigma | None
-    moved: Movement
-    iou: float
-    found: float
-    by_chance: float
-    residual_px: float | None
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """The answer of the engine. `rejected_because`: None when accepted.
-
-    `pitch`: the given one unless its ridge was to be found. `suspicions`: what the lines contradict of what was given.
-    """
-
-    pitch: Field
-    cameras: Sequence[CameraResult]
-    rejected_because: str | None
-    stitch_error_px: float | None
-    stitch_error_before_px: float | None
-    loss: float
-    generations: int
-    suspicions: Sequence[Suspicion]
-    timings_s: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def accepted(self) -> bool:
-        """Whether the gate lets the new poses replace the stored ones."""
-        return self.rejected_because is None
-
-
-class CalibrationError(Exception):
-    """The frames cannot be calibrated at all: names the camera and says what to do."""
-
-    def __init__(self, camera: str, kind: str, detail: str) -> None:
-        super().__init__(detail)
-        self.camera = camera
-        self.kind = kind
-        self.detail = detail
-
-
-class Stopped(Exception):  # noqa: N818  (a request, not an error)
-    """The caller asked to stop."""
 
 
 def calibrate(
@@ -184,48 +94,120 @@ def calibrate(
     """
     method = METHODS[options.preset]
     pitch = pitch.flat() if options.flat or method.flat else pitch
-    clock = Clock()
     journey = Journey(report, stop)
-    require_markings_in_view(pitch, cameras)
-    with clock.measuring("view"):
-        views = [view_of(frames[camera.id], pitch, camera) for camera in cameras]
-        usable = all(view.usable for view in views)
-    with clock.measuring("segmentation"):
-        responses = segment_all(pitch, cameras, frames, segment, journey)
-    with clock.measuring("evolution"):
-        strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
-        rng = np.random.default_rng(options.seed)
-        # What cannot be seen is not searched for: the stored poses are judged as they are, beside what is wrong.
-        found = (
-            search(pitch, cameras, responses, method.levels, strategy, rng, journey.evolution(options.generations))
-            if usable
-            else Found(list(cameras), np.inf, 0)
-        )
-    with clock.measuring("refinement"):
-        journey.at("refinement", 0.0)
-        brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
-        sight = Sight(brightness, responses)
-        finish = method.finish if usable else assess
-        refined = finish(pitch, found.cameras, sight, options.stitch_weight, _free(options, pitch, cameras))
-    with clock.measuring("quality"):
+    seen = look(pitch, cameras, frames, segment, journey)
+    found, finished = settle(method, pitch, cameras, seen, options, journey)
+    with journey.measuring("quality"):
         journey.at("refinement", 0.6)
-        by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
-        stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
-        stitch_before = stitch_error_px(pitch, cameras, by_id)
-        qualities = qualities_of(pitch, cameras, refined, sight, views)
+        answer = judge(pitch, cameras, seen, finished, journey)
+        stitch_before = _stitch_error_px(pitch, cameras, seen.sight)
         journey.at("refinement", 1.0)
     return Calibration(
-        refined.pitch,
-        [camera_result(quality) for quality in qualities],
-        rejection(qualities, pairs_in_common(refined.pitch, refined.cameras), stitch, Gate())
-        or ridge_rejection(refined.pitch, Gate()),
-        stitch,
-        stitch_before,
-        found.loss,
-        found.generations,
-        suspicions(believable(refined.deviations, qualities, Gate())),
-        clock.seconds,
+        **vars(answer),
+        stitch_error_before_px=stitch_before,
+        loss=found.loss,
+        generations=found.generations,
+        suspicions=suspicions(believable(finished.deviations, answer.cameras, Gate())),
     )
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the cameras see: `views`, whether their frames can be used, and the `sight` of the search and the finish."""
+
+    views: Sequence[ViewCondition]
+    sight: Sight
+
+    @property
+    def usable(self) -> bool:
+        """Whether all frames can be."""
+        return all(view.usable for view in self.views)
+
+
+def look(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    frames: Mapping[str, Sequence[Frame]],
+    segment: Segment,
+    journey: Journey,
+) -> Seen:
+    """Look at the frames, and for markings in them. Raises `CalibrationError`."""
+    require_markings_in_view(pitch, cameras)
+    with journey.measuring("view"):
+        views = [view_of(frames[camera.id], pitch, camera) for camera in cameras]
+    with journey.measuring("segmentation"):
+        responses = segment_all(pitch, cameras, frames, segment, journey)
+    return Seen(views, Sight([Channels(frames[camera.id]) for camera in cameras], responses))
+
+
+def settle(
+    method: Method, pitch: Field, cameras: Sequence[Camera], seen: Seen, options: Options, journey: Journey
+) -> tuple[Found, Finished]:
+    """Search for all cameras from their stored poses, and finish.
+
+    What cannot be seen is not searched for: the stored poses are judged as they are, beside what is wrong. Where the
+    poses that the network leads to do not explain the frames, ridges are followed in its place, and the better is kept.
+    """
+    free = _free(options, pitch, cameras)
+    if not seen.usable:
+        with journey.measuring("refinement"):
+            stored = assess(pitch, cameras, seen.sight, options.stitch_weight, free)
+        return Found(list(cameras), np.inf, 0), stored
+
+    def settled_by(responses: Sequence[Response]) -> tuple[Found, Finished]:
+        with journey.measuring("evolution"):
+            strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
+            rng = np.random.default_rng(options.seed)
+            on_generation = journey.evolution(options.generations)
+            found = search(pitch, cameras, responses, method.levels, strategy, rng, on_generation)
+        with journey.measuring("refinement"):
+            journey.at("refinement", 0.0)
+            return found, method.finish(pitch, found.cameras, seen.sight, options.stitch_weight, free)
+
+    first = settled_by(seen.sight.responses)
+    lost = [left.evidence.agreement < Gate().least_agreement for left in first[1].each]
+    if not (method.ridges and any(lost)):
+        return first
+    with journey.measuring("ridges"):
+        responses = _with_ridges(pitch, cameras, seen.sight, lost)
+    return max(first, settled_by(responses), key=lambda end: min(left.evidence.agreement for left in end[1].each))
+
+
+def _with_ridges(pitch: Field, cameras: Sequence[Camera], sight: Sight, lost: Sequence[bool]) -> list[Response]:
+    """The responses (H, W) to search by, of ridges for the cameras that are `lost` by those of the network."""
+    lines = pitch.line_points()
+    return [
+        ridge_response(channels, SeenLines.from_camera(lines, camera), CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
+        if is_lost
+        else response
+        for camera, channels, response, is_lost in zip(cameras, sight.channels, sight.responses, lost, strict=True)
+    ]
+
+
+def judge(pitch: Field, stored: Sequence[Camera], seen: Seen, finished: Finished, journey: Journey) -> Answer:
+    """What the finished cameras are worth beside the `stored` ones on the `pitch` they were stored for."""
+    lines = pitch.line_points()
+    results = [
+        CameraResult(
+            **vars(after),
+            view=view,
+            iou=markings_iou(finished.pitch, after.camera, response),
+            evidence_before=evidence_of(lines, before, channels, response),
+            moved=Movement.between(pitch, before, after.camera),
+        )
+        for before, after, view, channels, response in zip(
+            stored, finished.each, seen.views, seen.sight.channels, seen.sight.responses, strict=True
+        )
+    ]
+    stitch = _stitch_error_px(finished.pitch, finished.cameras, seen.sight)
+    rejected = rejection(results, pairs_in_common(finished.pitch, finished.cameras), stitch, Gate())
+    rejected = rejected or ridge_rejection(finished.pitch, Gate())
+    return Answer(finished.pitch, results, rejected, stitch, journey.seconds)
+
+
+def _stitch_error_px(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> float | None:
+    responses = {camera.id: response for camera, response in zip(cameras, sight.responses, strict=True)}
+    return stitch_error_px(pitch, cameras, responses)
 
 
 def require_markings_in_view(pitch: Field, cameras: Sequence[Camera]) -> None:
@@ -270,94 +252,8 @@ def _free(options: Options, pitch: Field, cameras: Sequence[Camera]) -> list[Par
     return [*lengths, *(free_ridge(pitch) if options.fit_ridge else [])]
 
 
-def camera_result(quality: CameraQuality) -> CameraResult:
-    """What is answered of what the gate looked at."""
-    return CameraResult(
-        quality.camera.id,
-        quality.camera.intrinsics,
-        quality.camera.pose,
-        quality.view,
-        quality.sigma,
-        quality.repeatability,
-        quality.moved,
-        quality.iou,
-        quality.evidence.share,
-        quality.evidence.by_chance,
-        quality.residual_px,
-    )
-
-
 def view_of(frames: Sequence[Frame], pitch: Field, camera: Camera) -> ViewCondition:
     """The view of the first frame that can be used, or what is wrong with the first."""
     first = look_at(frames[0], pitch, camera)
     later = (look_at(frame, pitch, camera) for frame in frames[1:])
     return first if first.usable else next((view for view in later if view.usable), first)
-
-
-def qualities_of(
-    pitch: Field, stored: Sequence[Camera], refined: Refined, sight: Sight, views: Sequence[ViewCondition]
-) -> list[CameraQuality]:
-    """What the gate looks at: the finished cameras beside the `stored` ones on the pitch they were stored for."""
-    lines = pitch.line_points()
-    return [
-        CameraQuality(
-            after,
-            view,
-            markings_iou(refined.pitch, after, response),
-            evidence,
-            evidence_of(lines, before, bright, response),
-            residual,
-            _sigma(covariance),
-            _sigma(repeatability),
-            Movement.between(pitch, before, after),
-        )
-        for before, after, view, bright, response, evidence, residual, covariance, repeatability in zip(
-            stored,
-            refined.cameras,
-            views,
-            sight.brightness,
-            sight.responses,
-            refined.evidence,
-            refined.residual_px,
-            refined.covariance,
-            refined.repeatability,
-            strict=True,
-        )
-    ]
-
-
-def _sigma(covariance: Array | None) -> Sigma | None:
-    return None if covariance is None else Sigma.from_covariance(covariance)
-
-
-class Clock:
-    """Seconds per stage."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def measuring(self, stage: str) -> Iterator[None]:
-        """Measure what is done inside."""
-        begin = time.perf_counter()
-        yield
-        self.seconds[stage] = time.perf_counter() - begin
-
-
-class Journey:
-    """Reports where a job stands, and ends it when its caller wants it to stop."""
-
-    def __init__(self, report: Callable[[Progress], None], stop: Callable[[], bool]) -> None:
-        self.report = report
-        self.stop = stop
-
-    def at(self, stage: Stage, share: float, generation: int | None = None, loss: float | None = None) -> None:
-        """Report `share` 0..1 of `stage`; raise `Stopped` when asked to stop."""
-        if self.stop():
-            raise Stopped
-        begin, end = SHARE_OF_JOB[stage]
-        self.report(Progress(stage, begin + share * (end - begin), generation, loss))
-
-    def evolution(self, total: int) -> Callable[[int, float], None]:
-        """What a search of at most `total` generations calls after each one."""
-        return lambda number, loss: self.at("evolution", number / total, number, loss)

@@ -2,35 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
-
-import cv2
+from dataclasses import fields
 
 from service.settings import Settings
 from service.wire.job import Progress
 from service.wire.options import Options
 from service.wire.results import Provenance, Result, Suspicion
 from service.wire.venue import Venue
-from worker.calibration import calibrate as engine
-from worker.calibration.calibrate import CalibrationError, calibrate
+from worker.calibration import records as engine
+from worker.calibration.calibrate import calibrate
 from worker.calibration.judge.quality import Gate
-from worker.jobs.pictures import Remembering, draw
-from worker.jobs.wire import (
-    PREVIEW_FRACTION,
-    Failure,
-    Solution,
-    camera_of,
-    decoded_frame,
-    number,
-    pitch_of,
-    provenance_of,
-    segmenter_of,
-    to_the_millisecond,
-    wire_camera,
-    wire_lens,
-    wire_progress,
-)
+from worker.jobs import from_frames
+from worker.jobs.pictures import draw
+from worker.jobs.wire import Solution, number, wire_camera, wire_lens
 
 
 def solve(
@@ -40,44 +25,23 @@ def solve(
     settings: Settings,
     report: Callable[[Progress], None],
 ) -> Solution[Result]:
-    """Calibrate a venue from the files of its cameras, with or without a server around it."""
-    segmenter = segmenter_of(settings)
-    cv2.setNumThreads(settings.threads)
-    begun = time.perf_counter()
-    frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
-    decoded = time.perf_counter()
-    pitch, cameras = pitch_of(venue.field), [camera_of(camera) for camera in venue.cameras]
-    network = Remembering(segmenter, frames)
-    try:
-        found = calibrate(
-            pitch, cameras, frames, network, _engine_options(options), lambda step: report(wire_progress(step))
-        )
-    except CalibrationError as error:
-        raise Failure(error.kind, error.detail, error.camera) from error
-    report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
-    drawing = time.perf_counter()
-    pictures = draw(pitch, cameras, found, frames, network.responses)
-    timings = {"decode": decoded - begun, **found.timings_s, "preview": time.perf_counter() - drawing}
-    provenance = provenance_of(segmenter, options)
-    return Solution(_result(found, options, timings, provenance), pictures)
+    """Calibrate a venue from the files of its cameras."""
+    asked = _engine_options(options)
+    return from_frames.solve(
+        venue,
+        files,
+        options,
+        settings,
+        report,
+        lambda given, step: calibrate(given.pitch, given.cameras, given.frames, given.network, asked, step),
+        draw,
+        lambda found, timings_s, provenance: _result(found, options, timings_s, provenance),
+    )
 
 
 def _engine_options(options: Options) -> engine.Options:
-    given = options.model_dump(
-        include={
-            "preset",
-            "seed",
-            "generations",
-            "parents",
-            "offspring",
-            "stitch_weight",
-            "flat",
-            "fit_focal_length",
-            "fit_ridge",
-        },
-        exclude_none=True,
-    )
-    return engine.Options(**given)
+    asked = {field.name for field in fields(engine.Options)}
+    return engine.Options(**options.model_dump(include=asked, exclude_none=True))
 
 
 def _result(
@@ -88,7 +52,7 @@ def _result(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
         cameras=[
-            wire_camera(camera, wire_lens(camera.intrinsics) if options.fit_focal_length else None)
+            wire_camera(camera, wire_lens(camera.camera.intrinsics) if options.fit_focal_length else None)
             for camera in found.cameras
         ],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
@@ -98,6 +62,6 @@ def _result(
         stitch_error_limit_px=Gate().largest_stitch_error_px,
         loss=number(found.loss),
         generations=found.generations,
-        timings_s=to_the_millisecond(timings_s),
+        timings_s=dict(timings_s),
         provenance=provenance,
     )

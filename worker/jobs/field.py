@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 
-import cv2
 import structlog
 
 from service.settings import Settings
@@ -14,27 +12,11 @@ from service.wire.job import Progress
 from service.wire.options import FieldOptions
 from service.wire.results import FieldResult, MeasureResult, Provenance
 from service.wire.venue import Venue
-from worker.calibration.calibrate import CalibrationError
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.measures.field_fit import FieldFit, Measure, fit_field
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
-from worker.jobs.wire import (
-    PREVIEW_FRACTION,
-    Failure,
-    Picture,
-    Solution,
-    camera_of,
-    decoded_frame,
-    jpeg,
-    number,
-    pitch_of,
-    provenance_of,
-    segmenter_of,
-    to_the_millisecond,
-    wire_camera,
-    wire_progress,
-)
+from worker.jobs import from_frames
+from worker.jobs.from_frames import Given
+from worker.jobs.wire import Solution, jpeg, number, wire_camera
 
 MILLIMETRE = 3
 log = structlog.get_logger()
@@ -47,35 +29,25 @@ def solve(
     settings: Settings,
     report: Callable[[Progress], None],
 ) -> Solution[FieldResult]:
-    """The measures of a venue's pitch from the files of its cameras, with or without a server around it."""
-    segmenter = segmenter_of(settings)
-    cv2.setNumThreads(settings.threads)
-    begun = time.perf_counter()
-    frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
-    decoded = time.perf_counter()
-    pitch, cameras = pitch_of(venue.field), [camera_of(camera) for camera in venue.cameras]
-    try:
-        found = fit_field(
-            pitch, cameras, frames, segmenter, options.seed or 0, lambda step: report(wire_progress(step))
-        )
-    except CalibrationError as error:
-        raise Failure(error.kind, error.detail, error.camera) from error
-    report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
-    drawing = time.perf_counter()
-    pictures = _draw(pitch, cameras, found, frames)
-    timings = {"decode": decoded - begun, **found.timings_s, "preview": time.perf_counter() - drawing}
-    provenance = provenance_of(segmenter, options)
-    return Solution(_result(venue.field, found, timings, provenance), pictures)
+    """The measures of a venue's pitch from the files of its cameras."""
+    seed = options.seed or 0
+    return from_frames.solve(
+        venue,
+        files,
+        options,
+        settings,
+        report,
+        lambda given, step: fit_field(given.pitch, given.cameras, given.frames, given.network, seed, step),
+        _draw,
+        lambda found, timings_s, provenance: _result(venue.field, found, timings_s, provenance),
+    )
 
 
-def _draw(
-    pitch: Field, before: Sequence[Camera], found: FieldFit, frames: Mapping[str, Sequence[Picture]]
-) -> dict[str, bytes]:
+def _draw(given: Given, found: FieldFit) -> dict[str, bytes]:
     pictures = {}
-    for old, new in zip(before, found.cameras, strict=True):
-        after = Camera(new.id, new.intrinsics, new.pose)
+    for old, new in zip(given.cameras, found.cameras, strict=True):
         try:
-            drawn = overlay((pitch, old), (found.pitch, after), frames[old.id][0], "field")
+            drawn = overlay((given.pitch, old), (found.pitch, new.camera), given.frames[old.id][0], "field")
         except Exception:  # what was rejected may look anywhere; a picture is not worth losing the reason
             log.warning("cannot draw", camera=old.id, exc_info=True)
             continue
@@ -91,7 +63,7 @@ def _result(given: FieldOfPlay, found: FieldFit, timings_s: Mapping[str, float],
         measures=[_wire_measure(measure) for measure in found.measures],
         cameras=[wire_camera(camera) for camera in found.cameras],
         stitch_error_px=number(found.stitch_error_px),
-        timings_s=to_the_millisecond(timings_s),
+        timings_s=dict(timings_s),
         provenance=provenance,
     )
 

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable
+from functools import cache, partial
 
 import cv2
 import numpy as np
 import structlog
 from numpy.typing import NDArray
 
-from worker.calibration.calibrate import Calibration, Segment
 from worker.calibration.draw import layers, mosaic
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.draw.viewpoint import viewpoint
+from worker.calibration.records import Calibration
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.see.segmentation import Region
+from worker.jobs.from_frames import Given
 from worker.jobs.wire import Picture, jpeg, png
 
 # Of the frames that layers are laid over: a wide screen. The overlays have the size of the frames.
@@ -27,39 +27,20 @@ Standing = tuple[Field, Camera]
 log = structlog.get_logger()
 
 
-class Remembering:
-    """A network that remembers what it said of the first frame of each camera."""
-
-    def __init__(self, segment: Segment, frames: Mapping[str, Sequence[Picture]]) -> None:
-        self._segment = segment
-        self._cameras = {id(several[0]): camera for camera, several in frames.items()}
-        self.responses: dict[str, NDArray[np.uint8]] = {}
-
-    def __call__(self, frame: Picture, regions: Sequence[Region]) -> NDArray[np.uint8]:
-        """As the network that is asked."""
-        response = self._segment(frame, regions)
-        if id(frame) in self._cameras:
-            self.responses[self._cameras[id(frame)]] = response
-        return response
-
-
-def draw(
-    pitch: Field,
-    before: Sequence[Camera],
-    found: Calibration,
-    frames: Mapping[str, Sequence[Picture]],
-    responses: Mapping[str, NDArray[np.uint8]],
-) -> dict[str, bytes]:
-    """Files by name; `responses`: what the network said of the first frame of each camera."""
-    after = [Camera(camera.id, camera.intrinsics, camera.pose) for camera in found.cameras]
+def draw(given: Given, found: Calibration) -> dict[str, bytes]:
+    """Files by name."""
+    pitch, before, frames = given.pitch, given.cameras, given.frames
+    after = [result.camera for result in found.cameras]
     first = {camera: several[0] for camera, several in frames.items()}
+    view = cache(lambda: viewpoint(found.pitch, after, PREVIEW_WIDTH))
     parts: list[Callable[[], dict[str, bytes]]] = [
-        lambda: _preview(found.pitch, after, first),
-        lambda: _preview_before((pitch, before), (found.pitch, after), first),
+        lambda: _preview(mosaic.stitched(found.pitch, view(), after, first)),
+        # The same view by the stored poses.
+        lambda: {"preview_before": jpeg(mosaic.stitched(pitch, view(), before, first).picture)},
         lambda: {"birdseye": jpeg(mosaic.birdseye(found.pitch, after, first))},
     ]
     for old, new in zip(before, after, strict=True):
-        frame, response = first[old.id], responses.get(old.id)
+        frame, response = first[old.id], given.network.responses.get(old.id)
         parts += [
             partial(_overlay, (pitch, old), (found.pitch, new), frame),
             partial(_layers, (pitch, old), (found.pitch, new), frame, response),
@@ -73,20 +54,9 @@ def draw(
     return pictures
 
 
-def _preview(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Picture]) -> dict[str, bytes]:
+def _preview(stitched: mosaic.Stitched) -> dict[str, bytes]:
     """One view by the new poses, and where one camera hands over to another in it."""
-    view = viewpoint(pitch, cameras, PREVIEW_WIDTH)
-    stitched = mosaic.stitched(pitch, view, cameras, frames)
     return {"preview": jpeg(stitched.picture), "seam": png(layers.seam_layer(stitched.owner))}
-
-
-def _preview_before(
-    stored: tuple[Field, Sequence[Camera]], new: tuple[Field, Sequence[Camera]], frames: Mapping[str, Picture]
-) -> dict[str, bytes]:
-    """The same view by the stored poses."""
-    view = viewpoint(*new, PREVIEW_WIDTH)
-    pitch, cameras = stored
-    return {"preview_before": jpeg(mosaic.stitched(pitch, view, cameras, frames).picture)}
 
 
 def _overlay(stored: Standing, new: Standing, frame: Picture) -> dict[str, bytes]:

@@ -20,7 +20,8 @@ from service.wire.job import JobError, Progress
 from service.wire.options import FieldOptions, Options
 from service.wire.problems import KINDS, type_of
 from service.wire.results import AnyResult, CameraResult, Provenance, Sigma, View
-from worker.calibration import calibrate as engine
+from worker.calibration import records
+from worker.calibration.finish import uncertainty
 from worker.calibration.judge import quality
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
@@ -148,7 +149,7 @@ def segmenter_of(settings: Settings) -> Segmenter:
         raise Failure("provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for.") from missing
 
 
-def wire_progress(step: engine.Progress) -> Progress:
+def wire_progress(step: records.Progress) -> Progress:
     """How far the engine is, with room for the pictures."""
     return Progress(
         stage=step.stage,
@@ -158,30 +159,28 @@ def wire_progress(step: engine.Progress) -> Progress:
     )
 
 
-def wire_camera(camera: engine.CameraResult, lens: geometry.Intrinsics | None = None) -> CameraResult:
+def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = None) -> CameraResult:
     """What a finish has to say of a camera; `lens` where it was found as well."""
     return CameraResult(
-        id=camera.id,
-        pose=wire_pose(camera.pose),
+        id=found.camera.id,
+        pose=wire_pose(found.camera.pose),
         intrinsics=lens,
-        sigma=_sigma(camera.sigma),
-        repeatability=_sigma(camera.repeatability),
+        sigma=_sigma(found.sigma),
+        repeatability=_sigma(found.repeatability),
         moved=Moved(
-            rotation_deg=camera.moved.rotation_deg,
-            position_m=camera.moved.position_m,
-            pixels=number(camera.moved.pixels),
+            rotation_deg=found.moved.rotation_deg,
+            position_m=found.moved.position_m,
+            pixels=number(found.moved.pixels),
         ),
-        iou=number(camera.iou),
-        found=number(camera.found),
-        by_chance=number(camera.by_chance),
-        view=View(
-            usable=camera.view.usable, cause=camera.view.cause, where=camera.view.where, detail=camera.view.words
-        ),
-        residual_px=number(camera.residual_px),
+        iou=number(found.iou),
+        found=number(found.evidence.share),
+        by_chance=number(found.evidence.by_chance),
+        view=View(usable=found.view.usable, cause=found.view.cause, where=found.view.where, detail=found.view.words),
+        residual_px=number(found.residual_px),
     )
 
 
-def _sigma(sigma: quality.Sigma | None) -> Sigma | None:
+def _sigma(sigma: uncertainty.Sigma | None) -> Sigma | None:
     if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
         return None
     return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)

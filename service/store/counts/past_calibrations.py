@@ -10,7 +10,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.engine import reading
+from service.store.engine import Repository, reading
 from service.wire.geometry import Moved
 from service.wire.job import OPEN, Status
 
@@ -42,11 +42,8 @@ class PastCalibration:
         return max((moved.pixels for moved in self.moved.values() if moved.pixels is not None), default=None)
 
 
-class PastCalibrations:
+class PastCalibrations(Repository):
     """The calibrations in the database that have ended, and which have not."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def of(self, venue: str, limit: int) -> list[PastCalibration]:
         """The last `limit` calibrations of a venue that have ended, newest first."""

@@ -15,10 +15,10 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.alarms import settle_alarms
 from service.store.counts.figures import note_quality, note_unaccepted
-from service.store.engine import clock, reading, serialise, writing
+from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.jobs.ending import Still, changed, end, still_open
-from service.store.jobs.reading import ONE
-from service.store.jobs.task import Origin, Task
+from service.store.jobs.reading import ONE, asked
+from service.store.jobs.task import Task
 from service.store.venues import find_venue, let_hold, venue_lock
 from service.wire.job import OPEN, JobError, Progress
 from service.wire.options import Options
@@ -29,11 +29,8 @@ DONE = Progress(stage="preview", fraction=1.0)
 j = tables.jobs.c
 
 
-class Attempts:
+class Attempts(Repository):
     """The attempts of the jobs in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def begin(self, job_id: str) -> Task | None:
         """Start an attempt; None if there is nothing to do any more."""
@@ -54,16 +51,7 @@ class Attempts:
             if connection.execute(begin).rowcount == 0:
                 return None
             row = connection.execute(ONE, {"job_id": job_id}).one()
-            return Task(
-                job_id=job_id,
-                kind=row.kind,
-                venue=row.venue_document,
-                options=row.options,
-                frames=row.frames,
-                origin=Origin(row.request_id, row.traceparent),
-                run_token=row.run_token,
-                attempt=row.attempt,
-            )
+            return Task(**asked(row), run_token=row.run_token, attempt=row.attempt)
 
     def holds(self, task: Task) -> bool:
         """Whether the job is still this attempt's; False if it has lost it, to a cancellation or to another attempt."""

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.alarms import settle_alarms
 from service.store.counts.figures import note_quality
-from service.store.engine import clock, serialise, writing
+from service.store.engine import Repository, clock, serialise, writing
 from service.store.jobs.ending import changed, end, still_open
 from service.store.jobs.reading import found_poses
 from service.store.revisions import TAKEN, newest_revision, revision_of_job
@@ -30,11 +30,8 @@ class MovedOn(Exception):  # noqa: N818
         self.newest = newest
 
 
-class Decisions:
+class Decisions(Repository):
     """The decisions about the jobs in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def cancel(self, job_id: str) -> None:
         """End a job that is still open; its worker notices."""

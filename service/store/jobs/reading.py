@@ -10,8 +10,9 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.deliveries import delivery_of
-from service.store.engine import reading
+from service.store.engine import Repository, reading
 from service.store.jobs.files import picture_file, picture_folder
+from service.store.jobs.task import Origin
 from service.store.revisions import revision_of_job
 from service.store.venues import with_result
 from service.wire.job import Job, Status
@@ -40,11 +41,8 @@ class State:
     status: Status
 
 
-class Jobs:
+class Jobs(Repository):
     """The jobs in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def get(self, job_id: str) -> Job | None:
         """One job as clients see it."""
@@ -104,6 +102,18 @@ def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] 
     done = [j.id == job_id, j.kind == "calibration", j.result.is_not(None)]
     row = connection.execute(sa.select(j.venue_document, j.result).where(*done)).one_or_none()
     return None if row is None else (Venue.model_validate(row.venue_document), Result.model_validate(row.result))
+
+
+def asked(row: Any) -> dict[str, Any]:
+    """What was asked of a job, as the members of `Asked`."""
+    return {
+        "job_id": row.id,
+        "kind": row.kind,
+        "venue": row.venue_document,
+        "options": row.options,
+        "frames": row.frames,
+        "origin": Origin(row.request_id, row.traceparent),
+    }
 
 
 def _job(connection: sa.Connection, row: Any) -> Job:

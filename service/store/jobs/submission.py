@@ -7,10 +7,10 @@ from collections.abc import Callable
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.engine import clock, reading, serialise, writing
+from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.jobs.files import frame_folder
-from service.store.jobs.reading import ONE, read_job
-from service.store.jobs.task import Asked, Origin
+from service.store.jobs.reading import ONE, asked, read_job
+from service.store.jobs.task import Asked
 from service.store.venues import find_venue, venue_lock
 from service.wire.job import OPEN, Job, Kind
 from service.wire.venue import Venue
@@ -52,11 +52,8 @@ class QueueFull(Exception):  # noqa: N818
     """As many jobs wait as may."""
 
 
-class Submissions:
+class Submissions(Repository):
     """The beginning of the jobs in the database."""
-
-    def __init__(self, engine: sa.Engine) -> None:
-        self._engine = engine
 
     def submit(
         self, submission: Submission, queue_limit: int, enqueue: Callable[[sa.Connection, str, int], None]
@@ -120,16 +117,7 @@ class Submissions:
             row = connection.execute(ONE, {"job_id": job_id}).one_or_none()
         if row is None or row.frames_deleted_at is not None:
             return None
-        return Submission(
-            job_id=job_id,
-            kind=row.kind,
-            venue=row.venue_document,
-            options=row.options,
-            frames=row.frames,
-            origin=Origin(row.request_id, row.traceparent),
-            content_hash=row.content_hash,
-            idempotency_key=row.idempotency_key,
-        )
+        return Submission(**asked(row), content_hash=row.content_hash, idempotency_key=row.idempotency_key)
 
 
 def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:

@@ -21,6 +21,11 @@ OPTIONS: dict[Kind, type[AnyOptions]] = {
 }
 
 
+def kind_of(options: AnyOptions) -> Kind:
+    """Which kind of job has such options."""
+    return next(kind for kind, model in OPTIONS.items() if type(options) is model)
+
+
 def seeded(options: AnyOptions) -> AnyOptions:
     """The options with a seed where one can be chosen and was not, so that a job can be computed again alike."""
     if not isinstance(options, Options | FieldOptions) or options.seed is not None:

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.benchmarks.fields.rows import Rows
-from worker.calibration.calibrate import Calibration, CalibrationError, CameraResult, Options, calibrate
-from worker.calibration.scene.camera import Camera, Frame, Pose
+from worker.calibration.calibrate import calibrate
+from worker.calibration.judge.quality import CameraResult
+from worker.calibration.records import Calibration, CalibrationError, Options
+from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Segmenter
 
@@ -66,17 +68,12 @@ class Engine:
 def camera_row(result: CameraResult) -> dict:
     """What the engine says of one camera."""
     return {
-        "rotation": result.pose.rotation.tolist(),
-        "position": result.pose.position.tolist(),
-        "found": result.found,
-        "by_chance": result.by_chance,
+        "rotation": result.camera.pose.rotation.tolist(),
+        "position": result.camera.pose.position.tolist(),
+        "found": result.evidence.share,
+        "by_chance": result.evidence.by_chance,
         "cause": result.view.cause,
         "residual_px": result.residual_px,
         "sigma_m": result.sigma.position_m if result.sigma else None,
         "sigma_deg": result.sigma.rotation_deg if result.sigma else None,
     }
-
-
-def found_camera(camera: Camera, result: CameraResult) -> Camera:
-    """A camera where the engine found it, with the lens that it found."""
-    return Camera(camera.id, result.intrinsics, Pose(result.pose.rotation, result.pose.position))

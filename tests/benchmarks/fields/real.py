@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tests.benchmarks.fields.cases import FOLDER, Case, cases, started
-from tests.benchmarks.fields.engine import Engine, camera_row, found_camera
+from tests.benchmarks.fields.engine import Engine, camera_row
 from tests.benchmarks.fields.judging import near, outcome, reasons, share
 from tests.benchmarks.fields.seeing import seen
 from tests.benchmarks.truth import apart
@@ -125,7 +125,7 @@ def _started(venue: str, group: Sequence[Case], number: int, turn_deg: float, sh
     for case in group:
         rows[case.name] = {"rms_px": None, "near": False}
         if case.name in found:
-            there = found_camera(case.camera, found[case.name])
+            there = found[case.name].camera
             rms = case.rms_px(there)
             metres, degrees = apart(there, case.camera)
             rows[case.name] = {

@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from fields.template import load
-from models.training.courts import render_court
-from models.training.floors import Floor, clay, concrete, grass, hard_court, ice, random_floor, sand, wood
-from tests.benchmarks.fields.engine import Engine, camera_row, found_camera
+from models.training.courts.court import render_court
+from models.training.courts.floors import Floor, clay, concrete, grass, hard_court, ice, random_floor, sand, wood
+from tests.benchmarks.fields.engine import Engine, camera_row
 from tests.benchmarks.fields.judging import caught, far_off, overconfident, reasons, share
 from tests.benchmarks.scenes import started
 from tests.benchmarks.truth import apart
@@ -144,7 +144,7 @@ def _judged(name: str, number: int, engine: Engine, pictures: Path | None) -> di
     row = {**answer.row, "ground": taken.ground, "shown": taken.shown}
     if answer.said is not None:
         result = answer.said.cameras[0]
-        metres, degrees = apart(found_camera(taken.camera, result), taken.camera)
+        metres, degrees = apart(result.camera, taken.camera)
         row |= {"shift_m": metres, "turn_deg": degrees, **camera_row(result)}
     return row
 

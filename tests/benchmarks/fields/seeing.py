@@ -10,11 +10,12 @@ import cv2
 import numpy as np
 
 from tests.benchmarks.fields.cases import Case
-from worker.calibration.calibrate import CAPTURE_RAD, Segment
+from worker.calibration.calibrate import CAPTURE_RAD
+from worker.calibration.records import Segment
 from worker.calibration.scene.camera import Camera, inside
 from worker.calibration.scene.field import LinePoints
+from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
-from worker.calibration.see.line_measurement import brightness_of
 from worker.calibration.see.segmentation import reachable_regions, whole_frame
 from worker.calibration.see.view import look_at
 
@@ -40,7 +41,7 @@ def seen(case: Case, segment: Segment) -> dict:
     response, network = _timed(lambda: segment(frame, regions) / np.float32(255))
     _, view = _timed(lambda: look_at(frame, case.pitch, case.camera))
     sure = _sure(case, case.pitch.line_points())
-    evidence, witness = _timed(lambda: evidence_of(sure, case.camera, brightness_of(frame), response))
+    evidence, witness = _timed(lambda: evidence_of(sure, case.camera, Channels([frame]), response))
     names = [marking.name for marking in case.pitch.markings()]
     by_marking = {}
     for number in np.unique(evidence.marking):

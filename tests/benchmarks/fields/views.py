@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from tests.benchmarks.fields.cases import Case, cases, started
-from tests.benchmarks.fields.engine import Engine, camera_row, found_camera
+from tests.benchmarks.fields.engine import Engine, camera_row
 from tests.benchmarks.fields.judging import reasons, share
 from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
 from tests.benchmarks.truth import apart
@@ -117,7 +117,7 @@ def _judged(view: View, name: str, other: View | None, options: argparse.Namespa
     row = answer.row
     if answer.said is not None:
         result = answer.said.cameras[0]
-        metres, degrees = apart(found_camera(view.camera, result), view.camera)
+        metres, degrees = apart(result.camera, view.camera)
         near = name in CAUSES and metres <= SAME_M and degrees <= SAME_DEG
         row |= {"shift_m": metres, "turn_deg": degrees, "near": near, **camera_row(result)}
     return row

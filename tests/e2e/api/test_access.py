@@ -12,7 +12,7 @@ from fastapi.routing import iter_route_contexts
 
 from service.app import create_app
 from service.pages.shown import SIGN_IN, Page
-from service.routes.guarded import Guarded
+from service.routes.contract.guarded import Guarded
 from service.settings import Settings
 from tests.e2e.commands import esc_here, esc_process
 from tests.e2e.running import Service, keys_in, png, upload, venue, wait_for

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from models.training.render import Conditions, render_frame
+from models.training.pitches.render import Conditions, render_frame
 from tests.e2e.running import Service
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose, rotation_angles_deg
 from worker.calibration.scene.field import Field

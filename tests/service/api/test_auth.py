@@ -10,7 +10,7 @@ from starlette.requests import HTTPConnection
 from structlog.testing import capture_logs
 
 from service.api.auth import BELIEVED_FOR_S, COOKIE, GUESS_EVERY_S, GUESSES, Gate, page_token
-from service.routes.guarded import Guarded
+from service.routes.contract.guarded import Guarded
 from service.settings import Settings
 from service.store.keys import Keys, hash_of
 from service.store.sessions import Sessions

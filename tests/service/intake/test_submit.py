@@ -8,9 +8,11 @@ from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context
 from service.intake import submit
-from service.routes import calibrate
+from service.routes.submissions import again, frames
+from service.routes.submissions.taking import Sender
 from service.settings import Settings
 from service.store.jobs.task import Origin
+from service.wire.options import Options
 from service.wire.problems import Problem
 from service.wire.venue import VenueIn
 from tests.e2e.running import png, venue
@@ -45,7 +47,7 @@ def uploaded():
 
 def refused(context, read, form):
     with pytest.raises(Problem) as problem:
-        calibrate.submit(context, read, form, None, Origin())
+        frames.submit(context, read, form, Options, Sender(None, Origin()))
     assert files(context.settings.home_blob_url) == []
     return problem.value.members()
 
@@ -53,7 +55,7 @@ def refused(context, read, form):
 def test_a_job_begins_from_the_poses_that_were_found_during_the_upload(context, read, form):
     moved = read.cameras[0].pose.model_copy(update={"position": [0.0, -60.0, 9.0]})
     context.venues.put(read.with_poses({"left": moved}), lambda _: None)
-    assert calibrate.submit(context, read, form, None, Origin()).status_code == 202
+    assert frames.submit(context, read, form, Options, Sender(None, Origin())).status_code == 202
     (job,) = context.jobs.page("v", None, None, 10)
     assert context.attempts.begin(job.id).venue == context.venues.get("v")
 
@@ -86,9 +88,34 @@ def test_frames_are_on_the_list_of_what_goes_until_they_are_a_job(context, read,
     with monkeypatch.context() as patch:
         patch.setattr(context.submissions, "submit", killed)
         with pytest.raises(KeyboardInterrupt):
-            calibrate.submit(context, read, form, None, Origin())
+            frames.submit(context, read, form, Options, Sender(None, Origin()))
     (folder,) = {path.rsplit("/", 2)[0] for path in files(context.settings.home_blob_url)}
     assert context.expiry.leftovers(datetime.now(UTC), 10) == []
     assert context.expiry.leftovers(later, 10) == [folder]
-    assert calibrate.submit(context, read, uploaded(), None, Origin()).status_code == 202
+    assert frames.submit(context, read, uploaded(), Options, Sender(None, Origin())).status_code == 202
     assert context.expiry.leftovers(later, 10) == [folder]
+
+
+def test_frames_that_are_submitted_again_are_copied_by_the_store(context, read, form, monkeypatch):
+    frames.submit(context, read, form, Options, Sender(None, Origin()))
+    (first,) = context.jobs.page("v", None, None, 10)
+    context.decisions.cancel(first.id)
+    with monkeypatch.context() as patch:
+        patch.setattr(context.blobs, "get", lambda path: pytest.fail(f"{path} was downloaded"))
+        assert again.submit(context, first, Origin()).status_code == 202
+    old, new = (context.submissions.of(job.id).frames for job in (first, context.jobs.page("v", None, None, 1)[0]))
+    assert old.keys() == new.keys()
+    for camera, paths in new.items():
+        assert [context.blobs.get(path) for path in paths] == [png()] == [context.blobs.get(old[camera][0])]
+
+
+def test_frames_that_are_gone_from_the_store_become_no_job(context, read, form):
+    frames.submit(context, read, form, Options, Sender(None, Origin()))
+    (first,) = context.jobs.page("v", None, None, 10)
+    context.decisions.cancel(first.id)
+    (left, *_) = context.submissions.of(first.id).frames["left"]
+    context.blobs.delete_under(left.rpartition("/")[0])
+    with pytest.raises(Problem, match="send new ones"):
+        again.submit(context, first, Origin())
+    assert len(context.jobs.page("v", None, None, 10)) == 1
+    assert {path.split("/")[1] for path in files(context.settings.home_blob_url)} == {first.id}

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame, pair
-from worker.calibration.calibrate import CalibrationError, Options, Stopped, calibrate
+from worker.calibration.calibrate import calibrate
 from worker.calibration.judge.quality import Gate, ridge_rejection
+from worker.calibration.records import CalibrationError, Options, Stopped
 from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.parameters import free_focal_lengths
 
@@ -43,8 +44,8 @@ def result():
 
 def test_outdated_poses_are_found_again():
     for truth, found in zip(pair(), result().cameras, strict=True):
-        assert np.linalg.norm(found.pose.position - truth.pose.position) < 0.03
-        assert rotation_angles_deg(found.pose.rotation, truth.pose.rotation) < 0.02
+        assert np.linalg.norm(found.camera.pose.position - truth.pose.position) < 0.03
+        assert rotation_angles_deg(found.camera.pose.rotation, truth.pose.rotation) < 0.02
     assert result().accepted
 
 
@@ -57,15 +58,15 @@ def test_what_moved_is_told():
     for found, was in zip(result().cameras, outdated(), strict=True):
         assert found.moved.position_m == pytest.approx(np.linalg.norm(SHIFT), abs=0.03)
         assert found.moved.rotation_deg == pytest.approx(
-            rotation_angles_deg(found.pose.rotation, was.pose.rotation), abs=1e-9
+            rotation_angles_deg(found.camera.pose.rotation, was.pose.rotation), abs=1e-9
         )
 
 
 def test_the_same_seed_gives_the_same_poses_to_the_last_digit():
     again = run(seed=3)
     for first, second in zip(result().cameras, again.cameras, strict=True):
-        np.testing.assert_array_equal(first.pose.rotation, second.pose.rotation)
-        np.testing.assert_array_equal(first.pose.position, second.pose.position)
+        np.testing.assert_array_equal(first.camera.pose.rotation, second.camera.pose.rotation)
+        np.testing.assert_array_equal(first.camera.pose.position, second.camera.pose.position)
 
 
 def test_one_camera_alone_has_no_stitch_error():
@@ -97,8 +98,8 @@ def test_what_walks_through_one_of_three_frames_does_not_matter():
     with_player = {name: [f[0].copy() for _ in range(3)] for name, f in frames().items()}
     with_player["left"][1][200:400, 500:560] = 255
     found = run(pictures=with_player)
-    for truth, camera in zip(pair(), found.cameras, strict=True):
-        assert np.linalg.norm(camera.pose.position - truth.pose.position) < 0.03
+    for truth, result in zip(pair(), found.cameras, strict=True):
+        assert np.linalg.norm(result.camera.pose.position - truth.pose.position) < 0.03
 
 
 def test_progress_runs_through_the_stages_and_never_back():
@@ -136,8 +137,8 @@ def test_a_focal_length_that_heat_has_changed_is_found_when_asked_for():
     left, right = outdated()
     found = run(cameras=[with_longer_lens(left, 2.0), right], fit_focal_length=True)
     assert found.accepted
-    assert found.cameras[0].intrinsics.matrix[0, 0] == pytest.approx(600.0, abs=0.3)
-    assert run(cameras=[with_longer_lens(left, 2.0), right]).cameras[0].intrinsics.matrix[0, 0] == 602.0
+    assert found.cameras[0].camera.intrinsics.matrix[0, 0] == pytest.approx(600.0, abs=0.3)
+    assert run(cameras=[with_longer_lens(left, 2.0), right]).cameras[0].camera.intrinsics.matrix[0, 0] == 602.0
 
 
 def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers():

@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 
 from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame
 from tests.worker.calibration.test_calibrate import white_on_green
-from worker.calibration.calibrate import Options, calibrate
+from worker.calibration.calibrate import calibrate
 from worker.calibration.draw.mosaic import birdseye, stitched
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.draw.viewpoint import viewpoint
+from worker.calibration.records import Options
 from worker.calibration.scene.camera import (
     FISHEYE_DISTORTION_LENGTHS,
     WIDEST_FISHEYE_RAD,
@@ -168,14 +169,14 @@ def test_outdated_poses_of_fisheyes_are_found_again_and_drawn():
     outdated = [moved(camera, (0.008, -0.006, 0.005), (0.08, -0.06, 0.05)) for camera in cameras]
     found = calibrate(CROWNED, outdated, frames, white_on_green, Options(seed=1))
     assert found.rejected_because is None
-    for truth, camera in zip(cameras, found.cameras, strict=True):
-        assert np.linalg.norm(camera.pose.position - truth.pose.position) < min(0.1, 2 * camera.sigma.position_m)
+    after = [result.camera for result in found.cameras]
+    for truth, camera, result in zip(cameras, after, found.cameras, strict=True):
+        assert np.linalg.norm(camera.pose.position - truth.pose.position) < min(0.1, 2 * result.sigma.position_m)
         off_deg = rotation_angles_deg(camera.pose.rotation, truth.pose.rotation)
-        assert off_deg < min(0.25, 2 * camera.sigma.rotation_deg)
+        assert off_deg < min(0.25, 2 * result.sigma.rotation_deg)
     assert found.stitch_error_px < 0.3 < found.stitch_error_before_px
 
     first = {name: several[0] for name, several in frames.items()}
-    after = [camera.with_pose(result.pose) for camera, result in zip(cameras, found.cameras, strict=True)]
     above = birdseye(CROWNED, after, first)
     halfway = above[:, above.shape[1] // 2 - 2 : above.shape[1] // 2 + 3].max(axis=1)
     assert np.median(halfway[above.shape[0] // 8 : -above.shape[0] // 8].min(axis=1)) > 150

@@ -8,9 +8,10 @@ import pytest
 from fields.template import Template, load
 from tests.worker.calibration.synthetic import camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
-from worker.calibration.calibrate import Options, calibrate
+from worker.calibration.calibrate import calibrate
 from worker.calibration.draw.mosaic import birdseye
 from worker.calibration.draw.overlays import overlay
+from worker.calibration.records import Options
 from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
 
@@ -63,8 +64,8 @@ def test_outdated_poses_are_found_again(sport):
     found = calibrate(field(sport), outdated, frames(sport), white_on_green, Options(seed=3))
     assert found.accepted, found.rejected_because
     for truth, result in zip(cameras(sport), found.cameras, strict=True):
-        assert np.linalg.norm(result.pose.position - truth.pose.position) < 0.03
-        assert rotation_angles_deg(result.pose.rotation, truth.pose.rotation) < 0.05
+        assert np.linalg.norm(result.camera.pose.position - truth.pose.position) < 0.03
+        assert rotation_angles_deg(result.camera.pose.rotation, truth.pose.rotation) < 0.05
     assert found.stitch_error_px < 0.2
 
 

@@ -6,10 +6,12 @@ from service.settings import Settings
 from service.store.jobs.files import picture_file
 from service.wire.options import Options
 from service.wire.venue import VenueIn
-from worker.calibration import calibrate as engine
+from worker.calibration import records as engine
 from worker.calibration.finish.diagnosis import Suspicion
-from worker.calibration.judge.quality import Sigma
+from worker.calibration.finish.uncertainty import Sigma
+from worker.calibration.judge.quality import CameraResult, Movement
 from worker.calibration.scene.camera import Pose
+from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition
 from worker.jobs import calibration, pictures, wire
 from worker.message import Message
@@ -52,24 +54,23 @@ def asked(monkeypatch):
             for frame in several:
                 segment(frame, [])
         report(engine.Progress("evolution", 1.5, 3, float("inf")))
+        seen = Evidence(np.array([0]), np.array([0]), np.ones(1), np.ones(1, bool), np.full(1, 0.1))
         results = [
-            engine.CameraResult(
-                camera.id,
-                camera.intrinsics,
-                Pose(camera.pose.rotation, camera.pose.position + [0.05, 0, 0]),
-                ViewCondition(True, None, None, "The field can be seen.", None),
-                Sigma(float("inf"), 0.1),
-                Sigma(0.01, 0.02),
-                engine.Movement(0.0, 0.05, float("nan")),
-                0.9,
-                0.8,
-                0.1,
-                None,
+            CameraResult(
+                camera=camera.with_pose(Pose(camera.pose.rotation, camera.pose.position + [0.05, 0, 0])),
+                evidence=seen,
+                residual_px=None,
+                covariance=np.diag([np.inf] * 3 + [0.1] * 3),
+                repeatability=Sigma(0.01, 0.02),
+                view=ViewCondition(True, None, None, "The field can be seen.", None),
+                iou=0.9,
+                evidence_before=seen,
+                moved=Movement(0.0, 0.05, float("nan")),
             )
             for camera in cameras
         ]
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
-        return engine.Calibration(pitch, results, None, 0.2, None, 0.1, 3, [doubt], {"evolution": 1.0})
+        return engine.Calibration(pitch, results, None, 0.2, {"evolution": 1.0}, None, 0.1, 3, [doubt])
 
     class Segmenter:
         sha256 = "f" * 64

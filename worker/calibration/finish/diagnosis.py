@@ -11,7 +11,7 @@ SURE = 3.0
 """A number is suspected when it is off by this many of the estimate's sigma..."""
 NOTABLE = 4.0
 """...and by this many times what is left after a good calibration."""
-WORDS = {
+MORE_OR_LESS = {
     "focal_length_px": ("a focal length", "px longer", "px shorter"),
     "principal_point_x_px": ("a principal point", "px farther right", "px farther left"),
     "principal_point_y_px": ("a principal point", "px lower", "px higher"),
@@ -43,7 +43,7 @@ def suspicions(deviations: Sequence[Deviation]) -> list[Suspicion]:
 
 
 def _detail(found: Deviation) -> str:
-    what, more, less = WORDS[found.name]
+    what, more, less = MORE_OR_LESS[found.name]
     by = f"{abs(found.value):.3g} ± {found.sigma:.2g} {more if found.value > 0 else less}"
     if found.camera is None:
         return f"the lines fit best on {what} {by} than the venue says; measure it again"

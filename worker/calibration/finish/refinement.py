@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from worker.calibration.finish.estimate import Estimate, step, unevenness
 from worker.calibration.finish.residuals import Unknowns, misfit_px
 from worker.calibration.finish.robust import huber_weights, tukey_weights
-from worker.calibration.finish.uncertainty import Determined, Deviation, judge
-from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.finish.uncertainty import Finished, judged
+from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
 from worker.calibration.scene.parameters import Parameter
+from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
 from worker.calibration.see.line_measurement import Measurements, measure_lines
 
@@ -38,32 +39,10 @@ SETTLED_M = 5e-5
 
 @dataclass(frozen=True)
 class Sight:
-    """What a finish looks at: per camera `brightness` (H, W) of its frame (`line_measurement.brightness_of`), and
-    `responses` (H, W), its segmentation in 0..1.
-    """
+    """What a finish looks at: per camera the `channels` of its frame and `responses` (H, W), the segmentation 0..1."""
 
-    brightness: Sequence[NDArray[np.float32]]
+    channels: Sequence[Channels]
     responses: Sequence[NDArray[np.float32]]
-
-
-@dataclass(frozen=True)
-class Refined:
-    """The finished cameras on their pitch; per camera, None where it had too few measurements and stayed where it was:
-
-    `covariance` (6, 6) of (rotation in the camera's frame rad, position m), `repeatability` (6, 6) the same for whom
-    lenses and field are what they are said to be, `residual_px` the rms of its lines. `deviations`: what the lines say
-    of lenses and field. `found`: what was left free, in that order. `evidence`: how much of the lines is seen where the
-    finished cameras put them.
-    """
-
-    pitch: Field
-    cameras: list[Camera]
-    covariance: list[Array | None]
-    repeatability: list[Array | None]
-    residual_px: list[float | None]
-    deviations: list[Deviation]
-    found: list[Determined]
-    evidence: list[Evidence]
 
 
 def refine(
@@ -73,7 +52,7 @@ def refine(
     stitch_weight: float,
     free: Sequence[Parameter] = (),
     searches_px: Sequence[float] = SEARCH_PX,
-) -> Refined:
+) -> Finished:
     """Measure the lines and move the cameras onto them, round by round with a narrower search.
 
     `free`: numbers of lenses and field to be found along with the poses; pitch and cameras come back with them.
@@ -88,7 +67,7 @@ def refine(
         before = here
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
         # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
-        here = _settled(here, cameras, measured, unknowns, stitch_weight)
+        here = _down_huber(here, cameras, measured, unknowns, stitch_weight)
         measured = doubted(here, measured)
         here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
         uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
@@ -101,7 +80,7 @@ def refine(
     return _assessed(here, cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
 
 
-def _settled(
+def _down_huber(
     here: Estimate,
     found: Sequence[Camera],
     measured: Sequence[Measurements],
@@ -131,7 +110,7 @@ def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measuremen
 
 def assess(
     pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float, free: Sequence[Parameter] = ()
-) -> Refined:
+) -> Finished:
     """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     return _assessed(Estimate.at(pitch, cameras, unknowns), cameras, sight, unknowns, stitch_weight)
@@ -140,43 +119,33 @@ def assess(
 def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
     """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
     return [
-        measure_lines(lines, camera, bright, response, search_px * camera.intrinsics.relative_size)
-        for camera, bright, response in zip(cameras, sight.brightness, sight.responses, strict=True)
+        measure_lines(lines, camera, channels, response, search_px * camera.intrinsics.relative_size)
+        for camera, channels, response in zip(cameras, sight.channels, sight.responses, strict=True)
     ]
 
 
-def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Refined:
+def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Finished:
     """Cameras that need not agree, each on a ground of its own."""
     ends = [
-        refine(pitch, [camera], Sight([bright], [response]), 0.0)
-        for camera, bright, response in zip(cameras, sight.brightness, sight.responses, strict=True)
+        refine(pitch, [camera], Sight([channels], [response]), 0.0)
+        for camera, channels, response in zip(cameras, sight.channels, sight.responses, strict=True)
     ]
-    return Refined(
-        pitch,
-        [end.cameras[0] for end in ends],
-        [end.covariance[0] for end in ends],
-        [end.repeatability[0] for end in ends],
-        [end.residual_px[0] for end in ends],
-        [deviation for end in ends for deviation in end.deviations if deviation.camera is not None],
-        [],
-        [end.evidence[0] for end in ends],
-    )
+    deviations = [deviation for end in ends for deviation in end.deviations if deviation.camera is not None]
+    return Finished(pitch, [end.each[0] for end in ends], deviations, [])
 
 
 def _assessed(
     here: Estimate, found: Sequence[Camera], sight: Sight, unknowns: Unknowns, stitch_weight: float
-) -> Refined:
+) -> Finished:
     lines = here.on_ground(unknowns)
     evidence = [
-        evidence_of(lines, camera, bright, response)
-        for camera, bright, response in zip(here.cameras, sight.brightness, sight.responses, strict=True)
+        evidence_of(lines, camera, channels, response)
+        for camera, channels, response in zip(here.cameras, sight.channels, sight.responses, strict=True)
     ]
     measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
-    prior, away = ordinary.prior(unknowns), here.away(found)
-    judged = judge(here.pitch, here.lines, here.cameras, measured, unknowns, here.heights, prior, away, stitch_weight)
-    return Refined(here.pitch, here.cameras, **vars(judged), evidence=evidence)
+    return judged(ordinary, found, measured, evidence, unknowns, stitch_weight)
 
 
 def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:

@@ -32,6 +32,18 @@ def tukey_weights(values: Array) -> Array:
     return np.maximum(0.0, 1 - (values / (TUKEY * scale)) ** 2) ** 2 / scale**2
 
 
+def tukey_slopes(values: Array) -> Array:
+    """How much more a residual pulls for being larger (M,), where Tukey's weights are how much it pulls for its size.
+
+    Less than those: a residual that grows is believed less. Of single ones it is below zero, so each has its weight
+    times what is true of all of them.
+    """
+    weights = tukey_weights(values)
+    within = np.minimum((values / (TUKEY * robust_scale(values))) ** 2, 1.0)
+    slopes, all_of = (1 - within) * (1 - 5 * within), (1 - within) ** 2
+    return weights * slopes.sum() / all_of.sum() if len(values) else weights
+
+
 def tukey_loss(values: Array, scale: float) -> Array:
     """What steps with Tukey's weights at this scale make small (M,): (values / scale)² near zero, bounded beyond."""
     within = np.minimum(np.abs(values) / (TUKEY * scale), 1.0)

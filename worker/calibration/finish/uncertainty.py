@@ -13,13 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from worker.calibration.finish.estimate import Estimate
 from worker.calibration.finish.normal_equations import error_of_measurement, normal_equations
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS, Unknowns, residuals, rms_px
-from worker.calibration.finish.robust import tukey_weights
+from worker.calibration.finish.robust import tukey_slopes, tukey_weights
 from worker.calibration.scene.camera import Array, Camera
-from worker.calibration.scene.field import Field, LinePoints
+from worker.calibration.scene.field import Field
 from worker.calibration.scene.motion import POSE_NUMBERS
 from worker.calibration.scene.parameters import LensParameter, Parameter, field_parameters, lens_parameters
+from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.line_measurement import Measurements
 
 TRUST, TRUST_NUMBERS = 0.05, 1.0
@@ -55,36 +57,72 @@ class Determined:
 
 
 @dataclass(frozen=True)
-class Judged:
-    """Per camera, None where it had too few measurements: `covariance` (6, 6), `repeatability` (6, 6), `residual_px`;
-    see `Refined`, also for `deviations` and `found`.
+class Sigma:
+    """One standard deviation of a pose: of the rotation's angle in degrees, of the position in metres."""
+
+    rotation_deg: float
+    position_m: float
+
+    @classmethod
+    def from_covariance(cls, covariance: Array) -> Sigma:
+        """From (6, 6) of (rotation rad, position m): root of the summed variances of each three."""
+        variances = np.diag(covariance)
+        return cls(float(np.degrees(np.sqrt(variances[:3].sum()))), float(np.sqrt(variances[3:].sum())))
+
+
+@dataclass(frozen=True)
+class FinishedCamera:
+    """A camera where the finish left it. `evidence`: how much of the lines is seen where it puts them.
+
+    None where it had too few measurements: `residual_px`, the rms of its lines, `covariance` (6, 6) of (rotation in the
+    camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens and field, which do
+    not change.
     """
 
-    covariance: list[Array | None]
-    repeatability: list[Array | None]
-    residual_px: list[float | None]
+    camera: Camera
+    evidence: Evidence
+    residual_px: float | None
+    covariance: Array | None
+    repeatability: Sigma | None
+
+    @property
+    def sigma(self) -> Sigma | None:
+        """How sure the pose is."""
+        return None if self.covariance is None else Sigma.from_covariance(self.covariance)
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The cameras on their pitch. `deviations`: what the lines say of lenses and field that were taken for known.
+
+    `determined`: what was left free, in that order.
+    """
+
+    pitch: Field
+    each: list[FinishedCamera]
     deviations: list[Deviation]
-    found: list[Determined]
+    determined: list[Determined]
+
+    @property
+    def cameras(self) -> list[Camera]:
+        """Where they stand."""
+        return [one.camera for one in self.each]
 
 
-def judge(
-    pitch: Field,
-    lines: LinePoints,
-    cameras: Sequence[Camera],
+def judged(
+    here: Estimate,
+    begun: Sequence[Camera],
     measured: Sequence[Measurements],
+    evidence: Sequence[Evidence],
     solved: Unknowns,
-    heights: Array,
-    prior: Array,
-    away: Array,
     stitch_weight: float,
-) -> Judged:
-    """Judge an answer that was found with `solved` unknown; `lines` of the pitch are those that were `measured`.
-
-    `prior` (U, U): the information on them before any line was measured; `away` (U,): how far they are from it.
-    """
-    suspects = _suspects(pitch, cameras, solved)
-    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(pitch, lines)
-    rows = residuals(lines.position, cameras, measured, unknowns, heights, stitch_weight, tukey_weights)
+) -> Finished:
+    """The answer `here` and what it is worth, found with `solved` unknown from where the cameras had `begun`."""
+    lines, cameras = here.lines, here.cameras
+    prior, away = here.prior(solved), here.away(begun)
+    suspects = _suspects(here.pitch, cameras, solved)
+    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(here.pitch, lines)
+    rows = residuals(lines.position, cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
     equations = normal_equations(rows, unknowns)
     kept = np.r_[: solved.dense, unknowns.dense : len(unknowns)]
     asked = np.arange(solved.dense, unknowns.dense)
@@ -99,18 +137,30 @@ def judge(
     value = np.linalg.solve(information + np.diag(certainty), pull)
     nearer = -inverse @ left_over - effect @ value
 
-    everything = np.zeros_like(equations.information)
+    # A sandwich: how the pull of the residuals varies, between how the pull changes with the unknowns (Huber, 1964).
+    slopes = residuals(lines.position, cameras, measured, unknowns, here.heights, stitch_weight, tukey_slopes)
+    bread = normal_equations(slopes, unknowns).information
+    everything = np.zeros_like(bread)
     everything[np.ix_(kept, kept)] = prior
     everything[asked, asked] = certainty
-    full = np.linalg.inv(equations.information + everything)
+    full = np.linalg.inv(bread + everything)
     measurement = error_of_measurement(rows, unknowns)
     covariance = full @ (measurement + everything) @ full
-    alone = inverse @ (measurement[np.ix_(kept, kept)] + prior) @ inverse
+    part = np.linalg.inv(bread[np.ix_(kept, kept)] + prior)
+    alone = part @ (measurement[np.ix_(kept, kept)] + prior) @ part
     enough = [len(found) >= FEWEST_MEASUREMENTS for found in measured]
-    return Judged(
-        [_of_pose(covariance, nearer, i) if known else None for i, known in enumerate(enough)],
-        [_of_pose(alone, np.zeros(len(alone)), i) if known else None for i, known in enumerate(enough)],
-        [rms_px(lines.position, camera, found) for camera, found in zip(cameras, measured, strict=True)],
+    return Finished(
+        here.pitch,
+        [
+            FinishedCamera(
+                camera,
+                seen,
+                rms_px(lines.position, camera, found),
+                _of_pose(covariance, nearer, i) if known else None,
+                Sigma.from_covariance(_of_pose(alone, np.zeros(len(alone)), i)) if known else None,
+            )
+            for i, (camera, seen, found, known) in enumerate(zip(cameras, evidence, measured, enough, strict=True))
+        ],
         [
             Deviation(
                 cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,

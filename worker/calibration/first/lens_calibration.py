@@ -130,7 +130,7 @@ def calibrate_lens(
     hurting: dict[str, float] = {}
     for number in range(ROUNDS):
         chosen = _choose(list(used.values()), size, model, _part(report, number))
-        bad = _hurting(list(used), chosen.left_out_by_photo, most - len(hurting))
+        bad = _hurting(list(used), chosen.best.left_out_by_photo, most - len(hurting))
         # What the last round would leave out has been fitted, and its figures are those of that fit.
         if not bad or number == ROUNDS - 1:
             break
@@ -183,10 +183,6 @@ class _Tried:
 class _Chosen:
     tried: Sequence[_Tried]
     best: _Tried
-
-    @property
-    def left_out_by_photo(self) -> Array:
-        return self.best.left_out_by_photo
 
 
 def _choose(

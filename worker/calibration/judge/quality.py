@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS
-from worker.calibration.finish.uncertainty import Deviation
+from worker.calibration.finish.uncertainty import Deviation, FinishedCamera
 from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
@@ -45,20 +45,6 @@ class Gate:
 
 
 @dataclass(frozen=True)
-class Sigma:
-    """One standard deviation of a pose: of the rotation's angle in degrees, of the position in metres."""
-
-    rotation_deg: float
-    position_m: float
-
-    @classmethod
-    def from_covariance(cls, covariance: Array) -> Sigma:
-        """From (6, 6) of (rotation rad, position m): root of the summed variances of each three."""
-        variances = np.diag(covariance)
-        return cls(float(np.degrees(np.sqrt(variances[:3].sum()))), float(np.sqrt(variances[3:].sum())))
-
-
-@dataclass(frozen=True)
 class Movement:
     """From the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in pixels."""
 
@@ -81,17 +67,15 @@ class Movement:
 
 
 @dataclass(frozen=True)
-class CameraQuality:
-    """What the gate looks at, of one camera."""
+class CameraResult(FinishedCamera):
+    """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
 
-    camera: Camera
+    `view`: whether its frame could be used, and what is wrong with it if not; `iou`: see `markings_iou`.
+    """
+
     view: ViewCondition
     iou: float
-    evidence: Evidence
     evidence_before: Evidence
-    residual_px: float | None
-    sigma: Sigma | None
-    repeatability: Sigma | None
     moved: Movement
 
 
@@ -119,9 +103,9 @@ def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) ->
     return found / (expected + beside)
 
 
-def believable(deviations: Sequence[Deviation], qualities: Sequence[CameraQuality], gate: Gate) -> list[Deviation]:
+def believable(deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate) -> list[Deviation]:
     """Those deviations that were read off cameras which see the pitch where they expect it."""
-    lost = {quality.camera.id for quality in qualities if quality.evidence.agreement < gate.least_agreement}
+    lost = {result.camera.id for result in results if result.evidence.agreement < gate.least_agreement}
     return [d for d in deviations if (not lost if d.camera is None else d.camera not in lost)]
 
 
@@ -137,7 +121,7 @@ def ridge_rejection(pitch: Field, gate: Gate) -> str | None:
 
 
 def rejection(
-    qualities: Sequence[CameraQuality],
+    results: Sequence[CameraResult],
     in_common: Sequence[tuple[Camera, Camera]],
     stitch_error_px: float | None,
     gate: Gate,
@@ -146,9 +130,9 @@ def rejection(
 
     `in_common`: the pairs of cameras whose views should register; `stitch_error_px` is None when they do not.
     """
-    unusable = [quality for quality in qualities if not quality.view.usable]
+    unusable = [result for result in results if not result.view.usable]
     # Where a view cannot be used nothing was searched, and the other cameras are not to blame for where they stand.
-    reasons = [(quality.camera.id, _camera_rejection(quality, gate)) for quality in unusable or qualities]
+    reasons = [(result.camera.id, _camera_rejection(result, gate)) for result in unusable or results]
     bad = [f"camera {name}: {reason}" for name, reason in reasons if reason is not None]
     if bad:
         return "; ".join(bad)
@@ -163,25 +147,25 @@ def rejection(
     return None
 
 
-def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
-    if not quality.view.usable:
-        return quality.view.words
-    moved, seen = quality.moved, quality.evidence
+def _camera_rejection(result: CameraResult, gate: Gate) -> str | None:
+    if not result.view.usable:
+        return result.view.words
+    moved, seen = result.moved, result.evidence
     if seen.agreement < gate.least_agreement:
         return (
             f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it ought "
             f"to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen anywhere); "
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
         )
-    if quality.residual_px is None or quality.repeatability is None:
+    if result.residual_px is None or result.repeatability is None:
         return f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?"
-    limit = max(gate.largest_residual_px * quality.camera.intrinsics.relative_size, gate.residual_floor_px)
-    if quality.residual_px > limit:
+    limit = max(gate.largest_residual_px * result.camera.intrinsics.relative_size, gate.residual_floor_px)
+    if result.residual_px > limit:
         return (
-            f"lines are {quality.residual_px:.1f} px from where the pose puts them, at most {limit:.1f} allowed; "
+            f"lines are {result.residual_px:.1f} px from where the pose puts them, at most {limit:.1f} allowed; "
             "check intrinsics and the field's measures"
         )
-    sigma = quality.repeatability
+    sigma = result.repeatability
     if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
         return (
             f"the visible lines do not determine the pose (sigma {sigma.rotation_deg:.2f} degrees, "
@@ -193,9 +177,9 @@ def _camera_rejection(quality: CameraQuality, gate: Gate) -> str | None:
             f"{moved.position_m:.2f} m (at most {gate.largest_shift_m}); if somebody moved the camera, store a new "
             "first pose"
         )
-    if seen.agreement < quality.evidence_before.agreement - gate.agreement_loss:
+    if seen.agreement < result.evidence_before.agreement - gate.agreement_loss:
         return (
-            f"the stored pose fits the frame better: {quality.evidence_before.share:.0%} of the markings' length is "
+            f"the stored pose fits the frame better: {result.evidence_before.share:.0%} of the markings' length is "
             f"seen where it puts them, with the new pose {seen.share:.0%}"
         )
     return None

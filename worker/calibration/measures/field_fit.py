@@ -7,36 +7,19 @@ leave open is said as a sigma, and a measure that they leave about as open as it
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 import numpy as np
 
-from worker.calibration.calibrate import (
-    METHODS,
-    CameraResult,
-    Clock,
-    Journey,
-    Options,
-    Progress,
-    Segment,
-    camera_result,
-    qualities_of,
-    require_markings_in_view,
-    segment_all,
-    view_of,
-)
-from worker.calibration.finish.refinement import SEARCH_PX, Refined, Sight, refine
-from worker.calibration.finish.uncertainty import Determined
-from worker.calibration.judge.quality import Gate, rejection, ridge_rejection
-from worker.calibration.judge.registration import pairs_in_common, stitch_error_px
-from worker.calibration.measures.ridge import RidgeTrials, try_ridges
+from worker.calibration.calibrate import METHODS, judge, look, settle
+from worker.calibration.finish.refinement import SEARCH_PX, Sight, assess, refine
+from worker.calibration.finish.uncertainty import Determined, Finished
+from worker.calibration.measures.ridge import TriedRidges, try_ridges
+from worker.calibration.records import Answer, Journey, Options, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import FieldParameter, LensParameter, Parameter, free_field
-from worker.calibration.search.search import Strategy, search
-from worker.calibration.see.line_measurement import brightness_of
-from worker.calibration.see.sampling import median
 
 FIRST_SEARCH_PX = (40.0, 24.0)
 """A pitch whose measures are guesses has its lines farther from where they are expected than one that is known."""
@@ -46,7 +29,7 @@ UNTOUCHED = 0.9
 """Where they leave this part, no line that it moves was measured."""
 SURE_DIP = 2.0
 """A ridge that is lower than the corners by this many sigma is no measurement of a flat pitch."""
-IN_WORDS = {
+QUANTITIES = {
     "length_m": "the pitch's length",
     "width_m": "the pitch's width",
     "ridge_height_m": "the ridge's height",
@@ -78,23 +61,10 @@ class Measure:
 
 
 @dataclass(frozen=True)
-class FieldFit:
-    """A pitch with the measures that the lines tell, and the cameras as they stand around it.
+class FieldFit(Answer):
+    """A pitch with the measures that the lines tell, and the cameras as they stand around it."""
 
-    `rejected_because`: why the frames are not to be trusted with it; None when they are.
-    """
-
-    pitch: Field
-    cameras: Sequence[CameraResult]
     measures: Sequence[Measure]
-    rejected_because: str | None
-    stitch_error_px: float | None
-    timings_s: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def accepted(self) -> bool:
-        """Whether the pitch may replace the one given."""
-        return self.rejected_because is None
 
 
 def fit_field(
@@ -110,48 +80,32 @@ def fit_field(
 
     Arguments, errors and determinism as of `calibrate`. Where the pitch has no ridge, one with hips of 45° is tried.
     """
-    clock, journey = Clock(), Journey(report, stop)
-    require_markings_in_view(pitch, cameras)
-    with clock.measuring("segmentation"):
-        responses = segment_all(pitch, cameras, frames, segment, journey)
-    options = Options(seed=seed)
-    with clock.measuring("evolution"):
-        strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
-        levels, rng = METHODS["esc"].levels, np.random.default_rng(seed)
-        found = search(pitch, cameras, responses, levels, strategy, rng, journey.evolution(options.generations))
-    with clock.measuring("refinement"):
-        journey.at("refinement", 0.0)
-        brightness = [median([brightness_of(frame) for frame in frames[camera.id]]) for camera in cameras]
-        sight = Sight(brightness, responses)
-        refined, measures = fit_measures(pitch, found.cameras, sight, options.stitch_weight)
-    with clock.measuring("quality"):
+    options, journey = Options(seed=seed), Journey(report, stop)
+    seen = look(pitch, cameras, frames, segment, journey)
+    found, _ = settle(METHODS["esc"], pitch, cameras, seen, options, journey)
+    with journey.measuring("measures"):
+        fit = fit_measures if seen.usable else leave_measures
+        finished, measures = fit(pitch, found.cameras, seen.sight, options.stitch_weight)
+    with journey.measuring("quality"):
         journey.at("refinement", 0.9)
-        by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
-        stitch = stitch_error_px(refined.pitch, refined.cameras, by_id)
-        views = [view_of(frames[camera.id], pitch, camera) for camera in cameras]
-        qualities = qualities_of(pitch, cameras, refined, sight, views)
+        answer = judge(pitch, cameras, seen, finished, journey)
         journey.at("refinement", 1.0)
-    gate = Gate()
-    rejected = (
-        rejection(qualities, pairs_in_common(refined.pitch, refined.cameras), stitch, gate)
-        or ridge_rejection(refined.pitch, gate)
-        or _implausible(refined.pitch)
-    )
-    return FieldFit(refined.pitch, [camera_result(q) for q in qualities], measures, rejected, stitch, clock.seconds)
+    answer = replace(answer, rejected_because=answer.rejected_because or _implausible(finished.pitch))
+    return FieldFit(**vars(answer), measures=measures)
 
 
 def fit_measures(
     pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float
-) -> tuple[Refined, list[Measure]]:
+) -> tuple[Finished, list[Measure]]:
     """The finish on the pitch with those measures that the lines tell; and what they tell of every measure."""
     free = free_field(pitch)
     everything = refine(pitch, cameras, sight, stitch_weight, free, (*FIRST_SEARCH_PX, *SEARCH_PX))
-    trials = try_ridges(everything, free, sight, stitch_weight)
+    tried = try_ridges(everything, free, sight, stitch_weight)
     measures = [
-        _measure(pitch, everything.pitch, parameter, found, trials, cameras)
-        for parameter, found in zip(free, everything.found, strict=True)
+        _measure(pitch, everything.pitch, parameter, found, tried, cameras)
+        for parameter, found in zip(free, everything.determined, strict=True)
     ]
-    ridge = _ridge_length(pitch, trials)
+    ridge = _ridge_length(pitch, tried)
     known, still_free = _with_known(pitch, everything.pitch, free, measures, ridge)
     final = refine(known, everything.cameras, sight, stitch_weight, still_free)
     told = [
@@ -161,15 +115,28 @@ def fit_measures(
     return final, [*told, ridge]
 
 
+def leave_measures(
+    pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float
+) -> tuple[Finished, list[Measure]]:
+    """Cameras and pitch as they are, where frames cannot be used to find any measure."""
+    given = [(p.name, p.read(pitch), p.expected) for p in free_field(pitch)]
+    given.append(("ridge_length_m", pitch.ridge_length, _open_ridge_length(pitch)))
+    measures = [
+        Measure(cast(MeasureName, name), value, value, open_m, open_m, False, "not every view can be used")
+        for name, value, open_m in given
+    ]
+    return assess(pitch, cameras, sight, stitch_weight), measures
+
+
 def _measure(
     given: Field,
     fitted: Field,
     parameter: FieldParameter,
     found: Determined,
-    trials: RidgeTrials,
+    tried: TriedRidges,
     cameras: Sequence[Camera],
 ) -> Measure:
-    sigma = float(np.hypot(found.sigma, trials.spread(parameter.read)))
+    sigma = float(np.hypot(found.sigma, tried.spread(parameter.read)))
     left = sigma / parameter.expected
     known = left <= TOLD
     detail = ""
@@ -184,12 +151,17 @@ def _measure(
     return Measure(name, parameter.read(given), parameter.read(fitted), sigma, parameter.expected, known, detail)
 
 
-def _ridge_length(given: Field, trials: RidgeTrials) -> Measure:
-    open_m = float(given.length / np.sqrt(12))
-    shortest, longest = trials.alike
-    known = bool(trials.sigma <= TOLD * open_m)
+def _ridge_length(given: Field, tried: TriedRidges) -> Measure:
+    open_m = _open_ridge_length(given)
+    shortest, longest = tried.alike
+    known = bool(tried.sigma <= TOLD * open_m)
     detail = "" if known else f"the lines fit alike with a ridge of any length from {shortest:.0f} to {longest:.0f} m"
-    return Measure("ridge_length_m", given.ridge_length, trials.best, trials.sigma, open_m, known, detail)
+    return Measure("ridge_length_m", given.ridge_length, tried.best, tried.sigma, open_m, known, detail)
+
+
+def _open_ridge_length(pitch: Field) -> float:
+    """One standard deviation of a length between none and that of the whole pitch."""
+    return float(pitch.length / np.sqrt(12))
 
 
 def _with_known(
@@ -211,7 +183,7 @@ def _with_known(
 
 
 def _named(parameter: Parameter, cameras: Sequence[Camera]) -> str:
-    words = IN_WORDS[parameter.name]
+    words = QUANTITIES[parameter.name]
     return f"{words} of camera {cameras[parameter.camera].id}" if isinstance(parameter, LensParameter) else words
 
 

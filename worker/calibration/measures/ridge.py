@@ -12,9 +12,10 @@ import numpy as np
 
 from worker.calibration.finish.estimate import Estimate, step
 from worker.calibration.finish.normal_equations import CLUSTER_POINTS
-from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Refined, Sight, measure_all
+from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Sight, measure_all
 from worker.calibration.finish.residuals import Residuals, Unknowns, residuals
 from worker.calibration.finish.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
+from worker.calibration.finish.uncertainty import Finished
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import Ground
@@ -29,7 +30,7 @@ ALIKE = 4.0
 
 
 @dataclass(frozen=True)
-class RidgeTrial:
+class TriedRidge:
     """A pitch with a ridge of some length, everything else found for it; `cost`: -2 log likelihood, from any zero."""
 
     pitch: Field
@@ -37,16 +38,16 @@ class RidgeTrial:
 
 
 @dataclass(frozen=True)
-class RidgeTrials:
+class TriedRidges:
     """`held`: the pitch with the length that it came with; `tried`: every `SPACING_M` from none to the whole pitch."""
 
     held: Field
-    tried: Sequence[RidgeTrial]
+    tried: Sequence[TriedRidge]
 
     @property
     def lengths(self) -> Array:
         """Of the ridges tried (T,)."""
-        return np.array([trial.pitch.ridge_length for trial in self.tried])
+        return np.array([ridge.pitch.ridge_length for ridge in self.tried])
 
     @property
     def credence(self) -> Array:
@@ -73,53 +74,45 @@ class RidgeTrials:
 
     def spread(self, read: Callable[[Field], float]) -> float:
         """How far (rms) another measure is off because the ridge is not as long as it was held."""
-        off = np.array([read(trial.pitch) for trial in self.tried]) - read(self.held)
+        off = np.array([read(ridge.pitch) for ridge in self.tried]) - read(self.held)
         return float(np.sqrt(self.credence @ off**2))
 
     @property
     def _costs(self) -> Array:
-        return np.array([trial.cost for trial in self.tried])
+        return np.array([ridge.cost for ridge in self.tried])
 
 
-def try_ridges(base: Refined, free: Sequence[Parameter], sight: Sight, stitch_weight: float) -> RidgeTrials:
+def try_ridges(base: Finished, free: Sequence[Parameter], sight: Sight, stitch_weight: float) -> TriedRidges:
     """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
     lines = base.pitch.line_points()
     measured = measure_all(lines, base.cameras, sight, ASSESSING_SEARCH_PX)
     unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
-    held = _settled_on(base.pitch, base.cameras, measured, unknowns, stitch_weight)
-    scale = robust_scale(held.rows.value)
-    together = _together(held.rows, scale)
+    held, rows = _fitted(base.pitch, base.cameras, measured, unknowns, stitch_weight)
+    scale = robust_scale(rows.value)
+    together = _together(rows, scale)
     tried = []
     for length in np.arange(0.0, base.pitch.length, SPACING_M).tolist():
-        found = _settled_on(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns, stitch_weight)
-        loss = float(np.sum(tukey_loss(found.rows.value, scale))) + found.strain
-        tried.append(RidgeTrial(found.pitch, loss / together))
-    return RidgeTrials(held.pitch, tried)
+        there, left = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns, stitch_weight)
+        away = there.away(base.cameras)
+        loss = float(np.sum(tukey_loss(left.value, scale))) + float(away @ there.prior(unknowns) @ away)
+        tried.append(TriedRidge(there.pitch, loss / together))
+    return TriedRidges(held.pitch, tried)
 
 
-@dataclass(frozen=True)
-class _Found:
-    """What was found with a ridge: the `pitch`, the `rows` that are left, the `strain` of what was thought before."""
-
-    pitch: Field
-    rows: Residuals
-    strain: float
-
-
-def _settled_on(
+def _fitted(
     pitch: Field,
     cameras: Sequence[Camera],
     measured: Sequence[Measurements],
     unknowns: Unknowns,
     stitch_weight: float,
-) -> _Found:
+) -> tuple[Estimate, Residuals]:
+    """Everything else found for a pitch, and what is left of the lines then."""
     here = Estimate.at(pitch, cameras, unknowns)
     for _ in range(STEPS):
         unknowns = unknowns.around(here.pitch, here.lines)
         here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
     rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
-    away = here.away(cameras)
-    return _Found(here.pitch, rows, float(away @ here.prior(unknowns) @ away))
+    return here, rows
 
 
 def _together(rows: Residuals, scale: float) -> float:

@@ -52,7 +52,8 @@ class LinePoints:
     """Points on the centres of markings, N of them.
 
     `position` (N, 3) metres; unit `tangent` (N, 3) along the line and unit `normal` (N, 3) across it in the surface;
-    `width` (N,) of the line; `marking` (N,) which of `Field.markings()`; `spacing` along the line.
+    `width` (N,) of the line; `marking` (N,) which of `Field.markings()`; `colour` (N,) of its paint; `spacing` along
+    the line.
     """
 
     position: Array
@@ -60,6 +61,7 @@ class LinePoints:
     normal: Array
     width: Array
     marking: NDArray[np.intp]
+    colour: NDArray[np.str_]
     spacing: float
 
     def __len__(self) -> int:
@@ -72,6 +74,7 @@ class LinePoints:
             self.normal[chosen],
             self.width[chosen],
             self.marking[chosen],
+            self.colour[chosen],
             self.spacing,
         )
 
@@ -197,14 +200,15 @@ class Field:
             tangents.append(along)
             widths.append(np.full(len(xy), marking.width))
             index.append(np.full(len(xy), number))
-        xy, along = np.concatenate(positions), np.concatenate(tangents)
+        xy, along, which = np.concatenate(positions), np.concatenate(tangents), np.concatenate(index)
         across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
         return LinePoints(
             self.lift(xy),
             self._in_surface(xy, along),
             self._in_surface(xy, across),
             np.concatenate(widths),
-            np.concatenate(index),
+            which,
+            np.array([marking.colour for marking in self.markings()])[which],
             spacing,
         )
 

@@ -64,7 +64,7 @@ class Objective:
             blurred = BlurredResponse.from_response(response, sigma)
             surround = BlurredResponse.from_response(response, SURROUND * sigma)
             self.singles.append(SingleTerm.build(lines, camera, blurred.minus(surround), sigma))
-            views.append(View(camera, blurred, sigma))
+            views.append(BlurredView(camera, blurred, sigma))
         pairs = [StitchTerm.build(lines, a, b, i, j) for (i, a), (j, b) in combinations(enumerate(views), 2)]
         self.pairs = [pair for pair in pairs if pair is not None]
         self.stitch_weight = stitch_weight if self.pairs else 0.0
@@ -115,7 +115,7 @@ class BlurredResponse:
 
 
 @dataclass(frozen=True)
-class View:
+class BlurredView:
     """One camera at the pose a level starts from, and its blurred response."""
 
     camera: Camera
@@ -167,12 +167,12 @@ class StitchTerm:
 
     points: Plane
     weight: Response
-    views: tuple[View, View]
+    views: tuple[BlurredView, BlurredView]
     heights: tuple[Response, Response]
     indices: tuple[int, int]
 
     @classmethod
-    def build(cls, lines: LinePoints, first: View, second: View, i: int, j: int) -> StitchTerm | None:
+    def build(cls, lines: LinePoints, first: BlurredView, second: BlurredView, i: int, j: int) -> StitchTerm | None:
         """The term for the cameras of index i and j; None where they share no markings."""
         both = lines[
             inside(first.camera.project(lines.position), first.camera.intrinsics.size)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import LinePoints
 from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.line_measurement import LEAST_ALONG, line_profiles
+from worker.calibration.see.contrast import Channels
+from worker.calibration.see.line_matching import LEAST_ALONG, match_lines
 from worker.calibration.see.sampling import bilinear
 
 TOLERANCE_PX = 3.0
@@ -83,23 +84,20 @@ def _mean(values: Array | NDArray[np.bool_], weight: Array) -> float:
     return float(np.sum(values * weight)) / total if total else 0.0
 
 
-def evidence_of(
-    lines: LinePoints, camera: Camera, brightness: NDArray[np.float32], response: NDArray[np.float32]
-) -> Evidence:
+def evidence_of(lines: LinePoints, camera: Camera, channels: Channels, response: NDArray[np.float32]) -> Evidence:
     """How much of `lines` the frame shows where the pose of `camera` puts them.
 
-    `brightness` (H, W) see `line_measurement.brightness_of`; `response` (H, W) the segmentation in 0..1.
+    `channels` of the frame; `response` (H, W) the segmentation in 0..1.
     """
     scale = camera.intrinsics.relative_size
     tolerance, beside = max(TOLERANCE_PX * scale, 2.0), max(CHANCE_REACH_PX * scale, 24.0)
     seen = SeenLines.from_camera(lines, camera)
     parts = []
-    for looked in line_profiles(seen, brightness, tolerance + beside, scale):
+    for looked in match_lines(seen, channels, tolerance + beside, scale):
         pieces = seen[looked.which]
         where = pieces.pixel[:, None] + looked.shifts[None, :, None] * pieces.normal[:, None]
         network = bilinear(response, where) / (MARKING * np.minimum(pieces.width_px, 1.0))[:, None]
-        # Of either polarity: black lines on a light floor are lines too.
-        strength = np.maximum(np.abs(looked.along) / LEAST_ALONG, network)
+        strength = np.maximum(looked.along / LEAST_ALONG, network)
         near = np.abs(looked.shifts) <= tolerance
         away = np.abs(looked.shifts) > min(2 * tolerance + pieces.width_px.max(initial=0) / 2, beside)
         # As many shifts at a time as there are around the expected place, and all that there are beside a wide line.

@@ -1,6 +1,6 @@
 """Whether the markings can be seen at all, near where a pose that may be some degrees off expects them.
 
-    sight = look_for_lines(grey, seen_lines, reach_px)
+    sight = look_for_lines(picture, seen_lines, reach_px)
 
 No network and no search for a pose: thin bright or dark streaks along the expected directions, in a picture of some
 thousand columns. The lines of one camera move together when it turns, so the one shift that most of them agree on is
@@ -11,30 +11,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array
+from worker.calibration.scene.camera import Array, Frame
 from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.see.streaks import LEAST_CONTRAST, Streaks
 
-Grey = NDArray[np.uint8]
-
-DIRECTIONS = 8
-"""Streaks are looked for in so many directions; between two of them little is lost."""
-BESIDE_PX = 3
-"""How far beside the middle of a streak its surroundings are read."""
-WIDEST_PX = 2.5
-"""Lines wider than that are looked for in a picture half as large, or again half of that."""
-LEVELS = 3
-ALONG_PX = 3
-"""A streak is averaged over so much of its length, to either side."""
 COARSE_PX = 6
 """Step between the shifts that are tried; what a streak reaches is widened by as much."""
 NEAR_PX = 12
 """How far from the common shift a line may be: a turn bends what it shifts, and the place may be off as well."""
-LEAST_CONTRAST = 5.0
-"""Of 255: fainter streaks are texture, and nothing after this could measure them."""
 AGREED_PX = 2.5
 """How far apart two neighbours on one line may find it."""
 STANDS_OUT = 1.6
@@ -67,11 +54,11 @@ class LinesInSight:
     contrast: Array
 
 
-def look_for_lines(grey: Grey, lines: SeenLines, reach_px: float) -> LinesInSight:
-    """Look for `lines` in a picture (H, W) that may be shifted by `reach_px` each way."""
+def look_for_lines(picture: Frame, lines: SeenLines, reach_px: float) -> LinesInSight:
+    """Look for `lines` in a picture (H, W, 3) that may be shifted by `reach_px` each way."""
     if len(lines) == 0:
         return LinesInSight(np.empty((0, 2)), np.empty(0, dtype=bool), np.empty(0))
-    streaks = _Streaks.of(grey)
+    streaks = Streaks.of(picture)
     at: Array = lines.pixel + _common_shift(streaks, lines, reach_px)
     for _ in range(SETTLING_STEPS):
         offset, contrast, found = _match(streaks, lines, at)
@@ -80,7 +67,7 @@ def look_for_lines(grey: Grey, lines: SeenLines, reach_px: float) -> LinesInSigh
     return LinesInSight(at, found, contrast)
 
 
-def _match(streaks: _Streaks, lines: SeenLines, at: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _match(streaks: Streaks, lines: SeenLines, at: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Where along its normal each line is strongest, near `at` (N, 2): offset, contrast, and whether it is a line."""
     steps = np.arange(-NEAR_PX, NEAR_PX + 1)
     near, *beside = (
@@ -124,11 +111,12 @@ def _agreeing(offset: NDArray[np.intp], lines: SeenLines) -> NDArray[np.bool_]:
     return np.concatenate([[False], agree]) | np.concatenate([agree, [False]])
 
 
-def _common_shift(streaks: _Streaks, lines: SeenLines, reach_px: float) -> Array:
+def _common_shift(streaks: Streaks, lines: SeenLines, reach_px: float) -> Array:
     """The shift (N, 2) at which most lines lie on streaks: the same for all but for a turn about the middle."""
     steps = COARSE_PX * np.arange(-int(reach_px // COARSE_PX), int(reach_px // COARSE_PX) + 1)
     shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    wide, few = streaks.widened(), lines[np.linspace(0, len(lines) - 1, min(MOST_TRIED, len(lines))).astype(np.intp)]
+    wide = streaks.widened(COARSE_PX)
+    few = lines[np.linspace(0, len(lines) - 1, min(MOST_TRIED, len(lines))).astype(np.intp)]
     far = FAR_COSTS * np.hypot(*shifts.T) / max(reach_px, 1.0)
     scores = []
     for roll in ROLLS_RAD:
@@ -142,79 +130,3 @@ def _turned(pixel: Array, of: Array, angle: float) -> Array:
     """By how much pixels (N, 2) move when the picture turns about the middle of others by a small angle."""
     away = pixel - of.mean(axis=0)
     return angle * np.stack([-away[:, 1], away[:, 0]], axis=1)
-
-
-@dataclass(frozen=True)
-class _Streaks:
-    """How much (levels, directions, H, W) a pixel stands out from both sides; coarser levels are repeated to size."""
-
-    strength: tuple[NDArray[np.uint8], ...]
-
-    @classmethod
-    def of(cls, grey: Grey) -> _Streaks:
-        levels = []
-        for level in range(LEVELS):
-            small = (
-                grey
-                if level == 0
-                else cv2.resize(grey, None, fx=0.5**level, fy=0.5**level, interpolation=cv2.INTER_AREA)
-            )
-            levels.append(_streaks(np.asarray(small)))
-        return cls(tuple(levels))
-
-    def widened(self) -> _Streaks:
-        return _Streaks(
-            tuple(
-                np.stack([cv2.dilate(plane, np.ones((COARSE_PX // 2**level | 1,) * 2, np.uint8)) for plane in planes])
-                for level, planes in enumerate(self.strength)
-            )
-        )
-
-    def read(self, lines: SeenLines, pixels: Array) -> NDArray[np.float32]:
-        """Strength (N, K) at pixels (N, K, 2) of streaks as wide as N lines and in their directions; 0 outside."""
-        level, direction = _level(lines.width_px), _direction(lines.normal)[:, None]
-        values = np.zeros(pixels.shape[:-1], np.float32)
-        for number, planes in enumerate(self.strength):
-            chosen = np.flatnonzero(level == number)
-            if len(chosen) == 0:
-                continue
-            _, height, width = planes.shape
-            column, row = (np.floor((pixels[chosen, :, axis] + 0.5) / 2**number).astype(np.int32) for axis in (0, 1))
-            inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
-            here = planes[direction[chosen], np.where(inside, row, 0), np.where(inside, column, 0)]
-            values[chosen] = np.where(inside, here, 0)
-        return values
-
-
-def _streaks(grey: Grey) -> NDArray[np.uint8]:
-    """Strength (directions, H, W) of streaks across which the normal points at multiples of 180° / `DIRECTIONS`."""
-    border = BESIDE_PX + ALONG_PX + 2
-    height, width = grey.shape
-    result = np.empty((DIRECTIONS, height, width), np.uint8)
-    padded = np.pad(cv2.GaussianBlur(grey, (3, 3), 0), border, mode="edge").astype(np.uint8)
-    for number in range(DIRECTIONS):
-        angle = np.pi * number / DIRECTIONS
-        normal = np.array([np.cos(angle), np.sin(angle)])
-        along = np.rint(ALONG_PX * np.array([-normal[1], normal[0]])).astype(int)
-        across = np.rint(BESIDE_PX * normal).astype(int)
-        both = cv2.addWeighted(_moved(padded, along, ALONG_PX), 0.5, _moved(padded, -along, ALONG_PX), 0.5, 0)
-        line = np.asarray(cv2.addWeighted(both, 2 / 3, _moved(padded, 0 * along, ALONG_PX), 1 / 3, 0), dtype=np.uint8)
-        inner, one, other = (_moved(line, side * across, BESIDE_PX + 2) for side in (0, 1, -1))
-        bright = cv2.min(cv2.subtract(inner, one), cv2.subtract(inner, other))
-        dark = cv2.min(cv2.subtract(one, inner), cv2.subtract(other, inner))
-        result[number] = cv2.max(bright, dark)
-    return result
-
-
-def _moved(padded: NDArray[np.uint8], by: NDArray[np.intp], border: int) -> NDArray[np.uint8]:
-    height, width = padded.shape
-    return padded[border + by[1] : height - border + by[1], border + by[0] : width - border + by[0]]
-
-
-def _level(width_px: Array) -> NDArray[np.intp]:
-    return np.clip(np.ceil(np.log2(np.maximum(width_px, 1e-3) / WIDEST_PX)), 0, LEVELS - 1).astype(np.intp)
-
-
-def _direction(normal: Array) -> NDArray[np.intp]:
-    angle = np.arctan2(normal[:, 1], normal[:, 0])
-    return np.rint(angle / (np.pi / DIRECTIONS)).astype(np.intp) % DIRECTIONS

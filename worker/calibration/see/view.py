@@ -130,7 +130,7 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: ViewFigures | Non
     lines = _expected_lines(pitch, reduced)
     ground = _Ground.of(pitch, reduced)
     cells = _Cells.of(small, ground.size)
-    sight = look_for_lines(grey, lines, REACH_RAD * float(reduced.intrinsics.matrix[0, 0]))
+    sight = look_for_lines(small, lines, REACH_RAD * float(reduced.intrinsics.matrix[0, 0]))
     lost = ground.field & _lost(sight, ground)
     noise = _noise(frame, ground.field)
     sharpness = _Sharpness.of(frame, grey, ground.field, lost)

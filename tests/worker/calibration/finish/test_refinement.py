@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 
@@ -17,12 +18,14 @@ from tests.worker.calibration.synthetic import (
 )
 from worker.calibration.finish.refinement import Sight, assess, refine
 from worker.calibration.finish.robust import huber_weights, tukey_weights
-from worker.calibration.judge.quality import Gate, Sigma
+from worker.calibration.judge.quality import Gate
 from worker.calibration.judge.registration import stitch_error_px
 from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import free_focal_lengths, free_ridge, lens_parameters
-from worker.calibration.see.line_measurement import brightness_of, expected_profiles, measure_lines, sliding_correlation
+from worker.calibration.see.contrast import Channels
+from worker.calibration.see.line_matching import expected_profiles, sliding_correlation
+from worker.calibration.see.line_measurement import measure_lines
 
 SMALL_TURN = (0.0008, -0.0006, 0.0005)
 SMALL_SHIFT = (0.02, -0.03, 0.02)
@@ -31,8 +34,8 @@ SMALL_SHIFT = (0.02, -0.03, 0.02)
 @cache
 def scene():
     cameras = pair()
-    brightness = [brightness_of(paint_frame(CROWNED, c)).astype(np.float32) for c in cameras]
-    return cameras, brightness, [paint_markings(CROWNED, c) for c in cameras]
+    channels = [Channels([paint_frame(CROWNED, c)]) for c in cameras]
+    return cameras, channels, [paint_markings(CROWNED, c) for c in cameras]
 
 
 def off_by(cameras, refined):
@@ -46,9 +49,9 @@ def off_by(cameras, refined):
 
 
 def test_lines_are_found_where_they_are():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     wrong = moved(cameras[0], SMALL_TURN)
-    found = measure_lines(CROWNED.line_points(), wrong, brightness[0], responses[0], 6.0)
+    found = measure_lines(CROWNED.line_points(), wrong, channels[0], responses[0], 6.0)
     truth = cameras[0].project(found.points.position)
     off = np.sum((found.pixel - truth) * found.normal, axis=1)
     assert len(found) > 300
@@ -57,25 +60,25 @@ def test_lines_are_found_where_they_are():
 
 
 def test_lines_that_the_network_misses_are_measured_by_their_ridges():
-    cameras, brightness, responses = scene()
-    found = measure_lines(CROWNED.line_points(), cameras[0], brightness[0], np.zeros_like(responses[0]), 6.0)
+    cameras, channels, responses = scene()
+    found = measure_lines(CROWNED.line_points(), cameras[0], channels[0], np.zeros_like(responses[0]), 6.0)
     truth = cameras[0].project(found.points.position)
     assert len(found) > 300
     assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
 
 
 def test_ridges_that_do_not_go_on_along_a_line_are_not_measured():
-    cameras, brightness, responses = scene()
-    noise = np.random.default_rng(3).normal(100, 20, brightness[0].shape).astype(np.float32)
-    found = measure_lines(CROWNED.line_points(), cameras[0], noise, np.zeros_like(responses[0]), 6.0)
-    seen = measure_lines(CROWNED.line_points(), cameras[0], brightness[0], responses[0], 6.0)
+    cameras, channels, responses = scene()
+    noise = np.random.default_rng(3).normal(100, 20, (*responses[0].shape, 3)).astype(np.uint8)
+    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([noise]), np.zeros_like(responses[0]), 6.0)
+    seen = measure_lines(CROWNED.line_points(), cameras[0], channels[0], responses[0], 6.0)
     assert len(found) < 0.2 * len(seen)
 
 
 def test_lines_darker_than_their_ground_are_measured_where_they_are():
-    cameras, brightness, responses = scene()
-    negative = np.float32(255) - brightness[0]
-    found = measure_lines(CROWNED.line_points(), cameras[0], negative, np.zeros_like(responses[0]), 6.0)
+    cameras, _, responses = scene()
+    negative = 255 - paint_frame(CROWNED, cameras[0])
+    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([negative]), np.zeros_like(responses[0]), 6.0)
     truth = cameras[0].project(found.points.position)
     assert len(found) > 300
     assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
@@ -94,62 +97,64 @@ def test_the_filter_fits_best_at_the_centre_of_its_line(width, shift):
 
 
 def test_slightly_moved_cameras_come_back_to_where_they_were():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     start = [moved(c, SMALL_TURN, SMALL_SHIFT) for c in cameras]
-    refined = refine(CROWNED, start, Sight(brightness, responses), 0.5)
+    refined = refine(CROWNED, start, Sight(channels, responses), 0.5)
     for shift, turn in off_by(cameras, refined.cameras):
         assert shift < 0.02
         assert turn < 0.02
-    assert all(residual < 0.3 for residual in refined.residual_px)
+    assert all(one.residual_px < 0.3 for one in refined.each)
 
 
 def test_where_it_ends_does_not_depend_on_where_it_began():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     starts = ([moved(c, SMALL_TURN, SMALL_SHIFT) for c in cameras], [moved(c, (-0.0005, 0.0008, 0)) for c in cameras])
-    first, second = (refine(CROWNED, start, Sight(brightness, responses), 0.5).cameras for start in starts)
+    first, second = (refine(CROWNED, start, Sight(channels, responses), 0.5).cameras for start in starts)
     for shift, turn in off_by(first, second):
         assert shift < 0.002
         assert turn < 0.001
 
 
 def test_the_error_is_of_the_size_of_its_sigma():
-    cameras, brightness, responses = scene()
+    cameras, _, responses = scene()
     rng = np.random.default_rng(0)
-    noisy = [b + rng.normal(scale=12, size=b.shape).astype(np.float32) for b in brightness]
-    refined = refine(CROWNED, cameras, Sight(noisy, responses), 0.5)
-    for before, after, covariance in zip(cameras, refined.cameras, refined.covariance, strict=True):
-        error = after.pose.position - before.pose.position
-        assert (np.abs(error) < 4 * np.sqrt(np.diag(covariance)[3:])).all()
-        assert np.sqrt(np.diag(covariance)[3:]).max() < 0.1
+    frames = [paint_frame(CROWNED, c) for c in cameras]
+    noisy = [np.clip(f + rng.normal(scale=12, size=f.shape), 0, 255).astype(np.uint8) for f in frames]
+    refined = refine(CROWNED, cameras, Sight([Channels([f]) for f in noisy], responses), 0.5)
+    for before, after in zip(cameras, refined.each, strict=True):
+        error = after.camera.pose.position - before.pose.position
+        assert (np.abs(error) < 4 * np.sqrt(np.diag(after.covariance)[3:])).all()
+        assert np.sqrt(np.diag(after.covariance)[3:]).max() < 0.1
 
 
 def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     by_id = {c.id: r for c, r in zip(cameras, responses, strict=True)}
     longer, _ = free_focal_lengths(cameras)[0].applied(cameras, CROWNED, 2.0)
     alone, together = (
-        stitch_error_px(CROWNED, refine(CROWNED, longer, Sight(brightness, responses), weight).cameras, by_id)
+        stitch_error_px(CROWNED, refine(CROWNED, longer, Sight(channels, responses), weight).cameras, by_id)
         for weight in (0.0, 0.9)
     )
     assert together < alone / 2
 
 
 def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
-    cameras, brightness, responses = scene()
-    blind = Sight([brightness[0], np.zeros_like(brightness[1])], [responses[0], np.zeros_like(responses[1])])
+    cameras, channels, responses = scene()
+    black = Channels([np.zeros((*responses[1].shape, 3), dtype=np.uint8)])
+    blind = Sight([channels[0], black], [responses[0], np.zeros_like(responses[1])])
     refined = refine(CROWNED, cameras, blind, 0.5)
     np.testing.assert_array_equal(refined.cameras[1].pose.position, cameras[1].pose.position)
-    assert refined.covariance[1] is None
-    assert refined.residual_px[1] is None
-    assert refined.covariance[0] is not None
+    seeing, unseeing = refined.each
+    assert (unseeing.sigma, unseeing.repeatability, unseeing.residual_px) == (None, None, None)
+    assert seeing.sigma is not None
 
 
 def test_assessing_moves_nothing():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     start = [moved(c, SMALL_TURN) for c in cameras]
-    assessed = assess(CROWNED, start, Sight(brightness, responses), 0.5)
+    assessed = assess(CROWNED, start, Sight(channels, responses), 0.5)
     assert assessed.cameras == start
-    assert all(residual > 0.3 for residual in assessed.residual_px)
+    assert all(one.residual_px > 0.3 for one in assessed.each)
 
 
 def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
@@ -162,13 +167,11 @@ def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
 @pytest.mark.parametrize("distortion", [(), BARREL])
 def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(distortion):
     one = camera("left", (-30.0, -48.0, 10.0), (-30.0, -34.0), focal=900, distortion=distortion, size=(960, 240))
-    brightness = brightness_of(paint_frame(CROWNED, one)).astype(np.float32)
-    refined = refine(
-        CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], Sight([brightness], [paint_markings(CROWNED, one)]), 0.5
-    )
-    assert refined.residual_px[0] is not None
+    sight = Sight([Channels([paint_frame(CROWNED, one)])], [paint_markings(CROWNED, one)])
+    refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], sight, 0.5)
+    assert refined.each[0].residual_px is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
-    assert Sigma.from_covariance(refined.repeatability[0]).position_m > Gate().largest_sigma_m
+    assert refined.each[0].repeatability.position_m > Gate().largest_sigma_m
 
 
 @pytest.mark.parametrize("colour", [0, 2])
@@ -178,17 +181,15 @@ def test_blue_and_red_that_the_lens_puts_elsewhere_move_no_line(colour):
     fringed = frame.copy()
     fringed[:, 4:, colour] = frame[:, :-4, colour]
     lines, response = CROWNED.line_points(), paint_markings(CROWNED, one)
-    here, there = (
-        measure_lines(lines, one, brightness_of(f).astype(np.float32), response, 6.0) for f in (frame, fringed)
-    )
+    here, there = (measure_lines(lines, one, Channels([f]), response, 6.0) for f in (frame, fringed))
     np.testing.assert_array_equal(here.pixel, there.pixel)
 
 
 def test_the_end_is_the_same_from_both_sides_where_the_model_is_wrong():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     wrong = Field(CROWNED.length, CROWNED.width, CROWNED.line_width, CROWNED.ridge + [0.0, 0.0, 0.3])
     ends = [
-        refine(wrong, [moved(c, turn, shift) for c in cameras], Sight(brightness, responses), 0.5).cameras
+        refine(wrong, [moved(c, turn, shift) for c in cameras], Sight(channels, responses), 0.5).cameras
         for turn, shift in ((SMALL_TURN, SMALL_SHIFT), (tuple(-np.array(SMALL_TURN)), tuple(-np.array(SMALL_SHIFT))))
     ]
     for shift, turn in off_by(*ends):
@@ -203,10 +204,10 @@ def test_huber_believes_what_is_near_and_doubts_the_rest_the_more_the_farther():
 
 
 def test_a_focal_length_that_is_left_free_is_found_with_the_pose():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     longer, _ = free_focal_lengths(cameras)[0].applied(cameras, CROWNED, 1.5)
     start = [moved(c, SMALL_TURN, SMALL_SHIFT) for c in longer]
-    found = refine(CROWNED, start, Sight(brightness, responses), 0.5, free_focal_lengths(start))
+    found = refine(CROWNED, start, Sight(channels, responses), 0.5, free_focal_lengths(start))
     for true, after in zip(cameras, found.cameras, strict=True):
         assert after.intrinsics.matrix[0, 0] == pytest.approx(true.intrinsics.matrix[0, 0], abs=0.2)
         assert np.linalg.norm(after.pose.position - true.pose.position) < 0.02
@@ -215,9 +216,9 @@ def test_a_focal_length_that_is_left_free_is_found_with_the_pose():
 
 @pytest.mark.parametrize("start", [0.1, 0.35, 0.5])
 def test_a_ridge_that_is_left_free_is_found_with_the_poses(start):
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     wrong = CROWNED.raised(start - 0.35)
-    found = refine(wrong, cameras, Sight(brightness, responses), 0.5, free_ridge(wrong))
+    found = refine(wrong, cameras, Sight(channels, responses), 0.5, free_ridge(wrong))
     assert found.pitch.ridge[:, 2] == pytest.approx([0.35, 0.35], abs=0.03)
 
 
@@ -231,14 +232,14 @@ def test_a_ground_that_swells_is_found_and_does_not_move_the_cameras():
 
     object.__setattr__(uneven, "height", swelling)
     sight = Sight(
-        [brightness_of(paint_frame(uneven, c)).astype(np.float32) for c in cameras],
+        [Channels([paint_frame(uneven, c)]) for c in cameras],
         [paint_markings(uneven, c) for c in cameras],
     )
     refined = refine(CROWNED, cameras, sight, 0.5)
-    for (shift, turn), covariance in zip(off_by(cameras, refined.cameras), refined.covariance, strict=True):
+    for (shift, turn), one in zip(off_by(cameras, refined.cameras), refined.each, strict=True):
         assert shift < 0.05
         assert turn < 0.05
-        assert shift < 3 * Sigma.from_covariance(covariance).position_m
+        assert shift < 3 * one.sigma.position_m
 
 
 def deviation(refined, camera, name):
@@ -246,10 +247,10 @@ def deviation(refined, camera, name):
 
 
 def test_lines_tell_which_number_of_which_lens_is_wrong():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     bent = next(p for p in lens_parameters(cameras) if p.name == "k1")
     wrong, _ = bent.applied(cameras, CROWNED, 0.01)
-    refined = refine(CROWNED, wrong, Sight(brightness, responses), 0.5)
+    refined = refine(CROWNED, wrong, Sight(channels, responses), 0.5)
     found = deviation(refined, "left", "k1")
     assert found.value == pytest.approx(-0.01, abs=3 * found.sigma)
     assert abs(found.value) > 3 * found.sigma
@@ -257,37 +258,33 @@ def test_lines_tell_which_number_of_which_lens_is_wrong():
 
 
 def test_a_lens_and_a_field_that_are_right_are_not_suspected():
-    cameras, brightness, responses = scene()
-    refined = refine(CROWNED, cameras, Sight(brightness, responses), 0.5)
+    cameras, channels, responses = scene()
+    refined = refine(CROWNED, cameras, Sight(channels, responses), 0.5)
     assert all(abs(d.value) < max(3 * d.sigma, 0.1 * d.expected) for d in refined.deviations)
 
 
 def test_lines_tell_that_the_pitch_is_crowned_though_it_is_said_to_be_flat():
-    cameras, brightness, responses = scene()
-    refined = refine(CROWNED.flat(), cameras, Sight(brightness, responses), 0.5)
+    cameras, channels, responses = scene()
+    refined = refine(CROWNED.flat(), cameras, Sight(channels, responses), 0.5)
     found = deviation(refined, None, "ridge_height_m")
     assert found.value == pytest.approx(0.35, abs=max(3 * found.sigma, 0.1))
     assert found.value > 3 * found.sigma
 
 
 def test_a_camera_with_a_wrong_lens_is_less_sure_of_its_pose():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     bent = next(p for p in lens_parameters(cameras) if p.name == "k1")
     wrong, _ = bent.applied(cameras, CROWNED, 0.01)
-    right, unsure = (
-        Sigma.from_covariance(refine(CROWNED, c, Sight(brightness, responses), 0.5).covariance[0])
-        for c in (cameras, wrong)
-    )
-    assert unsure.position_m > 2 * right.position_m
+    right, unsure = (refine(CROWNED, c, Sight(channels, responses), 0.5).each[0] for c in (cameras, wrong))
+    assert unsure.sigma.position_m > 2 * right.sigma.position_m
 
 
 def test_the_same_wrong_lens_makes_the_next_pose_no_less_like_this_one():
-    cameras, brightness, responses = scene()
+    cameras, channels, responses = scene()
     bent = next(p for p in lens_parameters(cameras) if p.name == "k1")
     wrong, _ = bent.applied(cameras, CROWNED, 0.01)
-    refined = refine(CROWNED, wrong, Sight(brightness, responses), 0.5)
-    sigma, repeatability = (Sigma.from_covariance(c[0]) for c in (refined.covariance, refined.repeatability))
-    assert repeatability.position_m < sigma.position_m / 2
+    left = refine(CROWNED, wrong, Sight(channels, responses), 0.5).each[0]
+    assert left.repeatability.position_m < left.sigma.position_m / 2
 
 
 def offsets(found, one):
@@ -296,8 +293,8 @@ def offsets(found, one):
 
 
 def test_bent_lines_are_found_where_they_are():
-    cameras, brightness, responses = scene()
-    found = measure_lines(CROWNED.line_points(), cameras[0], brightness[0], responses[0], 3.0)
+    cameras, channels, responses = scene()
+    found = measure_lines(CROWNED.line_points(), cameras[0], channels[0], responses[0], 3.0)
     names = np.array([marking.name for marking in CROWNED.markings()])[found.points.marking]
     for name in ("centre circle", "left penalty arc"):
         # Along a straight tangent the arc would be 0.3 px off.
@@ -305,11 +302,11 @@ def test_bent_lines_are_found_where_they_are():
 
 
 def test_ground_that_is_brighter_on_one_side_does_not_pull_a_line():
-    cameras, brightness, responses = scene()
+    cameras, _, responses = scene()
     with np.errstate(invalid="ignore"):
         outside = ground_behind(CROWNED, cameras[0])[..., 1] < -CROWNED.width / 2
-    lit = brightness[0] + 40.0 * outside.astype(np.float32)
-    found = measure_lines(CROWNED.line_points(), cameras[0], lit, responses[0], 3.0)
+    lit = cv2.add(paint_frame(CROWNED, cameras[0]), 40 * np.dstack([outside] * 3).astype(np.uint8))
+    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([lit]), responses[0], 3.0)
     names = np.array([marking.name for marking in CROWNED.markings()])[found.points.marking]
     beside = offsets(found, cameras[0])[names == "near touchline"]
     assert len(beside) > 30

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings
-from worker.calibration.judge.quality import CameraQuality, Gate, Movement, Sigma, markings_iou, rejection
+from worker.calibration.finish.uncertainty import Sigma
+from worker.calibration.judge.quality import CameraResult, Gate, Movement, markings_iou, rejection
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition, ViewFigures
 
@@ -34,16 +35,16 @@ FOGGED = ViewCondition(False, "fogged", "far half", "Fogged (far half): most lik
 
 
 def good():
-    return CameraQuality(
-        scene()[0],
-        IN_VIEW,
-        0.9,
-        seen(0.95),
-        seen(0.3),
-        0.2,
-        Sigma(0.5, 0.1),
-        Sigma(0.01, 0.01),
-        Movement(0.5, 0.1, 12.0),
+    return CameraResult(
+        camera=scene()[0],
+        evidence=seen(0.95),
+        residual_px=0.2,
+        covariance=np.diag([0.005**2] * 3 + [0.05**2] * 3),
+        repeatability=Sigma(0.01, 0.01),
+        view=IN_VIEW,
+        iou=0.9,
+        evidence_before=seen(0.3),
+        moved=Movement(0.5, 0.1, 12.0),
     )
 
 

@@ -7,10 +7,11 @@ import pytest
 
 from fields.template import load
 from tests.worker.calibration.synthetic import BARREL, CROWNED, PITCH, camera, moved, paint_frame, paint_markings, pair
+from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.finish.refinement import Sight
-from worker.calibration.measures.field_fit import fit_measures
+from worker.calibration.measures.field_fit import fit_field, fit_measures
 from worker.calibration.scene.field import Field
-from worker.calibration.see.line_measurement import brightness_of
+from worker.calibration.see.contrast import Channels
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.timeout(600)
 def fitted(truth, cameras, given):
     """The pitch that the lines of `truth` make of a `given` one, by cameras a little off, and its measures by name."""
     sight = Sight(
-        [brightness_of(paint_frame(truth, c)).astype(np.float32) for c in cameras],
+        [Channels([paint_frame(truth, c)]) for c in cameras],
         [paint_markings(truth, c) for c in cameras],
     )
     start = [moved(c, (0.0008, -0.0006, 0.0005), (0.02, -0.03, 0.02)) for c in cameras]
@@ -74,6 +75,19 @@ def test_a_flat_pitch_has_no_ridge_worth_mentioning_and_none_whose_length_could_
     assert refined.pitch.ridge_height == pytest.approx(0.0, abs=0.03)
     assert not length.known
     assert "from 0 to 100 m" in length.detail
+
+
+def test_cameras_of_which_one_sees_nothing_are_left_where_they_are_and_no_measure_is_known():
+    frames = {c.id: [paint_frame(CROWNED, c)] for c in pair()}
+    frames["right"] = [np.zeros_like(frames["right"][0])]
+    steps = []
+    found = fit_field(CROWNED, pair(), frames, white_on_green, 1, steps.append)
+    assert found.rejected_because.startswith("camera right: Dark")
+    assert {step.stage for step in steps} == {"segmentation", "refinement"}
+    assert [result.moved.position_m for result in found.cameras] == [0.0, 0.0]
+    assert (found.pitch.length, found.pitch.width) == (105.0, 68.0)
+    assert [measure.known for measure in found.measures] == [False] * 4
+    assert found.measures[3].value == found.measures[3].given == 37.0
 
 
 def test_a_handball_court_that_is_narrower_than_said_is_found_though_it_has_fewer_dashes():

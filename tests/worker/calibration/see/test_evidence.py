@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings
+from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
+
+Colour = float | tuple[float, float, float]
 
 
 @cache
@@ -15,11 +18,16 @@ def scene():
     return one, paint_markings(CROWNED, one)
 
 
-def floor(level: float, paint: float, noise: float = 3.0) -> np.ndarray:
-    """Lines of one brightness on a floor of another, with the sensor's noise."""
+def frame(level: Colour, paint: Colour, noise: float = 3.0) -> np.ndarray:
+    """Lines of one colour (blue, green, red) on a floor of another, with the sensor's noise."""
     _, share = scene()
-    grain = np.random.default_rng(1).normal(0, noise, share.shape)
-    return (level + (paint - level) * share + grain).astype(np.float32)
+    grain = np.random.default_rng(1).normal(0, noise, (*share.shape, 3))
+    ground, lines = (np.broadcast_to(np.asarray(colour, float), 3) for colour in (level, paint))
+    return np.clip(ground + (lines - ground) * share[..., None] + grain, 0, 255).astype(np.uint8)
+
+
+def floor(level: Colour, paint: Colour, noise: float = 3.0) -> Channels:
+    return Channels([frame(level, paint, noise)])
 
 
 def blind() -> np.ndarray:
@@ -38,7 +46,11 @@ def test_a_wrong_pose_finds_hardly_more_than_chance():
     assert seen.agreement < 0.3
 
 
-@pytest.mark.parametrize(("level", "paint"), [(120, 230), (230, 60)], ids=["white on grey", "black on light"])
+@pytest.mark.parametrize(
+    ("level", "paint"),
+    [(120, 230), (230, 60), ((60, 110, 170), (200, 110, 40)), ((60, 150, 90), (30, 150, 235))],
+    ids=["white on grey", "black on light", "blue on wood", "orange on turf"],
+)
 def test_a_ridge_alone_is_witness_enough(level, paint):
     one, _ = scene()
     assert evidence_of(CROWNED.line_points(), one, floor(level, paint), blind()).agreement > 0.85
@@ -65,13 +77,13 @@ def test_a_bright_picture_without_lines_is_no_evidence():
 def test_a_marking_that_is_not_there_is_not_seen():
     one, _ = scene()
     names = [marking.name for marking in CROWNED.markings()]
-    frame = floor(90, 200)
+    picture = frame(90, 200)
     lines = CROWNED.line_points()
     halfway = lines[lines.marking == names.index("halfway line")]
     pixels = one.project(halfway.position)
     for x, y in np.rint(pixels[np.isfinite(pixels).all(axis=1)]).astype(int):
-        frame[max(y - 8, 0) : y + 9, max(x - 8, 0) : x + 9] = 90
-    seen = evidence_of(lines, one, frame, blind())
+        picture[max(y - 8, 0) : y + 9, max(x - 8, 0) : x + 9] = 90
+    seen = evidence_of(lines, one, Channels([picture]), blind())
     assert names.index("halfway line") not in seen.seen()
     assert names.index("centre circle") in seen.seen()
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from models.training.render import Conditions, render_frame
+from models.training.pitches.render import Conditions, render_frame
 from tests.worker.calibration.see import spoiling
 from tests.worker.calibration.synthetic import PITCH, camera, moved
 from worker.calibration.scene.field import Field

@@ -1,0 +1,1 @@
+"""What the network eats: pitches kept on disk, courts made as fast as they are learnt."""

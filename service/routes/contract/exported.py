@@ -1,0 +1,65 @@
+"""Poses in the formats of other tools: what venues and jobs answer alike."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Annotated, Any
+
+from fastapi import Query, Response
+
+from service.api.context import Context
+from service.formats.lens import Shot
+from service.formats.table import formats
+from service.routes.contract.documented import headers
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
+from service.wire.base import ID_PATTERN, FormatName
+from service.wire.problems import Problem
+from service.wire.venue import Venue
+
+BINARY = {"schema": {"type": "string", "format": "binary"}}
+# Of `responses=`: what a document can be.
+DOCUMENTS: dict[int | str, dict[str, Any]] = {
+    200: {
+        "content": {
+            **dict.fromkeys(("application/yaml", "application/zip", "application/octet-stream"), BINARY),
+            "application/json": {},
+        },
+        **headers("ETag"),
+    },
+    304: TAGGED[304],
+}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which part of a document a caller asks for, and which he has."""
+
+    camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None
+    if_none_match: IfNoneMatch = None
+
+
+def exported(context: Context, venue: Venue, called: str, form: FormatName, wanted: Wanted) -> Response:
+    """The poses of a venue as a file whose name begins with `called`."""
+    shots = _shots(venue, wanted.camera)
+    # What the document is made of names it: one that the caller has is not computed again.
+    made_of: list[Any] = [form, context.settings.freed_axes, version("esc-calibration")]
+    made_of += [[shot.number, shot.camera.model_dump(mode="json")] for shot in shots]
+
+    def document() -> Response:
+        written = formats(context.settings)[form].document(shots)
+        name = "-".join([called, *([wanted.camera] if wanted.camera else []), form])
+        head = {"Content-Disposition": f'attachment; filename="{name}.{written.suffix}"'}
+        return Response(written.content, headers=head, media_type=written.media_type)
+
+    return unless_known(json.dumps(made_of).encode(), wanted.if_none_match, document)
+
+
+def _shots(venue: Venue, camera: str | None) -> list[Shot]:
+    shots = [Shot(each, number) for number, each in enumerate(venue.cameras, start=1)]
+    chosen = [shot for shot in shots if camera in (None, shot.id)]
+    if not chosen:
+        ids = [shot.id for shot in shots]
+        raise Problem("unknown-camera", f"Ask for one of {', '.join(ids)}.", camera=camera, expected=ids)
+    return chosen

@@ -1,0 +1,46 @@
+"""Routes that insist on the scope that their documentation names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from service.api.body_limit import is_form
+from service.api.problems import not_json
+from service.routes.contract.documented import KEY_SCHEME, problems
+from service.wire.base import Scope
+
+
+class Guarded(APIRoute):
+    """A route with `openapi_extra=needs(...)`: its security requirement is what is documented and what is checked.
+
+    It is checked before the body is read; FastAPI reads a body before it calls any dependency.
+    """
+
+    def __init__(self, path: str, endpoint: Callable[..., Any], **rest: Any) -> None:
+        security = (rest.get("openapi_extra") or {}).get("security")
+        if security is None:
+            raise TypeError(f"{path} must say who may call it: openapi_extra=needs(a scope) or =FOR_ALL")
+        self.needed: Scope | None = security[0][KEY_SCHEME][0] if security else None
+        if self.needed:
+            rest["responses"] = {**problems(401, 403, 421, 429), **(rest.get("responses") or {})}
+        super().__init__(path, endpoint, **rest)
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Check, then handle."""
+        handle, needed = super().get_route_handler(), self.needed
+        takes_document = self.body_field is not None
+        if needed is None:
+            return handle
+
+        async def guarded(request: Request) -> Response:
+            request.state.key = await request.app.state.context.gate.admit(request, needed)
+            # Forms may be large, and here one would be held in memory only to be refused.
+            if takes_document and is_form(request):
+                raise not_json(request)
+            return await handle(request)
+
+        return guarded

@@ -1,0 +1,1 @@
+"""Pictures and clicks in, a job out, a kind of job each."""

@@ -1,0 +1,76 @@
+"""The frames of a job once more: a new job, from the poses that hold now."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from service.api.context import Context, InContext
+from service.routes.contract.documented import needs, problems, submitted
+from service.routes.contract.guarded import Guarded
+from service.routes.jobs import Existing
+from service.routes.submissions import forms, taking
+from service.routes.venues import no_such_venue
+from service.store.ids import new_id
+from service.store.jobs.files import frame_folder
+from service.store.jobs.submission import Submission
+from service.store.jobs.task import Origin
+from service.wire.job import Job
+from service.wire.problems import Problem
+from service.wire.venue import Venue
+
+router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
+
+
+@router.post(
+    "/{job_id}/again",
+    status_code=202,
+    response_model=Job,
+    openapi_extra=needs("calibrate"),
+    responses=submitted("It is being computed") | problems(404, 409, 410, 507),
+)
+def submit_again(job: Existing, request: Request, context: InContext) -> Response:
+    """Submit what a job was made of again, with its options, as long as its frames are kept."""
+    return submit(context, job, request.state.origin)
+
+
+def submit(context: Context, job: Job, origin: Origin) -> Response:
+    """Make a job's frames, which the store copies, a new job."""
+    forms.require_room(context)
+    before = context.submissions.of(job.id)
+    if before is None:
+        raise _gone(context, job)
+    if before.venue is not None:
+        _require_the_same(context, before.venue)
+    renewed = _renewed(before, origin)
+
+    def store() -> None:
+        for name, paths in before.frames.items():
+            for old, new in zip(paths, renewed.frames[name], strict=True):
+                if not context.blobs.copy(old, new):
+                    raise _gone(context, job)
+
+    return taking.answer(*taking.enqueued(context, renewed, store))
+
+
+def _renewed(before: Submission, origin: Origin) -> Submission:
+    job_id = new_id()
+    old, new = frame_folder(before.job_id), frame_folder(job_id)
+    frames = {name: [new + path.removeprefix(old) for path in paths] for name, paths in before.frames.items()}
+    renewed = {"job_id": job_id, "frames": frames, "idempotency_key": None, "origin": origin}
+    return before.model_copy(update=renewed)
+
+
+def _require_the_same(context: Context, then: Venue) -> None:
+    """Frames of another pitch, other cameras or lenses are frames of another venue."""
+    now = context.venues.get(then.id)
+    if now is None:
+        raise no_such_venue(then.id)
+    if not now.films_like(then):
+        raise Problem("venue-replaced", "Its pitch, cameras or lenses were changed since; send new frames.")
+
+
+def _gone(context: Context, job: Job) -> Problem:
+    days = f"{context.settings.keep_frames_days:g} days"
+    return Problem(
+        "frames-deleted", f"Frames are deleted {days} after the end of their job; send new ones.", job=job.id
+    )

@@ -1,0 +1,105 @@
+"""The forms that pictures come in: what is refused before it is read, the options and the frames in it."""
+
+from __future__ import annotations
+
+import json
+from contextlib import AbstractAsyncContextManager
+from typing import TypeVar
+
+from fastapi import Request
+from pydantic import ValidationError
+from starlette.datastructures import FormData, UploadFile
+
+from service.api.context import Context
+from service.api.problems import invalid
+from service.intake import images
+from service.routes.venues import no_such_venue
+from service.settings import Settings
+from service.wire import callback_urls
+from service.wire.base import OPTIONS_PART
+from service.wire.options import Handling
+from service.wire.problems import Problem
+from service.wire.venue import Venue
+
+LONGEST_OPTIONS = 64 * 1024
+PARTS_TOO_MANY = 100
+Chosen = TypeVar("Chosen", bound=Handling)
+
+
+def require_form(request: Request) -> None:
+    """Refuse what is no form before it is read."""
+    if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
+        raise Problem("not-multipart", "Send each picture as a file part of a form, as curl -F does.")
+
+
+def is_empty(request: Request) -> bool:
+    """Whether a request has no body."""
+    return request.headers.get("content-length", "0") == "0" and "transfer-encoding" not in request.headers
+
+
+def has_no_frames(form: FormData) -> bool:
+    """Whether a form has options at most."""
+    return all(name == OPTIONS_PART for name in form)
+
+
+def require_room(context: Context) -> None:
+    """Refuse an upload that would fill the disk before it is read."""
+    if context.disk.short():
+        raise Problem(
+            "disk-full",
+            f"Less than {context.disk.least_bytes / 1e6:.0f} MB are free where the service keeps its files. Free some, "
+            "keep frames and pictures for fewer days (ESC_KEEP_FRAMES_DAYS, ESC_KEEP_PICTURES_DAYS), or lower "
+            "ESC_MIN_FREE_MB.",
+        )
+
+
+def expecting(context: Context, venue_id: str) -> Venue:
+    """The venue that frames arrive for, if there is room for them: the upload is not read before."""
+    stored = context.venues.get(venue_id)
+    if stored is None:
+        raise no_such_venue(venue_id)
+    require_room(context)
+    return stored
+
+
+def form_of(request: Request, most_files: int) -> AbstractAsyncContextManager[FormData]:
+    """The form of a request, with so many files at most; a few too many get the answer that names them."""
+    # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time.
+    return request.form(max_files=most_files + PARTS_TOO_MANY, max_fields=PARTS_TOO_MANY, max_part_size=LONGEST_OPTIONS)
+
+
+def most_frames(context: Context, venue: Venue) -> int:
+    """How many frames the cameras of a venue may have together."""
+    return len(venue.cameras) * context.settings.max_frames_per_camera
+
+
+def options_of(form: FormData, model: type[Chosen], settings: Settings) -> Chosen:
+    """The part `options`; without one, what the model is when nothing is chosen."""
+    parts = form.getlist(OPTIONS_PART)
+    if len(parts) > 1:
+        raise Problem("invalid-request", "Send one options part.", errors=[])
+    part = parts[0] if parts else "{}"
+    try:
+        data: str | bytes = part.file.read(LONGEST_OPTIONS + 1) if isinstance(part, UploadFile) else part
+        options = model.model_validate(json.loads(data))
+    except ValidationError as error:
+        raise invalid(error, OPTIONS_PART) from None
+    except (ValueError, RecursionError):
+        raise Problem("invalid-request", "The options part is not JSON.", errors=[]) from None
+    if options.callback_url is not None:
+        callback_urls.check(options.callback_url, settings)
+    return options
+
+
+def frames_of(venue: Venue, form: FormData, context: Context) -> dict[str, list[UploadFile]]:
+    """The frames of each camera of a venue, none of which may be missing."""
+    names = [name for name, _ in form.multi_items() if name != OPTIONS_PART]
+    images.check_cameras(venue, {name: names.count(name) for name in names}, context.settings)
+    files: dict[str, list[UploadFile]] = {camera.id: [] for camera in venue.cameras}
+    for name, part in form.multi_items():
+        if name == OPTIONS_PART:
+            continue
+        if not isinstance(part, UploadFile):
+            raise Problem("not-a-file", f"Send camera {name} as a file, with curl: -F {name}=@frame.jpg", camera=name)
+        files[name].append(part)
+    return files

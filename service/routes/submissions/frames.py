@@ -1,0 +1,85 @@
+"""Frames of all cameras of a venue in, a job out: checked once, stored, and queued before the answer leaves."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import FormData
+
+from service.api.context import Context, InContext, VenueIdPath
+from service.intake.submit import REFUSALS
+from service.routes.contract.documented import frames_form, needs, problems, submitted
+from service.routes.contract.guarded import Guarded
+from service.routes.submissions import forms, taking
+from service.routes.submissions.taking import FromSender, Sender
+from service.wire.job import Job
+from service.wire.options import FieldOptions, Options
+from service.wire.venue import Venue
+
+router = APIRouter(tags=["jobs"], route_class=Guarded)
+
+
+@router.post(
+    "/venues/{venue_id}/calibrate",
+    status_code=202,
+    response_model=Job,
+    responses=submitted() | problems(400, 404, 408, 409, 413, 415, 422, 429, 502, 507),
+    openapi_extra=frames_form(Options, required=False) | needs("calibrate"),
+)
+async def calibrate(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
+    """Submit a frame (or several) per camera, or none at all. Follow the job at `Location`.
+
+    Without frames (no body, or a form with `options` alone) the service fetches one from the source of each camera.
+    """
+    if forms.is_empty(request):
+        stored = await run_in_threadpool(forms.expecting, context, venue_id)
+        return await run_in_threadpool(fetch, context, stored, Options(), sender)
+    return await _uploaded(Options, venue_id, request, context, sender)
+
+
+@router.post(
+    "/venues/{venue_id}/field/fit",
+    status_code=202,
+    response_model=Job,
+    responses=submitted() | problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
+    openapi_extra=frames_form(FieldOptions) | needs("calibrate"),
+)
+async def fit_field(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
+    """Fit length, width and ridge of the pitch to the frames of all cameras. The stored venue stays as it is.
+
+    The result has each measure with its sigma, says which the frames cannot tell and why, and has a `field` to be put
+    into the venue.
+    """
+    return await _uploaded(FieldOptions, venue_id, request, context, sender)
+
+
+async def _uploaded(
+    model: type[Options | FieldOptions], venue_id: str, request: Request, context: Context, sender: Sender
+) -> Response:
+    forms.require_form(request)
+    stored = await run_in_threadpool(forms.expecting, context, venue_id)
+    async with forms.form_of(request, forms.most_frames(context, stored)) as form:
+        return await run_in_threadpool(submit, context, stored, form, model, sender)
+
+
+def submit(
+    context: Context, venue: Venue, form: FormData, model: type[Options | FieldOptions], sender: Sender
+) -> Response:
+    """Make a form, with options of this `model`, a job of `venue`, which is the venue before the form arrived."""
+    options = forms.options_of(form, model, context.settings)
+    fetched = forms.has_no_frames(form) and any(camera.source for camera in venue.cameras)
+    if fetched and isinstance(options, Options):
+        return fetch(context, venue, options, sender)
+    files = forms.frames_of(venue, form, context)
+    return taking.answer(*taking.take(context, venue, options, files, sender))
+
+
+def fetch(context: Context, venue: Venue, options: Options, sender: Sender) -> Response:
+    """Make what the cameras of `venue` show now a job."""
+    try:
+        job, new = context.from_sources.calibrate(
+            venue, options, sender.idempotency_key, sender.origin, context.queue.enqueue
+        )
+    except REFUSALS as refusal:
+        raise taking.in_words(refusal, venue.id, context.settings) from None
+    return taking.answer(job, new)

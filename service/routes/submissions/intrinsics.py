@@ -1,0 +1,87 @@
+"""Photos of a board in, a job out that finds the lens."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+from fastapi import APIRouter, Request, Response
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import FormData, UploadFile
+
+from service.api.context import Context, InContext
+from service.routes.contract.documented import FILE, form, needs, problems, submitted
+from service.routes.contract.guarded import Guarded
+from service.routes.submissions import forms, taking
+from service.routes.submissions.taking import FromSender, Sender
+from service.wire.base import OPTIONS_PART, PHOTOS_PART
+from service.wire.job import Job
+from service.wire.options import IntrinsicsOptions
+from service.wire.problems import Problem
+
+router = APIRouter(tags=["jobs"], route_class=Guarded)
+
+LONGEST_NAME = 100
+UPLOAD = form(
+    IntrinsicsOptions,
+    "JPEG or PNG photos of one board, all by one camera in one size, each a part `photos` with its file name.",
+    needed=[OPTIONS_PART, PHOTOS_PART],
+    parts={PHOTOS_PART: {"type": "array", "items": FILE}},
+    others=False,
+)
+
+
+@router.post(
+    "/intrinsics",
+    status_code=202,
+    response_model=Job,
+    responses=submitted() | problems(400, 408, 413, 415, 422, 429, 507),
+    openapi_extra=UPLOAD | needs("calibrate"),
+)
+async def intrinsics(
+    request: Request,
+    context: InContext,
+    sender: FromSender,
+) -> Response:
+    """Submit photos of a board: the job's result is the lens of the camera that took them, `coverage.jpg` its basis."""
+    forms.require_form(request)
+    await run_in_threadpool(forms.require_room, context)
+    async with forms.form_of(request, context.settings.max_photos) as form:
+        return await run_in_threadpool(_submit, context, form, sender)
+
+
+def _submit(context: Context, form: FormData, sender: Sender) -> Response:
+    options = forms.options_of(form, IntrinsicsOptions, context.settings)
+    return taking.answer(*taking.take(context, None, options, _photos(form, context), sender))
+
+
+def _photos(form: FormData, context: Context) -> dict[str, list[UploadFile]]:
+    """The photos by their names, those that share one told apart by a number."""
+    files: dict[str, list[UploadFile]] = {}
+    for part_name, part in form.multi_items():
+        if part_name == OPTIONS_PART:
+            continue
+        if part_name != PHOTOS_PART or not isinstance(part, UploadFile):
+            raise Problem(
+                "not-a-file",
+                f"Send each photo as a file part named {PHOTOS_PART}, with curl: -F {PHOTOS_PART}=@board1.jpg",
+                got=part_name[:64],
+            )
+        name = printable_name(part.filename, len(files))
+        files[name if name not in files else f"{name} ({len(files) + 1})"] = [part]
+    if not files:
+        raise Problem("missing-photos", f"Send photos of the board as file parts named {PHOTOS_PART}.")
+    if len(files) > context.settings.max_photos:
+        raise Problem(
+            "too-many-photos",
+            f"Send at most {context.settings.max_photos} photos; 15 to 30 good ones are enough.",
+            expected=context.settings.max_photos,
+            got=len(files),
+        )
+    return files
+
+
+def printable_name(filename: str | None, number: int) -> str:
+    """The last part of a file name, as far as it can be printed."""
+    last = PurePath((filename or "").replace("\\", "/")).name
+    shown = "".join(letter for letter in last if letter.isprintable())[-LONGEST_NAME:]
+    return shown or f"photo {number + 1}"

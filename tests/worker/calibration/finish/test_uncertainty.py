@@ -1,0 +1,49 @@
+"""How sure the finish is: its sigmas are as large as its errors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fields.template import load
+from tests.worker.calibration.synthetic import camera
+from worker.calibration.finish.estimate import Estimate, step
+from worker.calibration.finish.residuals import Unknowns
+from worker.calibration.finish.robust import tukey_weights
+from worker.calibration.finish.uncertainty import judged
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.ground import Ground
+from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.see.evidence import Evidence
+from worker.calibration.see.line_measurement import Measurements
+
+MISFIT_PX = 2.0
+EVEN_M = 1e-4
+TRIALS = 200
+
+
+def measured(lines, one):
+    """Each visible piece of line where it is, expected to be off by some pixels."""
+    seen = SeenLines.from_camera(lines, one)
+    across = (seen.normal, seen.px_per_metre, seen.px_per_metre_up)
+    return Measurements(seen.index, seen.points, seen.pixel, *across, seen.length_px, MISFIT_PX)
+
+
+def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
+    court = Field(40.0, 20.0, 0.05, template=load("handball"))
+    one, rng = camera("left", (-9.0, -15.0, 7.0), (-6.0, 0.0), focal=500.0), np.random.default_rng(0)
+    lines = court.line_points()
+    exact, unknowns = measured(lines, one), Unknowns(1, [], Ground.under(lines))
+    nothing = Evidence(np.empty(0, int), np.empty(0, int), np.empty(0), np.empty(0, bool), np.empty(0))
+    errors, said = [], []
+    for trial in range(TRIALS):
+        off = rng.normal(scale=exact.sigma_px)[:, None] * exact.normal
+        found = [replace(exact, pixel=exact.pixel + off)]
+        here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
+        for _ in range(4):
+            here = step(here, [one], found, unknowns, 0.5, tukey_weights)
+        errors.append(here.cameras[0].pose.position - one.pose.position)
+        if trial % 10 == 0:
+            said.append(judged(here, [one], found, [nothing], unknowns, 0.5).each[0].repeatability.position_m)
+    spread = np.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
+    assert np.mean(said) == pytest.approx(spread, rel=0.15)

@@ -1,0 +1,132 @@
+"""What goes into the engine and what comes out of it: options, progress, answers, errors."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.finish.diagnosis import Suspicion
+from worker.calibration.judge.quality import CameraResult
+from worker.calibration.scene.camera import Frame
+from worker.calibration.scene.field import Field
+from worker.calibration.see.segmentation import Region
+
+Preset = Literal["esc", "paper", "scpr"]
+Stage = Literal["segmentation", "evolution", "refinement", "preview"]
+
+SHARE_OF_JOB = {"segmentation": (0.0, 0.65), "evolution": (0.65, 0.85), "refinement": (0.85, 0.92)}
+"""Where on the way of a whole job each stage begins and ends; the pictures are the rest."""
+
+
+class Segment(Protocol):
+    """Probability (H, W) in 0..255 of a marking, see `segmentation.Segmenter`."""
+
+    def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
+        """Look at regions of a frame; 0 outside them."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a caller may choose; in the paper mu, lambda, G and the trade-off lambda of section III.
+
+    `fit_focal_length`: of each camera, as heat changes it; `fit_ridge`: its height. Both are for preset `esc`.
+    """
+
+    preset: Preset = "esc"
+    seed: int = 0
+    generations: int = 100
+    parents: int = 64
+    offspring: int = 128
+    stitch_weight: float = 0.5
+    flat: bool = False
+    fit_focal_length: bool = False
+    fit_ridge: bool = False
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a calibration has come: `fraction` 0..1 of the whole job; the rest during the evolution."""
+
+    stage: Stage
+    fraction: float
+    generation: int | None = None
+    loss: float | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the engine says of cameras around a pitch. `rejected_because`: None when accepted.
+
+    `pitch`: the given one but for what of it was to be found; `timings_s`: of each stage.
+    """
+
+    pitch: Field
+    cameras: Sequence[CameraResult]
+    rejected_because: str | None
+    stitch_error_px: float | None
+    timings_s: Mapping[str, float]
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the gate lets what was found replace what is stored."""
+        return self.rejected_because is None
+
+
+@dataclass(frozen=True)
+class Calibration(Answer):
+    """The answer to frames: new poses. `suspicions`: what the lines contradict of what was given."""
+
+    stitch_error_before_px: float | None
+    loss: float
+    generations: int
+    suspicions: Sequence[Suspicion]
+
+
+class CalibrationError(Exception):
+    """The frames cannot be calibrated at all: names the camera and says what to do."""
+
+    def __init__(self, camera: str, kind: str, detail: str) -> None:
+        super().__init__(detail)
+        self.camera = camera
+        self.kind = kind
+        self.detail = detail
+
+
+class Stopped(Exception):  # noqa: N818  (a request, not an error)
+    """The caller asked to stop."""
+
+
+class Journey:
+    """Where a job stands: how long each stage took, how far it is, and whether its caller wants it to stop."""
+
+    def __init__(self, report: Callable[[Progress], None], stop: Callable[[], bool]) -> None:
+        self.report = report
+        self.stop = stop
+        self.seconds: dict[str, float] = {}
+        self.fraction = 0.0
+
+    @contextmanager
+    def measuring(self, stage: str) -> Iterator[None]:
+        """Measure how long that takes which is done inside."""
+        begin = time.perf_counter()
+        yield
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin
+
+    def at(self, stage: Stage, share: float, generation: int | None = None, loss: float | None = None) -> None:
+        """Report `share` 0..1 of `stage`; raise `Stopped` when asked to stop."""
+        if self.stop():
+            raise Stopped
+        begin, end = SHARE_OF_JOB[stage]
+        # A second search does not take back what has been reported.
+        self.fraction = max(self.fraction, begin + share * (end - begin))
+        self.report(Progress(stage, self.fraction, generation, loss))
+
+    def evolution(self, total: int) -> Callable[[int, float], None]:
+        """What a search of at most `total` generations calls after each one."""
+        return lambda number, loss: self.at("evolution", number / total, number, loss)
