@@ -18,7 +18,16 @@ from prometheus_client.registry import Collector
 
 from service.observe.disk import Disk
 from service.store.alarms import BEGUN
-from service.store.counts.endings import ENDED, OTHER_OUTCOMES, OTHERS_ENDED, OUTCOMES, RESTARTS, STAGES
+from service.store.counts.endings import (
+    ENDED,
+    OTHER_OUTCOMES,
+    OTHERS_ENDED,
+    OUTCOMES,
+    RESTARTS,
+    STAGES,
+    VIEW_CONDITIONS,
+    VIEWS,
+)
 from service.store.counts.figures import Figures, VenueQuality, WorkerSeen
 from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Buckets, Key
 from service.store.deliveries import CALLBACKS
@@ -111,6 +120,12 @@ def _jobs(tallies: Mapping[Key, float]) -> Iterator[Metric]:
     for other in OTHER_OUTCOMES:
         others.add_metric(other, tallies.get((OTHERS_ENDED, other), 0))
     yield others
+    views = CounterMetricFamily(
+        "esc_views", "Cameras of calibrations by what their frames were like: usable, or why not.", labels=["condition"]
+    )
+    for condition in VIEW_CONDITIONS:
+        views.add_metric([condition], tallies.get((VIEWS, (condition,)), 0))
+    yield views
     restarts = tallies.get((RESTARTS, ()), 0)
     yield CounterMetricFamily(
         "esc_job_restarts", "Attempts after a job's first: its worker died or was stopped.", value=restarts

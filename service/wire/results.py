@@ -19,13 +19,22 @@ class Sigma(Wire):
     position_m: float
 
 
+Cause = Literal["dark", "fogged", "blinded", "snow", "out-of-focus", "blocked"]
+
+
 class View(Wire):
     """Whether a camera's frame could be used, and what is wrong with it if not."""
 
     usable: bool
-    cause: Literal["dark", "fogged", "blinded", "snow", "out-of-focus", "blocked"] | None = None
+    cause: Cause | None = None
     where: str | None = Field(None, description="Which part of the visible field.")
     detail: str
+    lines_found: float | None = Field(
+        None, description="Share 0..1 of the expected places on lines at which a line is seen, before any search."
+    )
+    blur_px: float | None = Field(
+        None, description="Of edges, one standard deviation; compared with that of the last accepted job."
+    )
 
 
 class CameraResult(Wire):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -48,12 +49,13 @@ from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.ridge_response import ridge_response
 from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import reachable_regions
-from worker.calibration.see.view import ViewCondition, look_at
+from worker.calibration.see.view import UsualView, ViewCondition, look_at
 
 CAPTURE_RAD = 0.1
 """How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
 FEWEST_VISIBLE_POINTS = 60
 """Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""
+NOTHING_USUAL: Mapping[str, UsualView] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -85,17 +87,19 @@ def calibrate(
     options: Options,
     report: Callable[[Progress], None] = lambda _: None,
     stop: Callable[[], bool] = lambda: False,
+    usual: Mapping[str, UsualView] = NOTHING_USUAL,
 ) -> Calibration:
     """Find the poses of all cameras at once.
 
     `cameras` carry their stored poses; `frames[camera.id]` are one or more BGR frames (height, width, 3) of the size of
-    the intrinsics. Deterministic for `options.seed`, whatever the number of threads. Raises `CalibrationError` when a
-    stored pose sees no markings, `Stopped` soon after `stop()` turns true.
+    the intrinsics; `usual[camera.id]`: what the last accepted job saw there. Deterministic for `options.seed`, whatever
+    the number of the network's threads. Raises `CalibrationError` when a stored pose sees no markings, `Stopped` soon
+    after `stop()` turns true.
     """
     method = METHODS[options.preset]
     pitch = pitch.flat() if options.flat or method.flat else pitch
     journey = Journey(report, stop)
-    seen = look(pitch, cameras, frames, segment, journey)
+    seen = look(pitch, cameras, frames, segment, journey, usual)
     found, finished = settle(method, pitch, cameras, seen, options, journey)
     with journey.measuring("quality"):
         journey.at("refinement", 0.6)
@@ -130,11 +134,12 @@ def look(
     frames: Mapping[str, Sequence[Frame]],
     segment: Segment,
     journey: Journey,
+    usual: Mapping[str, UsualView] = NOTHING_USUAL,
 ) -> Seen:
     """Look at the frames, and for markings in them. Raises `CalibrationError`."""
     require_markings_in_view(pitch, cameras)
     with journey.measuring("view"):
-        views = [view_of(frames[camera.id], pitch, camera) for camera in cameras]
+        views = [view_of(frames[camera.id], pitch, camera, usual.get(camera.id)) for camera in cameras]
     with journey.measuring("segmentation"):
         responses = segment_all(pitch, cameras, frames, segment, journey)
     return Seen(views, Sight([Channels(frames[camera.id]) for camera in cameras], responses))
@@ -168,7 +173,7 @@ def settle(
     lost = [left.evidence.agreement < Gate().least_agreement for left in first[1].each]
     if not (method.ridges and any(lost)):
         return first
-    with journey.measuring("ridges"):
+    with journey.measuring("segmentation"):
         responses = _with_ridges(pitch, cameras, seen.sight, lost)
     return max(first, settled_by(responses), key=lambda end: min(left.evidence.agreement for left in end[1].each))
 
@@ -252,8 +257,8 @@ def _free(options: Options, pitch: Field, cameras: Sequence[Camera]) -> list[Par
     return [*lengths, *(free_ridge(pitch) if options.fit_ridge else [])]
 
 
-def view_of(frames: Sequence[Frame], pitch: Field, camera: Camera) -> ViewCondition:
+def view_of(frames: Sequence[Frame], pitch: Field, camera: Camera, usual: UsualView | None) -> ViewCondition:
     """The view of the first frame that can be used, or what is wrong with the first."""
-    first = look_at(frames[0], pitch, camera)
-    later = (look_at(frame, pitch, camera) for frame in frames[1:])
+    first = look_at(frames[0], pitch, camera, usual)
+    later = (look_at(frame, pitch, camera, usual) for frame in frames[1:])
     return first if first.usable else next((view for view in later if view.usable), first)

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
+from types import MappingProxyType
 
 from service.settings import Settings
 from service.wire.job import Progress
 from service.wire.options import Options
-from service.wire.results import Provenance, Result, Suspicion
+from service.wire.results import Provenance, Result, Suspicion, View
 from service.wire.venue import Venue
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
 from worker.calibration.judge.quality import Gate
+from worker.calibration.see.view import UsualView
 from worker.jobs import from_frames
 from worker.jobs.pictures import draw
 from worker.jobs.wire import Solution, number, wire_camera, wire_lens
+
+NO_VIEWS: Mapping[str, View] = MappingProxyType({})
 
 
 def solve(
@@ -24,16 +28,20 @@ def solve(
     options: Options,
     settings: Settings,
     report: Callable[[Progress], None],
+    last_views: Mapping[str, View] = NO_VIEWS,
 ) -> Solution[Result]:
-    """Calibrate a venue from the files of its cameras."""
+    """Calibrate a venue from the files of its cameras; `last_views`: those of its last accepted calibration."""
     asked = _engine_options(options)
+    usual = {camera: UsualView(view.lines_found, view.blur_px) for camera, view in last_views.items()}
     return from_frames.solve(
         venue,
         files,
         options,
         settings,
         report,
-        lambda given, step: calibrate(given.pitch, given.cameras, given.frames, given.network, asked, step),
+        lambda given, step: calibrate(
+            given.pitch, given.cameras, given.frames, given.network, asked, step, usual=usual
+        ),
         draw,
         lambda found, timings_s, provenance: _result(found, options, timings_s, provenance),
     )

@@ -69,7 +69,7 @@ def _compute(
             return field.solve(task.venue, files, options, settings, report)
         case options:
             assert task.venue is not None
-            return calibration.solve(task.venue, files, options, settings, report)
+            return calibration.solve(task.venue, files, options, settings, report, task.last_views)
 
 
 def _line_to_parent() -> Callable[[Message], None]:

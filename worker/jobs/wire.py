@@ -26,6 +26,7 @@ from worker.calibration.judge import quality
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
+from worker.calibration.see.view import ViewCondition
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
@@ -175,8 +176,19 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
         iou=number(found.iou),
         found=number(found.evidence.share),
         by_chance=number(found.evidence.by_chance),
-        view=View(usable=found.view.usable, cause=found.view.cause, where=found.view.where, detail=found.view.words),
+        view=_view(found.view),
         residual_px=number(found.residual_px),
+    )
+
+
+def _view(found: ViewCondition) -> View:
+    return View(
+        usable=found.usable,
+        cause=found.cause,
+        where=found.where,
+        detail=found.words,
+        lines_found=number(found.figures.lines_found),
+        blur_px=number(found.figures.blur_px),
     )
 
 

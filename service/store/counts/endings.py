@@ -9,7 +9,7 @@ from typing import get_args
 from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Amounts, total
 from service.wire.job import JobError, Kind, Status
 from service.wire.problems import KINDS, type_of
-from service.wire.results import AnyResult, Result
+from service.wire.results import AnyResult, Cause, Result
 
 # As in `timings_s` of a result.
 STAGES = ("decode", "view", "segmentation", "evolution", "refinement", "quality", "preview")
@@ -42,6 +42,10 @@ OTHER_OUTCOMES = tuple(
     for status in ("succeeded", "failed", "cancelled")
 )
 RESTARTS = "job_restarts"
+# Of the cameras of calibrations: usable, or why not.
+VIEWS = "views"
+USABLE = "usable"
+VIEW_CONDITIONS = (USABLE, *get_args(Cause))
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,8 @@ class Ending:
         restarts: Amounts = {} if self.started_at is None else {(RESTARTS, ()): self.attempts - 1}
         if self.kind != "calibration":
             return total([{(OTHERS_ENDED, (self.kind, self.status)): 1}, restarts, *self._stages()])
-        return total([{(ENDED, self._outcome()): 1}, restarts, *self._course(), *self._stages(), *self._quality()])
+        ended: Amounts = {(ENDED, self._outcome()): 1}
+        return total([ended, restarts, *self._course(), *self._stages(), *self._quality(), *self._views()])
 
     def _outcome(self) -> tuple[str, str, str]:
         verdict = ""
@@ -88,6 +93,12 @@ class Ending:
         if not isinstance(self.result, Result) or self.result.stitch_error_px is None:
             return []
         return [STITCH_ERROR.of(self.result.stitch_error_px)]
+
+    def _views(self) -> list[Amounts]:
+        if not isinstance(self.result, Result):
+            return []
+        views = [camera.view for camera in self.result.cameras if camera.view is not None]
+        return [{(VIEWS, (view.cause or USABLE,)): 1} for view in views]
 
 
 def _kind(error: JobError) -> str:

@@ -15,7 +15,7 @@ from service.store.counts.tallies import Key
 from service.store.engine import clock, reading
 from service.wire.history import Revision
 from service.wire.job import OPEN
-from service.wire.results import Result
+from service.wire.results import Result, View
 
 j = tables.jobs.c
 q = tables.venue_quality.c
@@ -105,8 +105,18 @@ def note_quality(connection: sa.Connection, venue_id: str, result: Result, now: 
         venue_id,
         stitch_error_px=result.stitch_error_px if moved else result.stitch_error_before_px,
         moved_px=max(shifts, default=None),
-        **({"accepted_at": now, "rejected_in_a_row": 0} if moved else {}),
+        **({"accepted_at": now, "rejected_in_a_row": 0, "views": _views_in(result)} if moved else {}),
     )
+
+
+def views_of(connection: sa.Connection, venue_id: str) -> dict[str, View]:
+    """What the frames of a venue's last accepted calibration were like, by camera; empty without one."""
+    views = connection.scalar(sa.select(q.views).where(q.venue == venue_id)) or {}
+    return {camera: View.model_validate(view) for camera, view in views.items()}
+
+
+def _views_in(result: Result) -> dict[str, Any]:
+    return {camera.id: camera.view.model_dump(mode="json") for camera in result.cameras if camera.view is not None}
 
 
 def note_unaccepted(connection: sa.Connection, venue_id: str) -> None:

@@ -14,7 +14,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.alarms import settle_alarms
-from service.store.counts.figures import note_quality, note_unaccepted
+from service.store.counts.figures import note_quality, note_unaccepted, views_of
 from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.jobs.ending import Still, changed, end, still_open
 from service.store.jobs.reading import ONE, asked
@@ -51,7 +51,9 @@ class Attempts(Repository):
             if connection.execute(begin).rowcount == 0:
                 return None
             row = connection.execute(ONE, {"job_id": job_id}).one()
-            return Task(**asked(row), run_token=row.run_token, attempt=row.attempt)
+            job = asked(row)
+            last_views = views_of(connection, row.venue) if row.venue else {}
+            return Task(**job, run_token=row.run_token, attempt=row.attempt, last_views=last_views)
 
     def holds(self, task: Task) -> bool:
         """Whether the job is still this attempt's; False if it has lost it, to a cancellation or to another attempt."""

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 
 from service.wire.job import Kind
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.wire.results import View
 from service.wire.venue import Venue
 
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
@@ -74,6 +75,8 @@ class Task(Asked):
     # A worker that lost its job holds another one than the row.
     run_token: str
     attempt: int = 1
+    # By camera: what the frames of the venue's last accepted calibration were like.
+    last_views: dict[str, View] = {}
 
     def without_addresses(self) -> Task:
         """The same but for who is told of its end: to compute it nobody need know, and the address may be a secret."""

@@ -1,6 +1,6 @@
 """Whether a view can be used at all, and what is wrong with it if not: judged before anything is searched.
 
-    condition = look_at(frame, pitch, camera, usual=figures_of_the_last_good_job)
+    condition = look_at(frame, pitch, camera, usual)
 
 A view is only called unusable when its lines cannot be seen in a good part of the field *and* that part looks like one
 of the causes that are known. Lines that are merely worn, hidden by players or not where the pose expects them leave it
@@ -107,6 +107,14 @@ class ViewFigures:
 
 
 @dataclass(frozen=True)
+class UsualView:
+    """What this camera showed in the last accepted job, see `ViewFigures`."""
+
+    lines_found: float | None
+    blur_px: float | None
+
+
+@dataclass(frozen=True)
 class ViewCondition:
     """`cause`, `where` (which part of the visible field): None of a usable view. `words`: one sentence for people."""
 
@@ -117,10 +125,10 @@ class ViewCondition:
     figures: ViewFigures
 
 
-def look_at(frame: Frame, pitch: Field, camera: Camera, usual: ViewFigures | None = None) -> ViewCondition:
+def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None = None) -> ViewCondition:
     """Judge a frame (H, W, 3) of `camera`, whose stored pose may be some degrees off.
 
-    `usual`: the figures of the last accepted job of this camera, which tell a soft lens from one out of focus and a
+    `usual`: what the last accepted job of this camera saw, which tell a soft lens from one out of focus and a
     field of faint lines from one that is hidden.
     """
     scale = LOOKED_AT_PX / camera.intrinsics.size[0]
@@ -152,7 +160,7 @@ def _cause(
     spoiled: dict[str, Mask],
     sharpness: _Sharpness,
     figures: ViewFigures,
-    usual: ViewFigures | None,
+    usual: UsualView | None,
 ) -> tuple[Cause | None, Mask]:
     """The likeliest cause, and the cells it took; the surest causes first."""
     enough = LEAST_SPOILED * field.sum()
@@ -178,7 +186,7 @@ def _is_blocked(
     sharpness: _Sharpness,
     smeared: bool,
     figures: ViewFigures,
-    usual: ViewFigures | None,
+    usual: UsualView | None,
 ) -> bool:
     """Whether the cells without lines are no ground: other than the ground beside them, or like none."""
     clear = field & ~lost
@@ -194,7 +202,7 @@ def _is_blocked(
     # Right before the lens things are out of focus; of a field out of focus no such contrast is left.
     if structure > PATTERNED and sharpness.of_all > SOFT_PX * sharpness.size:
         return True
-    seen_before = usual is not None and usual.lines_found > GOOD_LINES
+    seen_before = usual is not None and usual.lines_found is not None and usual.lines_found > GOOD_LINES
     return seen_before and figures.lines_found < NO_LINES and not smeared
 
 
@@ -281,7 +289,7 @@ def _enlarged(field: Mask, shape: tuple[int, ...]) -> Mask:
     return np.asarray(cv2.resize(field.astype(np.uint8), (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST)) > 0
 
 
-def _words(cause: Cause, where: str, figures: ViewFigures, usual: ViewFigures | None, width: int) -> str:
+def _words(cause: Cause, where: str, figures: ViewFigures, usual: UsualView | None, width: int) -> str:
     match cause:
         case "dark":
             return (
@@ -395,7 +403,7 @@ class _Sharpness:
         of_clear, of_lost = (edge_blur_px(frame, grey, _enlarged(part, grey.shape)) for part in (clear, lost))
         return cls(of_all, of_clear, of_lost, frame.shape[1] / 1920)
 
-    def is_lost(self, usual: ViewFigures | None) -> bool:
+    def is_lost(self, usual: UsualView | None) -> bool:
         """Whether the whole field is out of focus."""
         if self.of_all is None:
             return False
