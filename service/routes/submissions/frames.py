@@ -77,9 +77,7 @@ def submit(
 def fetch(context: Context, venue: Venue, options: Options, sender: Sender) -> Response:
     """Make what the cameras of `venue` show now a job."""
     try:
-        job, new = context.from_sources.calibrate(
-            venue, options, sender.idempotency_key, sender.origin, context.queue.enqueue
-        )
+        job, new = context.from_sources.calibrate(venue, options, sender.idempotency_key, sender.origin)
     except REFUSALS as refusal:
         raise taking.in_words(refusal, venue.id, context.settings) from None
     return taking.answer(job, new)

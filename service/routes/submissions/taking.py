@@ -67,10 +67,8 @@ def take(context: Context, venue: Venue | None, options: AnyOptions, files: File
 
 def enqueued(context: Context, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
     """A submission as a job, or the job that it already is; says if it is new. `store` puts its frames in place."""
-    # A first pose takes a second, and somebody waits for it.
-    enqueue = context.queue.enqueue_light if submission.kind == "locate" else context.queue.enqueue
     try:
-        return context.intake.take(submission, store, enqueue)
+        return context.intake.take(submission, store)
     except REFUSALS as refusal:
         raise in_words(refusal, "" if submission.venue is None else submission.venue.id, context.settings) from None
 

@@ -15,6 +15,8 @@ from service.store.venues import find_venue, venue_lock
 from service.wire.job import OPEN, Job, Kind
 from service.wire.venue import Venue
 
+# Job, priority and kind, into the queue in the caller's transaction.
+Enqueue = Callable[[sa.Connection, str, int, Kind], None]
 PRIORITIES = {"live": 1, "routine": 100}
 j = tables.jobs.c
 
@@ -55,9 +57,7 @@ class QueueFull(Exception):  # noqa: N818
 class Submissions(Repository):
     """The beginning of the jobs in the database."""
 
-    def submit(
-        self, submission: Submission, queue_limit: int, enqueue: Callable[[sa.Connection, str, int], None]
-    ) -> tuple[Job, bool]:
+    def submit(self, submission: Submission, queue_limit: int, enqueue: Enqueue) -> tuple[Job, bool]:
         """Row and queue entry in one transaction, or the job that the content already is; also says which.
 
         The job begins from the poses that hold now: others may have been found since the upload began.
@@ -94,7 +94,7 @@ class Submissions(Repository):
                     updated_at=now,
                 )
             )
-            enqueue(connection, submission.job_id, priority)
+            enqueue(connection, submission.job_id, priority, submission.kind)
             # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
             serialise(connection, "queue")
             waiting = connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
