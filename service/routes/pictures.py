@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from service.api.context import Context, InContext
-from service.routes.contract.documented import needs, problems
+from service.routes.contract.documented import BINARY, needs, problems
 from service.routes.contract.guarded import Guarded
 from service.routes.jobs import Existing
 from service.store.jobs.files import picture_file
@@ -54,7 +54,7 @@ def _show(route: str, address: str, shows: str) -> None:
     def of_camera(job: Existing, camera: CameraPath, context: InContext) -> Response:
         return _picture(context, job, name.format(camera=camera))
 
-    content = {PNG if suffix == "png" else JPEG: {"schema": {"type": "string", "format": "binary"}}}
+    content = {PNG if suffix == "png" else JPEG: BINARY}
     router.add_api_route(
         f"/{{job_id}}/{address}",
         of_camera if "{camera}" in address else of_job,
