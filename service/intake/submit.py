@@ -9,23 +9,12 @@ from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.expiry import Expiry
 from service.store.jobs.files import frame_folder
-from service.store.jobs.submission import (
-    Enqueue,
-    KeyReused,
-    QueueFull,
-    Submission,
-    Submissions,
-    VenueBusy,
-    VenueGone,
-    VenueReplaced,
-)
+from service.store.jobs.submission import Enqueue, Refusal, Submission, Submissions
 from service.wire.job import Job
 from service.wire.problems import Problem
 
 # Longer than any upload takes from its first stored frame to its job.
 UPLOAD_GRACE = timedelta(hours=1)
-Refusal = KeyReused | VenueBusy | VenueGone | VenueReplaced | QueueFull
-REFUSALS = (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull)
 
 
 class Intake:
@@ -43,7 +32,7 @@ class Intake:
     def take(self, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
         """Store the files of a checked submission and make it a job, or find the job it already is; says if it is new.
 
-        `store` puts them where the submission says. Raises one of `REFUSALS`, and a `Problem` that `store` raises.
+        `store` puts them where the submission says. Raises a `Refusal`, and a `Problem` that `store` raises.
         """
         venue_id = None if submission.venue is None else submission.venue.id
         try:
@@ -56,7 +45,7 @@ class Intake:
             self._expiry.expect_upload(submission.job_id, UPLOAD_GRACE)
             store()
             job, new = self._submissions.submit(submission, self._settings.queue_limit, self._enqueue)
-        except (*REFUSALS, Problem):
+        except (Refusal, Problem):
             self._blobs.delete_under(frame_folder(submission.job_id))
             raise
         if not new:

@@ -8,8 +8,8 @@ from datetime import UTC, timedelta
 import structlog
 
 from service.intake.from_sources import FromSources
-from service.intake.submit import REFUSALS
 from service.observe.disk import Disk
+from service.store.jobs.submission import Refusal
 from service.store.jobs.task import Origin
 from service.store.schedules import Firing, Schedules
 from service.store.venues import Venues
@@ -48,7 +48,7 @@ class Scheduled:
                 job_id, error = self._calibrate(firing), None
             except Problem as problem:
                 job_id, error = None, problem.detail
-            except REFUSALS as refusal:
+            except Refusal as refusal:
                 job_id, error = None, f"{type(refusal).__name__}: {refusal.__doc__}"
             if error is not None:
                 log.warning("schedule fired in vain", why=error)

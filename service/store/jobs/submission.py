@@ -28,29 +28,33 @@ class Submission(Asked):
     idempotency_key: str | None
 
 
-class KeyReused(Exception):  # noqa: N818
+class Refusal(Exception):  # noqa: N818
+    """Why a submission becomes no job."""
+
+
+class KeyReused(Refusal):
     """The idempotency key belongs to a job of other content."""
 
     def __init__(self, job_id: str) -> None:
         self.job_id = job_id
 
 
-class VenueBusy(Exception):  # noqa: N818
+class VenueBusy(Refusal):
     """The venue has an active job of other content."""
 
     def __init__(self, job_id: str) -> None:
         self.job_id = job_id
 
 
-class VenueGone(Exception):  # noqa: N818
+class VenueGone(Refusal):
     """The venue was deleted while its frames arrived."""
 
 
-class VenueReplaced(Exception):  # noqa: N818
+class VenueReplaced(Refusal):
     """The pitch or a lens of the venue was changed while its frames arrived: they were checked against another one."""
 
 
-class QueueFull(Exception):  # noqa: N818
+class QueueFull(Refusal):
     """As many jobs wait as may."""
 
 
