@@ -26,7 +26,7 @@ class Home(Stores):
         self.blobs = Blobs(settings.home_blob_url, BLOB_PATIENCE_S)
         self.disk = Disk(settings)
         self.snapshots = Snapshots(settings)
-        self.intake = Intake(settings, self.submissions, self.expiry, self.blobs)
+        self.intake = Intake(settings, self.submissions, self.expiry, self.blobs, self.queue.enqueue)
         self.from_sources = FromSources(self.venues, self.submissions, self.snapshots, self.blobs, self.intake)
 
     def close(self) -> None:

@@ -15,11 +15,12 @@ from dbos import DBOS, DBOSClient, DBOSConfig
 from dbos import WorkflowStatusString as QueueStatus
 
 from service.store.engine import postgresql
+from service.wire.job import Kind
 
 APPLICATION = "esc"
 QUEUE = "calibration"
 # For what takes a second and somebody waits for: it does not stand behind a calibration.
-LIGHT_QUEUE = "light"
+LIGHT_QUEUE, LIGHT = "light", ("locate",)
 WORKFLOW = "calibrate"
 # The engine's default is a hash of the source; after a deployment the jobs of the old version would never be begun.
 VERSION = "1"
@@ -64,15 +65,9 @@ class Queue:
         self._engine = _engine(url)
         self._client = DBOSClient(system_database_engine=self._engine, application_name=APPLICATION)
 
-    def enqueue(self, connection: sa.Connection, job_id: str, priority: int) -> None:
+    def enqueue(self, connection: sa.Connection, job_id: str, priority: int, kind: Kind) -> None:
         """Put a job in, when and if the caller's transaction commits. A smaller `priority` goes first."""
-        self._enqueue(connection, QUEUE, job_id, priority)
-
-    def enqueue_light(self, connection: sa.Connection, job_id: str, priority: int) -> None:
-        """The same for a job that takes a second: it is computed beside calibrations."""
-        self._enqueue(connection, LIGHT_QUEUE, job_id, priority)
-
-    def _enqueue(self, connection: sa.Connection, queue: str, job_id: str, priority: int) -> None:
+        queue = LIGHT_QUEUE if kind in LIGHT else QUEUE
         self._client.enqueue_in_transaction(
             connection,
             {"workflow_name": WORKFLOW, "queue_name": queue, "workflow_id": job_id, "priority": priority},

@@ -11,7 +11,6 @@ import sys
 import threading
 import time
 from contextlib import nullcontext
-from types import TracebackType
 from typing import Self
 
 import structlog
@@ -130,9 +129,7 @@ class KeptWorker:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stopping.set()
         if self._process is not None:
             self._process.terminate()

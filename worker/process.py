@@ -82,7 +82,7 @@ class Worker:
         self._retention = Retention(settings, home.expiry, home.blobs, home.workers, self._queue.forget)
         self._delivering = Delivering(settings, home.deliveries, home.jobs, home.deliveries.now)
         self._alarms = Alarms(home.venues)
-        self._scheduled = Scheduled(home.schedules, home.venues, home.from_sources, home.disk, home.queue.enqueue)
+        self._scheduled = Scheduled(home.schedules, home.venues, home.from_sources, home.disk)
 
     def start(self) -> None:
         """Show up and take jobs."""
@@ -143,9 +143,9 @@ class Worker:
         with structlog.contextvars.bound_contextvars(job=job_id, **task.origin.names()), Spans(task) as spans:
             log.info("job begins", kind=task.kind, venue=task.venue.id if task.venue else None)
             try:
-                end = self._compute(task, limit_s, spans)
-                spans.end(end)
-                _insist(lambda: self._write_down(task, end), begun + limit_s + OUTAGE_S)
+                last = self._compute(task, limit_s, spans)
+                spans.end(last)
+                _insist(lambda: self._write_down(task, last), begun + limit_s + OUTAGE_S)
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
                 crashed = _error("job-crashed", f"The attempt broke off: {first_line(error)}")
@@ -177,13 +177,13 @@ class Worker:
         with suppress(*AWAY):
             self._attempts.report(task, progress)
 
-    def _write_down(self, task: Task, end: Message | None) -> None:
-        if end is None:
+    def _write_down(self, task: Task, last: Message | None) -> None:
+        if last is None:
             log.info("job taken away")
-        elif end.result is not None:
-            self._attempts.finish(task, end.result, end.pictures)
-        elif end.error is not None:
-            self._attempts.fail(task, end.error)
+        elif last.result is not None:
+            self._attempts.finish(task, last.result, last.pictures)
+        elif last.error is not None:
+            self._attempts.fail(task, last.error)
 
 
 class Hold:

@@ -79,10 +79,10 @@ def run(
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
     files = checked_files(stored, frames, settings)
     with failure_told(), bar() as show:
-        outcome = calibration.solve(stored, files, chosen, settings, lambda step: show(step, ""))
+        solution = calibration.solve(stored, files, chosen, settings, lambda step: show(step, ""))
     output.mkdir(parents=True, exist_ok=True)
-    (output / "result.json").write_text(outcome.result.model_dump_json(indent=2) + "\n")
-    for name, picture in outcome.pictures.items():
+    (output / "result.json").write_text(solution.result.model_dump_json(indent=2) + "\n")
+    for name, picture in solution.pictures.items():
         (output / picture_file(name)).write_bytes(picture)
-    say(outcome.result)
-    raise typer.Exit(gate(outcome.result))
+    say(solution.result)
+    raise typer.Exit(gate(solution.result))

@@ -56,11 +56,11 @@ def intrinsics(
     with failure_told(), bar() as show:
         for name, data in files.items():
             images.check_photo(name, data, settings)
-        outcome = intrinsics.solve(files, options, lambda step: show(step, ""))
-    output.write_text(outcome.result.model_dump_json(indent=2) + "\n")
+        solution = intrinsics.solve(files, options, lambda step: show(step, ""))
+    output.write_text(solution.result.model_dump_json(indent=2) + "\n")
     if picture is not None:
-        picture.write_bytes(outcome.pictures["coverage"])
-    tell_lens(outcome.result)
+        picture.write_bytes(solution.pictures["coverage"])
+    tell_lens(solution.result)
 
 
 def pose(
@@ -91,13 +91,13 @@ def pose(
     for camera, lens in given.items():
         engine_lens = lens_of(lens.intrinsics, lens.image_size)
         with failure_told():
-            outcome = locate.locate(camera, place.field, engine_lens, clicks[camera], seen.get(camera), lambda _: None)
-        result = outcome.result
+            solution = locate.locate(camera, place.field, engine_lens, clicks[camera], seen.get(camera), lambda _: None)
+        result = solution.result
         results.append(result)
         tell_pose(result)
         if pictures is not None:
             pictures.mkdir(parents=True, exist_ok=True)
-            (pictures / f"points_{camera}.jpg").write_bytes(outcome.pictures["points"])
+            (pictures / f"points_{camera}.jpg").write_bytes(solution.pictures["points"])
         stands = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
         if result.accepted:
             found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
@@ -148,8 +148,8 @@ def _fit_here(file: Path, frames: list[str], options: FieldOptions) -> tuple[Ven
     stored = checked(VenueIn, file.read_text(), str(file)).stored()
     files = checked_files(stored, frames, settings)
     with failure_told(), bar() as show:
-        outcome = field.solve(stored, files, options, settings, lambda step: show(step, ""))
-    return stored, outcome.result, outcome.pictures
+        solution = field.solve(stored, files, options, settings, lambda step: show(step, ""))
+    return stored, solution.result, solution.pictures
 
 
 def _fit_there(

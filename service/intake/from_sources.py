@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 
 from service.intake.snapshots import Snapshots
-from service.intake.submit import Enqueue, Intake, frame_paths
+from service.intake.submit import Intake, frame_paths
 from service.store.blobs import Blobs
 from service.store.ids import new_id
 from service.store.jobs.submission import Submission, Submissions
@@ -28,9 +28,7 @@ class FromSources:
         self._blobs = blobs
         self._intake = intake
 
-    def calibrate(
-        self, venue: Venue, options: Options, key: str | None, origin: Origin, enqueue: Enqueue
-    ) -> tuple[Job, bool]:
+    def calibrate(self, venue: Venue, options: Options, key: str | None, origin: Origin) -> tuple[Job, bool]:
         """A job from a frame of each source, or the job that the request already is; says if it is new.
 
         Raises a `Problem` for a source that gives no frame, and what `Intake.take` raises. The same request is the
@@ -56,4 +54,4 @@ class FromSources:
             for camera, (path,) in submission.frames.items():
                 self._blobs.put(path, frames[camera])
 
-        return self._intake.take(submission, store, enqueue)
+        return self._intake.take(submission, store)

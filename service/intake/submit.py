@@ -5,44 +5,34 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from datetime import timedelta
 
-import sqlalchemy as sa
-
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.expiry import Expiry
 from service.store.jobs.files import frame_folder
-from service.store.jobs.submission import (
-    KeyReused,
-    QueueFull,
-    Submission,
-    Submissions,
-    VenueBusy,
-    VenueGone,
-    VenueReplaced,
-)
+from service.store.jobs.submission import Enqueue, Refusal, Submission, Submissions
 from service.wire.job import Job
 from service.wire.problems import Problem
 
 # Longer than any upload takes from its first stored frame to its job.
 UPLOAD_GRACE = timedelta(hours=1)
-Enqueue = Callable[[sa.Connection, str, int], None]
-Refusal = KeyReused | VenueBusy | VenueGone | VenueReplaced | QueueFull
-REFUSALS = (KeyReused, VenueBusy, VenueGone, VenueReplaced, QueueFull)
 
 
 class Intake:
     """Makes jobs of submissions."""
 
-    def __init__(self, settings: Settings, submissions: Submissions, expiry: Expiry, blobs: Blobs) -> None:
+    def __init__(
+        self, settings: Settings, submissions: Submissions, expiry: Expiry, blobs: Blobs, enqueue: Enqueue
+    ) -> None:
         self._settings = settings
         self._submissions = submissions
         self._expiry = expiry
         self._blobs = blobs
+        self._enqueue = enqueue
 
-    def take(self, submission: Submission, store: Callable[[], None], enqueue: Enqueue) -> tuple[Job, bool]:
+    def take(self, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
         """Store the files of a checked submission and make it a job, or find the job it already is; says if it is new.
 
-        `store` puts them where the submission says. Raises one of `REFUSALS`, and a `Problem` that `store` raises.
+        `store` puts them where the submission says. Raises a `Refusal`, and a `Problem` that `store` raises.
         """
         venue_id = None if submission.venue is None else submission.venue.id
         try:
@@ -54,8 +44,8 @@ class Intake:
             # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
             self._expiry.expect_upload(submission.job_id, UPLOAD_GRACE)
             store()
-            job, new = self._submissions.submit(submission, self._settings.queue_limit, enqueue)
-        except (*REFUSALS, Problem):
+            job, new = self._submissions.submit(submission, self._settings.queue_limit, self._enqueue)
+        except (Refusal, Problem):
             self._blobs.delete_under(frame_folder(submission.job_id))
             raise
         if not new:

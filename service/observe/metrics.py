@@ -28,13 +28,29 @@ from service.store.counts.endings import (
     VIEW_CONDITIONS,
     VIEWS,
 )
-from service.store.counts.figures import Figures, VenueQuality, WorkerSeen
+from service.store.counts.figures import Figures, VenueQuality
 from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Buckets, Key
 from service.store.deliveries import CALLBACKS
 from service.store.engine import AWAY
 from service.store.jobs.submission import PRIORITIES
+from service.store.workers import SeenWorker
 from service.wire.health import AlarmRule
 
+# Name, meaning and figure; a figure that is not known is no sample.
+OF_VENUES: tuple[tuple[str, str, Callable[[VenueQuality], float | None]], ...] = (
+    (
+        "esc_venue_stitch_error_pixels",
+        "Of the poses that hold, by the last result; 1 px is 10 cm.",
+        lambda venue: venue.stitch_error_px,
+    ),
+    ("esc_venue_moved_pixels", "How far the last result found its worst camera moved.", lambda venue: venue.moved_px),
+    ("esc_venue_drift_pixels", "How far its worst camera is from where it was put.", lambda venue: venue.drift_px),
+    (
+        "esc_venue_accepted_timestamp_seconds",
+        "When poses were last accepted.",
+        lambda venue: None if venue.accepted_at is None else venue.accepted_at.timestamp(),
+    ),
+)
 log = structlog.get_logger()
 
 
@@ -145,28 +161,13 @@ def _jobs(tallies: Mapping[Key, float]) -> Iterator[Metric]:
 
 def _venues(venues: list[VenueQuality]) -> Iterator[Metric]:
     """Those with the worst stitch errors: how many at most is a setting."""
-    stitch = GaugeMetricFamily(
-        "esc_venue_stitch_error_pixels", "Of the poses that hold, by the last result; 1 px is 10 cm.", labels=["venue"]
-    )
-    moved = GaugeMetricFamily(
-        "esc_venue_moved_pixels", "How far the last result found its worst camera moved.", labels=["venue"]
-    )
-    accepted = GaugeMetricFamily(
-        "esc_venue_accepted_timestamp_seconds", "When poses were last accepted.", labels=["venue"]
-    )
-    drift = GaugeMetricFamily(
-        "esc_venue_drift_pixels", "How far its worst camera is from where it was put.", labels=["venue"]
-    )
-    for venue in venues:
-        if venue.drift_px is not None:
-            drift.add_metric([venue.venue], venue.drift_px)
-        if venue.stitch_error_px is not None:
-            stitch.add_metric([venue.venue], venue.stitch_error_px)
-        if venue.moved_px is not None:
-            moved.add_metric([venue.venue], venue.moved_px)
-        if venue.accepted_at is not None:
-            accepted.add_metric([venue.venue], venue.accepted_at.timestamp())
-    yield from (stitch, moved, drift, accepted)
+    for name, meaning, figure in OF_VENUES:
+        family = GaugeMetricFamily(name, meaning, labels=["venue"])
+        for venue in venues:
+            value = figure(venue)
+            if value is not None:
+                family.add_metric([venue.venue], value)
+        yield family
 
 
 def _alarms(figures: Figures) -> Iterator[Metric]:
@@ -181,7 +182,7 @@ def _alarms(figures: Figures) -> Iterator[Metric]:
     yield from (ringing, begun, of_venues)
 
 
-def _workers(workers: list[WorkerSeen], silence_s: float) -> Iterator[Metric]:
+def _workers(workers: list[SeenWorker], silence_s: float) -> Iterator[Metric]:
     alive = [worker for worker in workers if worker.silent_s <= silence_s]
     yield _gauge("esc_workers", "Workers that gave a sign of life.", len(alive))
     up = GaugeMetricFamily(

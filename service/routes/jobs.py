@@ -44,6 +44,14 @@ def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None)
     return answer
 
 
+async def at_its_end(context: Context, job: Job, wait_s: float) -> Job:
+    """The job when it has ended, or as it is after the time that somebody waits."""
+    if not wait_s or not job.open:
+        return job
+    await context.watch.until(job.id, lambda state: state.status not in OPEN, min(wait_s, LONGEST_WAIT_S))
+    return await _read_again(context, job)
+
+
 async def _existing(job_id: JobIdPath, context: InContext) -> Job:
     job = await context.reads.get(job_id)
     if job is None:
@@ -82,10 +90,7 @@ async def get_job(
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """A job in whatever state. With `wait` the answer is held until the job ends."""
-    if wait and job.open:
-        await context.watch.until(job.id, lambda state: state.status not in OPEN, min(wait, LONGEST_WAIT_S))
-        job = await _read_again(context, job)
-    return job_answer(job, if_none_match=if_none_match)
+    return job_answer(await at_its_end(context, job, wait), if_none_match=if_none_match)
 
 
 @router.post("/{job_id}/cancel", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404))

@@ -8,14 +8,13 @@ from fastapi import APIRouter, Depends, Path, Response
 
 from service.api.context import InContext
 from service.intake.images import PNG_START
-from service.routes.contract.documented import needs, problems
+from service.routes.contract.documented import BINARY, needs, problems
 from service.routes.contract.guarded import Guarded
 from service.routes.venues import ExistingVenue, camera_of
 from service.wire.base import ID_PATTERN
 from service.wire.venue import Camera
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
-BINARY = {"schema": {"type": "string", "format": "binary"}}
 PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINARY, "image/png": BINARY}}}
 
 

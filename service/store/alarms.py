@@ -72,11 +72,6 @@ def health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
     )
 
 
-def forget_alarms(connection: sa.Connection, venue_id: str) -> None:
-    """The venue is gone, and nobody is told of its alarms any more."""
-    connection.execute(sa.delete(tables.alarms).where(a.venue == venue_id))
-
-
 def _rings(connection: sa.Connection, venue: Venue, now: datetime) -> tuple[dict[Key, str], datetime | None]:
     """What rings now and why, and when to look again if nothing happens before."""
     rules, newest = venue.alarms, newest_revision(connection, venue.id)

@@ -106,11 +106,6 @@ def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venu
         raise RevisionUnfit("Its ridge is none of the pitch that the venue now has.") from None
 
 
-def forget_revisions(connection: sa.Connection, venue_id: str) -> None:
-    """The venue is gone."""
-    connection.execute(sa.delete(tables.revisions).where(r.venue == venue_id))
-
-
 def _with_state(venue: Venue, cameras: list[PosedCamera], ridge: list[list[float]] | None) -> Venue:
     """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
     then = {camera.id: camera for camera in cameras}

@@ -72,7 +72,7 @@ def plan(connection: sa.Connection, venue: Venue) -> None:
     known = connection.execute(sa.select(tables.schedules).where(s.venue == venue.id)).one_or_none()
     if wanted and known and (known.cron, known.time_zone) == (wanted.cron, wanted.time_zone):
         return
-    forget_schedule(connection, venue.id)
+    connection.execute(sa.delete(tables.schedules).where(s.venue == venue.id))
     if wanted is not None:
         next_at = next_time(wanted.cron, wanted.time_zone, clock(connection))
         values = {"cron": wanted.cron, "time_zone": wanted.time_zone, "due_at": next_at, "look_at": next_at}
@@ -85,8 +85,3 @@ def schedule_of(connection: sa.Connection, venue_id: str) -> ScheduleState | Non
     if row is None:
         return None
     return ScheduleState(next_at=row.due_at, last_job=row.last_job, last_error=row.last_error)
-
-
-def forget_schedule(connection: sa.Connection, venue_id: str) -> None:
-    """Nothing fires for the venue any more."""
-    connection.execute(sa.delete(tables.schedules).where(s.venue == venue_id))

@@ -7,16 +7,19 @@ from collections.abc import Callable
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.alarms import forget_alarms, health_of, settle_alarms
-from service.store.counts.figures import forget_quality, note_restored
+from service.store.alarms import health_of, settle_alarms
+from service.store.counts.figures import note
 from service.store.engine import Repository, clock, reading, serialise, writing
-from service.store.revisions import add_revision, forget_revisions, revisions_of, state_at
-from service.store.schedules import forget_schedule, plan
+from service.store.revisions import add_revision, revisions_of, state_at
+from service.store.schedules import plan
 from service.wire.health import VenueHealth
 from service.wire.history import Cause, Revision
 from service.wire.job import OPEN
 from service.wire.results import Result
 from service.wire.venue import Venue
+
+# What goes with a venue.
+OF_VENUES = (tables.revisions, tables.alarms, tables.schedules, tables.credentials, tables.venue_quality)
 
 
 class Venues(Repository):
@@ -98,11 +101,8 @@ class Venues(Repository):
             j = tables.jobs.c
             active = connection.scalar(sa.select(j.id).where(j.venue == venue_id, j.status.in_(OPEN)))
             allow(find_venue(connection, venue_id), active)
-            forget_revisions(connection, venue_id)
-            forget_alarms(connection, venue_id)
-            forget_schedule(connection, venue_id)
-            _keep(connection, venue_id, {})
-            forget_quality(connection, venue_id)
+            for table in OF_VENUES:
+                connection.execute(sa.delete(table).where(table.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
 
     def credentials(self, venue_id: str) -> dict[str, str]:
@@ -165,7 +165,7 @@ def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job:
     if not then.stands_like(venue):
         save_venue(connection, then)
         add_revision(connection, then, "restored", rejected_job, revision, revision.stitch_error_px)
-        note_restored(connection, venue.id, revision)
+        note(connection, venue.id, stitch_error_px=revision.stitch_error_px)
     return then
 
 

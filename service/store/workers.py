@@ -13,9 +13,10 @@ from service.store.tables import workers
 
 @dataclass(frozen=True)
 class SeenWorker:
-    """A worker that gave a sign of life, and the hash of its model file (None: missing)."""
+    """A worker, the seconds since its last sign of life, and the hash of its model file (None: missing)."""
 
     name: str
+    silent_s: float
     model_sha256: str | None
 
 
@@ -40,22 +41,21 @@ class Workers(Repository):
     def alive(self, silence_s: float) -> list[SeenWorker]:
         """The workers that were seen within `silence_s`."""
         with reading(self._engine) as connection:
-            recent = workers.c.seen_at >= _ago(connection, silence_s)
-            query = sa.select(workers.c.name, workers.c.model_sha256).where(recent)
-            return [SeenWorker(row.name, row.model_sha256) for row in connection.execute(query)]
+            return [worker for worker in seen(connection, clock(connection)) if worker.silent_s <= silence_s]
 
     def silent(self, silence_s: float) -> list[str]:
         """The workers that were not."""
         with reading(self._engine) as connection:
-            old = workers.c.seen_at < _ago(connection, silence_s)
-            return list(connection.scalars(sa.select(workers.c.name).where(old)))
+            return [worker.name for worker in seen(connection, clock(connection)) if worker.silent_s > silence_s]
 
     def leave(self, name: str, silence_s: float) -> None:
         """Forget a worker, unless it has come back meanwhile."""
         with writing(self._engine) as connection:
-            old = workers.c.seen_at < _ago(connection, silence_s)
+            old = workers.c.seen_at < clock(connection) - timedelta(seconds=silence_s)
             connection.execute(sa.delete(workers).where(workers.c.name == name, old))
 
 
-def _ago(connection: sa.Connection, seconds: float) -> datetime:
-    return clock(connection) - timedelta(seconds=seconds)
+def seen(connection: sa.Connection, now: datetime) -> list[SeenWorker]:
+    """All that were not given up, by name."""
+    rows = connection.execute(sa.select(workers).order_by(workers.c.name))
+    return [SeenWorker(row.name, max(0.0, (now - row.seen_at).total_seconds()), row.model_sha256) for row in rows]

@@ -113,17 +113,10 @@ class VenueIn(_Place):
     def stored(self) -> Venue:
         """The venue with poses in both conventions."""
         cameras = [
-            Camera(
-                id=c.id,
-                image_size=c.image_size,
-                intrinsics=c.intrinsics,
-                pose=Pose.of(c.pose),
-                source=None if c.source is None else without_credentials(c.source)[0],
-            )
+            Camera(**dict(c) | {"pose": Pose.of(c.pose), "source": c.source and without_credentials(c.source)[0]})
             for c in self.cameras
         ]
-        given = {"alarms": self.alarms, "schedule": self.schedule}
-        return Venue(id=self.id, name=self.name, field=self.field, cameras=cameras, **given)
+        return Venue(**dict(self) | {"cameras": cameras})
 
 
 class Venue(_Place):

@@ -42,7 +42,7 @@ class Stock(Stores):
             content_hash=job_id,
             idempotency_key=None,
         )
-        self.submissions.submit(submission, 100, lambda _, job_id, __: self.enqueued.append(job_id))
+        self.submissions.submit(submission, 100, lambda _, job_id, *__: self.enqueued.append(job_id))
         return job_id
 
     def ended(self, venue_id: str, at: datetime, *, accepted: bool | None = True, **options) -> str:

@@ -8,8 +8,8 @@ from datetime import UTC, timedelta
 import structlog
 
 from service.intake.from_sources import FromSources
-from service.intake.submit import REFUSALS, Enqueue
 from service.observe.disk import Disk
+from service.store.jobs.submission import Refusal
 from service.store.jobs.task import Origin
 from service.store.schedules import Firing, Schedules
 from service.store.venues import Venues
@@ -27,14 +27,11 @@ log = structlog.get_logger()
 class Scheduled:
     """Fires what is due by the clock of the database."""
 
-    def __init__(
-        self, schedules: Schedules, venues: Venues, from_sources: FromSources, disk: Disk, enqueue: Enqueue
-    ) -> None:
+    def __init__(self, schedules: Schedules, venues: Venues, from_sources: FromSources, disk: Disk) -> None:
         self._schedules = schedules
         self._venues = venues
         self._from_sources = from_sources
         self._disk = disk
-        self._enqueue = enqueue
         self._fetchers = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="schedule")
 
     def look(self) -> float:
@@ -51,7 +48,7 @@ class Scheduled:
                 job_id, error = self._calibrate(firing), None
             except Problem as problem:
                 job_id, error = None, problem.detail
-            except REFUSALS as refusal:
+            except Refusal as refusal:
                 job_id, error = None, f"{type(refusal).__name__}: {refusal.__doc__}"
             if error is not None:
                 log.warning("schedule fired in vain", why=error)
@@ -65,6 +62,6 @@ class Scheduled:
             raise Problem("disk-full", "Less is free on the disk than must be.")
         # Fired again after a worker died over it, it is the same job.
         name = f"schedule-{firing.due_at.astimezone(UTC):%Y%m%dT%H%M%SZ}"
-        job, _ = self._from_sources.calibrate(venue, Options(), name, Origin(request_id=name), self._enqueue)
+        job, _ = self._from_sources.calibrate(venue, Options(), name, Origin(request_id=name))
         log.info("schedule fired", job=job.id)
         return job.id

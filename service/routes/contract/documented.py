@@ -33,6 +33,7 @@ HEADERS: dict[str, dict[str, Any]] = {
     "Retry-After": {"description": "In seconds.", "schema": {"type": "integer", "minimum": 0}},
 }
 FILE: dict[str, Any] = {"type": "string", "format": "binary"}
+BINARY = {"schema": FILE}
 # Of a route that anybody may call.
 FOR_ALL: dict[str, Any] = {"security": []}
 

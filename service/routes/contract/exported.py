@@ -12,13 +12,12 @@ from fastapi import Query, Response
 from service.api.context import Context
 from service.formats.lens import Shot
 from service.formats.table import formats
-from service.routes.contract.documented import headers
+from service.routes.contract.documented import BINARY, headers
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
 from service.wire.base import ID_PATTERN, FormatName
 from service.wire.problems import Problem
 from service.wire.venue import Venue
 
-BINARY = {"schema": {"type": "string", "format": "binary"}}
 # Of `responses=`: what a document can be.
 DOCUMENTS: dict[int | str, dict[str, Any]] = {
     200: {

@@ -7,11 +7,11 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.intake.submit import REFUSALS
 from service.routes.contract.documented import frames_form, needs, problems, submitted
 from service.routes.contract.guarded import Guarded
 from service.routes.submissions import forms, taking
 from service.routes.submissions.taking import FromSender, Sender
+from service.store.jobs.submission import Refusal
 from service.wire.job import Job
 from service.wire.options import FieldOptions, Options
 from service.wire.venue import Venue
@@ -77,9 +77,7 @@ def submit(
 def fetch(context: Context, venue: Venue, options: Options, sender: Sender) -> Response:
     """Make what the cameras of `venue` show now a job."""
     try:
-        job, new = context.from_sources.calibrate(
-            venue, options, sender.idempotency_key, sender.origin, context.queue.enqueue
-        )
-    except REFUSALS as refusal:
+        job, new = context.from_sources.calibrate(venue, options, sender.idempotency_key, sender.origin)
+    except Refusal as refusal:
         raise taking.in_words(refusal, venue.id, context.settings) from None
     return taking.answer(job, new)

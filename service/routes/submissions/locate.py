@@ -11,12 +11,12 @@ from starlette.datastructures import FormData, UploadFile
 from service.api.context import Context, InContext, VenueIdPath
 from service.routes.contract.documented import form, needs, problems, submitted
 from service.routes.contract.guarded import Guarded
-from service.routes.jobs import LONGEST_WAIT_S, job_answer
+from service.routes.jobs import at_its_end, job_answer
 from service.routes.submissions import forms, taking
 from service.routes.submissions.taking import FromSender, Sender
 from service.routes.venues import camera_of
 from service.wire.base import ID_PATTERN, OPTIONS_PART
-from service.wire.job import OPEN, Job
+from service.wire.job import Job
 from service.wire.options import LocateOptions
 from service.wire.problems import Problem
 from service.wire.venue import Camera, Venue
@@ -57,10 +57,7 @@ async def locate(
     stored = await run_in_threadpool(forms.expecting, context, venue_id)
     async with forms.form_of(request, 1) as form:
         job, new = await run_in_threadpool(_submit, context, stored, camera, form, sender)
-    if wait and job.open:
-        await context.watch.until(job.id, lambda state: state.status not in OPEN, min(wait, LONGEST_WAIT_S))
-        ended: Job | None = await run_in_threadpool(context.jobs.get, job.id)
-        job = ended or job
+    job = await at_its_end(context, job, wait)
     return job_answer(job, status=202 if new and job.open else 200)
 
 

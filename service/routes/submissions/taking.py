@@ -12,13 +12,13 @@ from starlette.datastructures import UploadFile
 
 from service.api.context import Context
 from service.intake import images
-from service.intake.submit import REFUSALS, Refusal, frame_paths
+from service.intake.submit import frame_paths
 from service.routes.jobs import job_answer
 from service.routes.venues import RETRY_AFTER_S, no_such_venue, venue_busy
 from service.settings import Settings
 from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
-from service.store.jobs.submission import KeyReused, QueueFull, Submission, VenueBusy, VenueGone, VenueReplaced
+from service.store.jobs.submission import KeyReused, QueueFull, Refusal, Submission, VenueBusy, VenueGone, VenueReplaced
 from service.store.jobs.task import AnyOptions, Origin, kind_of, seeded
 from service.wire.job import Job
 from service.wire.problems import Problem
@@ -67,11 +67,9 @@ def take(context: Context, venue: Venue | None, options: AnyOptions, files: File
 
 def enqueued(context: Context, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
     """A submission as a job, or the job that it already is; says if it is new. `store` puts its frames in place."""
-    # A first pose takes a second, and somebody waits for it.
-    enqueue = context.queue.enqueue_light if submission.kind == "locate" else context.queue.enqueue
     try:
-        return context.intake.take(submission, store, enqueue)
-    except REFUSALS as refusal:
+        return context.intake.take(submission, store)
+    except Refusal as refusal:
         raise in_words(refusal, "" if submission.venue is None else submission.venue.id, context.settings) from None
 
 
@@ -128,3 +126,4 @@ def in_words(refusal: Refusal, venue_id: str, settings: Settings) -> Problem:
         case QueueFull():
             waiting = settings.queue_limit
             return Problem("queue-full", f"{waiting} jobs wait; try again.", headers={"Retry-After": "30"})
+    raise refusal

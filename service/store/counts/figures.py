@@ -13,7 +13,7 @@ from service.store import tables
 from service.store.counts import tallies
 from service.store.counts.tallies import Key
 from service.store.engine import clock, reading
-from service.wire.history import Revision
+from service.store.workers import SeenWorker, seen
 from service.wire.job import OPEN
 from service.wire.results import Result, View
 
@@ -28,15 +28,6 @@ class Waiting:
 
     jobs: int
     oldest_s: float
-
-
-@dataclass(frozen=True)
-class WorkerSeen:
-    """A worker, the seconds since its last sign of life, and the hash of its network (None: missing)."""
-
-    name: str
-    silent_s: float
-    model_sha256: str | None
 
 
 @dataclass(frozen=True)
@@ -70,7 +61,7 @@ class Figures:
     queue: Mapping[int, Waiting]
     running: int
     callbacks_waiting: int
-    workers: list[WorkerSeen]
+    workers: list[SeenWorker]
     venues: list[VenueQuality]
     alarms: Mapping[str, int]
     ringing: list[Ringing]
@@ -86,7 +77,7 @@ def look(engine: sa.Engine, most_venues: int) -> Figures:
             queue=queue,
             running=running,
             callbacks_waiting=_callbacks_waiting(connection),
-            workers=_workers(connection, now),
+            workers=seen(connection, now),
             venues=_venues(connection, most_venues),
             alarms=_alarms(connection),
             ringing=_ringing(connection, most_venues),
@@ -133,16 +124,6 @@ def note(connection: sa.Connection, venue_id: str, **values: Any) -> None:
         connection.execute(sa.insert(tables.venue_quality).values(venue=venue_id, **values))
 
 
-def note_restored(connection: sa.Connection, venue_id: str, revision: Revision) -> None:
-    """An older revision holds again, inside the caller's serialised transaction."""
-    note(connection, venue_id, stitch_error_px=revision.stitch_error_px)
-
-
-def forget_quality(connection: sa.Connection, venue_id: str) -> None:
-    """Nothing is known about the venue any more: it is gone."""
-    connection.execute(sa.delete(tables.venue_quality).where(q.venue == venue_id))
-
-
 def _queue(connection: sa.Connection, now: datetime) -> tuple[dict[int, Waiting], int]:
     count, oldest = sa.func.count().label("jobs"), sa.func.min(j.created_at, type_=j.created_at.type).label("oldest")
     query = sa.select(j.status, j.priority, count, oldest).where(j.status.in_(OPEN)).group_by(j.status, j.priority)
@@ -158,11 +139,6 @@ def _queue(connection: sa.Connection, now: datetime) -> tuple[dict[int, Waiting]
 def _callbacks_waiting(connection: sa.Connection) -> int:
     waiting = sa.select(sa.func.count()).where(tables.deliveries.c.status == "waiting")
     return connection.execute(waiting).scalar_one()
-
-
-def _workers(connection: sa.Connection, now: datetime) -> list[WorkerSeen]:
-    rows = connection.execute(sa.select(tables.workers).order_by(tables.workers.c.name))
-    return [WorkerSeen(row.name, max(0.0, (now - row.seen_at).total_seconds()), row.model_sha256) for row in rows]
 
 
 def _venues(connection: sa.Connection, most: int) -> list[VenueQuality]:

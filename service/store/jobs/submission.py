@@ -15,6 +15,8 @@ from service.store.venues import find_venue, venue_lock
 from service.wire.job import OPEN, Job, Kind
 from service.wire.venue import Venue
 
+# Job, priority and kind, into the queue in the caller's transaction.
+Enqueue = Callable[[sa.Connection, str, int, Kind], None]
 PRIORITIES = {"live": 1, "routine": 100}
 j = tables.jobs.c
 
@@ -26,38 +28,40 @@ class Submission(Asked):
     idempotency_key: str | None
 
 
-class KeyReused(Exception):  # noqa: N818
+class Refusal(Exception):  # noqa: N818
+    """Why a submission becomes no job."""
+
+
+class KeyReused(Refusal):
     """The idempotency key belongs to a job of other content."""
 
     def __init__(self, job_id: str) -> None:
         self.job_id = job_id
 
 
-class VenueBusy(Exception):  # noqa: N818
+class VenueBusy(Refusal):
     """The venue has an active job of other content."""
 
     def __init__(self, job_id: str) -> None:
         self.job_id = job_id
 
 
-class VenueGone(Exception):  # noqa: N818
+class VenueGone(Refusal):
     """The venue was deleted while its frames arrived."""
 
 
-class VenueReplaced(Exception):  # noqa: N818
+class VenueReplaced(Refusal):
     """The pitch or a lens of the venue was changed while its frames arrived: they were checked against another one."""
 
 
-class QueueFull(Exception):  # noqa: N818
+class QueueFull(Refusal):
     """As many jobs wait as may."""
 
 
 class Submissions(Repository):
     """The beginning of the jobs in the database."""
 
-    def submit(
-        self, submission: Submission, queue_limit: int, enqueue: Callable[[sa.Connection, str, int], None]
-    ) -> tuple[Job, bool]:
+    def submit(self, submission: Submission, queue_limit: int, enqueue: Enqueue) -> tuple[Job, bool]:
         """Row and queue entry in one transaction, or the job that the content already is; also says which.
 
         The job begins from the poses that hold now: others may have been found since the upload began.
@@ -94,7 +98,7 @@ class Submissions(Repository):
                     updated_at=now,
                 )
             )
-            enqueue(connection, submission.job_id, priority)
+            enqueue(connection, submission.job_id, priority, submission.kind)
             # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
             serialise(connection, "queue")
             waiting = connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
