@@ -100,18 +100,18 @@ def calibrate(
     pitch = pitch.flat() if options.flat or method.flat else pitch
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey, usual)
-    found, finished = settle(method, pitch, cameras, seen, options, journey)
+    end = settle(method, pitch, cameras, seen, options, journey)
     with journey.measuring("quality"):
         journey.at("refinement", 0.6)
-        answer = judge(pitch, cameras, seen, finished, journey)
+        answer = judge(pitch, cameras, seen, end.finished, journey)
         stitch_before = _stitch_error_px(pitch, cameras, seen.sight)
         journey.at("refinement", 1.0)
     return Calibration(
         **vars(answer),
         stitch_error_before_px=stitch_before,
-        loss=found.loss,
-        generations=found.generations,
-        suspicions=suspicions(believable(finished.deviations, answer.cameras, Gate())),
+        loss=end.found.loss,
+        generations=end.found.generations,
+        suspicions=suspicions(believable(end.finished.deviations, answer.cameras, Gate())),
     )
 
 
@@ -145,9 +145,22 @@ def look(
     return Seen(views, Sight([Channels(frames[camera.id]) for camera in cameras], responses))
 
 
+@dataclass(frozen=True)
+class End:
+    """Where search and finish ended."""
+
+    found: Found
+    finished: Finished
+
+    @property
+    def agreement(self) -> float:
+        """Of the camera whose frame is explained least."""
+        return min(camera.evidence.agreement for camera in self.finished.each)
+
+
 def settle(
     method: Method, pitch: Field, cameras: Sequence[Camera], seen: Seen, options: Options, journey: Journey
-) -> tuple[Found, Finished]:
+) -> End:
     """Search for all cameras from their stored poses, and finish.
 
     What cannot be seen is not searched for: the stored poses are judged as they are, beside what is wrong. Where the
@@ -157,9 +170,9 @@ def settle(
     if not seen.usable:
         with journey.measuring("refinement"):
             stored = assess(pitch, cameras, seen.sight, options.stitch_weight, free)
-        return Found(list(cameras), np.inf, 0), stored
+        return End(Found(list(cameras), np.inf, 0), stored)
 
-    def settled_by(responses: Sequence[Response]) -> tuple[Found, Finished]:
+    def settled_by(responses: Sequence[Response]) -> End:
         with journey.measuring("evolution"):
             strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
             rng = np.random.default_rng(options.seed)
@@ -167,15 +180,16 @@ def settle(
             found = search(pitch, cameras, responses, method.levels, strategy, rng, on_generation)
         with journey.measuring("refinement"):
             journey.at("refinement", 0.0)
-            return found, method.finish(pitch, found.cameras, seen.sight, options.stitch_weight, free)
+            finished = method.finish(pitch, found.cameras, seen.sight, options.stitch_weight, free)
+            return End(found, finished)
 
     first = settled_by(seen.sight.responses)
-    lost = [left.evidence.agreement < Gate().least_agreement for left in first[1].each]
+    lost = [camera.evidence.agreement < Gate().least_agreement for camera in first.finished.each]
     if not (method.ridges and any(lost)):
         return first
     with journey.measuring("segmentation"):
         responses = _with_ridges(pitch, cameras, seen.sight, lost)
-    return max(first, settled_by(responses), key=lambda end: min(left.evidence.agreement for left in end[1].each))
+    return max(first, settled_by(responses), key=lambda end: end.agreement)
 
 
 def _with_ridges(pitch: Field, cameras: Sequence[Camera], sight: Sight, lost: Sequence[bool]) -> list[Response]:
@@ -211,8 +225,16 @@ def judge(pitch: Field, stored: Sequence[Camera], seen: Seen, finished: Finished
 
 
 def _stitch_error_px(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> float | None:
-    responses = {camera.id: response for camera, response in zip(cameras, sight.responses, strict=True)}
-    return stitch_error_px(pitch, cameras, responses)
+    """By what the network sees, or by ridges where that brings no cameras together that share markings."""
+    error = _registered_px(pitch, cameras, sight.responses)
+    if error is not None or not pairs_in_common(pitch, cameras):
+        return error
+    return _registered_px(pitch, cameras, _with_ridges(pitch, cameras, sight, [True] * len(cameras)))
+
+
+def _registered_px(pitch: Field, cameras: Sequence[Camera], responses: Sequence[Response]) -> float | None:
+    by_id = {camera.id: response for camera, response in zip(cameras, responses, strict=True)}
+    return stitch_error_px(pitch, cameras, by_id)
 
 
 def require_markings_in_view(pitch: Field, cameras: Sequence[Camera]) -> None:

@@ -69,6 +69,16 @@ def test_the_same_seed_gives_the_same_poses_to_the_last_digit():
         np.testing.assert_array_equal(first.camera.pose.position, second.camera.pose.position)
 
 
+def test_lines_that_the_network_has_never_learnt_are_found_by_their_ridges():
+    def sees_nothing(frame, _):
+        return np.zeros(frame.shape[:2], dtype=np.uint8)
+
+    found = calibrate(CROWNED, outdated(), frames(), sees_nothing, Options(seed=3))
+    assert found.accepted, found.rejected_because
+    for truth, camera in zip(pair(), found.cameras, strict=True):
+        assert np.linalg.norm(camera.camera.pose.position - truth.pose.position) < 0.05
+
+
 def test_one_camera_alone_has_no_stitch_error():
     found = run(cameras=outdated()[:1])
     assert found.stitch_error_px is None

@@ -82,10 +82,10 @@ def fit_field(
     """
     options, journey = Options(seed=seed), Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey)
-    found, _ = settle(METHODS["esc"], pitch, cameras, seen, options, journey)
+    end = settle(METHODS["esc"], pitch, cameras, seen, options, journey)
     with journey.measuring("refinement"):
         fit = fit_measures if seen.usable else leave_measures
-        finished, measures = fit(pitch, found.cameras, seen.sight, options.stitch_weight)
+        finished, measures = fit(pitch, end.found.cameras, seen.sight, options.stitch_weight)
     with journey.measuring("quality"):
         journey.at("refinement", 0.9)
         answer = judge(pitch, cameras, seen, finished, journey)

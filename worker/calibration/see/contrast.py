@@ -32,6 +32,8 @@ PALE, DEEP = 0.75, 0.25
 """What reflects more in a channel is hardly ever darker than its ground there, what reflects less hardly brighter."""
 CLEARLY = 0.2
 """By so much correlation another contrast has to be better than bright in green."""
+OPPOSES = 0.33
+"""What stands out so much, beside how it stands out where it does most, as its paint cannot is of another paint."""
 
 
 class Channels:

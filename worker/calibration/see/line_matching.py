@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fields.shapes import WHITE
 from worker.calibration.scene.camera import Array
 from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.contrast import BLUE, CLEARLY, CONTRASTS, GREEN, RED, Channels, possible_signs
+from worker.calibration.see.contrast import BLUE, CLEARLY, CONTRASTS, GREEN, OPPOSES, RED, Channels, possible_signs
 from worker.calibration.see.line_profile import blurred_line
 from worker.calibration.see.sampling import bilinear
 
@@ -40,7 +41,7 @@ class Matches:
     picture, in steps of `sampling_px`; `expected` (M, K) at `offsets` (K,) from their centres, see `expected_profiles`;
     `correlation` (M, S) of the two at `shifts` (S,) px along their normals, -1..1, positive where a piece is bright or
     dark as its marking is; `along` (M, S): its mean over the pieces of the same marking around each: high where a ridge
-    goes on along the line, near zero elsewhere.
+    goes on along the line, near zero elsewhere; `opposed` (M, S): whether what is there has another paint's colour.
     """
 
     which: NDArray[np.intp]
@@ -49,6 +50,7 @@ class Matches:
     offsets: Array
     correlation: Array
     along: Array
+    opposed: NDArray[np.bool_]
     shifts: Array
     sampling_px: float
 
@@ -59,22 +61,31 @@ class Matches:
             which=self.which[chosen],
             brightness=self.brightness[chosen],
             expected=self.expected[chosen],
-            correlation=sign * self.correlation[chosen],
-            along=sign * self.along[chosen],
+            correlation=np.where(self.opposed[chosen], -1.0, sign * self.correlation[chosen]),
+            along=np.where(self.opposed[chosen], -1.0, sign * self.along[chosen]),
+            opposed=self.opposed[chosen],
         )
+
+    @property
+    def contrast(self) -> Array:
+        """How much (M, S) the pieces stand out as lines at each shift: grey levels, but for the filter's norm."""
+        windows = np.lib.stride_tricks.sliding_window_view(self.brightness, self.expected.shape[1], axis=1)
+        return np.asarray(np.einsum("nsk,nk->ns", windows, self.expected))
 
 
 def match_lines(seen: SeenLines, channels: Channels, reach_px: float, relative_size: float) -> list[Matches]:
     """The matches of all lines that are wide enough to be seen, for shifts up to `reach_px`, by class of width.
 
     Each marking is looked for where it stands out most: in another channel than green only if green does not show it.
+    What has another colour than a marking that is known not to be white is no match.
     """
     everywhere = np.ones(len(seen), dtype=bool)
     looked = {GREEN: _matches_in(channels[GREEN], seen, everywhere, reach_px, relative_size)}
     strength = _strengths(looked, seen)
-    faint = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking]
-    if faint.any():
-        looked |= {c: _matches_in(channels[c], seen, faint, reach_px, relative_size) for c in (RED, BLUE)}
+    wanted = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
+    if wanted.any():
+        looked |= {c: _matches_in(channels[c], seen, wanted, reach_px, relative_size) for c in (RED, BLUE)}
+        looked = _without_other_paint(looked, seen.points.colour)
         strength = _strengths(looked, seen)
     usual = np.argmax(strength > -np.inf, axis=0)
     strength[usual, np.arange(strength.shape[1])] += CLEARLY
@@ -85,6 +96,25 @@ def match_lines(seen: SeenLines, channels: Channels, reach_px: float, relative_s
         if number == 0 or number in chosen
         for of_class in looked[channel]
     ]
+
+
+def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np.str_]) -> dict[int, list[Matches]]:
+    """The matches in three channels with what has another colour than the paint (N,) of the lines opposed."""
+    freed = {channel: list(classes) for channel, classes in looked.items()}
+    for number, (green, red, blue) in enumerate(zip(*(looked[c] for c in (GREEN, RED, BLUE)), strict=True)):
+        named = colour[red.which] != WHITE
+        everywhere = np.isin(green.which, red.which[named])
+        contrast = {GREEN: green.contrast[everywhere], RED: red.contrast[named], BLUE: blue.contrast[named]}
+        most = np.abs(np.stack(list(contrast.values()))).max(axis=0)
+        opposed = np.zeros(most.shape, dtype=bool)
+        for channel, sign in CONTRASTS:
+            impossible = np.array([sign not in possible_signs(str(c), channel) for c in colour[red.which[named]]], bool)
+            opposed |= impossible[:, None] & (sign * contrast[channel] >= OPPOSES * most)
+        for channel, of_class, rows in ((GREEN, green, everywhere), (RED, red, named), (BLUE, blue, named)):
+            there = of_class.opposed.copy()
+            there[rows] = opposed
+            freed[channel][number] = replace(of_class, opposed=there)
+    return freed
 
 
 def _strengths(looked: Mapping[int, Sequence[Matches]], seen: SeenLines) -> Array:
@@ -126,7 +156,8 @@ def _matches_in(
         correlation = sliding_correlation(across, expected)
         along = _mean_along(correlation, pieces, TOGETHER_PX * relative_size)
         shifts = sampling * np.arange(-half_search, half_search + 1, dtype=float)
-        classes.append(Matches(which, across, expected, offsets, correlation, along, shifts, sampling))
+        free = np.zeros(correlation.shape, dtype=bool)
+        classes.append(Matches(which, across, expected, offsets, correlation, along, free, shifts, sampling))
     return classes
 
 
