@@ -12,7 +12,6 @@ from worker.calibration.judge.quality import CameraResult, Gate, Movement, marki
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition, ViewFigures
 
-
 LEFT = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
 PAIR = [(LEFT, LEFT)]
 
