@@ -12,14 +12,13 @@ from worker.calibration.judge.quality import CameraResult, Gate, Movement, marki
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition, ViewFigures
 
+LEFT = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
+PAIR = [(LEFT, LEFT)]
+
 
 @cache
 def scene():
-    one = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
-    return one, paint_markings(CROWNED, one)
-
-
-PAIR = [(scene()[0], scene()[0])]
+    return LEFT, paint_markings(CROWNED, LEFT)
 
 
 def seen(share: float, by_chance: float = 0.2) -> Evidence:
@@ -36,7 +35,7 @@ FOGGED = ViewCondition(False, "fogged", "far half", "Fogged (far half): most lik
 
 def good():
     return CameraResult(
-        camera=scene()[0],
+        camera=LEFT,
         evidence=seen(0.95),
         residual_px=0.2,
         covariance=np.diag([0.005**2] * 3 + [0.05**2] * 3),
