@@ -3,6 +3,10 @@
 import importlib.util
 import os
 
+# One BLAS thread, as the worker sets it, before NumPy is loaded: several only wait for each other where all cores are
+# busy with tests. What the tests start inherits it.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
 import pytest
 
 from service.store.engine import connect, migrate

@@ -106,7 +106,8 @@ def test_without_a_server_native_code_finds_the_environment_of_a_workers_child(s
     answer = subprocess.run(
         [sys.executable, "-u", "-m", "service.cli", "run", "venue.json", *FRAMES, "-o", "out"],
         cwd=tmp_path,
-        env=service.environment | {"PYTHONPATH": str(tmp_path), "ESC_MAX_FRAME_PIXELS": "4096"},
+        env=service.environment
+        | {"PYTHONPATH": str(tmp_path), "ESC_MAX_FRAME_PIXELS": "4096", "OPENBLAS_NUM_THREADS": "2"},
         capture_output=True,
         text=True,
         timeout=60,

@@ -16,8 +16,10 @@ SKY = np.array([230, 200, 170], np.float32)
 PITCH = Field(105.0, 68.0)
 CROWNED = Field(105.0, 68.0, ridge=np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
 BARREL = (-0.12, 0.02, 0.0, 0.0, 0.0)
-# Rows of samples.
-BAND = 16
+# Samples a side of a pixel, and pixels a side of a block.
+SAMPLES, BLOCK = 3, 4
+# How steeply a ray has to go down to meet the ground.
+LEVEL = 1e-3
 
 
 def camera(
@@ -46,19 +48,41 @@ def pair(distortion: tuple[float, ...] = BARREL) -> list[Camera]:
     ]
 
 
-def ground_behind(pitch: Field, camera: Camera, oversampling: int = 1) -> Array:
+def ground_behind(pitch: Field, camera: Camera) -> Array:
     """Points (H, W, 2) of the pitch plane behind each pixel, NaN above the horizon."""
+    return _ground_at(pitch, camera, np.stack(np.indices(camera.intrinsics.size[::-1])[::-1], axis=-1))
+
+
+def paint_markings(pitch: Field, camera: Camera) -> NDArray[np.float32]:
+    """The part (H, W), 0..1, of each pixel that is paint."""
     width, height = camera.intrinsics.size
-    # Rays are smooth over the picture, so they are interpolated between pixels; the ground behind them is not.
-    rays = camera.rays(np.stack(np.meshgrid(np.arange(-1.0, width + 1), np.arange(-1.0, height + 1)), axis=-1))
-    rays = cv2.resize(rays, None, fx=oversampling, fy=oversampling, interpolation=cv2.INTER_LINEAR)
-    rays = rays[oversampling:-oversampling, oversampling:-oversampling]
-    # Band by band: what the loop works on stays in the processor's cache.
-    return np.concatenate([_ground_of(rays[row : row + BAND], pitch, camera) for row in range(0, len(rays), BAND)])
+    middles = _blocks(camera)
+    behind = _ground_at(pitch, camera, middles)
+    side = BLOCK * SAMPLES
+    offsets = (np.arange(side) + 0.5) / SAMPLES - BLOCK / 2
+    samples = np.stack(np.meshgrid(offsets, offsets), axis=-1)
+    paint = np.zeros((*middles.shape[:2], side, side), np.float32)
+    for marking in pitch.markings():
+        close = _close(marking, behind)
+        covered = _covered(marking, _ground_at(pitch, camera, middles[close][:, None, None] + samples))
+        paint[close] = np.maximum(paint[close], np.nan_to_num(covered))
+    sampled = paint.transpose(0, 2, 1, 3).reshape(-1, paint.shape[1] * side)
+    return cv2.resize(sampled, None, fx=1 / SAMPLES, fy=1 / SAMPLES, interpolation=cv2.INTER_AREA)[:height, :width]
 
 
-def _ground_of(rays: Array, pitch: Field, camera: Camera) -> Array:
-    down = np.where(rays[..., 2] < -1e-3, rays[..., 2], np.nan)
+def _blocks(camera: Camera) -> Array:
+    """Pixels (h, w, 2) in the middles of blocks of the picture: what is far from all lines is not sampled finely."""
+    width, height = camera.intrinsics.size
+    middle = (BLOCK - 1) / 2
+    return np.stack(
+        np.meshgrid(np.arange(middle, width + middle, BLOCK), np.arange(middle, height + middle, BLOCK)), -1
+    )
+
+
+def _ground_at(pitch: Field, camera: Camera, pixels: Array) -> Array:
+    """Points (..., 2) of the pitch plane behind pixels (..., 2), NaN above the horizon."""
+    rays = camera.rays(pixels)
+    down = np.where(rays[..., 2] < -LEVEL, rays[..., 2], np.nan)
     surface = np.zeros(down.shape)
     for _ in range(1 if pitch.ridge is None else 6):
         along = (surface - camera.pose.position[2]) / down
@@ -67,23 +91,20 @@ def _ground_of(rays: Array, pitch: Field, camera: Camera) -> Array:
     return points
 
 
-def paint_markings(pitch: Field, camera: Camera, oversampling: int = 3) -> NDArray[np.float32]:
-    """The part (H, W), 0..1, of each pixel that is paint."""
-    points = ground_behind(pitch, camera, oversampling)
-    paint = np.zeros(points.shape[:2], np.float32)
-    rough = points[::4, ::4]
-    for marking in pitch.markings():
-        low, high = marking.centre.min(axis=0) - 1.0, marking.centre.max(axis=0) + 1.0
-        near = np.all((rough > low) & (rough < high), axis=-1)
-        if near.any():
-            rows, columns = 4 * np.flatnonzero(near.any(axis=1)), 4 * np.flatnonzero(near.any(axis=0))
-            part = np.s_[max(rows[0] - 4, 0) : rows[-1] + 5, max(columns[0] - 4, 0) : columns[-1] + 5]
-            paint[part] = np.maximum(paint[part], np.nan_to_num(_covered(marking, points[part])))
-    return cv2.resize(paint, camera.intrinsics.size, interpolation=cv2.INTER_AREA)
+def _close(marking: Marking, points: Array) -> NDArray[np.bool_]:
+    """Whether a marking may reach into the blocks (h, w) with these points (h, w, 2) in their middles."""
+    across, along, half_length = _place(marking, points)
+    return (np.abs(across) < marking.width / 2 + _step(across)) & (np.abs(along) < half_length + _step(along))
 
 
 def _covered(marking: Marking, points: Array) -> Array:
-    """The part of each sample that a marking covers: its box filter across the line times the one along it."""
+    """The part of each sample (..., h, w) that a marking covers: its box filter across the line times that along it."""
+    across, along, half_length = _place(marking, points)
+    return _box(across, marking.width / 2) * _box(along, half_length)
+
+
+def _place(marking: Marking, points: Array) -> tuple[Array, Array, float]:
+    """How far points (..., 2) are from the line and from its middle along it, and half its length."""
     start, end = marking.centre[0], marking.centre[-1]
     if len(marking.centre) == 2:
         direction = (end - start) / np.linalg.norm(end - start)
@@ -105,19 +126,25 @@ def _covered(marking: Marking, points: Array) -> Array:
             along = np.zeros_like(along)
     if marking.spot:
         across, along, half_length = np.hypot(across, along), np.zeros_like(along), 1.0
-    return _box(across, marking.width / 2) * _box(along, half_length)
+    return across, along, half_length
+
+
+def _step(distance: Array) -> Array:
+    """How much (..., h, w) a distance may change from one sample to the next."""
+    down, right = np.gradient(distance, axis=(-2, -1))
+    return np.abs(down) + np.abs(right)
 
 
 def _box(distance: Array, half_width: float) -> Array:
     """How much of a sample of the size of the distance's step lies within `half_width`."""
-    down, right = np.gradient(distance)
+    down, right = np.gradient(distance, axis=(-2, -1))
     step = np.maximum(np.hypot(down, right), 1e-9)
     return np.clip((distance + half_width) / step + 0.5, 0, 1) - np.clip((distance - half_width) / step + 0.5, 0, 1)
 
 
 def paint_frame(pitch: Field, camera: Camera, exposure: float = 1.0) -> NDArray[np.uint8]:
     """White lines on grass under a sky, BGR."""
-    paint = paint_markings(pitch, camera, oversampling=2)[..., None]
-    sky = np.isnan(ground_behind(pitch, camera)).any(axis=-1)[..., None]
-    picture = np.where(sky, SKY, GRASS + (PAINT - GRASS) * paint)
+    width, height = camera.intrinsics.size
+    down = cv2.resize(camera.rays(_blocks(camera))[..., 2], None, fx=BLOCK, fy=BLOCK)[:height, :width, None]
+    picture = np.where(down < -LEVEL, GRASS + (PAINT - GRASS) * paint_markings(pitch, camera)[..., None], SKY)
     return np.clip(exposure * picture, 0, 255).astype(np.uint8)
