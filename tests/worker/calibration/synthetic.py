@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +48,24 @@ def pair(distortion: tuple[float, ...] = BARREL) -> list[Camera]:
         camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0), distortion=distortion),
         camera("right", (1.0, -48.0, 10.0), (20.0, 0.0), distortion=distortion),
     ]
+
+
+@cache
+def pair_markings(distortion: tuple[float, ...] = BARREL) -> tuple[NDArray[np.float32], ...]:
+    """What the pair sees of the markings of the crowned pitch: painted once for all tests of a process."""
+    return tuple(_shared(paint_markings(CROWNED, one)) for one in pair(distortion))
+
+
+@cache
+def pair_frames(distortion: tuple[float, ...] = BARREL) -> tuple[NDArray[np.uint8], ...]:
+    """The frames of the pair: painted once for all tests of a process."""
+    seen = zip(pair(distortion), pair_markings(distortion), strict=True)
+    return tuple(_shared(_coloured(one, paint)) for one, paint in seen)
+
+
+def _shared(picture: NDArray) -> NDArray:
+    picture.flags.writeable = False
+    return picture
 
 
 def ground_behind(pitch: Field, camera: Camera) -> Array:
@@ -144,7 +164,11 @@ def _box(distance: Array, half_width: float) -> Array:
 
 def paint_frame(pitch: Field, camera: Camera, exposure: float = 1.0) -> NDArray[np.uint8]:
     """White lines on grass under a sky, BGR."""
+    return _coloured(camera, paint_markings(pitch, camera), exposure)
+
+
+def _coloured(camera: Camera, paint: NDArray[np.float32], exposure: float = 1.0) -> NDArray[np.uint8]:
     width, height = camera.intrinsics.size
     down = cv2.resize(camera.rays(_blocks(camera))[..., 2], None, fx=BLOCK, fy=BLOCK)[:height, :width, None]
-    picture = np.where(down < -LEVEL, GRASS + (PAINT - GRASS) * paint_markings(pitch, camera)[..., None], SKY)
+    picture = np.where(down < -LEVEL, GRASS + (PAINT - GRASS) * paint[..., None], SKY)
     return np.clip(exposure * picture, 0, 255).astype(np.uint8)

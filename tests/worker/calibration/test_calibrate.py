@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame, pair
+from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.calibrate import calibrate
 from worker.calibration.judge.quality import Gate, ridge_rejection
 from worker.calibration.records import CalibrationError, Options, Stopped
@@ -17,9 +17,8 @@ TURN = (0.006, -0.005, 0.004)
 SHIFT = (0.05, -0.06, 0.04)
 
 
-@cache
 def frames():
-    return {c.id: (paint_frame(CROWNED, c),) for c in pair()}
+    return {c.id: (frame,) for c, frame in zip(pair(), pair_frames(), strict=True)}
 
 
 def white_on_green(frame, regions):
@@ -148,7 +147,6 @@ def test_a_focal_length_that_heat_has_changed_is_found_when_asked_for():
     found = run(cameras=[with_longer_lens(left, 2.0), right], fit_focal_length=True)
     assert found.accepted
     assert found.cameras[0].camera.intrinsics.matrix[0, 0] == pytest.approx(600.0, abs=0.3)
-    assert run(cameras=[with_longer_lens(left, 2.0), right]).cameras[0].camera.intrinsics.matrix[0, 0] == 602.0
 
 
 def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers():
@@ -158,6 +156,7 @@ def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers
     told = {(s.camera, s.quantity): s for s in found.suspicions}
     assert told["left", "k1"].deviation == pytest.approx(-0.02, abs=3 * told["left", "k1"].sigma)
     assert "camera left fit best with a first radial coefficient" in told["left", "k1"].detail
+    assert found.cameras[0].camera.intrinsics is other
     assert result().suspicions == []
 
 

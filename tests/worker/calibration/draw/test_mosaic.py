@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -15,6 +13,7 @@ from tests.worker.calibration.synthetic import (
     camera,
     paint_frame,
     pair,
+    pair_frames,
 )
 from worker.calibration.draw import mosaic
 from worker.calibration.draw.mosaic import BACKDROP, birdseye, stitched
@@ -35,10 +34,9 @@ CAMERAS = pair()
 FRAME_SIZE = (960, 540)
 
 
-@cache
 def frames(exposure_right: float = 1.0) -> dict[str, NDArray[np.uint8]]:
-    left, right = CAMERAS
-    return {"left": paint_frame(CROWNED, left), "right": paint_frame(CROWNED, right, exposure_right)}
+    left, right = pair_frames()
+    return {"left": left, "right": (exposure_right * right).astype(np.uint8)}
 
 
 def lines_across(picture: NDArray[np.uint8], y: int, x: slice) -> int:

@@ -12,9 +12,9 @@ from tests.worker.calibration.synthetic import (
     PITCH,
     camera,
     moved,
-    paint_frame,
     paint_markings,
     pair,
+    pair_frames,
 )
 from worker.calibration.draw.overlays import EDGE_GAP, NEW_COLOUR, STORED_COLOUR, overlay
 from worker.calibration.scene.camera import Pose
@@ -40,16 +40,15 @@ def test_the_strokes_of_the_overlay_frame_the_painted_line() -> None:
 
 
 def test_the_overlay_draws_both_poses_and_leaves_the_frame_alone() -> None:
-    frame = paint_frame(CROWNED, LEFT)
-    before = frame.copy()
+    frame = pair_frames()[0].copy()
     drawn = overlay((CROWNED, moved(LEFT, rotation=(0.01, 0.0, 0.0))), (CROWNED, LEFT), frame)
-    assert (frame == before).all()
+    assert (frame == pair_frames()[0]).all()
     for colour in (STORED_COLOUR, NEW_COLOUR):
         assert (np.abs(drawn[:450] - np.array(colour)).max(axis=-1) < 60).sum() > 200
 
 
 def test_an_overlay_of_a_pose_that_sees_no_pitch_is_the_frame_with_a_legend() -> None:
-    frame = paint_frame(CROWNED, LEFT)
+    frame = pair_frames()[0]
     up = camera("left", (0.0, -48.0, 10.0), (0.0, -90.0))
     drawn = overlay((PITCH, up), (PITCH, up), frame)
     assert (drawn[:400] == frame[:400]).all()

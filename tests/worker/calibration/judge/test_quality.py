@@ -1,24 +1,22 @@
 """Quality without ground truth, and the gate."""
 
 from dataclasses import fields, replace
-from functools import cache
 
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings
+from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, pair, pair_markings
 from worker.calibration.finish.uncertainty import Sigma
 from worker.calibration.judge.quality import CameraResult, Gate, Movement, markings_iou, rejection
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition, ViewFigures
 
-LEFT = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
+LEFT = pair(())[0]
 PAIR = [(LEFT, LEFT)]
 
 
-@cache
 def scene():
-    return LEFT, paint_markings(CROWNED, LEFT)
+    return LEFT, pair_markings(())[0]
 
 
 def seen(share: float, by_chance: float = 0.2) -> Evidence:

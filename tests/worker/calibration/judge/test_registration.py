@@ -157,7 +157,7 @@ def test_the_number_of_threads_changes_no_digit() -> None:
         "from worker.calibration.judge.registration import register_pair\n"
         "left, right = pair()\n"
         "wrong = moved(right, rotation=(0.002, 0.001, 0.0))\n"
-        "masks = [paint_markings(PITCH, one, 1) for one in (left, right)]\n"
+        "masks = [paint_markings(PITCH, one) for one in (left, right)]\n"
         "found = register_pair(PITCH, left, wrong, *masks)\n"
         "print(found.dx_px.hex(), found.dy_px.hex())\n"
     )

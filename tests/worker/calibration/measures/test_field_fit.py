@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from fields.template import load
-from tests.worker.calibration.synthetic import BARREL, CROWNED, PITCH, camera, moved, paint_frame, paint_markings, pair
+from tests.worker.calibration.synthetic import (
+    BARREL,
+    CROWNED,
+    PITCH,
+    camera,
+    moved,
+    paint_frame,
+    paint_markings,
+    pair,
+    pair_frames,
+)
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.finish.refinement import Sight
 from worker.calibration.measures.field_fit import fit_field, fit_measures
@@ -78,8 +88,8 @@ def test_a_flat_pitch_has_no_ridge_worth_mentioning_and_none_whose_length_could_
 
 
 def test_cameras_of_which_one_sees_nothing_are_left_where_they_are_and_no_measure_is_known():
-    frames = {c.id: [paint_frame(CROWNED, c)] for c in pair()}
-    frames["right"] = [np.zeros_like(frames["right"][0])]
+    left, right = pair_frames()
+    frames = {"left": [left], "right": [np.zeros_like(right)]}
     steps = []
     found = fit_field(CROWNED, pair(), frames, white_on_green, 1, steps.append)
     assert found.rejected_because.startswith("camera right: Dark")

@@ -1,21 +1,17 @@
 """What a pose is worth: the truth is best, and nothing else pays."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair
+from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair, pair_markings
 from worker.calibration.search.ground_objective import GroundObjective
 from worker.calibration.search.objective import BlurredResponse, Objective
 from worker.calibration.search.search import genome_of
 from worker.calibration.see.line_profile import blurred_line
 
 
-@cache
 def scene():
-    cameras = pair()
-    return cameras, [paint_markings(CROWNED, c) for c in cameras]
+    return pair(), list(pair_markings())
 
 
 def loss(objective, cameras):

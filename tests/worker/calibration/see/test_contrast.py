@@ -1,13 +1,12 @@
 """Markings in paint of any colour, beside lines of other colours."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from fields.shapes import COLOURS
-from tests.worker.calibration.synthetic import CROWNED, camera, paint_markings
+from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
 from worker.calibration.see.contrast import BLUE, GREEN, RED, Channels, possible_signs
 from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.line_measurement import measure_lines
@@ -17,10 +16,8 @@ PAINTS = {"white": (235, 235, 235), "blue": (180, 90, 30), "yellow": (40, 200, 2
 BESIDE_PX = 9
 
 
-@cache
 def scene():
-    one = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
-    return one, paint_markings(CROWNED, one)
+    return pair(())[0], pair_markings(())[0]
 
 
 def lines(colour):

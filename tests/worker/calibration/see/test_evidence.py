@@ -1,21 +1,17 @@
 """How much of the expected lines a frame shows, beside what chance would find."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings
+from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
 
 Colour = float | tuple[float, float, float]
 
 
-@cache
 def scene():
-    one = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
-    return one, paint_markings(CROWNED, one)
+    return pair(())[0], pair_markings(())[0]
 
 
 def frame(level: Colour, paint: Colour, noise: float = 3.0) -> np.ndarray:

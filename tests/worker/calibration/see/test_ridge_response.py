@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings
+from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.scene.camera import inside
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import Channels
@@ -13,8 +13,7 @@ REACH_PX = 90.0
 
 
 def scene(ground, paint):
-    one = camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0))
-    share = paint_markings(CROWNED, one)[..., None]
+    one, share = pair(())[0], pair_markings(())[0][..., None]
     grain = np.random.default_rng(2).normal(0, 4, (*share.shape[:2], 3))
     picture = np.array(ground) + (np.array(paint) - np.array(ground)) * share + grain
     return one, Channels([np.clip(picture, 0, 255).astype(np.uint8)])

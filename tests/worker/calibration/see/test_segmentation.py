@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
-from tests.worker.calibration.synthetic import CROWNED, camera, paint_frame
+from tests.worker.calibration.synthetic import CROWNED, camera, pair_frames
 from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import (
     REGION_PX,
@@ -27,7 +27,7 @@ def segmenter():
 @pytest.fixture(scope="module")
 def picture():
     """A frame that is more than a tile wide and high."""
-    frame = paint_frame(CROWNED, camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0)))
+    frame = pair_frames(())[0]
     noise = np.random.default_rng(0).normal(scale=6, size=frame.shape)
     return np.clip(frame + noise, 0, 255).astype(np.uint8)
 
