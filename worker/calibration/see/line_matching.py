@@ -207,7 +207,7 @@ def sliding_correlation(profiles: Array, filters: Array) -> Array:
 
 
 def _window_sums(values: Array, first: NDArray[np.intp], count: NDArray[np.intp], shifts: int) -> Array:
-    """Sums (N, `shifts`) of `count` (N,) neighbours in rows (N, S), from `first` (N,) on and shifted by one at a time."""
+    """Sums (N, `shifts`) of `count` (N,) neighbours in rows (N, S), from `first` (N,) on, shift by shift."""
     up_to = np.zeros((len(values), values.shape[1] + 1))
     np.cumsum(values, axis=1, out=up_to[:, 1:])
     begin = first[:, None] + np.arange(shifts)
