@@ -194,16 +194,25 @@ def filter_reach(width_px: Array) -> Array:
 def sliding_correlation(profiles: Array, filters: Array) -> Array:
     """Normalised correlation (N, S - K + 1) of profiles (N, S) with their filters (N, K) at every shift.
 
-    Mean and norm of a window are taken over the filter's support, so that far surroundings do not count.
+    Mean and norm of a window are taken over the filter's support, so that far surroundings do not count. NaN where any
+    of a window is.
     """
     windows = np.lib.stride_tricks.sliding_window_view(profiles, filters.shape[1], axis=1)
-    support = (filters != 0).astype(float)
-    count = support.sum(axis=1)[:, None]
     product = np.einsum("nsk,nk->ns", windows, filters)
-    total = np.einsum("nsk,nk->ns", windows, support)
-    squares = np.einsum("nsk,nk->ns", windows**2, support)
-    spread = np.sqrt(np.maximum(squares - total**2 / count, 1e-6))
-    return product / np.maximum(spread, np.sqrt(count))
+    first, count = (filters != 0).argmax(axis=1), (filters != 0).sum(axis=1)
+    values = np.nan_to_num(profiles)
+    total, squares = (_window_sums(of, first, count, product.shape[1]) for of in (values, values**2))
+    spread = np.sqrt(np.maximum(squares - total**2 / count[:, None], 1e-6))
+    return product / np.maximum(spread, np.sqrt(count)[:, None])
+
+
+def _window_sums(values: Array, first: NDArray[np.intp], count: NDArray[np.intp], shifts: int) -> Array:
+    """Sums (N, `shifts`) of `count` (N,) neighbours in rows (N, S), from `first` (N,) on, shift by shift."""
+    up_to = np.zeros((len(values), values.shape[1] + 1))
+    np.cumsum(values, axis=1, out=up_to[:, 1:])
+    begin = first[:, None] + np.arange(shifts)
+    end = begin + count[:, None]
+    return np.asarray(np.take_along_axis(up_to, end, axis=1) - np.take_along_axis(up_to, begin, axis=1))
 
 
 def _profiles(image: NDArray[np.float32], seen: SeenLines, bend: Array, offsets: Array) -> Array:
