@@ -12,7 +12,11 @@ from worker.calibration.scene.camera import Array, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field, Marking
 
 GRASS = np.array([60, 130, 70], np.float32)
-PAINT = np.array([235, 240, 235], np.float32)
+PAINTS = {
+    "white": np.array([235, 240, 235], np.float32),
+    "blue": np.array([190, 90, 40], np.float32),
+    "red": np.array([50, 40, 200], np.float32),
+}
 SKY = np.array([230, 200, 170], np.float32)
 
 PITCH = Field(105.0, 68.0)
@@ -60,7 +64,7 @@ def pair_markings(distortion: tuple[float, ...] = BARREL) -> tuple[NDArray[np.fl
 def pair_frames(distortion: tuple[float, ...] = BARREL) -> tuple[NDArray[np.uint8], ...]:
     """The frames of the pair: painted once for all tests of a process."""
     seen = zip(pair(distortion), pair_markings(distortion), strict=True)
-    return tuple(_shared(_coloured(one, paint)) for one, paint in seen)
+    return tuple(_shared(_coloured(one, {"white": paint})) for one, paint in seen)
 
 
 def _shared(picture: NDArray) -> NDArray:
@@ -73,8 +77,8 @@ def ground_behind(pitch: Field, camera: Camera) -> Array:
     return _ground_at(pitch, camera, np.stack(np.indices(camera.intrinsics.size[::-1])[::-1], axis=-1))
 
 
-def paint_markings(pitch: Field, camera: Camera) -> NDArray[np.float32]:
-    """The part (H, W), 0..1, of each pixel that is paint."""
+def paint_markings(pitch: Field, camera: Camera, colour: str | None = None) -> NDArray[np.float32]:
+    """The part (H, W), 0..1, of each pixel that is paint, of one colour or of any."""
     width, height = camera.intrinsics.size
     middles = _blocks(camera)
     behind = _ground_at(pitch, camera, middles)
@@ -83,6 +87,8 @@ def paint_markings(pitch: Field, camera: Camera) -> NDArray[np.float32]:
     samples = np.stack(np.meshgrid(offsets, offsets), axis=-1)
     paint = np.zeros((*middles.shape[:2], side, side), np.float32)
     for marking in pitch.markings():
+        if colour not in (None, marking.colour):
+            continue
         close = _close(marking, behind)
         covered = _covered(marking, _ground_at(pitch, camera, middles[close][:, None, None] + samples))
         paint[close] = np.maximum(paint[close], np.nan_to_num(covered))
@@ -163,12 +169,15 @@ def _box(distance: Array, half_width: float) -> Array:
 
 
 def paint_frame(pitch: Field, camera: Camera, exposure: float = 1.0) -> NDArray[np.uint8]:
-    """White lines on grass under a sky, BGR."""
-    return _coloured(camera, paint_markings(pitch, camera), exposure)
+    """Lines on grass under a sky, BGR."""
+    colours = sorted({marking.colour for marking in pitch.markings()})
+    return _coloured(camera, {colour: paint_markings(pitch, camera, colour) for colour in colours}, exposure)
 
 
-def _coloured(camera: Camera, paint: NDArray[np.float32], exposure: float = 1.0) -> NDArray[np.uint8]:
+def _coloured(camera: Camera, paint: dict[str, NDArray[np.float32]], exposure: float = 1.0) -> NDArray[np.uint8]:
     width, height = camera.intrinsics.size
     down = cv2.resize(camera.rays(_blocks(camera))[..., 2], None, fx=BLOCK, fy=BLOCK)[:height, :width, None]
-    picture = np.where(down < -LEVEL, GRASS + (PAINT - GRASS) * paint[..., None], SKY)
+    picture = np.where(down < -LEVEL, GRASS, SKY)
+    for colour, share in paint.items():
+        picture += share[..., None] * (PAINTS[colour] - picture)
     return np.clip(exposure * picture, 0, 255).astype(np.uint8)
