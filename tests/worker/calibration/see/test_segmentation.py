@@ -1,5 +1,9 @@
 """The exported network and the tiles it looks at."""
 
+import os
+import subprocess
+import sys
+
 import cv2
 import numpy as np
 import pytest
@@ -143,3 +147,16 @@ def test_painted_lines_are_found_and_grass_is_not(segmenter, picture):
     lines = white & (picture[..., 0] > picture[..., 2] - 25) & (np.arange(len(picture))[:, None] > 250)
     assert (response[lines] > 127).mean() > 0.5
     assert (response[400:][~white[400:]] > 127).mean() < 0.02
+
+
+def test_the_runtime_of_the_network_keeps_and_tells_nothing_of_what_it_does(tmp_path):
+    """With its telemetry on, it would put an identifier of the machine and a queue of reports below the home folder."""
+    silenced_anyway = ("CI", "ORT_DISABLE_TELEMETRY", "XDG_CACHE_HOME")
+    environment = {name: value for name, value in os.environ.items() if name not in silenced_anyway}
+    program = (
+        f"import sys, pathlib; from {Segmenter.__module__} import Segmenter; "
+        "Segmenter(pathlib.Path(sys.argv[1]), threads=1)"
+    )
+    command = [sys.executable, "-c", program, MODEL_BESIDE_THE_CODE]
+    subprocess.run(command, check=True, env=environment | {"HOME": str(tmp_path)})
+    assert list(tmp_path.iterdir()) == []
