@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import cv2
 import numpy as np
 
 from worker.calibration.finish.diagnosis import suspicions
@@ -62,19 +63,21 @@ NOTHING_USUAL: Mapping[str, UsualView] = MappingProxyType({})
 class Method:
     """What a preset does: the levels of its search, the shape of the ground, and how it ends.
 
-    `ridges`: whether they are followed where what the network sees leads nowhere.
+    `power`: of the network's responses in the search, so that what it half believes (the edge of a shadow, a board)
+    hardly pulls; `ridges`: whether they are followed where what the network sees leads nowhere.
     """
 
     levels: Sequence[Level]
     flat: bool
+    power: int
     ridges: bool
     finish: Callable[..., Finished]
 
 
 METHODS: Mapping[Preset, Method] = {
-    "esc": Method(COARSE_TO_FINE, flat=False, ridges=True, finish=refine),
-    "paper": Method(ON_THE_GROUND, flat=False, ridges=False, finish=assess),
-    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, ridges=False, finish=assess),
+    "esc": Method(COARSE_TO_FINE, flat=False, power=3, ridges=True, finish=refine),
+    "paper": Method(ON_THE_GROUND, flat=False, power=1, ridges=False, finish=assess),
+    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, power=1, ridges=False, finish=assess),
 }
 """`esc`: the default. `paper`: the paper to the letter. `scpr`: its predecessor, flat and without a stitch term."""
 
@@ -183,7 +186,7 @@ def settle(
             finished = method.finish(pitch, found.cameras, seen.sight, options.stitch_weight, free)
             return End(found, finished)
 
-    first = settled_by(seen.sight.responses)
+    first = settled_by([np.asarray(cv2.pow(response, method.power)) for response in seen.sight.responses])
     lost = [camera.evidence.agreement < Gate().least_agreement for camera in first.finished.each]
     if not (method.ridges and any(lost)):
         return first
