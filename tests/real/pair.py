@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,14 @@ from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.field import Field
 
 FOLDER = Path(__file__).parents[3] / "shared" / "real" / "tsukuba"
+
+
+@cache
+def picture(path: Path) -> np.ndarray:
+    """A frame, read once for all tests."""
+    frame = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    frame.flags.writeable = False
+    return frame
 
 
 @dataclass(frozen=True)
@@ -36,7 +45,7 @@ class RealPair:
         return {camera.id: FOLDER / f"{camera.id}_{moment}.jpg" for camera in self.cameras}
 
     def frames(self, moment: str = "000") -> dict[str, tuple[np.ndarray]]:
-        return {name: (cv2.imread(str(path), cv2.IMREAD_COLOR),) for name, path in self.files(moment).items()}
+        return {name: (picture(path),) for name, path in self.files(moment).items()}
 
     def started(self, kind: str, number: int) -> list[Camera]:
         """The cameras at one of the outdated poses."""

@@ -29,6 +29,8 @@ def test_outdated_poses_of_real_cameras_are_found_again(real_pair, segmenter, ki
 def test_frames_of_swapped_cameras_are_rejected(real_pair, segmenter):
     frames = real_pair.frames()
     swapped = {"left": frames["right"], "right": frames["left"]}
-    found = calibrate(real_pair.pitch, real_pair.started("near", 0), swapped, segmenter, Options(seed=0))
+    found = calibrate(
+        real_pair.pitch, real_pair.started("near", 0), swapped, segmenter, Options(seed=0, generations=25)
+    )
     assert found.rejected_because is not None
     assert "camera" in found.rejected_because

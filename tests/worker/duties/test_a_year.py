@@ -26,7 +26,7 @@ STORM_RAD = 0.014
 RULES = Rules(
     moved_since_last_px=4,
     moved_since_first_px=5,
-    rejected_in_a_row=3,
+    rejected_in_a_row=2,
     not_calibrated_for_h=20 * 24,
     callback_url="https://example.com/alarms",
 )
@@ -170,7 +170,7 @@ def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stoc
     year.pass_(1)
     assert year.day("the day after", year.frames())
 
-    for number in range(3):
+    for number in range(2):
         year.pass_(1)
         frames = year.frames()
         swapped = {"left": frames["right"], "right": frames["left"]}

@@ -19,7 +19,7 @@ from worker.calibration.see.line_measurement import Measurements
 
 MISFIT_PX = 2.0
 EVEN_M = 1e-4
-TRIALS = 200
+TRIALS = 100
 
 
 def measured(lines, one):

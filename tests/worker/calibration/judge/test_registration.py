@@ -63,7 +63,7 @@ def test_a_camera_moved_sideways_shows_by_how_much() -> None:
     assert (found.dx_px, found.dy_px) == pytest.approx((2.0, 0.0), abs=0.05)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("turn_rad", "tolerance"), [(0.001, 0.1), (0.004, 0.15), (0.01, 0.8)])
 def test_wrong_poses_show_how_far_apart_they_put_the_centre(seed: int, turn_rad: float, tolerance: float) -> None:
     random = np.random.default_rng(seed)

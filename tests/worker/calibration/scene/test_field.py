@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fields.template import Template, load
@@ -124,6 +124,7 @@ def test_markings_have_the_colour_of_their_paint():
 @pytest.mark.parametrize(
     ("sport", "usual"), [("handball", (40, 20)), ("handball", (38, 18.4)), ("rugby-union", (120, 68))]
 )
+@settings(max_examples=30)
 @given(by=st.floats(-1.5, 1.5))
 def test_a_resized_field_has_the_same_dashes_where_its_broken_lines_are_now(sport, usual, by):
     template = load(sport)

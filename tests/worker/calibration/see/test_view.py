@@ -12,7 +12,7 @@ from tests.worker.calibration.synthetic import PITCH, camera, moved
 from worker.calibration.scene.field import Field
 from worker.calibration.see.view import look_at
 
-CAMERA = camera("left", (-1.0, -48.0, 12.0), (-14.0, -4.0), focal=675, size=(960, 540))
+CAMERA = camera("left", (-1.0, -48.0, 12.0), (-14.0, -4.0), focal=450, size=(640, 360))
 STORED = moved(CAMERA, rotation=(0.02, -0.02, 0.01), by=(0.1, 0.05, -0.05))
 """Some two degrees and a decimetre off, as a stored pose may be."""
 
@@ -86,11 +86,11 @@ def test_a_little_out_of_focus_is_usable(fair):
 
 
 def test_what_is_soft_for_one_camera_is_usual_for_another(fair):
-    soft = spoiling.defocused(fair, 2.0)
+    soft = spoiling.defocused(fair, 1.4)
     of_sharp, of_soft = (look_at(frame, PITCH, STORED).figures for frame in (fair, soft))
     assert look_at(soft, PITCH, STORED).usable
     assert look_at(soft, PITCH, STORED, usual=of_soft).usable
-    assert look_at(soft, PITCH, STORED, usual=replace(of_sharp, blur_px=0.4)).cause == "out-of-focus"
+    assert look_at(soft, PITCH, STORED, usual=replace(of_sharp, blur_px=0.3)).cause == "out-of-focus"
 
 
 def test_a_field_whose_lines_were_never_seen_is_not_called_blocked(fair):
