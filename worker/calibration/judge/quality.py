@@ -31,7 +31,7 @@ class Gate:
     least_agreement: float = 0.6
     agreement_loss: float = 0.05
     largest_residual_px: float = 2.6
-    residual_floor_px: float = 1.3
+    residual_floor_px: float = 1.25
     largest_sigma_deg: float = 0.2
     largest_sigma_m: float = 0.5
     largest_rotation_deg: float = 8.0
