@@ -44,6 +44,13 @@ def test_the_image_installs_by_hash_and_compiles_nothing_and_runs_as_nobody_spec
     assert "/livez" in last
 
 
+def test_a_machine_that_cannot_try_the_image_says_so_and_is_told_apart_from_a_broken_image():
+    """CI goes on with 77 and with nothing else."""
+    tried = subprocess.run(["/bin/bash", DOCKER / "try-image"], capture_output=True, text=True, env={"PATH": ""})
+    assert (tried.returncode, tried.stdout) == (77, "try-image: skipped: buildah is not installed.\n")
+    assert "docker/try-image || [ $? = 77 ]" in (ROOT / ".ci" / "run").read_text().splitlines()
+
+
 @pytest.mark.parametrize(("file", "service"), OURS)
 def test_containers_of_ours_may_write_nowhere_but_where_they_must(file, service):
     its = COMPOSE[file]["services"][service]
