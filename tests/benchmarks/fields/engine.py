@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.benchmarks.fields.rows import Rows
-from worker.calibration.calibrate import calibrate
+from worker.calibration.calibrate import NOTHING_USUAL, calibrate
 from worker.calibration.judge.quality import CameraResult
 from worker.calibration.records import Calibration, CalibrationError, Options
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Segmenter
+from worker.calibration.see.view import UsualView
 
 THREADS = 2
 
@@ -53,12 +54,17 @@ class Engine:
         self.rows = rows
 
     def __call__(
-        self, pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Sequence[Frame]], seed: int
+        self,
+        pitch: Field,
+        cameras: Sequence[Camera],
+        frames: Mapping[str, Sequence[Frame]],
+        seed: int,
+        usual: Mapping[str, UsualView] = NOTHING_USUAL,
     ) -> Answer:
         """A calibration of cameras at their stored poses, with all that it costs."""
         wall, cpu = time.perf_counter(), time.process_time()
         try:
-            said = calibrate(pitch, cameras, frames, self.segment, Options(seed=seed))
+            said = calibrate(pitch, cameras, frames, self.segment, Options(seed=seed), usual=usual)
             why = said.rejected_because or ""
         except CalibrationError as error:
             said, why = None, error.detail

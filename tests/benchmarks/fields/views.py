@@ -20,6 +20,7 @@ from tests.benchmarks.truth import apart
 from worker.calibration.judge.quality import Gate
 from worker.calibration.scene.camera import Camera, Frame, Pose, inside, rotation_vectors
 from worker.calibration.scene.field import Field
+from worker.calibration.see.view import UsualView, look_at
 
 OTHER = "another field's frame"
 MIRRORED = "mirrored"
@@ -113,7 +114,10 @@ def _judged(view: View, name: str, other: View | None, options: argparse.Namespa
     if options.pictures:
         cv2.imwrite(str(options.pictures / f"{view.name} {name}.jpg"), frame)
     stored = started([view.camera], view.name, 0, options.turn, options.shift / 100)
-    answer = engine(view.pitch, stored, {view.camera.id: [frame]}, 0)
+    # As the service does, the frame is judged beside the last good one.
+    last = look_at(view.frame(), view.pitch, view.camera).figures
+    usual = {view.camera.id: UsualView(last.lines_found, last.blur_px)}
+    answer = engine(view.pitch, stored, {view.camera.id: [frame]}, 0, usual)
     row = answer.row
     if answer.said is not None:
         result = answer.said.cameras[0]

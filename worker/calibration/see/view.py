@@ -75,8 +75,8 @@ SOFT_PX = 1.2
 BLUR_OF_USUAL = 3.0
 LEAST_UNUSUAL_BLUR_PX = 2.2
 """More than so many times what this camera usually shows is out of focus as well, unless it is still sharp."""
-NO_LINES, GOOD_LINES = 0.12, 0.5
-"""Share of the places on lines that chance finds, and that a view surely has when it sees lines."""
+GOOD_LINES, OF_USUAL_LINES = 0.5, 0.4
+"""Share of the places on lines that a view surely has when it sees lines; of that, what is left where it sees none."""
 OTHER_TINT, OTHER_LIGHT, OTHER_STRUCTURE, OTHER_BLUR = 0.06, 3.5, 2.5, 1.5
 """What stands in front differs so from the ground that is seen: in a channel's share, in light, in structure, in
 sharpness. A hard shadow has the ground's tint and seldom less than a third of its light."""
@@ -202,8 +202,8 @@ def _is_blocked(
     # Right before the lens things are out of focus; of a field out of focus no such contrast is left.
     if structure > PATTERNED and sharpness.of_all > SOFT_PX * sharpness.size:
         return True
-    seen_before = usual is not None and usual.lines_found is not None and usual.lines_found > GOOD_LINES
-    return seen_before and figures.lines_found < NO_LINES and not smeared
+    before = usual.lines_found if usual is not None and usual.lines_found is not None else 0.0
+    return before > GOOD_LINES and figures.lines_found < OF_USUAL_LINES * before and not smeared
 
 
 def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:
