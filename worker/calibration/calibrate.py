@@ -107,7 +107,7 @@ def calibrate(
     with journey.measuring("quality"):
         journey.at("refinement", 0.6)
         answer = judge(pitch, cameras, seen, end.finished, journey)
-        stitch_before = _stitch_error_px(pitch, cameras, seen.sight)
+        stitch_before = _registered_px(pitch, cameras, seen.sight.responses)
         journey.at("refinement", 1.0)
     return Calibration(
         **vars(answer),
@@ -186,24 +186,23 @@ def settle(
             finished = method.finish(pitch, found.cameras, seen.sight, options.stitch_weight, free)
             return End(found, finished)
 
-    first = settled_by([np.asarray(cv2.pow(response, method.power)) for response in seen.sight.responses])
+    responses: list[Response] = [
+        np.asarray(cv2.pow(response, method.power), dtype=np.float32) for response in seen.sight.responses
+    ]
+    first = settled_by(responses)
     lost = [camera.evidence.agreement < Gate().least_agreement for camera in first.finished.each]
     if not (method.ridges and any(lost)):
         return first
     with journey.measuring("segmentation"):
-        responses = _with_ridges(pitch, cameras, seen.sight, lost)
+        for number in np.flatnonzero(lost):
+            responses[number] = _ridges(pitch, cameras[number], seen.sight.channels[number])
     return max(first, settled_by(responses), key=lambda end: end.agreement)
 
 
-def _with_ridges(pitch: Field, cameras: Sequence[Camera], sight: Sight, lost: Sequence[bool]) -> list[Response]:
-    """The responses (H, W) to search by, of ridges for the cameras that are `lost` by those of the network."""
-    lines = pitch.line_points()
-    return [
-        ridge_response(channels, SeenLines.from_camera(lines, camera), CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
-        if is_lost
-        else response
-        for camera, channels, response, is_lost in zip(cameras, sight.channels, sight.responses, lost, strict=True)
-    ]
+def _ridges(pitch: Field, camera: Camera, channels: Channels) -> Response:
+    """What streaks say (H, W) of where the markings are, wherever the network would look for them."""
+    lines = SeenLines.from_camera(pitch.line_points(), camera)
+    return ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
 
 
 def judge(pitch: Field, stored: Sequence[Camera], seen: Seen, finished: Finished, journey: Journey) -> Answer:
@@ -232,7 +231,8 @@ def _stitch_error_px(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> f
     error = _registered_px(pitch, cameras, sight.responses)
     if error is not None or not pairs_in_common(pitch, cameras):
         return error
-    return _registered_px(pitch, cameras, _with_ridges(pitch, cameras, sight, [True] * len(cameras)))
+    ridges = [_ridges(pitch, camera, channels) for camera, channels in zip(cameras, sight.channels, strict=True)]
+    return _registered_px(pitch, cameras, ridges)
 
 
 def _registered_px(pitch: Field, cameras: Sequence[Camera], responses: Sequence[Response]) -> float | None:
