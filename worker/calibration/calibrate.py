@@ -194,8 +194,9 @@ def settle(
     if not (method.ridges and any(lost)):
         return first
     with journey.measuring("segmentation"):
-        for number in np.flatnonzero(lost):
-            responses[number] = _ridges(pitch, cameras[number], seen.sight.channels[number])
+        for number, is_lost in enumerate(lost):
+            if is_lost:
+                responses[number] = _ridges(pitch, cameras[number], seen.sight.channels[number])
     return max(first, settled_by(responses), key=lambda end: end.agreement)
 
 
