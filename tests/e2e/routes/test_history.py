@@ -95,4 +95,4 @@ def test_the_command_line_goes_back_too(service, esc, name):
     assert positions(service, name) == [-1.0, -1.0]
     assert len(esc("venue", "history", name, "--limit", "2").stdout.splitlines()) == 2
     late = esc("job", "reject", job)
-    assert (late.returncode, "revision 3 (restored)" in late.stderr) == (75, True)
+    assert (late.returncode, "revision 3 (restored)" in late.stderr) == (1, True)

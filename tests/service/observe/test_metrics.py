@@ -13,6 +13,7 @@ from service.store.counts.endings import STAGES
 from service.store.counts.figures import look
 from service.store.workers import Workers
 from service.wire.job import JobError
+from service.wire.results import View
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock, result
 
@@ -86,6 +87,17 @@ def test_a_venue_has_the_stitch_error_of_the_poses_that_hold(stock):
     assert found["esc_venue_moved_pixels", ("venue", "kept")] == 1.0
     stock.venues.delete("kept", lambda *_: None)
     assert ("esc_venue_stitch_error_pixels", ("venue", "kept")) not in figures(stock)
+
+
+def test_views_are_counted_by_their_condition(stock):
+    task = stock.attempts.begin(stock.submitted("v"))
+    found = result(task.venue, accepted=False)
+    fog = View(usable=False, cause="fogged", detail="Fogged.")
+    cameras = [camera.model_copy(update={"view": fog}) for camera in found.cameras]
+    stock.attempts.finish(task, found.model_copy(update={"cameras": cameras}), [])
+    counted = figures(stock)
+    assert counted["esc_views_total", ("condition", "fogged")] == len(cameras)
+    assert counted["esc_views_total", ("condition", "usable")] == 0
 
 
 def test_of_many_venues_only_the_worst_have_figures_of_their_own(stock):

@@ -11,6 +11,7 @@ from service.store.ids import new_id
 from service.store.venues import Venues
 from service.store.workers import Workers
 from service.wire.geometry import Intrinsics
+from service.wire.results import View
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
 from tests.homes import in_both_homes, on_servers
 from tests.worker.stock import result
@@ -124,3 +125,21 @@ def test_a_job_is_handed_out_with_the_lenses_that_its_poses_belong_to(stock):
 def test_a_bucket_that_takes_a_request_and_says_nothing_is_not_waited_for_any_longer(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as silent:
         assert gives_up_in_time(monkeypatch, "http://{}:{}".format(*silent.getsockname()))
+
+
+@in_both_homes
+def test_a_job_is_handed_out_with_what_the_frames_of_the_last_accepted_one_were_like(stock):
+    def after(task, view, *, accepted):
+        """The next job, when this one has ended with such a view of all cameras."""
+        found = result(task.venue, accepted)
+        cameras = [camera.model_copy(update={"view": view}) for camera in found.cameras]
+        stock.attempts.finish(task, found.model_copy(update={"cameras": cameras}), [])
+        return stock.attempts.begin(stock.submitted("v"))
+
+    clear = View(usable=True, detail="The field can be seen.", lines_found=0.9, blur_px=0.8)
+    fog = View(usable=False, cause="fogged", detail="Fogged.", lines_found=0.1)
+    first = stock.attempts.begin(stock.submitted("v"))
+    assert first.last_views == {}
+    second = after(first, clear, accepted=True)
+    assert second.last_views == {camera.id: clear for camera in first.venue.cameras}
+    assert after(second, fog, accepted=False).last_views == second.last_views

@@ -5,6 +5,7 @@ import pytest
 from service.settings import Settings
 from service.store.jobs.files import picture_file
 from service.wire.options import Options
+from service.wire.results import View
 from service.wire.venue import VenueIn
 from worker.calibration import records as engine
 from worker.calibration.finish.diagnosis import Suspicion
@@ -12,11 +13,12 @@ from worker.calibration.finish.uncertainty import Sigma
 from worker.calibration.judge.quality import CameraResult, Movement
 from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
-from worker.calibration.see.view import ViewCondition
+from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
 from worker.jobs import calibration, pictures, wire
 from worker.message import Message
 
 SIZE = (320, 180)
+FIGURES = ViewFigures(120.0, 1.5, 60.0, 0.8, 0.7, 0.0, 0.0, 0.0, 0.0, 0.1)
 UP_LEFT = [1.675, 0.372, -0.462]
 
 
@@ -48,8 +50,8 @@ def asked(monkeypatch):
     """The engine, replaced by one that keeps what it was asked and moves each camera by 5 cm."""
     asked = {}
 
-    def calibrate(pitch, cameras, frames, segment, options, report, stop=None):
-        asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options)
+    def calibrate(pitch, cameras, frames, segment, options, report, usual):
+        asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options, usual=usual)
         for several in frames.values():
             for frame in several:
                 segment(frame, [])
@@ -62,7 +64,7 @@ def asked(monkeypatch):
                 residual_px=None,
                 covariance=np.diag([np.inf] * 3 + [0.1] * 3),
                 repeatability=Sigma(0.01, 0.02),
-                view=ViewCondition(True, None, None, "The field can be seen.", None),
+                view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
                 iou=0.9,
                 evidence_before=seen,
                 moved=Movement(0.0, 0.05, float("nan")),
@@ -91,6 +93,13 @@ def settings(tmp_path):
     model = tmp_path / "unet.onnx"
     model.touch()
     return Settings(model=model, threads=1)
+
+
+def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, settings):
+    last = {"left": View(usable=True, detail="", lines_found=0.9, blur_px=None)}
+    outcome = calibration.solve(venue, files, Options(seed=7), settings, lambda _: None, last)
+    assert asked["usual"] == {"left": UsualView(0.9, None)}
+    assert outcome.result.cameras[0].view.lines_found == 0.8
 
 
 def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, settings):
@@ -171,7 +180,7 @@ def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, sett
 
 
 def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, asked, settings, monkeypatch):
-    def calibrate(*_):
+    def calibrate(*_, **__):
         raise engine.CalibrationError("left", "no-markings-in-view", "store another pose")
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
