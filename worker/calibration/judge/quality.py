@@ -30,7 +30,7 @@ class Gate:
 
     least_agreement: float = 0.6
     agreement_loss: float = 0.05
-    largest_residual_px: float = 2.6
+    largest_residual_px: float = 2.5
     residual_floor_px: float = 1.25
     largest_sigma_deg: float = 0.2
     largest_sigma_m: float = 0.5
@@ -162,7 +162,7 @@ def _camera_rejection(result: CameraResult, gate: Gate) -> str | None:
     limit = max(gate.largest_residual_px * result.camera.intrinsics.relative_size, gate.residual_floor_px)
     if result.residual_px > limit:
         return (
-            f"lines are {result.residual_px:.1f} px from where the pose puts them, at most {limit:.1f} allowed; "
+            f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
             "check intrinsics and the field's measures"
         )
     sigma = result.repeatability
