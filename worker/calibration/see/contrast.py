@@ -28,8 +28,8 @@ PAINT = {
     "orange": (0.1, 0.5, 0.9),
 }
 """How much (blue, green, red) paint of a name reflects, 0..1."""
-PALE, DEEP = 0.75, 0.25
-"""What reflects more in a channel is hardly ever darker than its ground there, what reflects less hardly brighter."""
+DEEP = 0.25
+"""What reflects less in a channel is hardly ever brighter than its ground there; on ice anything can be darker."""
 CLEARLY = 0.2
 """By so much correlation another contrast has to be better than bright in green."""
 OPPOSES = 0.33
@@ -57,8 +57,7 @@ def possible_signs(colour: str, channel: int) -> tuple[int, ...]:
     """
     if colour == WHITE:
         return (1, -1)
-    reflects = _reflectance(colour)[channel]
-    return (1,) if reflects > PALE else (-1,) if reflects < DEEP else (1, -1)
+    return (-1,) if _reflectance(colour)[channel] < DEEP else (1, -1)
 
 
 def _reflectance(colour: str) -> tuple[float, float, float]:

@@ -11,8 +11,14 @@ from worker.calibration.see.contrast import BLUE, GREEN, RED, Channels, possible
 from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.line_measurement import measure_lines
 
-WOOD, TURF = (60, 110, 170), (40, 120, 70)
-PAINTS = {"white": (235, 235, 235), "blue": (180, 90, 30), "yellow": (40, 200, 225), "black": (20, 20, 20)}
+WOOD, TURF, ICE = (60, 110, 170), (40, 120, 70), (235, 230, 225)
+PAINTS = {
+    "white": (235, 235, 235),
+    "blue": (180, 90, 30),
+    "yellow": (40, 200, 225),
+    "black": (20, 20, 20),
+    "red": (40, 40, 150),
+}
 BESIDE_PX = 9
 
 
@@ -45,6 +51,11 @@ def agreement(colour, channels):
 @pytest.mark.parametrize("ground", [WOOD, TURF], ids=["wood", "turf"])
 def test_markings_are_seen_in_the_colour_that_they_are_said_to_have(colour, ground):
     assert agreement(colour, painted(ground, (colour, 0))) > 0.8
+
+
+@pytest.mark.parametrize("colour", ["blue", "red"])
+def test_the_coloured_lines_of_a_rink_are_darker_than_ice_in_every_channel_and_seen(colour):
+    assert agreement(colour, painted(ICE, (colour, 0))) > 0.8
 
 
 @pytest.mark.parametrize("colour", ["blue", "yellow"])
