@@ -79,12 +79,12 @@ def match_lines(seen: SeenLines, channels: Channels, reach_px: float, relative_s
     Each marking is looked for where it stands out most: in another channel than green only if green does not show it.
     What has another colour than a marking that is known not to be white is no match.
     """
-    everywhere = np.ones(len(seen), dtype=bool)
-    looked = {GREEN: _matches_in(channels[GREEN], seen, everywhere, reach_px, relative_size)}
+    everywhere, bend = np.ones(len(seen), dtype=bool), _bend(seen)
+    looked = {GREEN: _matches_in(channels[GREEN], seen, bend, everywhere, reach_px, relative_size)}
     strength = _strengths(looked, seen)
     wanted = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
     if wanted.any():
-        looked |= {c: _matches_in(channels[c], seen, wanted, reach_px, relative_size) for c in (RED, BLUE)}
+        looked |= {c: _matches_in(channels[c], seen, bend, wanted, reach_px, relative_size) for c in (RED, BLUE)}
         looked = _without_other_paint(looked, seen.points.colour)
         strength = _strengths(looked, seen)
     usual = np.argmax(strength > -np.inf, axis=0)
@@ -139,10 +139,14 @@ def _strengths(looked: Mapping[int, Sequence[Matches]], seen: SeenLines) -> Arra
 
 
 def _matches_in(
-    brightness: NDArray[np.float32], seen: SeenLines, wanted: NDArray[np.bool_], reach_px: float, relative_size: float
+    brightness: NDArray[np.float32],
+    seen: SeenLines,
+    bend: Array,
+    wanted: NDArray[np.bool_],
+    reach_px: float,
+    relative_size: float,
 ) -> list[Matches]:
-    """The matches of the `wanted` lines (N,) in one channel, by class of width."""
-    bend = _bend(seen)
+    """The matches of the `wanted` lines (N,), which `bend` (N,) so, in one channel, by class of width."""
     classes = []
     for low, high, sampling in WIDTH_CLASSES_PX:
         which = np.flatnonzero(wanted & (seen.width_px >= low) & (seen.width_px < high))
