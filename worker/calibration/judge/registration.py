@@ -40,15 +40,16 @@ SHIFT_PENALTY = 0.05
 # Views that are nearer than this where they should be need no other guess.
 NEAR_M = 0.5
 
-# Sampled finely, so that no edge of a line falls between two samples; once blurred, every second sample will do.
-FINE_STEP_M, FINE_HALF_M, FINE_STRIDE = 0.05, 12.0, 2
+# Sampled finely, so that no edge of a line falls between two samples; once blurred, fewer will do.
+FINE_STEP_M, FINE_HALF_M = 0.05, 12.0
 # What is expected of a camera that is out of place, rad and m: the paper's Start errors.
 EXPECTED = np.array([0.02, 0.02, 0.02, 0.16, 0.16, 0.16])
-# Blur in metres, number of steps, and the part of what is expected that is expected at least. Coarse to fine; the last
-# blur is about what a far camera smears: with less, the smear of two cameras that face each other would show as a
-# displacement. What is expected shrinks with the displacement found: cameras that agree at the centre are not
-# suspected of turns and moves that happen to cancel there.
-FINE_STAGES = ((0.8, 5, 1.0), (0.4, 5, 0.3), (0.2, 4, 0.1), (0.2, 4, 0.01))
+# Blur in metres, every which sample (half a blur apart), and the part of what is expected that is expected at least in
+# each step. Coarse to fine; the last blur is about what a far camera smears: with less, the smear of two cameras that
+# face each other would show as a displacement. What is expected shrinks with the displacement found: cameras that agree
+# at the centre are not suspected of turns and moves that happen to cancel there.
+FINE_STAGES = ((0.8, 8, 5 * (1.0,)), (0.4, 4, 5 * (0.3,)), (0.2, 2, (*4 * (0.1,), *4 * (0.01,))))
+FINEST_STRIDE = min(stride for _, stride, _ in FINE_STAGES)
 # A difference of this part of a line's response counts as half an outlier.
 OUTLIER = 0.5
 # Grass, where neither view shows more than this, is left out.
@@ -209,7 +210,7 @@ def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Arr
     for (camera, response), moves in zip(segmented, (start[:6], start[6:]), strict=True):
         surface = pitch.lift(grid)
         views.append(ground_view(pitch, camera, response, grid + _displacement(camera, surface, moves)))
-        forms.append(_forms(camera, surface[::FINE_STRIDE, ::FINE_STRIDE]))
+        forms.append(_forms(camera, surface[::FINEST_STRIDE, ::FINEST_STRIDE]))
     fine = _fine_moves(views[0], views[1], np.concatenate(forms, axis=-1), at_middle, start, pitch.line_width)
 
     variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
@@ -300,24 +301,25 @@ def _fine_moves(
 ) -> _Fine:
     """Gauss-Newton on the moves (12,) of both cameras.
 
-    `forms` (n, n, 2, 12): what they do to every `FINE_STRIDE`th point of each view; `at_middle` (2, 12): what they do
+    `forms` (n, n, 2, 12): what they do to every `FINEST_STRIDE`th point of each view; `at_middle` (2, 12): what they do
     to the displacement in the middle. The views are sampled where `start` puts them.
     """
     a_seen, b_seen = first[1].astype(np.float32), second[1].astype(np.float32)
-    step_m = FINE_STRIDE * FINE_STEP_M
     expected = np.linalg.inv(at_middle @ at_middle.T)
-    # As plain matrices, which multiply ten times faster.
-    forms_a, forms_b = (forms[..., its].reshape(-1, 6) for its in (slice(6), slice(6, 12)))
-    offsets = forms.shape[:3]
     moves = start
-    for blur, steps, least in FINE_STAGES:
+    for blur, stride, leasts in FINE_STAGES:
         smooth_a, smooth_b = (_smooth(view, blur, FINE_STEP_M, line_width) for view in (first, second))
-        for _ in range(steps):
-            offset_a = (forms_a @ (moves - start)[:6]).reshape(offsets)
-            offset_b = (forms_b @ (moves - start)[6:]).reshape(offsets)
-            warped_a, warped_b = _warp(smooth_a, offset_a), _warp(smooth_b, offset_b)
-            valid = (_warp(a_seen, offset_a) == 1) & (_warp(b_seen, offset_b) == 1)
-            pull, information = _normal_equations(warped_a, warped_b, valid, forms, step_m, blur)
+        step_m = stride * FINE_STEP_M
+        every = stride // FINEST_STRIDE
+        coarser = np.ascontiguousarray(forms[::every, ::every])
+        # As plain matrices, which multiply ten times faster.
+        forms_a, forms_b = (coarser[..., its].reshape(-1, 6) for its in (slice(6), slice(6, 12)))
+        for least in leasts:
+            offset_a = (forms_a @ (moves - start)[:6]).reshape(coarser.shape[:3])
+            offset_b = (forms_b @ (moves - start)[6:]).reshape(coarser.shape[:3])
+            warped_a, warped_b = _warp(smooth_a, offset_a, stride), _warp(smooth_b, offset_b, stride)
+            valid = (_warp(a_seen, offset_a, stride) == 1) & (_warp(b_seen, offset_b, stride) == 1)
+            pull, information = _normal_equations(warped_a, warped_b, valid, coarser, step_m, blur)
             found = at_middle @ moves
             prior = 1 / max(float(found @ expected @ found), least**2)
             moves = moves + np.linalg.solve(information + prior * np.eye(len(moves)), pull - prior * moves)
@@ -359,9 +361,9 @@ def _smooth(view: BirdsEye, blur_m: float, step_m: float, line_width: float) -> 
     return np.asarray(np.minimum(values / np.maximum(seen, 1e-3), brightest), np.float32)
 
 
-def _warp(view: Response, offset: Array) -> Response:
-    """A view on the fine grid, sampled at every `FINE_STRIDE`th point moved by `offset` (n, n, 2) metres."""
-    rows, columns = FINE_STRIDE * np.indices(offset.shape[:2], np.float32)
+def _warp(view: Response, offset: Array, stride: int) -> Response:
+    """A view on the fine grid, sampled at every `stride`th point moved by `offset` (n, n, 2) metres."""
+    rows, columns = stride * np.indices(offset.shape[:2], np.float32)
     move = (offset / FINE_STEP_M).astype(np.float32)
     sampled = cv2.remap(view, columns + move[..., 0], rows - move[..., 1], cv2.INTER_LINEAR, borderValue=0.0)
     return np.asarray(sampled, np.float32)
