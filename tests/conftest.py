@@ -35,6 +35,10 @@ def pytest_configure(config):
         raise pytest.UsageError(f"ESC_TEST_REQUIRE names {', '.join(sorted(unknown))}; known are {known}")
 
 
+def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config):
     """One more than there are cores: tests of the whole service wait longer than they compute."""

@@ -15,7 +15,7 @@ from tests.real.pair import FOLDER
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 
-pytestmark = [pytest.mark.real, pytest.mark.timeout(1200)]
+pytestmark = [pytest.mark.long, pytest.mark.real, pytest.mark.timeout(1200)]
 DOCUMENT = Path(__file__).parents[2] / "docs" / "first-calibration.md"
 EXCHANGED = (3, 10)
 

@@ -139,6 +139,7 @@ def exchanged(of: Camera) -> Camera:
     return Camera(of.id, Intrinsics(matrix, of.intrinsics.distortion, SIZE), of.pose)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stock, monkeypatch):
     # Nobody looks at the pictures.
