@@ -183,7 +183,7 @@ def settle(
             found = search(pitch, cameras, responses, method.levels, strategy, rng, on_generation)
         with journey.measuring("refinement"):
             journey.at("refinement", 0.0)
-            finished = method.finish(pitch, found.cameras, seen.sight, options.stitch_weight, free)
+            finished = method.finish(pitch, found.cameras, seen.sight, options.stitch_weight, free, stored=cameras)
             return End(found, finished)
 
     responses: list[Response] = [

@@ -9,13 +9,15 @@ from worker.calibration.finish.uncertainty import Deviation
 
 SURE = 3.0
 """A number is suspected when it is off by this many of the estimate's sigma..."""
-NOTABLE = 4.0
+NOTABLE = 3.0
 """...and by this many times what is left after a good calibration."""
 MORE_OR_LESS = {
     "focal_length_px": ("a focal length", "px longer", "px shorter"),
     "principal_point_x_px": ("a principal point", "px farther right", "px farther left"),
     "principal_point_y_px": ("a principal point", "px lower", "px higher"),
+    "aspect": ("a ratio of vertical to horizontal focal length", "larger", "smaller"),
     "k1": ("a first radial coefficient", "larger", "smaller"),
+    "k2": ("a second radial coefficient", "larger", "smaller"),
     "ridge_height_m": ("a ridge", "m higher", "m lower"),
     "length_m": ("a pitch", "m longer", "m shorter"),
     "width_m": ("a pitch", "m wider", "m narrower"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from worker.calibration.finish.residuals import Residuals, Unknowns
 from worker.calibration.scene.camera import Array
 
-CLUSTER_POINTS = 8
-"""Line points (25 cm apart) whose errors of paint and measurement are taken as one."""
+CLUSTER_POINTS = 40
+"""Line points (25 cm apart) whose errors of paint, lens and measurement are taken as one."""
 
 LEAST_NOISE = 0.2
 
@@ -39,10 +39,10 @@ def normal_equations(rows: Residuals, unknowns: Unknowns) -> NormalEquations:
 
 
 def error_of_measurement(rows: Residuals, unknowns: Unknowns) -> Array:
-    """Covariance (U, U) of the gradient by the residuals themselves, those of two metres of line taken as one.
+    """Covariance (U, U) of the gradient by the residuals themselves, those of ten metres of line taken as one.
 
-    Neighbours on a line share the error of its paint, so they are not as many as they seem (the sandwich of Liang and
-    Zeger, 1986). Never less than a fifth of what their expected errors say: no picture is perfect.
+    Neighbours on a line share the error of its paint and of the lens, so they are not as many as they seem (the sandwich
+    of Liang and Zeger, 1986). On top, a fifth of what their expected errors say: no picture is perfect.
     """
     patches, patch = np.unique(rows.point // CLUSTER_POINTS, return_inverse=True)
     weighted = rows.jacobian * rows.weight[:, None]
@@ -50,17 +50,8 @@ def error_of_measurement(rows: Residuals, unknowns: Unknowns) -> Array:
     pull[:, : unknowns.dense] = _sum_by(patch, len(patches), weighted * rows.value[:, None])
     rises = -(rows.weight * rows.rise * rows.value)[:, None] * unknowns.ground.share[rows.point]
     np.add.at(pull, (patch[:, None], unknowns.dense + unknowns.ground.node[rows.point]), rises)
-    measured = np.einsum("ci,cj->ij", pull, pull)
-    expected = np.concatenate(
-        [
-            np.sum(weighted**2, axis=0),
-            np.diag(unknowns.ground.gathered_twice(rows.point, (rows.weight * rows.rise) ** 2)),
-        ]
-    )
-    growth = np.sqrt(np.maximum(LEAST_NOISE * expected / np.maximum(np.diag(measured), 1e-300), 1.0))
-    # What nothing was measured of has no error of measurement.
-    growth[expected == 0] = 0.0
-    return measured * growth[:, None] * growth[None, :]
+    expected = normal_equations(replace(rows, weight=rows.weight**2), unknowns).information
+    return np.asarray(np.einsum("ci,cj->ij", pull, pull) + LEAST_NOISE * expected)
 
 
 def _sum_by(group: NDArray[np.intp], groups: int, rows: Array) -> Array:

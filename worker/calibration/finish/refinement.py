@@ -52,10 +52,12 @@ def refine(
     stitch_weight: float,
     free: Sequence[Parameter] = (),
     searches_px: Sequence[float] = SEARCH_PX,
+    stored: Sequence[Camera] | None = None,
 ) -> Finished:
     """Measure the lines and move the cameras onto them, round by round with a narrower search.
 
-    `free`: numbers of lenses and field to be found along with the poses; pitch and cameras come back with them.
+    `stored`: where the cameras stood when that was last known, if not where they begin. `free`: numbers of lenses and
+    field to be found along with the poses; pitch and cameras come back with them.
     """
     if stitch_weight == 0 and len(cameras) > 1 and not free:
         return _each_alone(pitch, cameras, sight)
@@ -77,7 +79,7 @@ def refine(
         if here.farthest_from(before) < SETTLED_M:
             break
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _assessed(here, cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
+    return _assessed(here, stored or cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
 
 
 def _down_huber(
@@ -109,11 +111,16 @@ def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measuremen
 
 
 def assess(
-    pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float, free: Sequence[Parameter] = ()
+    pitch: Field,
+    cameras: Sequence[Camera],
+    sight: Sight,
+    stitch_weight: float,
+    free: Sequence[Parameter] = (),
+    stored: Sequence[Camera] | None = None,
 ) -> Finished:
     """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    return _assessed(Estimate.at(pitch, cameras, unknowns), cameras, sight, unknowns, stitch_weight)
+    return _assessed(Estimate.at(pitch, cameras, unknowns), stored or cameras, sight, unknowns, stitch_weight)
 
 
 def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
@@ -135,7 +142,11 @@ def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Finish
 
 
 def _assessed(
-    here: Estimate, found: Sequence[Camera], sight: Sight, unknowns: Unknowns, stitch_weight: float
+    here: Estimate,
+    stored: Sequence[Camera],
+    sight: Sight,
+    unknowns: Unknowns,
+    stitch_weight: float,
 ) -> Finished:
     lines = here.on_ground(unknowns)
     evidence = [
@@ -145,7 +156,7 @@ def _assessed(
     measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
-    return judged(ordinary, found, measured, evidence, unknowns, stitch_weight)
+    return judged(ordinary, stored, measured, evidence, unknowns, stitch_weight)
 
 
 def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:

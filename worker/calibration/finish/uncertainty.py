@@ -17,18 +17,26 @@ from worker.calibration.finish.estimate import Estimate
 from worker.calibration.finish.normal_equations import error_of_measurement, normal_equations
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS, Unknowns, residuals, rms_px
 from worker.calibration.finish.robust import tukey_slopes, tukey_weights
+from worker.calibration.finish.scales import Group, Posterior, posterior
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.scene.motion import POSE_NUMBERS
+from worker.calibration.scene.motion import POSE_NUMBERS, change_between
 from worker.calibration.scene.parameters import LensParameter, Parameter, field_parameters, lens_parameters
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.line_measurement import Measurements
 
-TRUST, TRUST_NUMBERS = 0.05, 1.0
-"""Lens and field are thought to be off by this part of what is expected before they are seen, and how many numbers of
-evidence that is worth."""
-EVIDENCE_STEPS = 12
-LARGEST_FACTOR = 100.0
+MOVED_RAD, MOVED_M = 0.01, 0.1
+"""How far a camera that has moved is expected to be from where it was, per axis, ..."""
+MOVEMENT_SCALES: Array = 0.3 * 2.0 ** np.arange(7.0)
+"""...times one of these: wind and heat move every camera a little."""
+LENS_SCALES: Array = 2.0 ** np.arange(8.0)
+"""A lens is off by what is expected of it, or by so many times more; never by less: lines that fit say little of it."""
+FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
+"""A measure of the field may have been taken better than expected, or worse."""
+WEAK = 1e-9
+"""Part of what is known of a number that keeps equations solvable where nothing is known of another."""
+LEAST_HELD, TINY = 1e-9, 1e-300
+"""Directions of which the lines say less than this part of what they say of single numbers are said nothing of."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +83,8 @@ class FinishedCamera:
     """A camera where the finish left it. `evidence`: how much of the lines is seen where it puts them.
 
     None where it had too few measurements: `residual_px`, the rms of its lines, `covariance` (6, 6) of (rotation in the
-    camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens and field, which do
-    not change.
+    camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens, field and ground,
+    which do not change.
     """
 
     camera: Camera
@@ -111,68 +119,120 @@ class Finished:
 
 def judged(
     here: Estimate,
-    begun: Sequence[Camera],
+    stored: Sequence[Camera],
     measured: Sequence[Measurements],
     evidence: Sequence[Evidence],
     solved: Unknowns,
     stitch_weight: float,
 ) -> Finished:
-    """The answer `here` and what it is worth, found with `solved` unknown from where the cameras had `begun`."""
+    """The answer `here` and what it is worth, found with `solved` unknown.
+
+    `stored`: where the cameras stood when their poses were last known.
+    """
     lines, cameras = here.lines, here.cameras
-    prior, away = here.prior(solved), here.away(begun)
     suspects = _suspects(here.pitch, cameras, solved)
     unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(here.pitch, lines)
-    rows = residuals(lines.position, cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
-    equations = normal_equations(rows, unknowns)
-    kept = np.r_[: solved.dense, unknowns.dense : len(unknowns)]
-    asked = np.arange(solved.dense, unknowns.dense)
-
-    # Given the suspects, everything else follows: what is left of the equations is about the suspects alone.
-    inverse = np.linalg.inv(equations.information[np.ix_(kept, kept)] + prior)
-    left_over = equations.gradient[kept] + prior @ away
-    effect = inverse @ equations.information[np.ix_(kept, asked)]
-    information = equations.information[np.ix_(asked, asked)] - equations.information[np.ix_(asked, kept)] @ effect
-    pull = effect.T @ left_over - equations.gradient[asked]
-    certainty = _certainty(information, pull, suspects)
-    value = np.linalg.solve(information + np.diag(certainty), pull)
-    nearer = -inverse @ left_over - effect @ value
-
-    # A sandwich: how the pull of the residuals varies, between how the pull changes with the unknowns (Huber, 1964).
-    slopes = residuals(lines.position, cameras, measured, unknowns, here.heights, stitch_weight, tukey_slopes)
-    bread = normal_equations(slopes, unknowns).information
-    everything = np.zeros_like(bread)
-    everything[np.ix_(kept, kept)] = prior
-    everything[asked, asked] = certainty
-    full = np.linalg.inv(bread + everything)
-    measurement = error_of_measurement(rows, unknowns)
-    covariance = full @ (measurement + everything) @ full
-    part = np.linalg.inv(bread[np.ix_(kept, kept)] + prior)
-    alone = part @ (measurement[np.ix_(kept, kept)] + prior) @ part
-    enough = [len(found) >= FEWEST_MEASUREMENTS for found in measured]
+    told = _told(here, measured, unknowns, solved.dense, stitch_weight)
+    found = posterior(told.information, told.pull, _blocks(here, stored, unknowns, len(solved.parameters)))
+    enough = [len(seen) >= FEWEST_MEASUREMENTS for seen in measured]
+    first = POSE_NUMBERS * unknowns.cameras
     return Finished(
         here.pitch,
         [
             FinishedCamera(
                 camera,
                 seen,
-                rms_px(lines.position, camera, found),
-                _of_pose(covariance, nearer, i) if known else None,
-                Sigma.from_covariance(_of_pose(alone, np.zeros(len(alone)), i)) if known else None,
+                rms_px(lines.position, camera, of_lines),
+                _second_moment(found, i) if known else None,
+                _repeatability(told.repeated, i) if known else None,
             )
-            for i, (camera, seen, found, known) in enumerate(zip(cameras, evidence, measured, enough, strict=True))
+            for i, (camera, seen, of_lines, known) in enumerate(zip(cameras, evidence, measured, enough, strict=True))
         ],
         [
             Deviation(
                 cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
                 suspect.name,
-                float(value[i]),
-                float(np.sqrt(covariance[asked[i], asked[i]])),
+                float(found.value[number]),
+                float(np.sqrt(found.covariance[number, number])),
                 suspect.expected,
             )
-            for i, suspect in enumerate(suspects)
+            for number, suspect in enumerate(suspects, solved.dense)
         ],
-        [_determined(number, unknowns, covariance, nearer) for number in range(len(solved.parameters))],
+        [_determined(number, unknowns, found) for number in range(first, solved.dense)],
     )
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What lines say of the dense unknowns (D,), whatever the ground: `information` (D, D) and `pull` (D,).
+
+    `repeated` (6 N + F, 6 N + F): covariance of poses and of the free numbers by the measurement alone.
+    """
+
+    information: Array
+    pull: Array
+    repeated: Array
+
+
+def _told(
+    here: Estimate, measured: Sequence[Measurements], unknowns: Unknowns, solved: int, stitch_weight: float
+) -> _Told:
+    """By how the pull of the residuals varies, between how the pull changes with the unknowns: Huber's sandwich."""
+    position, dense = here.lines.position, unknowns.dense
+    rows = residuals(position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
+    slopes = residuals(position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_slopes)
+    bread, gradient = normal_equations(slopes, unknowns).information, normal_equations(rows, unknowns).gradient
+    spread = error_of_measurement(rows, unknowns)
+    part = np.linalg.inv(bread[:solved, :solved] + WEAK * np.diag(np.diag(bread[:solved, :solved])))
+    repeated = part @ spread[:solved, :solved] @ part
+
+    level = unknowns.ground.precision / here.uneven_m**2
+    effect = np.linalg.solve(bread[dense:, dense:] + level, bread[dense:, :dense])
+    information = bread[:dense, :dense] - bread[:dense, dense:] @ effect
+    pull = effect.T @ (gradient[dense:] + level @ here.heights) - gradient[:dense]
+    spread[dense:, dense:] += level
+    reduced = np.concatenate([np.eye(dense), -effect.T], axis=1)
+    believed = _believed(information, reduced @ spread @ reduced.T)
+    return _Told(believed, believed @ np.linalg.pinv(information, hermitian=True) @ pull, repeated)
+
+
+def _believed(information: Array, spread: Array) -> Array:
+    """The `information` (A, A) that is left when the pull varies by `spread` (A, A) and not by as much as that.
+
+    Few patches of line say little of how it varies in any one direction, so it is drawn to what it does on average.
+    """
+    scale = np.sqrt(np.maximum(np.diag(information), TINY))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    held = values > LEAST_HELD
+    directions, root = vectors[:, held], np.sqrt(values[held])
+    whitening = directions / root / scale[:, None]
+    variance = whitening.T @ spread @ whitening
+    variance = (variance + np.trace(variance) / len(variance) * np.eye(len(variance))) / 2
+    back = directions * root * scale[:, None]
+    return np.asarray(back @ np.linalg.solve(variance, back.T))
+
+
+def _blocks(here: Estimate, stored: Sequence[Camera], unknowns: Unknowns, solved: int) -> list[list[Group]]:
+    """What may be off together: how far a camera moved and its lens; and each measure of the field for itself.
+
+    The first `solved` of the parameters were found with the poses, and are as far off as is expected.
+    """
+    first, suspects = POSE_NUMBERS * unknowns.cameras, unknowns.parameters[solved:]
+    owner = np.array([getattr(suspect, "camera", -1) for suspect in suspects])
+    expected = np.array([parameter.expected for parameter in unknowns.parameters])
+    moves = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
+
+    def alone(number: int, mean: float, scales: Array) -> list[Group]:
+        return [Group(np.array([first + number]), expected[number : number + 1], np.array([mean]), scales)]
+
+    blocks = [alone(number, -here.values[number], np.ones(1)) for number in range(solved)]
+    for number, (camera, before) in enumerate(zip(here.cameras, stored, strict=True)):
+        its = POSE_NUMBERS * number + np.arange(POSE_NUMBERS)
+        movement = Group(its, moves, change_between(camera, before), MOVEMENT_SCALES)
+        lens = solved + np.flatnonzero(owner == number)
+        blocks.append([movement, Group(first + lens, expected[lens], np.zeros(len(lens)), LENS_SCALES)])
+    fields = (solved + np.flatnonzero(owner == -1)).tolist()
+    return [*blocks, *(alone(number, 0.0, FIELD_SCALES) for number in fields)]
 
 
 def _suspects(pitch: Field, cameras: Sequence[Camera], solved: Unknowns) -> list[Parameter]:
@@ -182,45 +242,26 @@ def _suspects(pitch: Field, cameras: Sequence[Camera], solved: Unknowns) -> list
     return [p for p in everything if (getattr(p, "camera", None), p.name) not in known]
 
 
-def _certainty(information: Array, pull: Array, suspects: Sequence[Parameter]) -> Array:
-    """Information (S,) on the suspects before the lines were measured, by what the lines say of how good each lens is.
-
-    MacKay's evidence update, as for the ground (`Ground.unevenness`): one scale for each lens, and one for each measure
-    of the field, which were not taken together as the numbers of a lens are.
-    """
-    owner = np.array([getattr(suspect, "camera", -1 - number) for number, suspect in enumerate(suspects)])
-    expected = np.array([suspect.expected for suspect in suspects])
-    factor = np.ones(len(suspects))
-    for _ in range(EVIDENCE_STEPS):
-        certainty = (expected * factor) ** -2
-        covariance = np.linalg.inv(information + np.diag(certainty))
-        determined = 1 - np.diag(covariance) * certainty
-        power = (covariance @ pull / expected) ** 2
-        for one in np.unique(owner):
-            its = owner == one
-            evidence = max(float(determined[its].sum()), 0.0) + TRUST_NUMBERS
-            scale = np.sqrt((power[its].sum() + TRUST_NUMBERS * TRUST**2) / evidence)
-            factor[its] = min(scale, LARGEST_FACTOR)
-    return np.asarray((expected * factor) ** -2)
-
-
-def _determined(number: int, unknowns: Unknowns, covariance: Array, nearer: Array) -> Determined:
-    """What is known of the free parameter of this number."""
+def _determined(number: int, unknowns: Unknowns, found: Posterior) -> Determined:
+    """What is known of the free parameter that is this number of all unknowns."""
     first = POSE_NUMBERS * unknowns.cameras
-    at = first + number
-    variance = np.diag(covariance)[first : unknowns.dense]
-    together = np.sqrt(variance * variance[number])
-    jointly = covariance[at, first : unknowns.dense]
-    correlation = np.divide(jointly, together, out=np.zeros_like(together), where=together > 0)
-    correlation[number] = 0.0
+    variance = np.diag(found.covariance)[first:]
+    together = np.sqrt(variance * found.covariance[number, number])
+    correlation = np.divide(found.covariance[number, first:], together, out=np.zeros_like(together), where=together > 0)
+    correlation[number - first] = 0.0
     most = int(np.argmax(np.abs(correlation)))
     return Determined(
-        float(np.sqrt(variance[number] + nearer[at] ** 2)),
-        None if most == number else (unknowns.parameters[most], float(correlation[most])),
+        float(np.hypot(np.sqrt(found.covariance[number, number]), found.value[number])),
+        None if most == number - first else (unknowns.parameters[most], float(correlation[most])),
     )
 
 
-def _of_pose(covariance: Array, nearer: Array, camera: int) -> Array:
-    """Second moment (6, 6) of one pose's error: its variance, and how far it is from where it should be."""
+def _second_moment(found: Posterior, camera: int) -> Array:
+    """That (6, 6) of one pose's error: its variance, and how far it is from where it should be."""
     its = slice(POSE_NUMBERS * camera, POSE_NUMBERS * (camera + 1))
-    return np.asarray(covariance[its, its] + np.outer(nearer[its], nearer[its]))
+    return np.asarray(found.covariance[its, its] + np.outer(found.value[its], found.value[its]))
+
+
+def _repeatability(repeated: Array, camera: int) -> Sigma:
+    its = slice(POSE_NUMBERS * camera, POSE_NUMBERS * (camera + 1))
+    return Sigma.from_covariance(repeated[its, its])

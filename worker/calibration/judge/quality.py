@@ -157,7 +157,7 @@ def _camera_rejection(result: CameraResult, gate: Gate) -> str | None:
             f"to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen anywhere); "
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
         )
-    if result.residual_px is None or result.repeatability is None:
+    if result.residual_px is None or result.sigma is None:
         return f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?"
     limit = max(gate.largest_residual_px * result.camera.intrinsics.relative_size, gate.residual_floor_px)
     if result.residual_px > limit:
@@ -165,7 +165,7 @@ def _camera_rejection(result: CameraResult, gate: Gate) -> str | None:
             f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
             "check intrinsics and the field's measures"
         )
-    sigma = result.repeatability
+    sigma = result.sigma
     if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
         return (
             f"the visible lines do not determine the pose (sigma {sigma.rotation_deg:.2f} degrees, "

@@ -8,7 +8,7 @@ the view and does not swing the camera around the pitch: P = K R [I | -C].
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal
 
@@ -119,12 +119,14 @@ class Pose:
 class Intrinsics:
     """A lens of OpenCV's calib3d: pinhole with radial, tangential, thin prism and tilt terms.
 
-    `matrix` (3, 3) in pixels, `distortion` in OpenCV's order (`DISTORTION_LENGTHS`), `size` (width, height).
+    `matrix` (3, 3) in pixels, `distortion` in OpenCV's order (`DISTORTION_LENGTHS`), `size` (width, height); `sigma`:
+    one standard deviation of its numbers by name (fx, fy, aspect, cx, cy, k1 ...), of those that are known.
     """
 
     matrix: Array
     distortion: Array
     size: tuple[int, int]
+    sigma: Mapping[str, float] = field(default_factory=dict)
     model: ClassVar[LensModel] = "opencv"
 
     @property

@@ -11,6 +11,9 @@ from worker.calibration.scene.camera import Array, Camera, Intrinsics
 from worker.calibration.scene.field import Field, LinePoints
 
 FIELD_STEP_M = 1e-3
+BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
+"""What the photos of a good board leave uncertain: part of the focal length, ratio of the two, k1 and k2; and of the
+principal point a pixel of a 4K frame."""
 FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
 """How far off what is left free may be: heat changes a focal length by a thousandth, a crown is up to half a metre."""
 FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
@@ -19,7 +22,7 @@ FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
 
 @dataclass(frozen=True)
 class LensParameter:
-    """A number of the lens of camera number `camera`. `expected`: how far off it is after a good calibration."""
+    """A number of the lens of camera number `camera`. `expected`: how far off it may be."""
 
     camera: int
     name: str
@@ -79,16 +82,22 @@ Parameter = LensParameter | FieldParameter
 
 
 def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
-    """What a board's photos leave uncertain of each lens, for a 4K frame: a pixel of its centre, and a little more."""
+    """The numbers of each lens, as uncertain as the lens says (`Intrinsics.sigma`), or as a good board leaves them."""
     found: list[Parameter] = []
     for number, camera in enumerate(cameras):
-        lens = camera.intrinsics
+        lens, known = camera.intrinsics, camera.intrinsics.sigma
         focal, pixel = float(lens.matrix[0, 0]), lens.relative_size
         found += [
-            LensParameter(number, "focal_length_px", 3e-4 * focal, 1e-5 * focal, _longer),
-            LensParameter(number, "principal_point_x_px", pixel, 0.01, lambda one, by: _centred(one, by, 0.0)),
-            LensParameter(number, "principal_point_y_px", pixel, 0.01, lambda one, by: _centred(one, 0.0, by)),
-            LensParameter(number, "k1", 5e-4, 1e-5, _bent),
+            LensParameter(number, "focal_length_px", known.get("fx", BOARD_FOCAL * focal), 1e-5 * focal, _longer),
+            LensParameter(
+                number, "principal_point_x_px", known.get("cx", pixel), 0.01, lambda one, by: _centred(one, by, 0.0)
+            ),
+            LensParameter(
+                number, "principal_point_y_px", known.get("cy", pixel), 0.01, lambda one, by: _centred(one, 0.0, by)
+            ),
+            LensParameter(number, "aspect", known.get("aspect", BOARD_ASPECT), 1e-5, _taller),
+            LensParameter(number, "k1", known.get("k1", BOARD_RADIAL), 1e-5, lambda one, by: _bent(one, 0, by)),
+            LensParameter(number, "k2", known.get("k2", BOARD_RADIAL), 1e-5, lambda one, by: _bent(one, 1, by)),
         ]
     return found
 
@@ -155,9 +164,16 @@ def _centred(lens: Intrinsics, right: float, down: float) -> Intrinsics:
     return replace(lens, matrix=matrix)
 
 
-def _bent(lens: Intrinsics, by: float) -> Intrinsics:
-    """Another first radial coefficient."""
+def _taller(lens: Intrinsics, by: float) -> Intrinsics:
+    """Another ratio of the vertical focal length to the horizontal one."""
+    matrix = lens.matrix.copy()
+    matrix[1, 1] += by * matrix[0, 0]
+    return replace(lens, matrix=matrix)
+
+
+def _bent(lens: Intrinsics, number: int, by: float) -> Intrinsics:
+    """Another radial coefficient: number 0 or 1 of the distortion."""
     distortion = np.zeros(max(len(lens.distortion), 4))
     distortion[: len(lens.distortion)] = lens.distortion
-    distortion[0] += by
+    distortion[number] += by
     return replace(lens, distortion=distortion)
