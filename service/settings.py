@@ -21,6 +21,8 @@ FREED_ANGLES = " ".join(rf"-?{angle}([+-]\d{{1,3}}(\.\d+)?)?" for angle in ("pan
 FREED_AXES = re.compile(rf"(-?[xyz] ){{3}}{FREED_ANGLES}")
 # Not all digits, or an address that has a digit too many would count as a name.
 HOST_PATTERN = re.compile(r"(?=.*[A-Za-z*])[A-Za-z0-9*._-]+")
+# Part of an address, which as a pattern of names would match no address but 10.1.0.evil.com.
+ADDRESS_PATTERN = re.compile(r"(?=.*\d)(?=.*\*)[\d.*-]+")
 BLOB_URL = re.compile(r"(file|s3)://.+")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
@@ -57,6 +59,7 @@ class Settings(BaseSettings):
 
     # What a client may send.
     max_body_mb: float = Field(256, gt=0)
+    uploads_at_once: int = Field(16, ge=1, description="Uploads that one API process takes at the same time.")
     max_frame_mb: float = Field(48, gt=0)
     max_frame_pixels: int = Field(64_000_000, gt=0)
     max_frames_per_camera: int = Field(16, ge=1)
@@ -155,6 +158,10 @@ class Settings(BaseSettings):
             try:
                 ipaddress.ip_network(pattern)
             except ValueError:
+                if ADDRESS_PATTERN.fullmatch(pattern):
+                    raise ValueError(
+                        f"{pattern} matches no address, wildcards are for names: write a network such as 10.1.0.0/24"
+                    ) from None
                 if not HOST_PATTERN.fullmatch(pattern):
                     raise ValueError(
                         f"{pattern} is neither a host's name, such as *.cams.lan, nor a network such as 10.1.0.0/16"

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
-
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake, frame_paths
 from service.store.blobs import Blobs
 from service.store.ids import new_id
-from service.store.jobs.submission import Submission, Submissions
+from service.store.jobs.submission import Submission, Submissions, VenueGone, fetched_hash
 from service.store.jobs.task import Origin, seeded
 from service.store.venues import Venues
 from service.wire.job import Job
 from service.wire.options import Options
-from service.wire.venue import Venue
 
 
 class FromSources:
@@ -28,17 +25,21 @@ class FromSources:
         self._blobs = blobs
         self._intake = intake
 
-    def calibrate(self, venue: Venue, options: Options, key: str | None, origin: Origin) -> tuple[Job, bool]:
+    def calibrate(self, venue_id: str, options: Options, key: str | None, origin: Origin) -> tuple[Job, bool]:
         """A job from a frame of each source, or the job that the request already is; says if it is new.
 
-        Raises a `Problem` for a source that gives no frame, and what `Intake.take` raises. The same request is the
-        same job whatever the cameras show meanwhile.
+        Raises a `Problem` for a source that gives no frame, `VenueGone` and what else `Intake.take` raises. The same
+        request is the same job whatever the cameras show meanwhile.
         """
-        sent = hashlib.sha256(f"sources {options.model_dump_json()}".encode()).hexdigest()
-        known = self._submissions.same_as(venue.id, key, sent)
+        sent = fetched_hash(options)
+        known = self._submissions.same_as(venue_id, key, sent)
         if known is not None:
             return known, False
-        frames = self._snapshots.take(venue.cameras, self._venues.credentials(venue.id))
+        found = self._venues.with_credentials(venue_id)
+        if found is None:
+            raise VenueGone
+        venue, credentials = found
+        frames = self._snapshots.take(venue.cameras, credentials)
         job_id = new_id()
         submission = Submission(
             job_id=job_id,

@@ -105,10 +105,13 @@ class Venues(Repository):
                 connection.execute(sa.delete(table).where(table.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
 
-    def credentials(self, venue_id: str) -> dict[str, str]:
-        """User and password of the sources of a venue that have some, by camera."""
+    def with_credentials(self, venue_id: str) -> tuple[Venue, dict[str, str]] | None:
+        """A venue, and by camera user and password of the sources that have some: of one moment, or a password could
+        go to the host that a source was on before.
+        """
         with reading(self._engine) as connection:
-            return _credentials(connection, venue_id)
+            venue = find_venue(connection, venue_id)
+            return None if venue is None else (venue, _credentials(connection, venue_id))
 
     def history(self, venue_id: str, before: int | None, limit: int) -> list[Revision]:
         """Up to `limit` revisions of a venue, newest first, those before number `before`."""

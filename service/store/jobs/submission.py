@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 
 import sqlalchemy as sa
@@ -13,11 +14,14 @@ from service.store.jobs.reading import ONE, asked, read_job
 from service.store.jobs.task import Asked
 from service.store.venues import find_venue, venue_lock
 from service.wire.job import OPEN, Job, Kind
+from service.wire.options import Options
 from service.wire.venue import Venue
 
 # Job, priority and kind, into the queue in the caller's transaction.
 Enqueue = Callable[[sa.Connection, str, int, Kind], None]
 PRIORITIES = {"live": 1, "routine": 100}
+# How the content hash of a job begins whose frames were fetched.
+FETCHED = "fetched "
 j = tables.jobs.c
 
 
@@ -26,6 +30,20 @@ class Submission(Asked):
 
     content_hash: str
     idempotency_key: str | None
+
+    @property
+    def hash_again(self) -> str:
+        """The content hash of these frames sent once more.
+
+        Frames that were fetched once are not what the cameras show now: who asks for that is to get another job.
+        """
+        fetched = self.content_hash.startswith(FETCHED)
+        return hashlib.sha256(self.job_id.encode()).hexdigest() if fetched else self.content_hash
+
+
+def fetched_hash(options: Options) -> str:
+    """The content hash of what the cameras show at the time, which is not known before."""
+    return FETCHED + hashlib.sha256(options.model_dump_json().encode()).hexdigest()[: 64 - len(FETCHED)]
 
 
 class Refusal(Exception):  # noqa: N818
@@ -101,11 +119,15 @@ class Submissions(Repository):
             enqueue(connection, submission.job_id, priority, submission.kind)
             # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
             serialise(connection, "queue")
-            waiting = connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
-            if waiting > queue_limit:
+            if _waiting(connection) > queue_limit:
                 raise QueueFull
         with reading(self._engine) as connection:
             return read_job(connection, submission.job_id), True
+
+    def waiting(self) -> int:
+        """How many jobs wait."""
+        with reading(self._engine) as connection:
+            return _waiting(connection)
 
     def same_as(
         self, venue_id: str | None, idempotency_key: str | None, content_hash: str, kind: Kind = "calibration"
@@ -122,6 +144,10 @@ class Submissions(Repository):
         if row is None or row.frames_deleted_at is not None:
             return None
         return Submission(**asked(row), content_hash=row.content_hash, idempotency_key=row.idempotency_key)
+
+
+def _waiting(connection: sa.Connection) -> int:
+    return connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
 
 
 def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:
