@@ -10,6 +10,7 @@ import httpx
 import pytest
 from fastapi.routing import iter_route_contexts
 
+from service.api.auth import GUESSES
 from service.app import create_app
 from service.pages.shown import SIGN_IN, Page
 from service.routes.contract.guarded import Guarded
@@ -220,6 +221,19 @@ def test_where_a_proxy_decides_who_may_call_it_can_be_switched_off(start, tmp_pa
     service = start("serve", "--host", "0.0.0.0", ESC_AUTH="off")
     assert httpx.get(f"http://127.0.0.1:{httpx.URL(service.url).port}/jobs").status_code == 200
     assert "ESC_AUTH=off" in (service.data / "log").read_text()
+
+
+@pytest.mark.parametrize(("trusted", "second"), [("127.0.0.1", "key-unknown"), ("10.9.9.9", "too-many-unknown-keys")])
+def test_who_guesses_is_told_apart_by_what_a_proxy_says_where_it_is_trusted(start, tmp_path, trusted, second):
+    keys_in(tmp_path / "esc").add("ops", "admin")
+    service = start("serve", FORWARDED_ALLOW_IPS=trusted)
+
+    def guess(client):
+        answer = service.http.get("/jobs", headers=bearer("esc_guessed") | {"X-Forwarded-For": client})
+        return answer.json()["type"].rpartition("/")[2]
+
+    assert [guess("192.0.2.1") for _ in range(GUESSES + 1)][-1] == "too-many-unknown-keys"
+    assert guess("192.0.2.2") == second
 
 
 def test_the_log_names_the_key_and_does_not_hold_it(guarded, key):
