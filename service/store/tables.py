@@ -93,7 +93,12 @@ jobs = sa.Table(
     # The request that it came with, as its log and its trace call it.
     sa.Column("request_id", sa.String(64)),
     sa.Column("traceparent", sa.String(55)),
-    sa.Index("jobs_by_venue", "venue", "id"),
+    # The lists, newest first, by whatever they are filtered; of one venue, filtered within the index.
+    sa.Index("jobs_by_venue", "venue", "id", "status", "kind"),
+    sa.Index("jobs_of_status", "status", "id"),
+    sa.Index("jobs_of_kind", "kind", "id"),
+    sa.Index("jobs_of_kind_and_status", "kind", "status", "id"),
+    # The queue.
     sa.Index("jobs_by_status", "status", "priority", "id"),
     sa.Index("one_job_per_key", "venue", "idempotency_key", unique=True),
     sa.Index(
@@ -134,6 +139,8 @@ deliveries = sa.Table(
     # Of the job that has ended, or of an alarm's event.
     sa.Column("id", sa.String(26), primary_key=True),
     sa.Column("url", sa.String(2048), nullable=False),
+    # The host of the URL.
+    sa.Column("receiver", sa.String(255), nullable=False),
     # `waiting`, then `delivered` or `given-up`.
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("attempts", sa.Integer, nullable=False, default=0),

@@ -88,7 +88,15 @@ ROWS = {
     "sessions": [{"hash": "1" * 64, "key_hash": "0" * 64, "expires_at": NOON + timedelta(days=36500)}],
     "leftovers": [{"folder": "frames/lost", "due_at": NOON}],
     "deliveries": [
-        {"id": DONE, "url": RECEIVER, "status": "waiting", "attempts": 1, "due_at": NOON, "last_error": "timed out"}
+        {
+            "id": DONE,
+            "url": RECEIVER,
+            "receiver": "example.com",
+            "status": "waiting",
+            "attempts": 1,
+            "due_at": NOON,
+            "last_error": "timed out",
+        }
     ],
     "alarms": [{"venue": VENUE.id, "rule": "not-calibrated", "camera": "", "since": NOON, "why": "No poses."}],
     "credentials": [{"venue": VENUE.id, "camera": "left", "userinfo": "user:secret"}],
