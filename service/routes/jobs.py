@@ -22,7 +22,7 @@ from service.store.jobs.decisions import MovedOn, NoPoses
 from service.store.jobs.reading import State
 from service.store.revisions import RevisionUnfit
 from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
-from service.wire.job import OPEN, Job, Jobs, Status
+from service.wire.job import OPEN, Job, Jobs, Kind, Status
 from service.wire.problems import Problem
 
 log = structlog.get_logger()
@@ -68,11 +68,12 @@ def list_jobs(
     context: InContext,
     venue: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
     status: Status | None = None,
+    kind: Kind | None = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
     cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
 ) -> Jobs:
     """Jobs, newest first, in pages."""
-    page = context.jobs.page(venue, status, cursor, limit + 1)
+    page = context.jobs.page(venue, status, cursor, limit + 1, kind)
     more = len(page) > limit
     return Jobs(jobs=page[:limit], next_cursor=page[limit - 1].id if more else None)
 

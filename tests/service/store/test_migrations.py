@@ -180,7 +180,7 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(upgraded, revis
     health = venues.health(VENUE.id)
     assert [alarm.why for alarm in health.alarms] == ["No poses."]
     assert (health.revision, health.rejected_in_a_row, health.schedule.last_job) == (2, 0, DONE)
-    assert venues.credentials(VENUE.id) == {"left": "user:secret"}
+    assert venues.with_credentials(VENUE.id)[1] == {"left": "user:secret"}
     seen = look(stores.engine, 10)
     assert seen.tallies == {(ENDED, ("succeeded", "accepted", "")): 3}
     assert seen.venues == [VenueQuality(VENUE.id, 0.2, 2.0, NOON)]
