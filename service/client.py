@@ -25,7 +25,7 @@ import httpx
 from service.wire.base import OPTIONS_PART, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
-from service.wire.job import Job
+from service.wire.job import Job, Jobs, Kind, Status
 from service.wire.venue import Venue, VenueIn, Venues
 
 # Longer than the longest poll.
@@ -144,6 +144,27 @@ class AsyncClient:
         """A job, at its end or after `wait_s`."""
         params = {"wait": wait_s} if wait_s else {}
         return Job.model_validate_json(await self._ask("GET", f"/jobs/{job_id}", params=params))
+
+    async def jobs(
+        self,
+        venue: str | None = None,
+        status: Status | None = None,
+        kind: Kind | None = None,
+        most: int | None = None,
+    ) -> list[Job]:
+        """Jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
+        chosen = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
+        page = Jobs.model_validate_json(await self._ask("GET", "/jobs", params=chosen))
+        found = page.jobs
+        while page.next_cursor is not None and (most is None or len(found) < most):
+            more = chosen | {"cursor": page.next_cursor}
+            page = Jobs.model_validate_json(await self._ask("GET", "/jobs", params=more))
+            found += page.jobs
+        return found[:most]
+
+    async def again(self, job_id: str) -> Job:
+        """Submit the frames of a job once more, from the poses that hold now: another job."""
+        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/again"))
 
     async def cancel(self, job_id: str) -> Job:
         """End a job."""
@@ -264,6 +285,8 @@ class Client:
     calibrate = _Method(AsyncClient.calibrate)
     fit_field = _Method(AsyncClient.fit_field)
     job = _Method(AsyncClient.job)
+    jobs = _Method(AsyncClient.jobs)
+    again = _Method(AsyncClient.again)
     cancel = _Method(AsyncClient.cancel)
     accept = _Method(AsyncClient.accept)
     reject = _Method(AsyncClient.reject)

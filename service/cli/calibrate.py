@@ -8,7 +8,18 @@ from typing import Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, Frames, OneCamera, OptionsText, Url, checked, files_of, options_of
+from service.cli.arguments import (
+    LOCAL,
+    ApiKey,
+    Frames,
+    OneCamera,
+    OptionsText,
+    Url,
+    VenueId,
+    checked,
+    files_of,
+    options_of,
+)
 from service.cli.local import checked_files, engine_settings, failure_told
 from service.cli.printing import bar, err, followed, gate, say, verdict
 from service.client import Client
@@ -17,14 +28,23 @@ from service.wire.venue import VenueIn
 
 
 def calibrate(
-    venue: Annotated[str, typer.Argument()],
+    venue: VenueId,
     frames: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[CAMERA=FILE...]", help="Repeat a camera to fuse its frames. None: from the sources."),
+        typer.Argument(
+            metavar="[CAMERA=FILE...]",
+            help="A JPEG or PNG of each camera, such as left=left.jpg; several of one camera are fused. None at all: "
+            "the service fetches them.",
+        ),
     ] = None,
     options: OptionsText = "{}",
-    wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end.")] = False,
-    key: Annotated[str | None, typer.Option("--idempotency-key", help="The same key is the same job.")] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end and print it.")] = False,
+    key: Annotated[
+        str | None,
+        typer.Option(
+            "--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."
+        ),
+    ] = None,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
@@ -44,9 +64,9 @@ def calibrate(
 
 
 def snapshot(
-    venue: Annotated[str, typer.Argument()],
+    venue: VenueId,
     camera: OneCamera = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder.")] = Path(),
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to.")] = Path(),
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
@@ -62,7 +82,12 @@ def snapshot(
 
 
 def run(
-    venue: Annotated[Path, typer.Argument(metavar="VENUE.json", exists=True, dir_okay=False)],
+    venue: Annotated[
+        Path,
+        typer.Argument(
+            metavar="VENUE.json", exists=True, dir_okay=False, help="File of a venue, as `esc venue get` prints it."
+        ),
+    ],
     frames: Frames,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for result.json and the pictures.")],
     options: OptionsText = "{}",

@@ -24,9 +24,16 @@ app = typer.Typer(no_args_is_help=True, help="API keys, in the database of this 
 
 @app.command("add")
 def add_key(
-    name: Annotated[str, typer.Argument(help="Of who will use it: a machine, a person.")],
-    scope: Annotated[Scope, typer.Option("--scope", help="Each includes those before it.")],
-    days: Annotated[int | None, typer.Option("--days", min=1, max=36500, help="How long it is good.")] = None,
+    name: Annotated[str, typer.Argument(help="Name for the key: of the machine or person that will use it.")],
+    scope: Annotated[
+        Scope,
+        typer.Option(
+            "--scope", help="What it may do: read; calibrate, which includes that; admin, which includes both."
+        ),
+    ],
+    days: Annotated[
+        int | None, typer.Option("--days", min=1, max=36500, help="Days after which it expires; otherwise never.")
+    ] = None,
     data: Data = None,
 ) -> None:
     """Make a key and print it, this once: what is stored is its hash."""
@@ -54,7 +61,9 @@ def list_keys(data: Data = None) -> None:
 
 
 @app.command("remove")
-def remove_key(name: str, data: Data = None) -> None:
+def remove_key(
+    name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")], data: Data = None
+) -> None:
     """Forget a key."""
     from service.api.auth import BELIEVED_FOR_S
 

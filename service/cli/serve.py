@@ -24,7 +24,14 @@ def serve(data: Data = None, host: Host = None, port: Port = None) -> None:
 
 
 def worker(
-    data: Data = None, name: Annotated[str | None, typer.Option("--name", help="Unique and stable.")] = None
+    data: Data = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name",
+            help="A name that no other worker has, the same after a restart (ESC_WORKER_NAME) [default: the host's]",
+        ),
+    ] = None,
 ) -> None:
     """A worker alone."""
     from worker import process

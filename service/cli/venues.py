@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, Form, OneCamera, Output, Url, checked
+from service.cli.arguments import LOCAL, ApiKey, Form, OneCamera, Output, Url, VenueId, checked
 from service.cli.printing import REJECTED, hand_out, say
 from service.client import Client
 from service.wire.geometry import Moved
@@ -18,7 +18,9 @@ app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored pos
 
 @app.command("put")
 def put_venue(
-    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False)], url: Url = LOCAL, api_key: ApiKey = None
+    file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="JSON file of a venue.")],
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
 ) -> None:
     """Create or replace a venue from a JSON file."""
     venue = checked(VenueIn, file.read_text(), str(file))
@@ -27,7 +29,7 @@ def put_venue(
 
 
 @app.command("get")
-def get_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def get_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print a venue with the poses that hold now."""
     with Client(url, api_key) as client:
         say(client.venue(venue))
@@ -42,7 +44,7 @@ def list_venues(url: Url = LOCAL, api_key: ApiKey = None) -> None:
 
 
 @app.command("delete")
-def delete_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def delete_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Forget a venue and the history of its poses."""
     with Client(url, api_key) as client:
         client.delete_venue(venue)
@@ -50,7 +52,7 @@ def delete_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
 
 @app.command("poses")
 def venue_poses(
-    venue: str,
+    venue: VenueId,
     form: Form = "json",
     camera: OneCamera = None,
     output: Output = None,
@@ -64,8 +66,8 @@ def venue_poses(
 
 @app.command("history")
 def venue_history(
-    venue: str,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="So many, the newest.")] = 20,
+    venue: VenueId,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most, the newest.")] = 20,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
@@ -78,7 +80,7 @@ def venue_history(
 
 
 @app.command("health")
-def venue_health(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def venue_health(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print how a venue is doing: alarms, drift, schedule. Exit: 0 ok, 3 an alarm rings."""
     with Client(url, api_key) as client:
         health = client.venue_health(venue)
@@ -89,7 +91,10 @@ def venue_health(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
 
 @app.command("restore")
 def restore_venue(
-    venue: str, revision: Annotated[int, typer.Argument(min=1)], url: Url = LOCAL, api_key: ApiKey = None
+    venue: VenueId,
+    revision: Annotated[int, typer.Argument(min=1, help="Number of the revision, as `esc venue history` prints it.")],
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
 ) -> None:
     """Let the poses of a revision hold again, see `esc venue history`."""
     with Client(url, api_key) as client:
