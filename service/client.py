@@ -26,6 +26,7 @@ from service.wire.base import OPTIONS_PART, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
 from service.wire.job import Job, Jobs, Kind, Status
+from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.wire.venue import Venue, VenueIn, Venues
 
 # Longer than the longest poll.
@@ -67,10 +68,24 @@ class AsyncClient:
 
     # Venues
 
-    async def put_venue(self, venue: VenueIn) -> Venue:
-        """Create or replace a venue."""
+    async def put_venue(self, venue: VenueIn, if_match: str | None = None) -> Venue:
+        """Create or replace a venue; `if_match`: only the one with this tag."""
         content = venue.model_dump(mode="json", exclude_none=True)
-        return Venue.model_validate_json(await self._ask("PUT", f"/venues/{venue.id}", json=content))
+        headers = {"If-Match": if_match} if if_match else {}
+        return Venue.model_validate_json(await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers))
+
+    async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> Venue:
+        """Change parts of a venue by a JSON merge patch; cameras may be an object of their ids."""
+        headers = {"Content-Type": MERGE_PATCH} | ({"If-Match": if_match} if if_match else {})
+        content = json.dumps(patch).encode()
+        return Venue.model_validate_json(
+            await self._ask("PATCH", f"/venues/{venue_id}", content=content, headers=headers)
+        )
+
+    async def tagged_venue(self, venue_id: str) -> tuple[Venue, str]:
+        """A venue, and the tag by which to change this one and no other."""
+        response = await self._answer("GET", f"/venues/{venue_id}")
+        return Venue.model_validate_json(response.content), response.headers["etag"]
 
     async def venue(self, venue_id: str) -> Venue:
         """A venue with its stored poses."""
@@ -205,9 +220,12 @@ class AsyncClient:
 
     async def _ask(self, method: str, path: str, **more: Any) -> bytes:
         """The body of an answer, if it is what was asked for; raises `Refused`."""
+        return (await self._answer(method, path, **more)).content
+
+    async def _answer(self, method: str, path: str, **more: Any) -> httpx.Response:
         response = await self._send(method, path, **more)
         if response.is_success:
-            return response.content
+            return response
         try:
             members = response.json()
         except ValueError:
@@ -274,6 +292,8 @@ class Client:
         return str(self._calls.http.base_url.join(path))
 
     put_venue = _Method(AsyncClient.put_venue)
+    patch_venue = _Method(AsyncClient.patch_venue)
+    tagged_venue = _Method(AsyncClient.tagged_venue)
     venue = _Method(AsyncClient.venue)
     venues = _Method(AsyncClient.venues)
     delete_venue = _Method(AsyncClient.delete_venue)

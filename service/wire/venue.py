@@ -70,6 +70,13 @@ VENUE_EXAMPLE: dict[str, Any] = {
 }
 
 
+PATCH_EXAMPLES: dict[str, Any] = {
+    "an alarm": {"value": {"alarms": {"rejected_in_a_row": 3}}},
+    "no schedule": {"value": {"schedule": None}},
+    "the source of a camera": {"value": {"cameras": {"left": {"source": "http://10.1.0.7/snapshot.jpg"}}}},
+}
+
+
 class _Place(Wire):
     id: Id
     name: Name = ""

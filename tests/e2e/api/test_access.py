@@ -23,7 +23,7 @@ SCOPES = ("read", "calibrate", "admin")
 OPEN = {"/livez", "/readyz", "/problems/{kind}", "/docs", "/docs/rapidoc-min.js", "/docs/LICENSE.txt"}
 # The way to sign in, and what it is drawn with.
 OPEN |= {"/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
-NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "DELETE": "admin"}
+NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "PATCH": "admin", "DELETE": "admin"}
 # Pages that show nothing but how to change something, and a question that takes a body.
 OTHERWISE = {"/ui/venues/{venue_id}/calibrate": "calibrate", "/ui/new-venue": "admin", "/ui/new-venue/plan": "read"}
 JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"

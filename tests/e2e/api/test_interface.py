@@ -23,6 +23,8 @@ EXAMPLES = int(os.environ.get("ESC_TEST_EXAMPLES", "0"))
 REACHED = {
     ("PUT", "/venues/*", 201),
     ("PUT", "/venues/*", 412),
+    ("PATCH", "/venues/*", 200),
+    ("PATCH", "/venues/*", 422),
     ("DELETE", "/venues/*", 204),
     ("POST", "/venues/*/calibrate", 202),
     ("POST", "/venues/*/cameras/left/locate", 202),

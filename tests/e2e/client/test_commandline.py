@@ -15,6 +15,17 @@ from service.store.engine import SCHEMA_TABLE, connect, migrate, writing
 from tests.e2e.commands import esc_here, esc_process
 from tests.e2e.running import FRAMES, png, venue, wait_for
 
+# An editor in which somebody changes the name, while somebody else may put another one.
+MEDDLING = """
+import os, sys, urllib.request
+path = sys.argv[1]
+text = open(path).read()
+if url := os.environ.get("MEDDLE"):
+    headers = {"Content-Type": "application/merge-patch+json"}
+    urllib.request.urlopen(urllib.request.Request(url, b'{"name": "theirs"}', headers, method="PATCH"))
+open(path, "w").write(text.replace('"name": "accept"', '"name": "mine"').replace('"name": "theirs"', '"name": "mine"'))
+"""
+
 
 def test_a_venue_is_put_read_listed_and_deleted(esc, name, tmp_path):
     (tmp_path / "venue.json").write_text(json.dumps(venue(name)))
@@ -32,6 +43,65 @@ def test_a_wrong_venue_file_is_a_usage_error(esc, tmp_path):
     answer = esc("venue", "put", "venue.json")
     assert answer.returncode == 2
     assert "cameras" in answer.stderr
+
+
+def test_a_file_that_would_undo_a_calibration_is_not_put_unless_one_insists(service, esc, name, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name)))
+    assert esc("venue", "put", "venue.json").returncode == 0
+    service.calibrated(name)
+    calibrated = service.http.get(f"/venues/{name}").json()
+    refused = esc("venue", "put", "venue.json")
+    assert refused.returncode == 1
+    assert "the pose of camera left (calibrated " in refused.stderr
+    assert "by the file it stands 6.3" in refused.stderr
+    assert "--keep-poses" in refused.stderr
+    assert service.http.get(f"/venues/{name}").json() == calibrated
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name) | {"name": "Main pitch"}))
+    kept = esc("venue", "put", "venue.json", "--keep-poses")
+    assert (kept.returncode, json.loads(kept.stdout)) == (0, calibrated | {"name": "Main pitch"})
+    assert json.loads(esc("venue", "put", "venue.json", "--force").stdout)["cameras"][0]["pose"]["position"][1] == -50
+
+
+def test_settings_that_a_file_has_not_are_not_lost_unless_one_insists(service, esc, name, tmp_path):
+    document = venue(name)
+    (tmp_path / "old.json").write_text(json.dumps(document))
+    document["cameras"][0]["source"] = "http://127.0.0.1/x"
+    service.http.put(f"/venues/{name}", json=document | {"alarms": {"rejected_in_a_row": 2}}).raise_for_status()
+    refused = esc("venue", "put", "old.json")
+    assert refused.returncode == 1
+    assert "alarms: the file has none" in refused.stderr
+    assert "the source of camera left: the file has none" in refused.stderr
+    # What it gives, it takes.
+    (tmp_path / "new.json").write_text(esc("venue", "get", name).stdout)
+    assert esc("venue", "put", "new.json").returncode == 0
+
+
+def test_a_venue_that_others_change_meanwhile_is_not_put(service, esc, name, tmp_path, monkeypatch):
+    service.venue(name)
+    editor = tmp_path / "editor"
+    editor.write_text(f"#!{sys.executable}\n" + MEDDLING)
+    editor.chmod(0o755)
+    answer = esc("venue", "edit", name, EDITOR=str(editor), MEDDLE=f"{service.url}/venues/{name}")
+    assert (answer.returncode, "not the one the request expects" in answer.stderr) == (1, True), answer.stderr
+    assert service.http.get(f"/venues/{name}").json()["name"] == "theirs"
+    assert json.loads(esc("venue", "edit", name, EDITOR=str(editor)).stdout)["name"] == "mine"
+    assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 1
+    assert esc("venue", "edit", name, EDITOR="true").stderr == "Nothing was changed.\n"
+    assert esc("venue", "edit", name, EDITOR="false").returncode == 2
+
+
+def test_parts_of_a_venue_are_set_by_name(service, esc, name):
+    service.calibrated(service.venue(name))
+    before = service.http.get(f"/venues/{name}").json()
+    answer = esc(
+        "venue", "set", name, "name=Main pitch", "alarms.rejected_in_a_row=3", "cameras.left.source=http://127.0.0.1/x"
+    )
+    after = json.loads(answer.stdout)
+    assert (after["name"], after["alarms"]["rejected_in_a_row"]) == ("Main pitch", 3)
+    assert after["cameras"][0] == before["cameras"][0] | {"source": "http://127.0.0.1/x"}
+    assert json.loads(esc("venue", "set", name, "alarms=null").stdout)["alarms"] is None
+    for wrong in ("name", "=x", "a..b=1"):
+        assert esc("venue", "set", name, wrong).returncode == 2
 
 
 @pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3)])
