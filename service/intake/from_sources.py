@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake, frame_paths
 from service.store.blobs import Blobs
@@ -9,8 +11,10 @@ from service.store.ids import new_id
 from service.store.jobs.submission import Submission, Submissions, VenueGone, fetched_hash
 from service.store.jobs.task import Origin, seeded
 from service.store.venues import Venues
-from service.wire.job import Job
+from service.wire.job import Job, JobError
 from service.wire.options import Options
+from service.wire.problems import KINDS, Problem, type_of
+from service.wire.venue import Venue
 
 
 class FromSources:
@@ -40,19 +44,30 @@ class FromSources:
             raise VenueGone
         venue, credentials = found
         frames = self._snapshots.take(venue.cameras, credentials)
-        job_id = new_id()
-        submission = Submission(
-            job_id=job_id,
-            venue=venue,
-            options=seeded(options),
-            frames=frame_paths(job_id, dict.fromkeys(frames, 1)),
-            origin=origin,
-            content_hash=sent,
-            idempotency_key=key,
-        )
+        submission = _submission(venue, options, key, origin, list(frames))
 
         def store() -> None:
             for camera, (path,) in submission.frames.items():
                 self._blobs.put(path, frames[camera])
 
         return self._intake.take(submission, store)
+
+    def fail(self, venue: Venue, options: Options, key: str | None, origin: Origin, why: Problem) -> Job:
+        """A job for a calibration that nobody waits for and whose frames could not be had: it has failed."""
+        error = JobError(
+            type=type_of(why.kind), title=KINDS[why.kind].title, detail=why.detail, camera=why.parts.get("camera")
+        )
+        return self._submissions.fail(_submission(venue, options, key, origin, []), error)
+
+
+def _submission(venue: Venue, options: Options, key: str | None, origin: Origin, cameras: Sequence[str]) -> Submission:
+    job_id = new_id()
+    return Submission(
+        job_id=job_id,
+        venue=venue,
+        options=seeded(options),
+        frames=frame_paths(job_id, dict.fromkeys(cameras, 1)),
+        origin=origin,
+        content_hash=fetched_hash(options),
+        idempotency_key=key,
+    )

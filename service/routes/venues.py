@@ -262,8 +262,8 @@ def _patchable(venue: Venue, patch: dict[str, Any]) -> dict[str, Any]:
     """A venue to be patched. A camera's place is said twice: where a patch moves the camera, it says it once."""
     document: dict[str, Any] = venue.model_dump(mode="json")
     by_id = patch.get("cameras")
-    for camera in document["cameras"] if isinstance(by_id, dict) else ():
-        changed = by_id.get(camera["id"])
+    for camera in document["cameras"]:
+        changed = by_id.get(camera["id"]) if isinstance(by_id, dict) else None
         pose = changed.get("pose") if isinstance(changed, dict) else None
         if isinstance(pose, dict):
             del camera["pose"]["position" if "translation" in pose else "translation"]
@@ -274,10 +274,10 @@ def _checked(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
     """A venue as it is kept, if this service can keep it at this address."""
     if venue.id != venue_id:
         raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
-    told = [venue.alarms and venue.alarms.callback_url]
-    told += [venue.schedule and venue.schedule.options and venue.schedule.options.callback_url]
-    for url in filter(None, told):
-        callback_urls.check(url, settings)
+    scheduled = None if venue.schedule is None else venue.schedule.options
+    for told in (venue.alarms, scheduled):
+        if told is not None and told.callback_url is not None:
+            callback_urls.check(told.callback_url, settings)
     stored = venue.stored()
     sources.check(stored, settings.sources)
     return stored

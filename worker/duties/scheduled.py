@@ -17,8 +17,10 @@ from service.store.jobs.submission import QueueFull, Refusal, Submissions, Venue
 from service.store.jobs.task import Origin
 from service.store.schedules import Firing, Schedules
 from service.store.venues import Venues
+from service.wire.job import Job
 from service.wire.options import Options
 from service.wire.problems import Problem
+from service.wire.venue import Venue
 from worker.duties.hands import Hands
 
 LOOK_S = 1.0
@@ -29,8 +31,11 @@ ATTEMPT = timedelta(minutes=10)
 PUT_OFF = timedelta(seconds=30)
 # What ends by itself: jobs that wait or run, and files past their time.
 PASSING = (QueueFull, VenueBusy, VenueReplaced)
-PASSING_PROBLEMS = ("disk-full", "unavailable")
 log = structlog.get_logger()
+
+
+class Passing(Exception):  # noqa: N818
+    """Why there is no job yet: what will be over by itself."""
 
 
 class Scheduled:
@@ -72,26 +77,34 @@ class Scheduled:
 
     def _fire(self, firing: Firing) -> None:
         with structlog.contextvars.bound_contextvars(venue=firing.venue_id):
+            venue = self._venues.get(firing.venue_id)
+            if venue is None or venue.schedule is None:
+                return
             try:
-                job_id, error, passing = self._calibrate(firing), None, False
-            except Problem as problem:
-                job_id, error, passing = None, problem.detail, problem.kind in PASSING_PROBLEMS
+                job = self._job(firing, venue, venue.schedule.options or Options())
+            except Passing as passing:
+                self._schedules.put_off(firing, self._schedules.now() + PUT_OFF, str(passing))
+                log.warning("schedule put off", why=str(passing))
             except Refusal as refusal:
-                job_id, error, passing = None, refusal.__doc__ or "", isinstance(refusal, PASSING)
-            if error is None or not passing:
-                self._schedules.done(firing, self._schedules.now(), job_id, error)
+                self._schedules.done(firing, self._schedules.now(), None, refusal.__doc__)
+                log.warning("schedule fired in vain", why=refusal.__doc__)
             else:
-                self._schedules.put_off(firing, self._schedules.now() + PUT_OFF, error)
-            if error is not None:
-                log.warning("schedule put off" if passing else "schedule fired in vain", why=error)
+                error = None if job.error is None else job.error.detail
+                self._schedules.done(firing, self._schedules.now(), job.id, error)
+                log.info("schedule fired", job=job.id, error=error)
 
-    def _calibrate(self, firing: Firing) -> str | None:
-        if self._venues.get(firing.venue_id) is None:
-            return None
+    def _job(self, firing: Firing, venue: Venue, options: Options) -> Job:
+        """What became of it: a job, which has failed where the frames could not be had."""
         if self._disk.short():
-            raise Problem("disk-full", "Less is free on the disk than must be.")
+            raise Passing("Less is free on the disk than must be.")
         # Fired again after a worker died over it, it is the same job.
         name = f"schedule-{firing.due_at.astimezone(UTC):%Y%m%dT%H%M%SZ}"
-        job, _ = self._from_sources.calibrate(firing.venue_id, Options(), name, Origin(request_id=name))
-        log.info("schedule fired", job=job.id)
-        return job.id
+        origin = Origin(request_id=name)
+        try:
+            return self._from_sources.calibrate(venue.id, options, name, origin)[0]
+        except PASSING as refusal:
+            raise Passing(refusal.__doc__) from None
+        except Problem as problem:
+            if problem.kind == "unavailable":
+                raise Passing(problem.detail) from None
+            return self._from_sources.fail(venue, options, name, origin, problem)

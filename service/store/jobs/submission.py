@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from datetime import datetime
+from typing import Any
 
 import sqlalchemy as sa
 
 from service.store import tables
 from service.store.engine import Repository, clock, reading, serialise, writing
+from service.store.jobs.attempts import end_without_result
 from service.store.jobs.files import frame_folder
 from service.store.jobs.reading import ONE, asked, read_job
 from service.store.jobs.task import Asked
 from service.store.venues import find_venue, venue_lock
-from service.wire.job import OPEN, Job, Kind
+from service.wire.job import OPEN, Job, JobError, Kind, Status
 from service.wire.options import Options
 from service.wire.venue import Venue
 
@@ -97,25 +100,8 @@ class Submissions(Repository):
             # From here on the frames are the job's.
             folder = frame_folder(submission.job_id)
             connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
-            priority, now = PRIORITIES[submission.options.priority], clock(connection)
-            connection.execute(
-                sa.insert(tables.jobs).values(
-                    id=submission.job_id,
-                    kind=submission.kind,
-                    venue=venue_id,
-                    status="queued",
-                    priority=priority,
-                    options=submission.options.model_dump(mode="json"),
-                    content_hash=submission.content_hash,
-                    idempotency_key=submission.idempotency_key,
-                    venue_document=venue.model_dump(mode="json") if venue else None,
-                    frames=submission.frames,
-                    request_id=submission.origin.request_id,
-                    traceparent=submission.origin.traceparent,
-                    created_at=now,
-                    updated_at=now,
-                )
-            )
+            _insert(connection, submission, venue, "queued", clock(connection))
+            priority = PRIORITIES[submission.options.priority]
             enqueue(connection, submission.job_id, priority, submission.kind)
             # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
             serialise(connection, "queue")
@@ -123,6 +109,19 @@ class Submissions(Repository):
                 raise QueueFull
         with reading(self._engine) as connection:
             return read_job(connection, submission.job_id), True
+
+    def fail(self, submission: Submission, error: JobError) -> Job:
+        """A job that failed before it had frames, or the job that the submission already is by its key."""
+        assert submission.venue is not None
+        with writing(self._engine) as connection:
+            serialise(connection, venue_lock(submission.venue.id))
+            same = _of_key(connection, submission.venue.id, submission.idempotency_key)
+            if same is None:
+                venue, now = _as_it_is_now(connection, submission.venue), clock(connection)
+                _insert(connection, submission, venue, "failed", now, frames_deleted_at=now)
+                end_without_result(connection, submission.job_id, [j.id == submission.job_id], error)
+        with reading(self._engine) as connection:
+            return read_job(connection, submission.job_id if same is None else same.id)
 
     def waiting(self) -> int:
         """How many jobs wait."""
@@ -146,6 +145,28 @@ class Submissions(Repository):
         return Submission(**asked(row), content_hash=row.content_hash, idempotency_key=row.idempotency_key)
 
 
+def _insert(
+    connection: sa.Connection, submission: Submission, venue: Venue | None, status: Status, now: datetime, **more: Any
+) -> None:
+    values = {
+        "id": submission.job_id,
+        "kind": submission.kind,
+        "venue": None if venue is None else venue.id,
+        "status": status,
+        "priority": PRIORITIES[submission.options.priority],
+        "options": submission.options.model_dump(mode="json"),
+        "content_hash": submission.content_hash,
+        "idempotency_key": submission.idempotency_key,
+        "venue_document": venue.model_dump(mode="json") if venue else None,
+        "frames": submission.frames,
+        "request_id": submission.origin.request_id,
+        "traceparent": submission.origin.traceparent,
+        "created_at": now,
+        "updated_at": now,
+    }
+    connection.execute(sa.insert(tables.jobs).values(values | more))
+
+
 def _waiting(connection: sa.Connection) -> int:
     return connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
 
@@ -163,15 +184,11 @@ def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:
 def _duplicate(
     connection: sa.Connection, kind: Kind, venue_id: str | None, idempotency_key: str | None, content_hash: str
 ) -> str | None:
-    if idempotency_key is not None:
-        # Of no venue is a place of its own.
-        here = j.venue.is_(None) if venue_id is None else j.venue == venue_id
-        query = sa.select(j.id, j.content_hash).where(here, j.idempotency_key == idempotency_key)
-        known = connection.execute(query).one_or_none()
-        if known is not None:
-            if known.content_hash != content_hash:
-                raise KeyReused(known.id)
-            return str(known.id)
+    known = _of_key(connection, venue_id, idempotency_key)
+    if known is not None:
+        if known.content_hash != content_hash:
+            raise KeyReused(known.id)
+        return str(known.id)
     if kind != "calibration":
         return None
     query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.kind == "calibration", j.status.in_(OPEN))
@@ -181,3 +198,13 @@ def _duplicate(
     if active.content_hash != content_hash:
         raise VenueBusy(active.id)
     return str(active.id)
+
+
+def _of_key(connection: sa.Connection, venue_id: str | None, idempotency_key: str | None) -> Any:
+    """Id and content hash of the job of a key, None if there is none."""
+    if idempotency_key is None:
+        return None
+    # Of no venue is a place of its own.
+    here = j.venue.is_(None) if venue_id is None else j.venue == venue_id
+    query = sa.select(j.id, j.content_hash).where(here, j.idempotency_key == idempotency_key)
+    return connection.execute(query).one_or_none()

@@ -9,7 +9,10 @@ import sqlalchemy as sa
 from service.home import Home
 from service.settings import Settings
 from service.store import tables
+from service.store.counts.endings import ENDED
+from service.store.counts.figures import look as look_at_figures
 from service.wire.options import Options
+from service.wire.problems import Problem
 from service.wire.venue import VenueIn
 from tests.e2e.running import png, venue
 from tests.homes import in_both_homes
@@ -34,15 +37,16 @@ def duty(home_of_schedules):
     return Scheduled(made.settings, made.schedules, made.venues, made.submissions, made.from_sources, made.disk)
 
 
-def put(home, name):
-    document = venue(name, cameras=("left",)) | {"schedule": {"cron": "*/15 * * * *"}}
+def put(home, name, options=None, alarms=None):
+    schedule = {"cron": "*/15 * * * *", "options": options}
+    document = venue(name, cameras=("left",)) | {"schedule": schedule, "alarms": alarms}
     document["cameras"][0]["source"] = "http://127.0.0.1/x"
     home.venues.put(VenueIn.model_validate(document).stored(), lambda _: None)
 
 
-def all_due(home):
-    """Let the times of all schedules have come a while ago."""
-    a_while_ago = home.schedules.now() - timedelta(minutes=1)
+def all_due(home, minutes=1):
+    """Let the times of all schedules have come so many minutes ago."""
+    a_while_ago = home.schedules.now() - timedelta(minutes=minutes)
     with home.engine.begin() as connection:
         connection.execute(sa.update(tables.schedules).values(due_at=a_while_ago, look_at=a_while_ago))
 
@@ -108,6 +112,68 @@ def test_a_venue_that_is_being_calibrated_is_put_off_and_not_forgotten(home_of_s
     (job,) = waiting(home)
     assert home.venues.health("v").schedule.last_job == job.id
     assert home.venues.health("v").schedule.last_error is None
+
+
+@in_both_homes
+def test_a_camera_that_gives_no_frame_is_a_job_that_failed(home_of_schedules, duty, monkeypatch):
+    home = home_of_schedules
+    put(home, "v", alarms={"rejected_in_a_row": 2})
+    gone = Problem(
+        "source-failed", "No frame of camera left: answered 404.", camera="left", source="http://127.0.0.1/x"
+    )
+
+    def take(*_):
+        raise gone
+
+    monkeypatch.setattr(home.snapshots, "take", take)
+    for minutes in (3, 2):
+        all_due(home, minutes)
+        look(duty)
+    last, first = home.jobs.page("v", None, None, 10)
+    assert (last.status, last.error.type, last.error.camera) == ("failed", "/problems/source-failed", "left")
+    assert last.error.detail == home.venues.health("v").schedule.last_error == gone.detail
+    assert home.venues.health("v").schedule.last_job == last.id != first.id
+    assert [alarm.rule for alarm in home.venues.health("v").alarms] == ["rejected-in-a-row"]
+    assert look_at_figures(home.engine, 1).tallies[ENDED, ("failed", "", "source-failed")] == 2
+    # There is nothing to compute again, and nothing in the way of the next time.
+    assert home.submissions.of(last.id) is None
+    assert home.expiry.expire_frames(home.schedules.now() + timedelta(days=1), home.schedules.now(), 10) == 0
+    monkeypatch.setattr(home.snapshots, "take", lambda cameras, _: {camera.id: png() for camera in cameras})
+    all_due(home)
+    look(duty)
+    assert [job.venue for job in waiting(home)] == ["v"]
+    assert home.venues.health("v").schedule.last_error is None
+
+
+@in_both_homes
+def test_a_time_that_failed_and_is_fired_again_is_the_same_job(home_of_schedules, duty, monkeypatch):
+    home = home_of_schedules
+    put(home, "v")
+    monkeypatch.setattr(home.snapshots, "take", lambda *_: fail_with("source-failed"))
+    with monkeypatch.context() as patch:
+        # The worker dies before it writes down that it is done.
+        patch.setattr(home.schedules, "done", lambda *_: 1 / 0)
+        all_due(home)
+        look(duty)
+    with home.engine.begin() as connection:
+        connection.execute(sa.update(tables.schedules).values(look_at=tables.schedules.c.due_at))
+    look(duty)
+    (job,) = home.jobs.page("v", None, None, 10)
+    assert home.venues.health("v").schedule.last_job == job.id
+
+
+def test_a_schedule_says_how_it_is_to_be_calibrated(home_of_schedules, duty):
+    home = home_of_schedules
+    put(home, "v", options={"preset": "esc", "priority": "live", "dry_run": True})
+    all_due(home)
+    look(duty)
+    (job,) = waiting(home)
+    options = home.submissions.of(job.id).options
+    assert (options.priority, options.dry_run) == ("live", True)
+
+
+def fail_with(kind):
+    raise Problem(kind, "No frame.", camera="left")
 
 
 def test_those_that_were_put_off_go_before_those_that_came_after(home_of_schedules):
