@@ -181,6 +181,10 @@ class AsyncClient:
         """Submit the frames of a job once more, from the poses that hold now: another job."""
         return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/again"))
 
+    async def delete_job(self, job_id: str) -> None:
+        """Forget a job that has ended, with its frames and pictures."""
+        await self._ask("DELETE", f"/jobs/{job_id}")
+
     async def cancel(self, job_id: str) -> Job:
         """End a job."""
         return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/cancel"))
@@ -307,6 +311,7 @@ class Client:
     job = _Method(AsyncClient.job)
     jobs = _Method(AsyncClient.jobs)
     again = _Method(AsyncClient.again)
+    delete_job = _Method(AsyncClient.delete_job)
     cancel = _Method(AsyncClient.cancel)
     accept = _Method(AsyncClient.accept)
     reject = _Method(AsyncClient.reject)

@@ -131,6 +131,13 @@ def cancel_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
         say(client.cancel(job))
 
 
+@app.command("delete")
+def delete_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Forget a job that has ended, with its frames and pictures. Poses that it brought to its venue stay."""
+    with Client(url, api_key) as client:
+        client.delete_job(job)
+
+
 def _to_its_end(client: Client, job: Job) -> None:
     job = followed(client, job)
     say(job)
