@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import binascii
 import ipaddress
-import os
 import re
 import socket
 import sys
@@ -14,6 +13,8 @@ from typing import Literal
 
 from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from service import cores
 
 # Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
 DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
@@ -106,7 +107,7 @@ class Settings(BaseSettings):
     provider: Literal["cpu", "cuda", "openvino"] = Field(
         "cpu", description="What runs the network; all but `cpu` need their own build of ONNX Runtime."
     )
-    threads: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="Per job.")
+    threads: int = Field(default_factory=cores.usable, ge=1, description="Per job.")
     job_timeout_s: float = Field(600, gt=0, description="For jobs that name no limit of their own.")
     job_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.jobs.job"],
@@ -118,6 +119,9 @@ class Settings(BaseSettings):
     keep_frames_days: float = Field(2, ge=0)
     keep_pictures_days: float = Field(14, ge=0, description="Those of a venue's last accepted job stay.")
     keep_jobs_days: float = Field(400, ge=2, description="With them idempotency keys; the last accepted job stays.")
+    keep_revisions_years: float = Field(
+        5, ge=1, description="Poses that a calibration brought by itself; what was put, accepted or restored stays."
+    )
     min_free_mb: float = Field(500, ge=0, description="With less free on the disk, uploads are refused.")
     tidy_every_s: float = Field(600, gt=0, description="How often a worker looks for what is past its time.")
 

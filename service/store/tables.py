@@ -52,6 +52,7 @@ revisions = sa.Table(
     sa.Column("movements", sa.JSON, nullable=False),
     sa.Index("revisions_by_venue", "venue", "number", unique=True),
     sa.Index("revisions_by_job", "job"),
+    sa.Index("revisions_by_time", "cause", "at"),
 )
 
 jobs = sa.Table(

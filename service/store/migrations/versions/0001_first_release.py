@@ -41,6 +41,7 @@ def _venues() -> None:
     )
     op.create_index("revisions_by_venue", "revisions", ["venue", "number"], unique=True)
     op.create_index("revisions_by_job", "revisions", ["job"])
+    op.create_index("revisions_by_time", "revisions", ["cause", "at"])
 
 
 def _jobs() -> None:
