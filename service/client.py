@@ -136,18 +136,21 @@ class AsyncClient:
     async def calibrate(
         self,
         venue_id: str,
-        files: Mapping[str, Sequence[Path]],
+        files: Mapping[str, Path | Sequence[Path]],
         options: Mapping[str, Any],
         idempotency_key: str | None = None,
     ) -> Job:
-        """Submit frames, or none: then they are fetched. The job may be an older one if the content is the same."""
+        """Submit a frame of each camera, or several, or none: then they are fetched.
+
+        The job may be an older one if the content is the same.
+        """
         sent = _upload(files, options, idempotency_key)
         return Job.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
 
     async def fit_field(
         self,
         venue_id: str,
-        files: Mapping[str, Sequence[Path]],
+        files: Mapping[str, Path | Sequence[Path]],
         options: Mapping[str, Any],
         idempotency_key: str | None = None,
     ) -> Job:
@@ -330,12 +333,12 @@ def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:
 
 
 def _upload(
-    files: Mapping[str, Sequence[Path]], options: Mapping[str, Any], idempotency_key: str | None
+    files: Mapping[str, Path | Sequence[Path]], options: Mapping[str, Any], idempotency_key: str | None
 ) -> dict[str, Any]:
     parts: list[tuple[str, tuple[str, bytes, str]]] = [
         (camera, (path.name, path.read_bytes(), "application/octet-stream"))
         for camera, several in files.items()
-        for path in several
+        for path in ([several] if isinstance(several, Path) else several)
     ]
     # Never without a part: a form of none is none.
     if options or not parts:

@@ -14,7 +14,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from service.cli.printing import USAGE, fail
 from service.observe import logs
 from service.settings import Settings
-from service.wire.base import FormatName
+from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
 from service.wire.options import Options
 
 M = TypeVar("M", bound=BaseModel)
@@ -50,6 +50,18 @@ def _as_header(context: typer.Context, option: typer.CallbackParam, value: str |
     return key.strip()
 
 
+def _is_of_a_venue(venue_id: str) -> str:
+    if not re.fullmatch(ID_PATTERN, venue_id):
+        raise typer.BadParameter(f"{venue_id!r} is no id: up to 64 of a-z, 0-9, - and _, such as esc venue list prints")
+    return venue_id
+
+
+def _is_of_a_job(job_id: str) -> str:
+    if not re.fullmatch(JOB_ID_PATTERN, job_id):
+        raise typer.BadParameter(f"{job_id!r} is no id: 26 capital letters and digits, such as esc job list prints")
+    return job_id
+
+
 Url = Annotated[
     str,
     typer.Option(
@@ -77,8 +89,13 @@ Host = Annotated[
 Port = Annotated[
     int | None, typer.Option("--port", help="Port to listen on; 0 takes a free one (ESC_PORT) [default: 8000]")
 ]
-VenueId = Annotated[str, typer.Argument(metavar="VENUE", help="Id of a venue, as `esc venue list` prints it.")]
-JobId = Annotated[str, typer.Argument(metavar="JOB", help="Id of a job, as `esc job list` prints it.")]
+VenueId = Annotated[
+    str,
+    typer.Argument(metavar="VENUE", callback=_is_of_a_venue, help="Id of a venue, as `esc venue list` prints it."),
+]
+JobId = Annotated[
+    str, typer.Argument(metavar="JOB", callback=_is_of_a_job, help="Id of a job, as `esc job list` prints it.")
+]
 Frames = Annotated[
     list[str],
     typer.Argument(

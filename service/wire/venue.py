@@ -102,7 +102,8 @@ class VenueIn(_Place):
     def _can_be_fetched(self) -> Self:
         blind = [camera.id for camera in self.cameras if camera.source is None]
         if self.schedule is not None and blind:
-            raise ValueError(f"a schedule needs a source of every camera, and {', '.join(blind)} has none")
+            have = "has" if len(blind) == 1 else "have"
+            raise ValueError(f"a schedule needs a source of every camera, and {', '.join(blind)} {have} none")
         return self
 
     @model_validator(mode="after")

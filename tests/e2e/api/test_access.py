@@ -175,6 +175,19 @@ def test_a_key_that_is_removed_opens_nothing_for_long(guarded):
     wait_for(lambda: guarded.http.get("/jobs", headers=bearer(key)).status_code == 401)
 
 
+@pytest.mark.parametrize("command", [("list",), ("remove", "cron")])
+def test_to_ask_for_the_keys_of_no_service_makes_none(tmp_path, command):
+    answer = esc(tmp_path, "key", *command)
+    assert (answer.returncode, "There is no service here" in answer.stderr) == (1, True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_first_key_of_a_folder_is_said_to_be_that(tmp_path):
+    first, second = (esc(tmp_path, "key", "add", name, "--scope", "read") for name in ("a", "b"))
+    assert (first.returncode, "no service has used it yet" in first.stderr) == (0, True)
+    assert (second.returncode, "no service has used it yet" in second.stderr) == (0, False)
+
+
 @pytest.mark.parametrize("arguments", [("Bad name", "--scope", "read"), ("x", "--scope", "all"), ("x",)])
 def test_a_key_needs_a_name_and_a_scope(tmp_path, arguments):
     assert esc(tmp_path, "key", "add", *arguments).returncode == 2

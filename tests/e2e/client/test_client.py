@@ -44,7 +44,7 @@ def test_the_same_without_blocking(service, frames, name):
     async def life():
         async with AsyncClient(service.url) as client:
             await client.put_venue(VenueIn.model_validate(venue(name, "accept 0.5")))
-            submitted = await client.calibrate(name, frames, {"seed": 1})
+            submitted = await client.calibrate(name, {side: file for side, (file,) in frames.items()}, {"seed": 1})
             shown = []
             job, there = await asyncio.gather(client.follow(submitted, shown.append), client.venue(name))
             assert (job.status, there.id, shown[0].open) == ("succeeded", name, True)

@@ -188,6 +188,14 @@ def test_jobs_are_listed_waited_for_and_submitted_again(service, esc, name):
     assert esc("job", "list", "--venue", name, "--status", "failed").stdout == ""
 
 
+@pytest.mark.parametrize(
+    ("command", "says"), [(("job", "get", "01ABC"), "26 capital"), (("venue", "get", "A B"), "64 of a-z")]
+)
+def test_an_id_that_is_none_is_told_in_words(esc, command, says):
+    answer = esc(*command)
+    assert (answer.returncode, says in " ".join(answer.stderr.replace("│", " ").split())) == (2, True), answer.stderr
+
+
 def test_a_job_that_failed_is_listed_with_why(service, esc, name):
     job = service.calibrated(service.venue(name, "fail"))["id"]
     (line,) = esc("job", "list", "--venue", name).stdout.splitlines()
