@@ -55,6 +55,9 @@ revisions = sa.Table(
     sa.Index("revisions_by_time", "cause", "at"),
 )
 
+# Of a calibration that waits or runs. A query that says it in these words finds it in the index of these words.
+ACTIVE = sa.text("status IN ('queued', 'running') AND kind = 'calibration'")
+
 jobs = sa.Table(
     "jobs",
     metadata,
@@ -106,8 +109,8 @@ jobs = sa.Table(
         "one_active_job_per_venue",
         "venue",
         unique=True,
-        sqlite_where=sa.text("status IN ('queued', 'running') AND kind = 'calibration'"),
-        postgresql_where=sa.text("status IN ('queued', 'running') AND kind = 'calibration'"),
+        sqlite_where=ACTIVE,
+        postgresql_where=ACTIVE,
     ),
     sa.Index("jobs_by_end", "finished_at"),
     sa.Index(
@@ -123,6 +126,9 @@ jobs = sa.Table(
         postgresql_where=sa.text("pictures_deleted_at IS NULL"),
     ),
 )
+
+# For queries about the jobs of one venue: SQLite, which has no statistics, would as soon go through all of a kind.
+BY_VENUE = (jobs, "INDEXED BY jobs_by_venue", "sqlite")
 
 # Folders of the blob store that are deleted at `due_at`: what no row names any more, and an upload until it is a job.
 leftovers = sa.Table(

@@ -61,8 +61,7 @@ class Jobs(Repository):
         """Up to `limit` jobs, newest first, those older than `before`."""
         query = sa.select(tables.jobs).order_by(j.id.desc()).limit(limit)
         if venue is not None:
-            # One venue has few of all jobs, which SQLite does not know.
-            query = query.with_hint(tables.jobs, "INDEXED BY jobs_by_venue", "sqlite")
+            query = query.with_hint(*tables.BY_VENUE)
         for column, value in ((j.venue, venue), (j.status, status), (j.kind, kind)):
             if value is not None:
                 query = query.where(column == value)

@@ -16,7 +16,7 @@ from service.store.jobs.files import frame_folder
 from service.store.jobs.reading import ONE, asked, read_job
 from service.store.jobs.task import Asked
 from service.store.venues import find_venue, venue_lock
-from service.wire.job import OPEN, Job, JobError, Kind, Status
+from service.wire.job import Job, JobError, Kind, Status
 from service.wire.options import Options
 from service.wire.venue import Venue
 
@@ -191,7 +191,7 @@ def _duplicate(
         return str(known.id)
     if kind != "calibration":
         return None
-    query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.kind == "calibration", j.status.in_(OPEN))
+    query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, tables.ACTIVE)
     active = connection.execute(query).one_or_none()
     if active is None:
         return None
