@@ -113,6 +113,7 @@ OneCamera = Annotated[
     str | None, typer.Option("--camera", metavar="CAMERA", help="Id of the one camera that is wanted; otherwise all.")
 ]
 Output = Annotated[Path | None, typer.Option("-o", "--output", help="File to write; otherwise standard output.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of lines.")]
 OptionsText = Annotated[
     str,
     typer.Option(

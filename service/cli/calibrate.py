@@ -48,7 +48,7 @@ def calibrate(
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
-    """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the quality gate, 75 busy.
+    """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the gate, 75 busy or away.
 
     Without frames the service fetches them from the sources of the cameras.
     """
@@ -92,7 +92,7 @@ def run(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for result.json and the pictures.")],
     options: OptionsText = "{}",
 ) -> None:
-    """The same calibration without a server. Exit codes as of `calibrate`."""
+    """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
     settings, chosen = engine_settings(), options_of(options)
     if chosen.callback_url is not None:
         err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")

@@ -33,7 +33,7 @@ from service.wire.options import ClickedPoints, FieldOptions, IntrinsicsOptions
 from service.wire.results import FieldResult
 from service.wire.venue import CameraIn, Site, Venue, VenueIn
 
-field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue.")
+field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue: fit its length, width and ridge.")
 
 
 def intrinsics(
@@ -66,7 +66,7 @@ def intrinsics(
         Path | None, typer.Option("--picture", help="JPEG file to draw into where in the frame the board was seen.")
     ] = None,
 ) -> None:
-    """The lens of a camera from photos of a board. Exit: 0 found (read the warnings), 1 not, 2 usage."""
+    """Find the lens of a camera from photos of a chessboard. Exit: 0 found (read the warnings), 1 not, 2 usage."""
     settings = engine_settings()
     options = _lens_options(board, square, charuco, model)
     from worker.jobs import intrinsics
@@ -111,7 +111,7 @@ def pose(
     ] = None,
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
 ) -> None:
-    """First poses of cameras from clicked points, as a venue. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
+    """Find first poses of cameras from clicked points. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
     engine_settings()
     place = checked(Site, site.read_text(), str(site))
     clicks = checked(ClickedPoints, points.read_text(), str(points)).root
@@ -159,7 +159,7 @@ def fit_field(
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
-    """Length, width and ridge of a pitch from frames of its cameras. Exit codes as of `calibrate`.
+    """Fit length, width and ridge of a pitch to frames of its cameras. Exit codes as of `calibrate`.
 
     A venue's file is fitted here, a stored venue by its service. What is stored stays as it is until `venue put`.
     """

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, Form, JobId, OneCamera, Output, Url
+from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, JobId, OneCamera, Output, Url
 from service.cli.printing import ACCEPTED, FAILED, REJECTED, err, fail, followed, hand_out, say, verdict
 from service.client import Client
 from service.store.jobs.files import picture_file
-from service.wire.job import Job, Kind, Status
+from service.wire.job import Job, Jobs, Kind, Status
 from service.wire.results import FieldResult, IntrinsicsResult, LocateResult
 
 app = typer.Typer(
@@ -26,14 +26,19 @@ def list_jobs(
     status: Annotated[Status | None, typer.Option("--status", help="Only those in this state.")] = None,
     kind: Annotated[Kind | None, typer.Option("--kind", help="Only those of this kind.")] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most.")] = 20,
+    as_json: AsJson = False,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
     """Print a line per job, newest first: id, when it was submitted, venue, kind, status, and what came of it."""
     with Client(url, api_key) as client:
-        for job in client.jobs(venue, status, kind, limit):
-            came = f"{job.created_at:%Y-%m-%dT%H:%M:%SZ}"
-            print(f"{job.id}\t{came}\t{job.venue or '-'}\t{job.kind}\t{job.status}\t{_outcome(job)}")
+        jobs = client.jobs(venue, status, kind, limit)
+    if as_json:
+        say(Jobs(jobs=jobs))
+        return
+    for job in jobs:
+        came = f"{job.created_at:%Y-%m-%dT%H:%M:%SZ}"
+        print(f"{job.id}\t{came}\t{job.venue or '-'}\t{job.kind}\t{job.status}\t{_outcome(job)}")
 
 
 @app.command("get")

@@ -9,12 +9,13 @@ from typing import Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, Form, OneCamera, Output, Url, VenueId, checked
+from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, OneCamera, Output, Url, VenueId, checked
 from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
 from service.cli.printing import FAILED, REJECTED, USAGE, err, fail, hand_out, say
 from service.client import Client, Refused
 from service.wire.geometry import Moved
-from service.wire.venue import Venue, VenueIn
+from service.wire.history import History
+from service.wire.venue import Venue, VenueIn, Venues
 
 OTHERWISE = "Keep the poses with --keep-poses, change parts with esc venue set or edit, or put it anyway with --force."
 app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
@@ -92,11 +93,15 @@ def get_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
 
 
 @app.command("list")
-def list_venues(url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def list_venues(as_json: AsJson = False, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print a line per venue: id, name, cameras."""
     with Client(url, api_key) as client:
-        for venue in client.venues():
-            print(f"{venue.id}\t{venue.name}\t{' '.join(camera.id for camera in venue.cameras)}")
+        venues = client.venues()
+    if as_json:
+        say(Venues(venues=venues))
+        return
+    for venue in venues:
+        print(f"{venue.id}\t{venue.name}\t{' '.join(camera.id for camera in venue.cameras)}")
 
 
 @app.command("delete")
@@ -124,15 +129,20 @@ def venue_poses(
 def venue_history(
     venue: VenueId,
     limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most, the newest.")] = 20,
+    as_json: AsJson = False,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
     """Print a line per change of the poses, newest first: revision, time, cause, job, pixels moved and drifted."""
     with Client(url, api_key) as client:
-        for revision in client.history(venue, limit):
-            cause = revision.cause if revision.restored_from is None else f"restored {revision.restored_from}"
-            cameras = " ".join(f"{c.id}:{_pixels(c.moved)}/{_pixels(c.drift)}" for c in revision.cameras)
-            print(f"{revision.revision}\t{revision.at:%Y-%m-%dT%H:%M:%SZ}\t{cause}\t{revision.job or '-'}\t{cameras}")
+        revisions = client.history(venue, limit)
+    if as_json:
+        say(History(revisions=revisions))
+        return
+    for revision in revisions:
+        cause = revision.cause if revision.restored_from is None else f"restored {revision.restored_from}"
+        cameras = " ".join(f"{c.id}:{_pixels(c.moved)}/{_pixels(c.drift)}" for c in revision.cameras)
+        print(f"{revision.revision}\t{revision.at:%Y-%m-%dT%H:%M:%SZ}\t{cause}\t{revision.job or '-'}\t{cameras}")
 
 
 @app.command("health")

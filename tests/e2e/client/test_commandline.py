@@ -185,6 +185,10 @@ def test_jobs_are_listed_waited_for_and_submitted_again(service, esc, name):
     assert lines[0][2:] == [name, "calibration", "succeeded", "rejected: the lines do not fit"]
     assert esc("job", "list", "--venue", name, "--limit", "1").stdout.splitlines() == ["\t".join(lines[0])]
     assert esc("job", "list", "--venue", name, "--kind", "locate").stdout == ""
+    (newest, *_) = json.loads(esc("job", "list", "--venue", name, "--json").stdout)["jobs"]
+    assert newest == service.job(newest["id"])
+    assert name in [one["id"] for one in json.loads(esc("venue", "list", "--json").stdout)["venues"]]
+    assert json.loads(esc("venue", "history", name, "--json").stdout)["revisions"][0]["cause"] == "put"
     assert esc("job", "list", "--venue", name, "--status", "failed").stdout == ""
 
 
