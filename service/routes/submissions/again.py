@@ -75,6 +75,6 @@ def _require_the_same(context: Context, then: Venue) -> None:
 
 def _gone(context: Context, job: Job) -> Problem:
     days = f"{context.settings.keep_frames_days:g} days"
-    return Problem(
-        "frames-deleted", f"Frames are deleted {days} after the end of their job; send new ones.", job=job.id
-    )
+    never_any = job.status == "failed" and job.started_at is None
+    why = "It never had any" if never_any else f"Frames are deleted {days} after the end of their job"
+    return Problem("frames-deleted", f"{why}; send new ones.", job=job.id)

@@ -173,6 +173,13 @@ def test_a_file_that_cannot_be_written_is_told_in_a_line(service, esc, name):
     assert (answer.returncode, answer.stderr) == (1, "nowhere/poses.json: No such file or directory\n")
 
 
+def test_a_zip_that_is_not_called_one_is_said_to_be_one(service, esc, name):
+    service.venue(name)
+    assert "all.yml is a zip" in esc("venue", "poses", name, "--format", "opencv", "-o", "all.yml").stderr
+    assert esc("venue", "poses", name, "--format", "opencv", "-o", "all.zip").stderr == ""
+    assert esc("venue", "poses", name, "--format", "opencv", "--camera", "left", "-o", "left.yml").stderr == ""
+
+
 def test_jobs_are_listed_waited_for_and_submitted_again(service, esc, name):
     first = service.calibrated(service.venue(name, "reject"))["id"]
     second = json.loads(esc("job", "again", first).stdout)["job"]

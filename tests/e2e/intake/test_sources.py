@@ -204,6 +204,8 @@ def test_a_schedule_that_finds_no_frames_says_why_and_goes_on(service, camera, n
     assert "Calibrated by itself (0 3 * * *, Asia/Tokyo), next at " in page
     assert "Not the last time: No frame of camera right" in page
     assert service.http.get(f"/ui/jobs/{failed['id']}").status_code == 200
+    again = service.http.post(f"/jobs/{failed['id']}/again")
+    assert (again.status_code, again.json()["detail"]) == (410, "It never had any; send new ones.")
     service.http.put(f"/venues/{name}", json=scheduled(name, left=camera.url("/ok"), right=camera.url("/ok")))
     due_now(service, name)
     wait_for(lambda: health(service, name)["schedule"]["last_job"] != failed["id"])
