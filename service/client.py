@@ -25,7 +25,8 @@ import httpx
 from service.wire.base import OPTIONS_PART, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
-from service.wire.job import Job
+from service.wire.job import Job, Jobs, Kind, Status
+from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.wire.venue import Venue, VenueIn, Venues
 
 # Longer than the longest poll.
@@ -67,10 +68,24 @@ class AsyncClient:
 
     # Venues
 
-    async def put_venue(self, venue: VenueIn) -> Venue:
-        """Create or replace a venue."""
+    async def put_venue(self, venue: VenueIn, if_match: str | None = None) -> Venue:
+        """Create or replace a venue; `if_match`: only the one with this tag."""
         content = venue.model_dump(mode="json", exclude_none=True)
-        return Venue.model_validate_json(await self._ask("PUT", f"/venues/{venue.id}", json=content))
+        headers = {"If-Match": if_match} if if_match else {}
+        return Venue.model_validate_json(await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers))
+
+    async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> Venue:
+        """Change parts of a venue by a JSON merge patch; cameras may be an object of their ids."""
+        headers = {"Content-Type": MERGE_PATCH} | ({"If-Match": if_match} if if_match else {})
+        content = json.dumps(patch).encode()
+        return Venue.model_validate_json(
+            await self._ask("PATCH", f"/venues/{venue_id}", content=content, headers=headers)
+        )
+
+    async def tagged_venue(self, venue_id: str) -> tuple[Venue, str]:
+        """A venue, and the tag by which to change this one and no other."""
+        response = await self._answer("GET", f"/venues/{venue_id}")
+        return Venue.model_validate_json(response.content), response.headers["etag"]
 
     async def venue(self, venue_id: str) -> Venue:
         """A venue with its stored poses."""
@@ -121,18 +136,21 @@ class AsyncClient:
     async def calibrate(
         self,
         venue_id: str,
-        files: Mapping[str, Sequence[Path]],
+        files: Mapping[str, Path | Sequence[Path]],
         options: Mapping[str, Any],
         idempotency_key: str | None = None,
     ) -> Job:
-        """Submit frames, or none: then they are fetched. The job may be an older one if the content is the same."""
+        """Submit a frame of each camera, or several, or none: then they are fetched.
+
+        The job may be an older one if the content is the same.
+        """
         sent = _upload(files, options, idempotency_key)
         return Job.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
 
     async def fit_field(
         self,
         venue_id: str,
-        files: Mapping[str, Sequence[Path]],
+        files: Mapping[str, Path | Sequence[Path]],
         options: Mapping[str, Any],
         idempotency_key: str | None = None,
     ) -> Job:
@@ -144,6 +162,31 @@ class AsyncClient:
         """A job, at its end or after `wait_s`."""
         params = {"wait": wait_s} if wait_s else {}
         return Job.model_validate_json(await self._ask("GET", f"/jobs/{job_id}", params=params))
+
+    async def jobs(
+        self,
+        venue: str | None = None,
+        status: Status | None = None,
+        kind: Kind | None = None,
+        most: int | None = None,
+    ) -> list[Job]:
+        """Jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
+        chosen = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
+        page = Jobs.model_validate_json(await self._ask("GET", "/jobs", params=chosen))
+        found = page.jobs
+        while page.next_cursor is not None and (most is None or len(found) < most):
+            more = chosen | {"cursor": page.next_cursor}
+            page = Jobs.model_validate_json(await self._ask("GET", "/jobs", params=more))
+            found += page.jobs
+        return found[:most]
+
+    async def again(self, job_id: str) -> Job:
+        """Submit the frames of a job once more, from the poses that hold now: another job."""
+        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/again"))
+
+    async def delete_job(self, job_id: str) -> None:
+        """Forget a job that has ended, with its frames and pictures."""
+        await self._ask("DELETE", f"/jobs/{job_id}")
 
     async def cancel(self, job_id: str) -> Job:
         """End a job."""
@@ -184,9 +227,12 @@ class AsyncClient:
 
     async def _ask(self, method: str, path: str, **more: Any) -> bytes:
         """The body of an answer, if it is what was asked for; raises `Refused`."""
+        return (await self._answer(method, path, **more)).content
+
+    async def _answer(self, method: str, path: str, **more: Any) -> httpx.Response:
         response = await self._send(method, path, **more)
         if response.is_success:
-            return response.content
+            return response
         try:
             members = response.json()
         except ValueError:
@@ -253,6 +299,8 @@ class Client:
         return str(self._calls.http.base_url.join(path))
 
     put_venue = _Method(AsyncClient.put_venue)
+    patch_venue = _Method(AsyncClient.patch_venue)
+    tagged_venue = _Method(AsyncClient.tagged_venue)
     venue = _Method(AsyncClient.venue)
     venues = _Method(AsyncClient.venues)
     delete_venue = _Method(AsyncClient.delete_venue)
@@ -264,6 +312,9 @@ class Client:
     calibrate = _Method(AsyncClient.calibrate)
     fit_field = _Method(AsyncClient.fit_field)
     job = _Method(AsyncClient.job)
+    jobs = _Method(AsyncClient.jobs)
+    again = _Method(AsyncClient.again)
+    delete_job = _Method(AsyncClient.delete_job)
     cancel = _Method(AsyncClient.cancel)
     accept = _Method(AsyncClient.accept)
     reject = _Method(AsyncClient.reject)
@@ -282,12 +333,12 @@ def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:
 
 
 def _upload(
-    files: Mapping[str, Sequence[Path]], options: Mapping[str, Any], idempotency_key: str | None
+    files: Mapping[str, Path | Sequence[Path]], options: Mapping[str, Any], idempotency_key: str | None
 ) -> dict[str, Any]:
     parts: list[tuple[str, tuple[str, bytes, str]]] = [
         (camera, (path.name, path.read_bytes(), "application/octet-stream"))
         for camera, several in files.items()
-        for path in several
+        for path in ([several] if isinstance(several, Path) else several)
     ]
     # Never without a part: a form of none is none.
     if options or not parts:

@@ -74,6 +74,10 @@ class Queue:
             job_id,
         )
 
+    def forget(self, job_ids: Collection[str]) -> None:
+        """Delete what the queue keeps about jobs that have ended; those it does not know are no error."""
+        self._client.delete_workflows(list(job_ids))
+
     def close(self) -> None:
         """Let the database go."""
         self._client.destroy()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import binascii
 import ipaddress
-import os
 import re
 import socket
 import sys
@@ -15,12 +14,16 @@ from typing import Literal
 from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from service import cores
+
 # Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
 DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
 FREED_ANGLES = " ".join(rf"-?{angle}([+-]\d{{1,3}}(\.\d+)?)?" for angle in ("pan", "tilt", "roll"))
 FREED_AXES = re.compile(rf"(-?[xyz] ){{3}}{FREED_ANGLES}")
 # Not all digits, or an address that has a digit too many would count as a name.
 HOST_PATTERN = re.compile(r"(?=.*[A-Za-z*])[A-Za-z0-9*._-]+")
+# Part of an address, which as a pattern of names would match no address but 10.1.0.evil.com.
+ADDRESS_PATTERN = re.compile(r"(?=.*\d)(?=.*\*)[\d.*-]+")
 BLOB_URL = re.compile(r"(file|s3)://.+")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
@@ -57,6 +60,7 @@ class Settings(BaseSettings):
 
     # What a client may send.
     max_body_mb: float = Field(256, gt=0)
+    uploads_at_once: int = Field(16, ge=1, description="Uploads that one API process takes at the same time.")
     max_frame_mb: float = Field(48, gt=0)
     max_frame_pixels: int = Field(64_000_000, gt=0)
     max_frames_per_camera: int = Field(16, ge=1)
@@ -103,7 +107,7 @@ class Settings(BaseSettings):
     provider: Literal["cpu", "cuda", "openvino"] = Field(
         "cpu", description="What runs the network; all but `cpu` need their own build of ONNX Runtime."
     )
-    threads: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1, description="Per job.")
+    threads: int = Field(default_factory=cores.usable, ge=1, description="Per job.")
     job_timeout_s: float = Field(600, gt=0, description="For jobs that name no limit of their own.")
     job_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.jobs.job"],
@@ -115,6 +119,9 @@ class Settings(BaseSettings):
     keep_frames_days: float = Field(2, ge=0)
     keep_pictures_days: float = Field(14, ge=0, description="Those of a venue's last accepted job stay.")
     keep_jobs_days: float = Field(400, ge=2, description="With them idempotency keys; the last accepted job stays.")
+    keep_revisions_years: float = Field(
+        5, ge=1, description="Poses that a calibration brought by itself; what was put, accepted or restored stays."
+    )
     min_free_mb: float = Field(500, ge=0, description="With less free on the disk, uploads are refused.")
     tidy_every_s: float = Field(600, gt=0, description="How often a worker looks for what is past its time.")
 
@@ -155,6 +162,10 @@ class Settings(BaseSettings):
             try:
                 ipaddress.ip_network(pattern)
             except ValueError:
+                if ADDRESS_PATTERN.fullmatch(pattern):
+                    raise ValueError(
+                        f"{pattern} matches no address, wildcards are for names: write a network such as 10.1.0.0/24"
+                    ) from None
                 if not HOST_PATTERN.fullmatch(pattern):
                     raise ValueError(
                         f"{pattern} is neither a host's name, such as *.cams.lan, nor a network such as 10.1.0.0/16"

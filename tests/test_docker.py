@@ -73,6 +73,14 @@ def test_the_large_compose_file_has_two_workers_of_names_of_their_own():
     assert {"ESC_DATABASE_URL", "ESC_BLOB_URL", "ESC_WEBHOOK_SECRET"} <= api.keys()
 
 
+@pytest.mark.parametrize(("file", "service"), OURS)
+def test_settings_in_the_file_of_secrets_reach_the_containers(file, service):
+    its = COMPOSE[file]["services"][service]
+    # Without one, the single container starts too; the others need their secrets from it.
+    expected = [{"path": ".env", "required": False}] if file == "compose.single.yaml" else ".env"
+    assert its["env_file"] == expected
+
+
 def test_every_secret_is_asked_for_and_none_has_a_default():
     text = (DOCKER / "compose.yaml").read_text()
     used = re.findall(r"(?<!\$)\$\{(\w+)([^}]*)\}", text)

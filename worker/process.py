@@ -82,7 +82,9 @@ class Worker:
         self._retention = Retention(settings, home.expiry, home.blobs, home.workers, self._queue.forget)
         self._delivering = Delivering(settings, home.deliveries, home.jobs, home.deliveries.now)
         self._alarms = Alarms(home.venues)
-        self._scheduled = Scheduled(home.schedules, home.venues, home.from_sources, home.disk)
+        self._scheduled = Scheduled(
+            settings, home.schedules, home.venues, home.submissions, home.from_sources, home.disk
+        )
 
     def start(self) -> None:
         """Show up and take jobs."""

@@ -176,14 +176,23 @@ class Gate:
         wait_s = self._guesses.wait_s(address)
         if wait_s:
             raise Problem("too-many-unknown-keys", "See that the key is right, then try again.", headers=_later(wait_s))
-        return await self._find(hash_, address)
+        # Before the look, or any number of guesses that come at once would all be looked up.
+        self._guesses.take(address)
+        guessed = False
+        try:
+            return await self._find(hash_, address)
+        except Problem:
+            guessed = True
+            raise
+        finally:
+            if not guessed:
+                self._guesses.give_back(address)
 
     async def _find(self, hash_: str, address: str) -> Key:
         until = self._clock() + BELIEVED_FOR_S
         key = await run_in_threadpool(self._keys.find, hash_)
         if key is None:
             self._believed.pop(hash_, None)
-            self._guesses.take(address)
             log.warning("unknown key", address=address)
             raise _refused(
                 "key-unknown", "It was removed, or is of another service; `esc key list` names those of this."

@@ -7,7 +7,9 @@ from typing import Annotated, cast
 from fastapi import Depends, Path, Request
 
 from service.api.auth import Gate
+from service.api.clicked_pose import ClickedPoses
 from service.api.shared_reads import SharedReads
+from service.api.uploads import Uploads
 from service.api.watch import Watch
 from service.home import Home
 from service.observe.metrics import Metrics
@@ -28,6 +30,8 @@ class Context(Home):
         self.metrics = Metrics(lambda: look(self.engine, settings.metrics_venues), self.disk, silence_s)
         self.readiness = Readiness(self.jobs, self.blobs, self.disk, self.workers, silence_s)
         self.gate = Gate(self.keys, self.sessions, settings)
+        self.uploads = Uploads(settings)
+        self.clicked_poses = ClickedPoses(settings)
 
 
 async def _context(request: Request) -> Context:

@@ -16,10 +16,10 @@ log = structlog.get_logger()
 
 
 class OneAtATime:
-    """Runs of a program, one after the other; whoever comes meanwhile waits a little, then is told to come again."""
+    """Runs of a program, never two; whoever comes meanwhile is told to come again."""
 
-    def __init__(self, what: str, longest_s: float, again_s: int, patience_s: float) -> None:
-        self._what, self._longest_s, self._again_s, self._patience_s = what, longest_s, again_s, patience_s
+    def __init__(self, what: str, longest_s: float, again_s: int) -> None:
+        self._what, self._longest_s, self._again_s = what, longest_s, again_s
         self._turn = threading.Lock()
 
     def run(self, command: Sequence[str], environment: Mapping[str, str], given: bytes) -> bytes:
@@ -27,10 +27,8 @@ class OneAtATime:
 
         One that lacks a package says so on its standard error and ends with `os.EX_UNAVAILABLE`.
         """
-        if not self._turn.acquire(timeout=self._patience_s):
-            raise Problem(
-                "unavailable", f"Another {self._what} is being made.", headers={"Retry-After": str(self._again_s)}
-            )
+        if not self._turn.acquire(blocking=False):
+            raise self.busy()
         try:
             done = subprocess.run(
                 command,
@@ -51,3 +49,8 @@ class OneAtATime:
         finally:
             self._turn.release()
         return done.stdout
+
+    def busy(self) -> Problem:
+        """What those are told that come meanwhile."""
+        headers = {"Retry-After": str(self._again_s)}
+        return Problem("unavailable", f"Another {self._what} is being made.", headers=headers)

@@ -42,3 +42,8 @@ class Buckets:
         if len(self._full_at) > self._at_most:
             kept = heapq.nlargest(self._at_most // 2, self._full_at.items(), key=lambda entry: entry[1])
             self._full_at = dict(kept)
+
+    def give_back(self, name: str) -> None:
+        """Put back a token that was taken, as if it had not been."""
+        if name in self._full_at:
+            self._full_at[name] -= self._interval_s

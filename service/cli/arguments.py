@@ -9,19 +9,40 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 from pydantic import BaseModel, ValidationError
+from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.cli.printing import USAGE, fail
 from service.observe import logs
 from service.settings import Settings
-from service.wire.base import FormatName
+from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
 from service.wire.options import Options
 
 M = TypeVar("M", bound=BaseModel)
 LOCAL = "http://127.0.0.1:8000"
 
 
-def _as_header(key: str | None) -> str | None:
+class _Service(BaseSettings):
+    """Which service, and the key for it, where `.env` says so."""
+
+    model_config = SettingsConfigDict(env_prefix="ESC_", env_file=".env", env_ignore_empty=True, extra="ignore")
+
+    url: str | None = None
+    api_key: str | None = None
+
+
+def _or_as_the_file_says(context: typer.Context, option: typer.CallbackParam, value: str | None) -> str | None:
+    """What is given on the command line or in the environment, or else in `.env`, or else the default."""
+    name = option.name or ""
+    source = context.get_parameter_source(name)
+    if source is not None and source.name != "DEFAULT":
+        return value
+    in_file: str | None = getattr(_Service(), name)
+    return in_file or value
+
+
+def _as_header(context: typer.Context, option: typer.CallbackParam, value: str | None) -> str | None:
     """A key read from a file brings its line end along; what else no header takes is told here, not by the socket."""
+    key = _or_as_the_file_says(context, option, value)
     if key is None:
         return None
     if not re.fullmatch(r"[\x21-\x7e]+", key.strip()):
@@ -29,19 +50,79 @@ def _as_header(key: str | None) -> str | None:
     return key.strip()
 
 
-Url = Annotated[str, typer.Option("--url", envvar="ESC_URL", help="The service.")]
+def _is_of_a_venue(venue_id: str) -> str:
+    if not re.fullmatch(ID_PATTERN, venue_id):
+        raise typer.BadParameter(f"{venue_id!r} is no id: up to 64 of a-z, 0-9, - and _, such as esc venue list prints")
+    return venue_id
+
+
+def _is_of_a_job(job_id: str) -> str:
+    if not re.fullmatch(JOB_ID_PATTERN, job_id):
+        raise typer.BadParameter(f"{job_id!r} is no id: 26 capital letters and digits, such as esc job list prints")
+    return job_id
+
+
+Url = Annotated[
+    str,
+    typer.Option(
+        "--url", envvar="ESC_URL", callback=_or_as_the_file_says, help="Address of the service; .env may have it too."
+    ),
+]
 ApiKey = Annotated[
     str | None,
-    typer.Option("--api-key", envvar="ESC_API_KEY", callback=_as_header, help="Sent as bearer token.", metavar="KEY"),
+    typer.Option(
+        "--api-key",
+        envvar="ESC_API_KEY",
+        callback=_as_header,
+        metavar="KEY",
+        help="API key for the service, as `esc key add` printed it; .env may have it too.",
+    ),
 ]
-Data = Annotated[Path | None, typer.Option("--data", help="Folder of the embedded home (ESC_DATA).")]
-Host = Annotated[str | None, typer.Option("--host", help="Address to listen on (ESC_HOST).")]
-Port = Annotated[int | None, typer.Option("--port", help="0 takes a free one (ESC_PORT).")]
-Frames = Annotated[list[str], typer.Argument(metavar="CAMERA=FILE...", help="Repeat a camera to fuse its frames.")]
-Form = Annotated[FormatName, typer.Option("--format", help="Whose.")]
-OneCamera = Annotated[str | None, typer.Option("--camera", help="One camera; otherwise all.")]
-Output = Annotated[Path | None, typer.Option("-o", "--output", help="File; otherwise standard output.")]
-OptionsText = Annotated[str, typer.Option("--options", metavar="JSON", help='For instance {"dry_run": true}.')]
+Data = Annotated[
+    Path | None,
+    typer.Option("--data", help="Folder of the service's database, frames and pictures (ESC_DATA) [default: esc-data]"),
+]
+Host = Annotated[
+    str | None,
+    typer.Option("--host", help="Address to listen on; 0.0.0.0: all of this machine (ESC_HOST) [default: 127.0.0.1]"),
+]
+Port = Annotated[
+    int | None, typer.Option("--port", help="Port to listen on; 0 takes a free one (ESC_PORT) [default: 8000]")
+]
+VenueId = Annotated[
+    str,
+    typer.Argument(metavar="VENUE", callback=_is_of_a_venue, help="Id of a venue, as `esc venue list` prints it."),
+]
+JobId = Annotated[
+    str, typer.Argument(metavar="JOB", callback=_is_of_a_job, help="Id of a job, as `esc job list` prints it.")
+]
+Frames = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="CAMERA=FILE...",
+        help="A JPEG or PNG of each camera, such as left=left.jpg; several of one camera are fused.",
+    ),
+]
+Form = Annotated[
+    FormatName,
+    typer.Option(
+        "--format", help="File format: json is ESC's own, the others are those of the tools they are named after."
+    ),
+]
+OneCamera = Annotated[
+    str | None, typer.Option("--camera", metavar="CAMERA", help="Id of the one camera that is wanted; otherwise all.")
+]
+Output = Annotated[Path | None, typer.Option("-o", "--output", help="File to write; otherwise standard output.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of lines.")]
+OptionsText = Annotated[
+    str,
+    typer.Option(
+        "--options",
+        metavar="JSON",
+        help='Options of the calibration: {"dry_run": true} moves no stored pose, {"priority": "live"} goes first, '
+        '{"timeout_s": 60} ends it after so many seconds; all are in /docs of a service.',
+    ),
+]
 
 
 def settings_of(**given: Any) -> Settings:

@@ -8,7 +8,18 @@ from typing import Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, Frames, OneCamera, OptionsText, Url, checked, files_of, options_of
+from service.cli.arguments import (
+    LOCAL,
+    ApiKey,
+    Frames,
+    OneCamera,
+    OptionsText,
+    Url,
+    VenueId,
+    checked,
+    files_of,
+    options_of,
+)
 from service.cli.local import checked_files, engine_settings, failure_told
 from service.cli.printing import bar, err, followed, gate, say, verdict
 from service.client import Client
@@ -17,18 +28,27 @@ from service.wire.venue import VenueIn
 
 
 def calibrate(
-    venue: Annotated[str, typer.Argument()],
+    venue: VenueId,
     frames: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[CAMERA=FILE...]", help="Repeat a camera to fuse its frames. None: from the sources."),
+        typer.Argument(
+            metavar="[CAMERA=FILE...]",
+            help="A JPEG or PNG of each camera, such as left=left.jpg; several of one camera are fused. None at all: "
+            "the service fetches them.",
+        ),
     ] = None,
     options: OptionsText = "{}",
-    wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end.")] = False,
-    key: Annotated[str | None, typer.Option("--idempotency-key", help="The same key is the same job.")] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end and print it.")] = False,
+    key: Annotated[
+        str | None,
+        typer.Option(
+            "--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."
+        ),
+    ] = None,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
-    """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the quality gate, 75 busy.
+    """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the gate, 75 busy or away.
 
     Without frames the service fetches them from the sources of the cameras.
     """
@@ -44,9 +64,9 @@ def calibrate(
 
 
 def snapshot(
-    venue: Annotated[str, typer.Argument()],
+    venue: VenueId,
     camera: OneCamera = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder.")] = Path(),
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to.")] = Path(),
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
@@ -62,12 +82,17 @@ def snapshot(
 
 
 def run(
-    venue: Annotated[Path, typer.Argument(metavar="VENUE.json", exists=True, dir_okay=False)],
+    venue: Annotated[
+        Path,
+        typer.Argument(
+            metavar="VENUE.json", exists=True, dir_okay=False, help="File of a venue, as `esc venue get` prints it."
+        ),
+    ],
     frames: Frames,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for result.json and the pictures.")],
     options: OptionsText = "{}",
 ) -> None:
-    """The same calibration without a server. Exit codes as of `calibrate`."""
+    """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
     settings, chosen = engine_settings(), options_of(options)
     if chosen.callback_url is not None:
         err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")

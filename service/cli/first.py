@@ -33,21 +33,40 @@ from service.wire.options import ClickedPoints, FieldOptions, IntrinsicsOptions
 from service.wire.results import FieldResult
 from service.wire.venue import CameraIn, Site, Venue, VenueIn
 
-field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue.")
+field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue: fit its length, width and ridge.")
 
 
 def intrinsics(
-    photos: Annotated[list[Path], typer.Argument(metavar="PHOTO...", exists=True, dir_okay=False)],
-    board: Annotated[str, typer.Option("--board", metavar="9x6", help="Inner corners, where four squares meet.")],
-    square: Annotated[float, typer.Option("--square", metavar="METRES", help="Side of a square.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="File of the lens.")],
+    photos: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="PHOTO...", exists=True, dir_okay=False, help="15 to 30 JPEG or PNG photos of the board."
+        ),
+    ],
+    board: Annotated[
+        str,
+        typer.Option(
+            "--board", metavar="9x6", help="Inner corners of the board across and down, where four squares meet."
+        ),
+    ],
+    square: Annotated[
+        float, typer.Option("--square", metavar="METRES", help="Side of a square of the board, in metres.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="JSON file to write the lens to, for `esc pose`.")],
     charuco: Annotated[
-        str | None, typer.Option("--charuco", metavar="4X4_50:0.022", help="Dictionary and side of a marker, m.")
+        str | None,
+        typer.Option(
+            "--charuco", metavar="4X4_50:0.022", help="Of a ChArUco board: dictionary, and side of a marker in metres."
+        ),
     ] = None,
-    model: Annotated[LensModel, typer.Option("--model", help="Of lens.")] = "opencv",
-    picture: Annotated[Path | None, typer.Option("--picture", help="Where the corners are: .jpg.")] = None,
+    model: Annotated[
+        LensModel, typer.Option("--model", help="Lens model: opencv, or fisheye (Kannala-Brandt) for very wide lenses.")
+    ] = "opencv",
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="JPEG file to draw into where in the frame the board was seen.")
+    ] = None,
 ) -> None:
-    """The lens of a camera from photos of a board. Exit: 0 found (read the warnings), 1 not, 2 usage."""
+    """Find the lens of a camera from photos of a chessboard. Exit: 0 found (read the warnings), 1 not, 2 usage."""
     settings = engine_settings()
     options = _lens_options(board, square, charuco, model)
     from worker.jobs import intrinsics
@@ -64,18 +83,35 @@ def intrinsics(
 
 
 def pose(
-    site: Annotated[Path, typer.Argument(metavar="SITE.json", exists=True, dir_okay=False, help="Id, name, field.")],
-    points: Annotated[
-        Path, typer.Argument(metavar="POINTS.json", exists=True, dir_okay=False, help="Clicked points by camera.")
+    site: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SITE.json",
+            exists=True,
+            dir_okay=False,
+            help="Id, name and field of the venue; cameras that have poses already, if any.",
+        ),
     ],
-    lenses: Annotated[list[str], typer.Argument(metavar="CAMERA=LENS.json...", help="As esc intrinsics writes it.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="File of the venue, for venue put and run.")],
+    points: Annotated[
+        Path,
+        typer.Argument(
+            metavar="POINTS.json", exists=True, dir_okay=False, help="Clicked points of the pitch by camera."
+        ),
+    ],
+    lenses: Annotated[
+        list[str],
+        typer.Argument(metavar="CAMERA=LENS.json...", help="The lens of each camera, as `esc intrinsics` writes it."),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="JSON file to write the venue to, for `esc venue put` and `esc run`.")
+    ],
     frame: Annotated[
-        list[str] | None, typer.Option("--frame", metavar="CAMERA=FILE", help="What the points were clicked in.")
+        list[str] | None,
+        typer.Option("--frame", metavar="CAMERA=FILE", help="The frame that the points of a camera were clicked in."),
     ] = None,
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
 ) -> None:
-    """First poses of cameras from clicked points, as a venue. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
+    """Find first poses of cameras from clicked points. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
     engine_settings()
     place = checked(Site, site.read_text(), str(site))
     clicks = checked(ClickedPoints, points.read_text(), str(points)).root
@@ -112,13 +148,18 @@ def pose(
 def fit_field(
     venue: Annotated[str, typer.Argument(metavar="VENUE", help="A venue's file, or the id of one that is stored.")],
     frames: Frames,
-    output: Annotated[Path, typer.Option("-o", "--output", help="File of the venue with its fitted field.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="JSON file to write the venue with its fitted field to.")
+    ],
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Absent: one is chosen.")] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", min=0, help="Any number: the same one finds the same. Otherwise one is chosen."),
+    ] = None,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
-    """Length, width and ridge of a pitch from frames of its cameras. Exit codes as of `calibrate`.
+    """Fit length, width and ridge of a pitch to frames of its cameras. Exit codes as of `calibrate`.
 
     A venue's file is fitted here, a stored venue by its service. What is stored stays as it is until `venue put`.
     """

@@ -2,18 +2,108 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, Form, OneCamera, Output, Url
-from service.cli.printing import hand_out, say
+from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, JobId, OneCamera, Output, Url
+from service.cli.printing import ACCEPTED, FAILED, REJECTED, err, fail, followed, hand_out, say, verdict
 from service.client import Client
+from service.store.jobs.files import picture_file
+from service.wire.job import Job, Jobs, Kind, Status
+from service.wire.results import FieldResult, IntrinsicsResult, LocateResult
 
-app = typer.Typer(no_args_is_help=True, help="Jobs of a running service.")
+app = typer.Typer(
+    no_args_is_help=True, help="Jobs of a running service: calibrations, and what comes before the first."
+)
+NOT_PICTURES = {"self", "events", "cancel", "venue"}
+
+
+@app.command("list")
+def list_jobs(
+    venue: Annotated[str | None, typer.Option("--venue", metavar="VENUE", help="Only those of one venue.")] = None,
+    status: Annotated[Status | None, typer.Option("--status", help="Only those in this state.")] = None,
+    kind: Annotated[Kind | None, typer.Option("--kind", help="Only those of this kind.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most.")] = 20,
+    as_json: AsJson = False,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Print a line per job, newest first: id, when it was submitted, venue, kind, status, and what came of it."""
+    with Client(url, api_key) as client:
+        jobs = client.jobs(venue, status, kind, limit)
+    if as_json:
+        say(Jobs(jobs=jobs))
+        return
+    for job in jobs:
+        came = f"{job.created_at:%Y-%m-%dT%H:%M:%SZ}"
+        print(f"{job.id}\t{came}\t{job.venue or '-'}\t{job.kind}\t{job.status}\t{_outcome(job)}")
+
+
+@app.command("get")
+def get_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Print a job as JSON."""
+    with Client(url, api_key) as client:
+        say(client.job(job))
+
+
+@app.command("wait")
+def wait_for_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Follow a job to its end and print it. Exit: 0 accepted, 1 failed or cancelled, 3 rejected, 75 busy."""
+    with Client(url, api_key) as client:
+        _to_its_end(client, client.job(job))
+
+
+@app.command("again")
+def submit_again(
+    job: JobId,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Follow the new job to its end, as `esc job wait` does.")
+    ] = False,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Compute the frames of a job once more, with its options, from the poses that hold now: a new job."""
+    with Client(url, api_key) as client:
+        new = client.again(job)
+        if wait:
+            _to_its_end(client, new)
+        else:
+            say({"job": new.id, "url": client.url_of(new.links["self"])})
+
+
+@app.command("picture")
+def picture_of_job(
+    job: JobId,
+    picture: Annotated[
+        str | None,
+        typer.Argument(metavar="[PICTURE]", help="Such as preview or overlay/left; otherwise all are named."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write; otherwise one named as the picture, here.")
+    ] = None,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Save a picture of a job and print its file; without a name, print the names of those there are."""
+    with Client(url, api_key) as client:
+        found = client.job(job)
+        names = [name for name in found.links if name not in NOT_PICTURES]
+        if picture is None:
+            print(*names, sep="\n")
+            return
+        content = client.picture(found, picture) if picture in names else None
+        if content is None:
+            fail(f"Job {job} has no picture {picture}; it has {', '.join(names) or 'none'}.", FAILED)
+        file = output or Path(picture_file(picture.replace("/", "_", 1)))
+        file.write_bytes(content)
+        print(file)
 
 
 @app.command("poses")
 def job_poses(
-    job: str,
+    job: JobId,
     form: Form = "json",
     camera: OneCamera = None,
     output: Output = None,
@@ -26,28 +116,51 @@ def job_poses(
 
 
 @app.command("accept")
-def accept_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def accept_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Let the poses of a job hold that the gate rejected, or that was a dry run."""
     with Client(url, api_key) as client:
         say(client.accept(job))
 
 
 @app.command("reject")
-def reject_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def reject_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Put back the poses that held before those of a job."""
     with Client(url, api_key) as client:
         say(client.reject(job))
 
 
-@app.command("get")
-def get_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
-    """Print a job."""
-    with Client(url, api_key) as client:
-        say(client.job(job))
-
-
 @app.command("cancel")
-def cancel_job(job: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def cancel_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """End a job that is still open."""
     with Client(url, api_key) as client:
         say(client.cancel(job))
+
+
+@app.command("delete")
+def delete_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Forget a job that has ended, with its frames and pictures. Poses that it brought to its venue stay."""
+    with Client(url, api_key) as client:
+        client.delete_job(job)
+
+
+def _to_its_end(client: Client, job: Job) -> None:
+    job = followed(client, job)
+    say(job)
+    match job.result:
+        case IntrinsicsResult():
+            raise typer.Exit(ACCEPTED)
+        case LocateResult() | FieldResult():
+            if not job.result.accepted:
+                err.print(f"Rejected: {job.result.rejected_because}")
+            raise typer.Exit(ACCEPTED if job.result.accepted else REJECTED)
+        case _:
+            raise typer.Exit(verdict(job))
+
+
+def _outcome(job: Job) -> str:
+    """The verdict, or what went wrong, in a line."""
+    if job.error is not None:
+        return f"{job.error.title}: {job.error.detail}"
+    if job.result is None or isinstance(job.result, IntrinsicsResult):
+        return "-"
+    return "accepted" if job.result.accepted else f"rejected: {job.result.rejected_because}"

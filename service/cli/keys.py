@@ -19,14 +19,22 @@ from service.wire.base import ID_PATTERN, Scope
 if TYPE_CHECKING:
     from service.store.keys import Keys
 
+ELSEWHERE = "Of a service that has its folder elsewhere, name it: --data, or ESC_DATA."
 app = typer.Typer(no_args_is_help=True, help="API keys, in the database of this machine's service.")
 
 
 @app.command("add")
 def add_key(
-    name: Annotated[str, typer.Argument(help="Of who will use it: a machine, a person.")],
-    scope: Annotated[Scope, typer.Option("--scope", help="Each includes those before it.")],
-    days: Annotated[int | None, typer.Option("--days", min=1, max=36500, help="How long it is good.")] = None,
+    name: Annotated[str, typer.Argument(help="Name for the key: of the machine or person that will use it.")],
+    scope: Annotated[
+        Scope,
+        typer.Option(
+            "--scope", help="What it may do: read; calibrate, which includes that; admin, which includes both."
+        ),
+    ],
+    days: Annotated[
+        int | None, typer.Option("--days", min=1, max=36500, help="Days after which it expires; otherwise never.")
+    ] = None,
     data: Data = None,
 ) -> None:
     """Make a key and print it, this once: what is stored is its hash."""
@@ -46,7 +54,7 @@ def add_key(
 @app.command("list")
 def list_keys(data: Data = None) -> None:
     """Print a line per key: name, scope, when it was made, when (to the minute) last used, until when it is good."""
-    with _keys(data) as keys:
+    with _known_keys(data) as keys:
         for key in keys.all():
             used, until = (f"{at:%Y-%m-%dT%H:%MZ}" if at else "-" for at in (key.last_used_at, key.expires_at))
             state = " (expired)" if key.expired else ""
@@ -54,17 +62,29 @@ def list_keys(data: Data = None) -> None:
 
 
 @app.command("remove")
-def remove_key(name: str, data: Data = None) -> None:
+def remove_key(
+    name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")], data: Data = None
+) -> None:
     """Forget a key."""
     from service.api.auth import BELIEVED_FOR_S
 
-    with _keys(data) as keys:
+    with _known_keys(data) as keys:
         if not keys.remove(name):
             fail(f"There is no key {name}; esc key list names those there are.", FAILED)
         left = keys.any()
     err.print(f"Removed. A service that runs may take it for {BELIEVED_FOR_S:.0f} s more.")
     if not left:
         err.print("No key is left: a service on loopback will let anyone on this machine call after its next start.")
+
+
+@contextmanager
+def _known_keys(data: Path | None) -> Iterator[Keys]:
+    """The keys of a service that has been there: to ask for them makes none."""
+    url = settings_of(data=data).home_database_url
+    if url.startswith("sqlite") and not Path(url.partition("sqlite:///")[2]).exists():
+        fail(f"There is no service here: {url} does not exist. {ELSEWHERE}", FAILED)
+    with _keys(data) as keys:
+        yield keys
 
 
 @contextmanager
@@ -78,6 +98,9 @@ def _keys(data: Path | None) -> Iterator[Keys]:
         engine = connect(settings.home_database_url)
         # Keys of another folder open nothing, and nothing else would tell.
         err.print(f"Keys in {engine.url.set(query={}).render_as_string(hide_password=True)}")
+        made = engine.dialect.name == "sqlite" and not Path(engine.url.database or "").exists()
         migrate(engine)
+        if made:
+            err.print(f"That database is new: no service has used it yet. {ELSEWHERE}")
         yield Keys(engine)
         engine.dispose()

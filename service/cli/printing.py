@@ -19,6 +19,7 @@ from service.wire.job import Progress as Step
 from service.wire.results import FieldResult, IntrinsicsResult, LocateResult, Result
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
+ZIP_START = b"PK"
 err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
 
 
@@ -33,6 +34,8 @@ def hand_out(document: bytes, output: Path | None) -> None:
         sys.stdout.buffer.write(document)
     else:
         output.write_bytes(document)
+        if document.startswith(ZIP_START) and output.suffix != ".zip":
+            err.print(f"{output} is a zip: in this format, each camera has a file of its own (--camera writes one).")
 
 
 def fail(message: str, code: int) -> NoReturn:

@@ -14,19 +14,26 @@ from service.settings import Settings
 
 
 def up(data: Data = None, host: Host = None, port: Port = None) -> None:
-    """API and one worker on this machine, with nothing else beside them."""
+    """Run the whole service on this machine: API, operator's page and one worker, with nothing else beside them."""
     _serve(settings_of(data=data, host=host, port=port), with_worker=True)
 
 
 def serve(data: Data = None, host: Host = None, port: Port = None) -> None:
-    """The API alone; `esc worker` computes, here or on other machines."""
+    """Run the API and the operator's page alone; `esc worker` computes, here or on other machines."""
     _serve(settings_of(data=data, host=host, port=port), with_worker=False)
 
 
 def worker(
-    data: Data = None, name: Annotated[str | None, typer.Option("--name", help="Unique and stable.")] = None
+    data: Data = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name",
+            help="A name that no other worker has, the same after a restart (ESC_WORKER_NAME) [default: the host's]",
+        ),
+    ] = None,
 ) -> None:
-    """A worker alone."""
+    """Run a worker alone: it computes the jobs of a service whose database and files its settings name."""
     from worker import process
 
     try:

@@ -2,47 +2,110 @@
 
 from __future__ import annotations
 
+import json
+from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, Form, OneCamera, Output, Url, checked
-from service.cli.printing import REJECTED, hand_out, say
-from service.client import Client
+from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, OneCamera, Output, Url, VenueId, checked
+from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
+from service.cli.printing import FAILED, REJECTED, USAGE, err, fail, hand_out, say
+from service.client import Client, Refused
 from service.wire.geometry import Moved
-from service.wire.venue import VenueIn
+from service.wire.history import History
+from service.wire.venue import Venue, VenueIn, Venues
 
+OTHERWISE = "Keep the poses with --keep-poses, change parts with esc venue set or edit, or put it anyway with --force."
 app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
 
 
 @app.command("put")
 def put_venue(
-    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False)], url: Url = LOCAL, api_key: ApiKey = None
+    file: Annotated[Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="JSON file of a venue.")],
+    keep_poses: Annotated[
+        bool,
+        typer.Option(
+            "--keep-poses", help="Keep the stored poses, with their lenses and ridge, whatever the file says."
+        ),
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Put it whatever would be lost by that.")] = False,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
 ) -> None:
-    """Create or replace a venue from a JSON file."""
+    """Create or replace a venue from a JSON file. Exit 1: nothing was put, something would be lost by it."""
     venue = checked(VenueIn, file.read_text(), str(file))
     with Client(url, api_key) as client:
-        say(client.put_venue(venue))
+        before = _stored(client, venue.id)
+        if before is None:
+            say(client.put_venue(venue))
+            return
+        stored, tag = before
+        wanted = standing_like(venue, stored) if keep_poses else venue
+        lost = what_is_lost(wanted.stored(), stored, client.history(venue.id, 1)[0])
+        if lost and not force:
+            fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *lost, OTHERWISE]), FAILED)
+        say(client.put_venue(wanted, tag))
+
+
+@app.command("set")
+def set_venue(
+    venue: VenueId,
+    changes: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="PART=VALUE...",
+            help="Such as name='Main pitch', alarms.rejected_in_a_row=3 or cameras.left.source=http://10.1.0.7/a.jpg; "
+            "schedule=null takes it away. Values are JSON, or else text.",
+        ),
+    ],
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Change parts of a venue and leave the others as they are, its poses among them."""
+    patch = patch_of(changes)
+    with Client(url, api_key) as client:
+        say(client.patch_venue(venue, patch))
+
+
+@app.command("edit")
+def edit_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+    """Open a venue in $EDITOR and change what was changed there, unless somebody else has changed it meanwhile."""
+    with Client(url, api_key) as client:
+        stored, tag = client.tagged_venue(venue)
+        shown = stored.sent().model_dump(mode="json", exclude_none=True)
+        try:
+            patch = patch_between(shown, json.loads(edited(json.dumps(shown, indent=2) + "\n")))
+        except ValueError as error:
+            fail(f"Nothing was changed. What was saved is no JSON: {error}", USAGE)
+        if not patch:
+            err.print("Nothing was changed.")
+            return
+        say(client.patch_venue(venue, patch, tag))
 
 
 @app.command("get")
-def get_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def get_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print a venue with the poses that hold now."""
     with Client(url, api_key) as client:
         say(client.venue(venue))
 
 
 @app.command("list")
-def list_venues(url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def list_venues(as_json: AsJson = False, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print a line per venue: id, name, cameras."""
     with Client(url, api_key) as client:
-        for venue in client.venues():
-            print(f"{venue.id}\t{venue.name}\t{' '.join(camera.id for camera in venue.cameras)}")
+        venues = client.venues()
+    if as_json:
+        say(Venues(venues=venues))
+        return
+    for venue in venues:
+        print(f"{venue.id}\t{venue.name}\t{' '.join(camera.id for camera in venue.cameras)}")
 
 
 @app.command("delete")
-def delete_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def delete_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Forget a venue and the history of its poses."""
     with Client(url, api_key) as client:
         client.delete_venue(venue)
@@ -50,7 +113,7 @@ def delete_venue(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
 
 @app.command("poses")
 def venue_poses(
-    venue: str,
+    venue: VenueId,
     form: Form = "json",
     camera: OneCamera = None,
     output: Output = None,
@@ -64,21 +127,26 @@ def venue_poses(
 
 @app.command("history")
 def venue_history(
-    venue: str,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="So many, the newest.")] = 20,
+    venue: VenueId,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most, the newest.")] = 20,
+    as_json: AsJson = False,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
     """Print a line per change of the poses, newest first: revision, time, cause, job, pixels moved and drifted."""
     with Client(url, api_key) as client:
-        for revision in client.history(venue, limit):
-            cause = revision.cause if revision.restored_from is None else f"restored {revision.restored_from}"
-            cameras = " ".join(f"{c.id}:{_pixels(c.moved)}/{_pixels(c.drift)}" for c in revision.cameras)
-            print(f"{revision.revision}\t{revision.at:%Y-%m-%dT%H:%M:%SZ}\t{cause}\t{revision.job or '-'}\t{cameras}")
+        revisions = client.history(venue, limit)
+    if as_json:
+        say(History(revisions=revisions))
+        return
+    for revision in revisions:
+        cause = revision.cause if revision.restored_from is None else f"restored {revision.restored_from}"
+        cameras = " ".join(f"{c.id}:{_pixels(c.moved)}/{_pixels(c.drift)}" for c in revision.cameras)
+        print(f"{revision.revision}\t{revision.at:%Y-%m-%dT%H:%M:%SZ}\t{cause}\t{revision.job or '-'}\t{cameras}")
 
 
 @app.command("health")
-def venue_health(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def venue_health(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print how a venue is doing: alarms, drift, schedule. Exit: 0 ok, 3 an alarm rings."""
     with Client(url, api_key) as client:
         health = client.venue_health(venue)
@@ -89,11 +157,23 @@ def venue_health(venue: str, url: Url = LOCAL, api_key: ApiKey = None) -> None:
 
 @app.command("restore")
 def restore_venue(
-    venue: str, revision: Annotated[int, typer.Argument(min=1)], url: Url = LOCAL, api_key: ApiKey = None
+    venue: VenueId,
+    revision: Annotated[int, typer.Argument(min=1, help="Number of the revision, as `esc venue history` prints it.")],
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
 ) -> None:
     """Let the poses of a revision hold again, see `esc venue history`."""
     with Client(url, api_key) as client:
         say(client.restore(venue, revision))
+
+
+def _stored(client: Client, venue_id: str) -> tuple[Venue, str] | None:
+    try:
+        return client.tagged_venue(venue_id)
+    except Refused as refused:
+        if refused.status == HTTPStatus.NOT_FOUND:
+            return None
+        raise
 
 
 def _pixels(moved: Moved | None) -> str:

@@ -9,7 +9,7 @@ from service.api.programs import OneAtATime
 from service.formats.lens import Shot
 
 # A 4K lens takes 10 s of one core, and its maps 100 MB.
-_maps = OneAtATime("set of ST maps", longest_s=60, again_s=10, patience_s=0)
+_maps = OneAtATime("set of ST maps", longest_s=60, again_s=10)
 
 
 def write(

@@ -53,7 +53,7 @@ def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -
 
 def check(camera: Camera, data: bytes, settings: Settings) -> None:
     """One frame: an entire JPEG or PNG of the camera's size."""
-    size = _size_of_whole_picture(f"camera {camera.id}", data, settings, camera=camera.id)
+    size = _size_of_whole_picture(data, settings, camera=camera.id)
     wanted = camera.image_size
     if size != wanted:
         raise Problem(
@@ -67,19 +67,29 @@ def check(camera: Camera, data: bytes, settings: Settings) -> None:
 
 def check_photo(name: str, data: bytes, settings: Settings) -> None:
     """One photo of a board: an entire JPEG or PNG of any size."""
-    _size_of_whole_picture(f"photo {name}", data, settings, photo=name)
+    _size_of_whole_picture(data, settings, photo=name)
 
 
-def _size_of_whole_picture(subject: str, data: bytes, settings: Settings, **parts: Any) -> list[int]:
-    """Width and height of a picture that is all there; `subject` and `parts` name it in a problem."""
-    if not data:
-        raise Problem("empty-frame", f"The file of {subject} is empty; was it still being written?", **parts)
-    if len(data) > settings.max_frame_mb * 1e6:
+def check_length(length: int, settings: Settings, **part: Any) -> None:
+    """So many bytes are not too many for one picture; `part`, a camera or a photo by its name, is whose they are."""
+    if length > settings.max_frame_mb * 1e6:
         raise Problem(
             "frame-too-large",
-            f"Send {subject} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
-            **parts,
+            f"Send {_in_words(part)} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
+            **part,
         )
+
+
+def _in_words(part: Mapping[str, Any]) -> str:
+    return " ".join(f"{kind} {name}" for kind, name in part.items())
+
+
+def _size_of_whole_picture(data: bytes, settings: Settings, **parts: Any) -> list[int]:
+    """Width and height of a picture that is all there; `parts` name it in a problem."""
+    subject = _in_words(parts)
+    if not data:
+        raise Problem("empty-frame", f"The file of {subject} is empty; was it still being written?", **parts)
+    check_length(len(data), settings, **parts)
     if not data.startswith((JPEG_START, PNG_START)):
         raise Problem("not-an-image", f"Send {subject} as JPEG or PNG.", **parts)
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -26,6 +27,16 @@ class Disk:
         """Whether less is free than must be."""
         free = self.free_bytes()
         return free is not None and free < self.least_bytes
+
+
+def spool_folder() -> Path:
+    """Where the files of an upload lie while it arrives."""
+    return Path(tempfile.gettempdir())
+
+
+def spool_free_bytes() -> int:
+    """What is free there."""
+    return shutil.disk_usage(spool_folder()).free
 
 
 def _growing(settings: Settings) -> list[Path]:

@@ -16,7 +16,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
-from service.observe.disk import Disk
+from service.observe.disk import Disk, spool_free_bytes
 from service.store.alarms import BEGUN
 from service.store.counts.endings import (
     ENDED,
@@ -102,10 +102,11 @@ class _Stored(Collector):
 
     def _room(self) -> Iterator[Metric]:
         try:
-            free = self._disk.free_bytes()
+            free, spool = self._disk.free_bytes(), spool_free_bytes()
         except OSError:
             log.warning("cannot read how full the disk is", exc_info=True)
             return
+        yield _gauge("esc_upload_free_bytes", "Free where uploads lie while they arrive, on this machine.", spool)
         if free is not None:
             yield _gauge("esc_disk_free_bytes", "Free where database and files grow.", free)
             yield _gauge("esc_disk_needed_bytes", "With less free, uploads are refused.", self._disk.least_bytes)

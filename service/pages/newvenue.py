@@ -9,7 +9,6 @@ from fastapi import APIRouter, Request, Response
 
 from fields.shapes import Arc, Line, Point, Shape
 from fields.template import NAMES
-from service.api.clicked_pose import clicked_pose
 from service.api.context import InContext
 from service.pages.shown import Page, page
 from service.routes.contract.documented import needs
@@ -46,9 +45,9 @@ def plan(field: FieldOfPlay) -> dict[str, Any]:
 
 
 @data.post("/pose", openapi_extra=needs("calibrate"))
-def pose(asked: ClickedCamera, context: InContext) -> ClickedPose:
+async def pose(asked: ClickedCamera, context: InContext) -> ClickedPose:
     """Where a camera stands by what was clicked so far."""
-    return clicked_pose(asked, context.settings)
+    return await context.clicked_poses.find(asked)
 
 
 def _polyline(shape: Shape) -> list[Point]:

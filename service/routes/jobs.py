@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterable, Callable
+from datetime import timedelta
 from http import HTTPStatus
 from typing import Annotated
 
@@ -17,18 +18,22 @@ from service.routes.contract.exported import DOCUMENTS, Wanted, exported
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
 from service.routes.venues import RETRY_AFTER_S, revision_unfit
+from service.store.blobs import AWAY as BLOBS_AWAY
 from service.store.engine import AWAY
 from service.store.jobs.decisions import MovedOn, NoPoses
+from service.store.jobs.files import frame_folder, pictures_folder
 from service.store.jobs.reading import State
 from service.store.revisions import RevisionUnfit
 from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
-from service.wire.job import OPEN, Job, Jobs, Status
+from service.wire.job import OPEN, Job, Jobs, Kind, Status
 from service.wire.problems import Problem
 
 log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
 LONGEST_WAIT_S = 60
+# A worker notices within seconds that its job was taken away.
+STRAGGLING = timedelta(minutes=10)
 # An event at least this often, so that a client sees the queue move.
 EVENT_AT_LEAST_EVERY_S = 10
 
@@ -68,11 +73,12 @@ def list_jobs(
     context: InContext,
     venue: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
     status: Status | None = None,
+    kind: Kind | None = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
     cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
 ) -> Jobs:
     """Jobs, newest first, in pages."""
-    page = context.jobs.page(venue, status, cursor, limit + 1)
+    page = context.jobs.page(venue, status, cursor, limit + 1, kind)
     more = len(page) > limit
     return Jobs(jobs=page[:limit], next_cursor=page[limit - 1].id if more else None)
 
@@ -98,6 +104,22 @@ def cancel_job(job: Existing, context: InContext) -> Response:
     """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
     context.decisions.cancel(job.id)
     return job_answer(context.jobs.get(job.id) or job)
+
+
+@router.delete("/{job_id}", openapi_extra=needs("admin"), status_code=204, responses=problems(404, 409))
+def delete_job(job: Existing, context: InContext) -> None:
+    """Forget a job that has ended, with its frames and its pictures. Poses that it brought to its venue stay."""
+    if job.open:
+        raise Problem("job-open", f"Cancel it first: POST /jobs/{job.id}/cancel.", job=job.id)
+    # The queue first: without the row nobody would ever ask it to forget.
+    context.queue.forget([job.id])
+    # Swept once more, as a worker that was at the job until now may write another picture.
+    context.expiry.delete_jobs([job.id], context.expiry.now() + STRAGGLING)
+    for folder in (frame_folder(job.id), pictures_folder(job.id)):
+        try:
+            context.blobs.delete_under(folder)
+        except BLOBS_AWAY:
+            log.warning("cannot delete yet", folder=folder, exc_info=True)
 
 
 @router.post("/{job_id}/accept", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))

@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Header, Query, Response
+from fastapi import APIRouter, Body, Depends, Header, Query, Response
+from pydantic import ValidationError
 
 from service.api import etags
 from service.api.context import InContext, VenueIdPath
+from service.api.problems import invalid
 from service.intake import sources
 from service.routes.contract.documented import headers, needs, problems
 from service.routes.contract.exported import DOCUMENTS, Wanted, exported
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_known
+from service.settings import Settings
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 from service.wire import callback_urls
 from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
+from service.wire.merge_patch import MEDIA_TYPE, merged
 from service.wire.problems import Problem
-from service.wire.venue import Camera, Venue, VenueIn, Venues
+from service.wire.venue import PATCH_EXAMPLES, Camera, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # While a job is open.
 RETRY_AFTER_S = 2
+PATCH_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {MEDIA_TYPE: {"schema": {"type": "object"}, "examples": PATCH_EXAMPLES}},
+    }
+}
 
 
 def no_such_venue(venue_id: str) -> Problem:
@@ -85,10 +95,7 @@ def put_venue(
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Venue:
     """Create or replace a venue. Its poses are where the next calibration starts."""
-    if venue.id != venue_id:
-        raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
-    if venue.alarms is not None and venue.alarms.callback_url is not None:
-        callback_urls.check(venue.alarms.callback_url, context.settings)
+    stored = _checked(venue, venue_id, context.settings)
 
     def allow(before: Venue | None) -> None:
         _require_match(if_match, before)
@@ -96,15 +103,45 @@ def put_venue(
         if if_none_match is not None and etags.names(if_none_match, tag):
             raise Problem("venue-changed", "The venue is already there.", got=tag)
 
-    stored = venue.stored()
-    sources.check(stored, context.settings.sources)
-
     def credentials(before: Venue | None, known: dict[str, str]) -> dict[str, str]:
         return sources.credentials_of(stored, venue.credentials, before, known)
 
     new = context.venues.put(stored, allow, credentials)
     response.headers["ETag"] = etags.quoted(_tag(stored))
     response.status_code = 201 if new else 200
+    return stored
+
+
+@router.patch(
+    "/{venue_id}",
+    openapi_extra=needs("admin") | PATCH_BODY,
+    responses={200: headers("ETag"), **problems(400, 404, 408, 412, 413, 415, 422)},
+)
+def patch_venue(
+    venue_id: VenueIdPath,
+    patch: Annotated[dict[str, Any], Body(media_type=MEDIA_TYPE)],
+    response: Response,
+    context: InContext,
+    if_match: Annotated[str | None, Header()] = None,
+) -> Venue:
+    """Change parts of a venue and leave the others as they are, the poses that were calibrated among them.
+
+    A JSON merge patch (RFC 7396). `cameras` may be an object of camera ids: `{"cameras": {"left": {"source": "..."}}}`.
+    """
+
+    def change(before: Venue | None, known: dict[str, str]) -> tuple[Venue, dict[str, str]]:
+        if before is None:
+            raise no_such_venue(venue_id)
+        _require_match(if_match, before)
+        try:
+            venue = VenueIn.model_validate(merged(_patchable(before, patch), patch))
+        except ValidationError as error:
+            raise invalid(error, "body") from None
+        stored = _checked(venue, venue_id, context.settings)
+        return stored, sources.credentials_of(stored, venue.credentials, before, known)
+
+    stored, _ = context.venues.change(venue_id, change)
+    response.headers["ETag"] = etags.quoted(_tag(stored))
     return stored
 
 
@@ -219,6 +256,31 @@ def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[
         _require_match(if_match, before)
 
     context.venues.delete(venue_id, allow)
+
+
+def _patchable(venue: Venue, patch: dict[str, Any]) -> dict[str, Any]:
+    """A venue to be patched. A camera's place is said twice: where a patch moves the camera, it says it once."""
+    document: dict[str, Any] = venue.model_dump(mode="json")
+    by_id = patch.get("cameras")
+    for camera in document["cameras"]:
+        changed = by_id.get(camera["id"]) if isinstance(by_id, dict) else None
+        pose = changed.get("pose") if isinstance(changed, dict) else None
+        if isinstance(pose, dict):
+            del camera["pose"]["position" if "translation" in pose else "translation"]
+    return document
+
+
+def _checked(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
+    """A venue as it is kept, if this service can keep it at this address."""
+    if venue.id != venue_id:
+        raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
+    scheduled = None if venue.schedule is None else venue.schedule.options
+    for told in (venue.alarms, scheduled):
+        if told is not None and told.callback_url is not None:
+            callback_urls.check(told.callback_url, settings)
+    stored = venue.stored()
+    sources.check(stored, settings.sources)
+    return stored
 
 
 def _require_match(if_match: str | None, before: Venue | None) -> None:

@@ -6,9 +6,13 @@ dies over an attempt leaves it to be attempted again, so it is made at least onc
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from types import MappingProxyType
 from typing import Any
+from urllib.parse import urlsplit
 
 import sqlalchemy as sa
 
@@ -21,6 +25,9 @@ from service.wire.job import CallbackState
 
 CALLBACKS = "callbacks"
 LONGEST_ERROR = 500
+# Attempts of one receiver: one that takes its time holds up its own.
+AT_ONCE_PER_RECEIVER = 2
+NOBODY: Mapping[str, int] = MappingProxyType({})
 d = tables.deliveries.c
 
 
@@ -32,20 +39,25 @@ class Delivery:
     url: str
     attempt: int
     event: AlarmEvent | None
+    receiver: str
 
 
 class Deliveries(Repository):
     """The deliveries in the database."""
 
-    def attempt(self, now: datetime, again_at: datetime, limit: int) -> list[Delivery]:
-        """Up to `limit` that are due; due again at `again_at` unless their end is written down before."""
-        due = sa.select(tables.deliveries).where(d.status == "waiting", d.due_at <= now).order_by(d.due_at).limit(limit)
+    def attempt(
+        self, now: datetime, again_at: datetime, limit: int, running: Mapping[str, int] = NOBODY
+    ) -> list[Delivery]:
+        """Up to `limit` that are due; due again at `again_at` unless their end is written down before.
+
+        `running`: how many attempts there are already, by receiver.
+        """
         with reading(self._engine) as connection:
-            if connection.execute(due).first() is None:
+            if limit == 0 or not _due(connection, now, 1, running):
                 return []
         with writing(self._engine) as connection:
             serialise(connection, "deliveries")
-            rows = connection.execute(due).all()
+            rows = _due(connection, now, limit, running)
             begun = sa.update(tables.deliveries).where(d.id.in_([row.id for row in rows]))
             connection.execute(begun.values(attempts=d.attempts + 1, due_at=again_at))
             return [_delivery(row) for row in rows]
@@ -72,6 +84,24 @@ class Deliveries(Repository):
                     connection.execute(sa.delete(tables.deliveries).where(d.id == delivery.id))
 
 
+def _due(connection: sa.Connection, now: datetime, limit: int, running: Mapping[str, int]) -> list[sa.Row[Any]]:
+    """Those that have waited longest, without those of receivers that have as many as one may have."""
+    due, of = sa.select(tables.deliveries).where(d.status == "waiting", d.due_at <= now), Counter(running)
+    taken: list[sa.Row[Any]] = []
+    while len(taken) < limit:
+        full = [receiver for receiver, attempts in of.items() if attempts >= AT_ONCE_PER_RECEIVER]
+        others = due.where(d.receiver.not_in(full), d.id.not_in([row.id for row in taken]))
+        rows = connection.execute(others.order_by(d.due_at).limit(limit - len(taken))).all()
+        before = len(taken)
+        for row in rows:
+            if of[row.receiver] < AT_ONCE_PER_RECEIVER:
+                of[row.receiver] += 1
+                taken.append(row)
+        if len(taken) - before == len(rows):
+            break
+    return taken
+
+
 def _write(connection: sa.Connection, delivery: Delivery, **values: datetime | str) -> bool:
     # Of an attempt that took so long that another one was begun, nothing is written down.
     this_attempt = (d.id == delivery.id, d.attempts == delivery.attempt, d.status == "waiting")
@@ -80,28 +110,36 @@ def _write(connection: sa.Connection, delivery: Delivery, **values: datetime | s
 
 def add_delivery(connection: sa.Connection, job_id: str, url: str, now: datetime) -> None:
     """Have `url` told that the job has ended, when and if the caller's transaction commits."""
-    connection.execute(sa.insert(tables.deliveries).values(id=job_id, url=url, status="waiting", due_at=now))
+    told = {"id": job_id, "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
+    connection.execute(sa.insert(tables.deliveries).values(**told))
 
 
 def add_alarm_delivery(connection: sa.Connection, event: AlarmEvent, url: str, now: datetime) -> None:
     """Have `url` told of an alarm, when and if the caller's transaction commits."""
-    told = {"id": new_id(), "url": url, "status": "waiting", "due_at": now, "event": event.model_dump(mode="json")}
-    connection.execute(sa.insert(tables.deliveries).values(**told))
+    told = {"id": new_id(), "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
+    connection.execute(sa.insert(tables.deliveries).values(event=event.model_dump(mode="json"), **told))
 
 
-def delivery_of(connection: sa.Connection, job_id: str) -> CallbackState | None:
-    """How far the telling of a job's end has come; None: nobody is to be told (yet)."""
-    row = connection.execute(sa.select(tables.deliveries).where(d.id == job_id)).one_or_none()
-    if row is None:
-        return None
-    return CallbackState(
-        state=row.status,
-        attempts=row.attempts,
-        last_error=row.last_error,
-        next_attempt_at=row.due_at if row.status == "waiting" else None,
-    )
+def deliveries_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, CallbackState]:
+    """How far the telling of the end of jobs has come, of those whose end somebody is to be told."""
+    if not job_ids:
+        return {}
+    rows = connection.execute(sa.select(tables.deliveries).where(d.id.in_(job_ids)))
+    return {
+        row.id: CallbackState(
+            state=row.status,
+            attempts=row.attempts,
+            last_error=row.last_error,
+            next_attempt_at=row.due_at if row.status == "waiting" else None,
+        )
+        for row in rows
+    }
 
 
 def _delivery(row: sa.Row[Any]) -> Delivery:
     event = None if row.event is None else AlarmEvent.model_validate(row.event)
-    return Delivery(row.id, row.url, row.attempts + 1, event)
+    return Delivery(row.id, row.url, row.attempts + 1, event, row.receiver)
+
+
+def _receiver(url: str) -> str:
+    return urlsplit(url).hostname or ""

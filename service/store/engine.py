@@ -16,6 +16,7 @@ from alembic import command
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from sqlalchemy.dialects.sqlite.base import SQLiteCompiler
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 # Which schema a database has. Before the first release its name was that of Alembic's default, and the numbers of the
@@ -57,9 +58,18 @@ def connect(url: str) -> sa.Engine:
     if parsed.database:
         Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
     engine = sa.create_engine(parsed)
+    engine.dialect.statement_compiler = _Hinting
     sa.event.listen(engine, "connect", _set_up_sqlite)
     sa.event.listen(engine, "begin", _begin_sqlite)
     return engine
+
+
+class _Hinting(SQLiteCompiler):
+    """SQLite has hints (INDEXED BY), which SQLAlchemy takes and leaves out."""
+
+    def get_from_hint_text(self, table: sa.FromClause, text: str | None) -> str | None:  # noqa: ARG002
+        """What follows the name of a table."""
+        return text
 
 
 def postgresql(url: str) -> sa.Engine:

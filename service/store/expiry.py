@@ -30,6 +30,10 @@ LAST_ACCEPTED = (
     .correlate(tables.jobs)
     .scalar_subquery()
 )
+# Of the same venue: the revision that holds, and the last whose poses a job brought.
+others = sa.alias(tables.revisions, "others")
+NEWEST = sa.select(others.c.number).where(others.c.venue == r.venue).order_by(others.c.number.desc()).limit(1)
+NEWEST_TAKEN = NEWEST.where(others.c.cause.in_(TAKEN))
 NOT_THE_LAST_ACCEPTED = j.id != sa.func.coalesce(LAST_ACCEPTED, "")
 
 
@@ -59,8 +63,27 @@ class Expiry(Repository):
         with reading(self._engine) as connection:
             return self._ended(connection, ended_before, limit, NOT_THE_LAST_ACCEPTED)
 
+    def expire_revisions(self, before: datetime, limit: int) -> int:
+        """Forget up to `limit` revisions from before a moment that calibrations brought by themselves; says how many.
+
+        What somebody put, accepted or restored stays: there are few, and drift is measured from them. So does the
+        revision that holds, the one before it, which is there to go back to, and the last whose poses a job brought.
+        """
+        newest, newest_taken = (which.correlate(tables.revisions).scalar_subquery() for which in (NEWEST, NEWEST_TAKEN))
+        old = (
+            sa.select(r.id)
+            .where(r.cause == "calibrated", r.at < before, r.number < newest - 1, r.number != newest_taken)
+            .order_by(r.at)
+            .limit(limit)
+        )
+        with writing(self._engine) as connection:
+            serialise(connection, "expiry")
+            ids = list(connection.scalars(old))
+            connection.execute(sa.delete(tables.revisions).where(r.id.in_(ids)))
+            return len(ids)
+
     def delete_jobs(self, job_ids: Collection[str], now: datetime) -> None:
-        """Forget ended jobs with everything that is theirs."""
+        """Forget ended jobs with everything that is theirs; their files are to be deleted from `now` on."""
         with writing(self._engine) as connection:
             serialise(connection, "expiry")
             connection.execute(sa.delete(tables.jobs).where(j.id.in_(job_ids), j.finished_at.is_not(None)))

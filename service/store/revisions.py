@@ -6,6 +6,7 @@ computes nothing.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from datetime import datetime
 from typing import Any
 
@@ -89,6 +90,15 @@ def revision_of_job(connection: sa.Connection, job_id: str) -> int | None:
     query = sa.select(sa.func.max(r.number)).where(r.job == job_id, r.cause.in_(TAKEN))
     number: int | None = connection.scalar(query)
     return number
+
+
+def revisions_of_jobs(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:
+    """The numbers of the revisions that the poses of jobs became last, of those whose poses did."""
+    if not job_ids:
+        return {}
+    newest = sa.func.max(r.number).label("newest")
+    query = sa.select(r.job, newest).where(r.job.in_(job_ids), r.cause.in_(TAKEN)).group_by(r.job)
+    return {row.job: row.newest for row in connection.execute(query)}
 
 
 def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venue, Revision]:

@@ -35,7 +35,8 @@ class Schedules(Repository):
 
     def fire(self, now: datetime, again_at: datetime, limit: int) -> list[Firing]:
         """Up to `limit` that are due; fired again at `again_at` unless they are done with before."""
-        due = sa.select(tables.schedules).where(s.look_at <= now).order_by(s.look_at).limit(limit)
+        # Those that were put off go before those that have become due since.
+        due = sa.select(tables.schedules).where(s.look_at <= now).order_by(s.due_at, s.look_at).limit(limit)
         with reading(self._engine) as connection:
             if connection.execute(due).first() is None:
                 return []
@@ -49,6 +50,14 @@ class Schedules(Repository):
     def done(self, firing: Firing, now: datetime, job_id: str | None, error: str | None) -> None:
         """Wait for the next time. `error`: why there is no job."""
         next_at = next_time(firing.cron, firing.time_zone, now)
+        brought = {} if job_id is None else {"last_job": job_id}
+        self._write(firing, error, due_at=next_at, look_at=next_at, **brought)
+
+    def put_off(self, firing: Firing, until: datetime, why: str) -> None:
+        """Fire it again at a moment, for the time that it was due at."""
+        self._write(firing, why, look_at=until)
+
+    def _write(self, firing: Firing, error: str | None, **values: datetime | str) -> None:
         # A venue that was put meanwhile with another schedule has other times.
         same = (
             s.venue == firing.venue_id,
@@ -56,14 +65,10 @@ class Schedules(Repository):
             s.cron == firing.cron,
             s.time_zone == firing.time_zone,
         )
-        values = {
-            "due_at": next_at,
-            "look_at": next_at,
-            "last_error": None if error is None else error[:LONGEST_ERROR],
-            **({} if job_id is None else {"last_job": job_id}),
-        }
+        last_error = None if error is None else error[:LONGEST_ERROR]
         with writing(self._engine) as connection:
-            connection.execute(sa.update(tables.schedules).where(*same).values(**values))
+            fired = sa.update(tables.schedules).where(*same)
+            connection.execute(fired.values(last_error=last_error, **values))
 
 
 def plan(connection: sa.Connection, venue: Venue) -> None:

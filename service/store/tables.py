@@ -52,7 +52,11 @@ revisions = sa.Table(
     sa.Column("movements", sa.JSON, nullable=False),
     sa.Index("revisions_by_venue", "venue", "number", unique=True),
     sa.Index("revisions_by_job", "job"),
+    sa.Index("revisions_by_time", "cause", "at"),
 )
+
+# Of a calibration that waits or runs. A query that says it in these words finds it in the index of these words.
+ACTIVE = sa.text("status IN ('queued', 'running') AND kind = 'calibration'")
 
 jobs = sa.Table(
     "jobs",
@@ -93,15 +97,20 @@ jobs = sa.Table(
     # The request that it came with, as its log and its trace call it.
     sa.Column("request_id", sa.String(64)),
     sa.Column("traceparent", sa.String(55)),
-    sa.Index("jobs_by_venue", "venue", "id"),
+    # The lists, newest first, by whatever they are filtered; of one venue, filtered within the index.
+    sa.Index("jobs_by_venue", "venue", "id", "status", "kind"),
+    sa.Index("jobs_of_status", "status", "id"),
+    sa.Index("jobs_of_kind", "kind", "id"),
+    sa.Index("jobs_of_kind_and_status", "kind", "status", "id"),
+    # The queue.
     sa.Index("jobs_by_status", "status", "priority", "id"),
     sa.Index("one_job_per_key", "venue", "idempotency_key", unique=True),
     sa.Index(
         "one_active_job_per_venue",
         "venue",
         unique=True,
-        sqlite_where=sa.text("status IN ('queued', 'running') AND kind = 'calibration'"),
-        postgresql_where=sa.text("status IN ('queued', 'running') AND kind = 'calibration'"),
+        sqlite_where=ACTIVE,
+        postgresql_where=ACTIVE,
     ),
     sa.Index("jobs_by_end", "finished_at"),
     sa.Index(
@@ -117,6 +126,9 @@ jobs = sa.Table(
         postgresql_where=sa.text("pictures_deleted_at IS NULL"),
     ),
 )
+
+# For queries about the jobs of one venue: SQLite, which has no statistics, would as soon go through all of a kind.
+BY_VENUE = (jobs, "INDEXED BY jobs_by_venue", "sqlite")
 
 # Folders of the blob store that are deleted at `due_at`: what no row names any more, and an upload until it is a job.
 leftovers = sa.Table(
@@ -134,6 +146,8 @@ deliveries = sa.Table(
     # Of the job that has ended, or of an alarm's event.
     sa.Column("id", sa.String(26), primary_key=True),
     sa.Column("url", sa.String(2048), nullable=False),
+    # The host of the URL.
+    sa.Column("receiver", sa.String(255), nullable=False),
     # `waiting`, then `delivered` or `given-up`.
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("attempts", sa.Integer, nullable=False, default=0),

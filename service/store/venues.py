@@ -48,17 +48,31 @@ class Venues(Repository):
 
         `credentials`: those of its sources, by what is there and those that are stored; it may raise too.
         """
-        with writing(self._engine) as connection:
-            serialise(connection, venue_lock(venue.id))
-            before = find_venue(connection, venue.id)
+
+        def put(before: Venue | None, known: dict[str, str]) -> tuple[Venue, dict[str, str]]:
             allow(before)
-            _keep(connection, venue.id, credentials(before, _credentials(connection, venue.id)))
+            return venue, credentials(before, known)
+
+        return self.change(venue.id, put)[1]
+
+    def change(
+        self, venue_id: str, change: Callable[[Venue | None, dict[str, str]], tuple[Venue, dict[str, str]]]
+    ) -> tuple[Venue, bool]:
+        """Store what `change` makes of a venue and of the credentials of its sources, unless it raises at the sight.
+
+        Gives the venue, and says whether it is new.
+        """
+        with writing(self._engine) as connection:
+            serialise(connection, venue_lock(venue_id))
+            before = find_venue(connection, venue_id)
+            venue, credentials = change(before, _credentials(connection, venue_id))
+            _keep(connection, venue_id, credentials)
             save_venue(connection, venue)
             if before is None or not venue.stands_like(before):
                 add_revision(connection, venue, "put")
             settle_alarms(connection, venue)
             plan(connection, venue)
-            return before is None
+            return venue, before is None
 
     def restore(self, venue_id: str, number: int, allow: Callable[[Venue | None], None]) -> Venue:
         """Let a revision hold again unless `allow` raises at the sight of the venue.
@@ -105,10 +119,13 @@ class Venues(Repository):
                 connection.execute(sa.delete(table).where(table.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
 
-    def credentials(self, venue_id: str) -> dict[str, str]:
-        """User and password of the sources of a venue that have some, by camera."""
+    def with_credentials(self, venue_id: str) -> tuple[Venue, dict[str, str]] | None:
+        """A venue, and by camera user and password of the sources that have some: of one moment, or a password could
+        go to the host that a source was on before.
+        """
         with reading(self._engine) as connection:
-            return _credentials(connection, venue_id)
+            venue = find_venue(connection, venue_id)
+            return None if venue is None else (venue, _credentials(connection, venue_id))
 
     def history(self, venue_id: str, before: int | None, limit: int) -> list[Revision]:
         """Up to `limit` revisions of a venue, newest first, those before number `before`."""

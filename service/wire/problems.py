@@ -79,6 +79,7 @@ KINDS: dict[str, Kind] = {
     "no-field-fit": Kind(422, "The field has lines that no measure can be fitted to"),
     # Jobs.
     "poses-not-found": Kind(404, "The job has no poses"),
+    "job-open": Kind(409, "The job has not ended"),
     "job-not-found": Kind(404, "There is no such job"),
     "picture-not-found": Kind(404, "There is no such picture"),
     "frames-deleted": Kind(410, "The frames are no longer kept"),

@@ -10,6 +10,7 @@ from croniter import CroniterError, croniter
 from pydantic import ConfigDict, Field, StringConstraints, model_validator
 
 from service.wire.base import Wire
+from service.wire.options import Options
 
 FIELDS = 5
 
@@ -25,6 +26,7 @@ class Schedule(Wire):
         description="Cron's five fields: minute, hour, day, month, day of the week."
     )
     time_zone: Annotated[str, StringConstraints(max_length=64)] = Field("UTC", description="A name of IANA's.")
+    options: Options | None = Field(None, description="Of its calibrations; absent: what they are when none are given.")
 
     @model_validator(mode="after")
     def _fires(self) -> Self:
@@ -36,8 +38,8 @@ class ScheduleState(Wire):
     """When a venue is calibrated next, and what came of the last time."""
 
     next_at: datetime
-    last_job: str | None
-    last_error: str | None = Field(description="Why the last time brought no job.")
+    last_job: str | None = Field(description="Of the last time; one that had no frames to compute has failed.")
+    last_error: str | None = Field(description="Why the last time brought no poses, or is put off.")
 
 
 class NoSchedule(ValueError):  # noqa: N818

@@ -70,6 +70,13 @@ VENUE_EXAMPLE: dict[str, Any] = {
 }
 
 
+PATCH_EXAMPLES: dict[str, Any] = {
+    "an alarm": {"value": {"alarms": {"rejected_in_a_row": 3}}},
+    "no schedule": {"value": {"schedule": None}},
+    "the source of a camera": {"value": {"cameras": {"left": {"source": "http://10.1.0.7/snapshot.jpg"}}}},
+}
+
+
 class _Place(Wire):
     id: Id
     name: Name = ""
@@ -95,7 +102,8 @@ class VenueIn(_Place):
     def _can_be_fetched(self) -> Self:
         blind = [camera.id for camera in self.cameras if camera.source is None]
         if self.schedule is not None and blind:
-            raise ValueError(f"a schedule needs a source of every camera, and {', '.join(blind)} has none")
+            have = "has" if len(blind) == 1 else "have"
+            raise ValueError(f"a schedule needs a source of every camera, and {', '.join(blind)} {have} none")
         return self
 
     @model_validator(mode="after")

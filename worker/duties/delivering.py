@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta
+from functools import partial
 
 import httpx
 import structlog
@@ -15,10 +15,11 @@ from service.store.deliveries import Deliveries, Delivery
 from service.store.jobs.reading import Jobs
 from service.wire.job import JobEvent
 from worker.duties import webhook
+from worker.duties.hands import Hands
 
 LOOK_S = 1.0
-# Receivers that hang hold up others only when there are as many of them.
-AT_ONCE = 8
+# To each receiver two go at once, whatever it takes: those that hang hold up others only when there are eight of them.
+AT_ONCE = 16
 # Longer than an attempt takes, looking its name up included.
 ATTEMPT = timedelta(seconds=120)
 # After the first attempt, the second, ...: five seconds to nine hours, about a day in all.
@@ -39,18 +40,25 @@ class Delivering:
         self._jobs = jobs
         self._now = now
         self._tls = httpx.create_ssl_context()
-        self._senders = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="callback")
+        self._senders = Hands(AT_ONCE, "callback")
 
     def look(self) -> float:
-        """Attempt what is due; returns the seconds until it is worth looking again."""
+        """Begin to attempt what is due; returns the seconds until it is worth looking again."""
         if not self._settings.webhook_keys:
             # Only the API has the secret, or it was taken away meanwhile: to a worker that can sign they stay due.
             return LOOK_S
         now = self._now()
-        due = self._deliveries.attempt(now, now + ATTEMPT, AT_ONCE)
-        for sent in [self._senders.submit(self._attempt, delivery) for delivery in due]:
-            sent.result()
-        return 0.0 if len(due) == AT_ONCE else LOOK_S
+        due = self._deliveries.attempt(now, now + ATTEMPT, self._senders.free, self._senders.busy_with)
+        for delivery in due:
+            self._senders.begin(partial(self._attempt, delivery), delivery.receiver)
+        if not due and self._senders.free == AT_ONCE:
+            return LOOK_S
+        self._senders.until_one_is_free(LOOK_S)
+        return 0.0
+
+    def finish(self) -> None:
+        """Wait for the attempts that have begun."""
+        self._senders.rest()
 
     def _attempt(self, delivery: Delivery) -> None:
         body = self._body(delivery)

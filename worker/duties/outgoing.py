@@ -8,6 +8,7 @@ same reason.
 from __future__ import annotations
 
 import socket
+import threading
 from collections.abc import Mapping
 from contextlib import AbstractAsyncContextManager
 from importlib.metadata import version
@@ -17,6 +18,10 @@ import httpx
 PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtsps": 322}
 
 
+# Resolvers ask several servers, each several times, for as long as they are set to.
+LOOK_UP_S = 5.0
+
+
 class NotFound(Exception):  # noqa: N818
     """The name leads to no address; the message says why."""
 
@@ -24,11 +29,26 @@ class NotFound(Exception):  # noqa: N818
 def look_up(target: httpx.URL) -> list[str]:
     """The addresses of the host of a URL."""
     name, port = target.raw_host.decode("ascii"), target.port or PORTS[target.scheme]
-    try:
-        found = socket.getaddrinfo(name, port, type=socket.SOCK_STREAM)
-    except (OSError, UnicodeError) as error:
-        raise NotFound(f"{name} cannot be looked up: {error}") from None
-    return [str(address[0]) for *_, address in found]
+    looked_up: list[list[str] | str] = []
+
+    def look() -> None:
+        try:
+            found = socket.getaddrinfo(name, port, type=socket.SOCK_STREAM)
+            looked_up.append([str(address[0]) for *_, address in found])
+        except (OSError, UnicodeError) as error:
+            looked_up.append(str(error))
+
+    # Nothing ends a look-up: it is left alone in a thread that holds nobody up.
+    thread = threading.Thread(target=look, daemon=True)
+    thread.start()
+    thread.join(LOOK_UP_S)
+    match looked_up:
+        case [list(addresses)]:
+            return addresses
+        case [why]:
+            raise NotFound(f"{name} cannot be looked up: {why}")
+        case _:
+            raise NotFound(f"{name} cannot be looked up within {LOOK_UP_S:g} s")
 
 
 def stream(

@@ -20,6 +20,7 @@ from service.store.workers import Workers
 
 # Of each kind per round: some seconds on a bucket, a fraction of one in a folder.
 BATCH = 100
+YEAR = timedelta(days=365.25)
 # Between two rounds while there is more to do: what others write gets its turn.
 BREATH_S = 2.0
 # Between two looks at whether a round is due.
@@ -31,7 +32,7 @@ log = structlog.get_logger()
 
 
 class Retention:
-    """Deletes frames, pictures and jobs after the days that the settings keep them."""
+    """Deletes frames, pictures, jobs and revisions after the time that the settings keep them."""
 
     def __init__(
         self,
@@ -71,6 +72,7 @@ class Retention:
             "frames": self._expiry.expire_frames(now - timedelta(days=keep_frames_days), now, BATCH),
             "pictures": self._expiry.expire_pictures(now - timedelta(days=keep.keep_pictures_days), now, BATCH),
             "jobs": self._delete_jobs(now - timedelta(days=keep.keep_jobs_days), now),
+            "revisions": self._expiry.expire_revisions(now - keep.keep_revisions_years * YEAR, BATCH),
             "folders": self._sweep(now),
         }
         if any(counts.values()):

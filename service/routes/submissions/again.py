@@ -35,6 +35,9 @@ def submit_again(job: Existing, request: Request, context: InContext) -> Respons
 
 def submit(context: Context, job: Job, origin: Origin) -> Response:
     """Make a job's frames, which the store copies, a new job."""
+    still = context.jobs.get(job.id)
+    if still is not None and still.open:
+        return taking.answer(still, new=False)
     forms.require_room(context)
     before = context.submissions.of(job.id)
     if before is None:
@@ -56,7 +59,8 @@ def _renewed(before: Submission, origin: Origin) -> Submission:
     job_id = new_id()
     old, new = frame_folder(before.job_id), frame_folder(job_id)
     frames = {name: [new + path.removeprefix(old) for path in paths] for name, paths in before.frames.items()}
-    renewed = {"job_id": job_id, "frames": frames, "idempotency_key": None, "origin": origin}
+    content = {"content_hash": before.hash_again, "idempotency_key": None}
+    renewed = {"job_id": job_id, "frames": frames, "origin": origin, **content}
     return before.model_copy(update=renewed)
 
 
@@ -71,6 +75,6 @@ def _require_the_same(context: Context, then: Venue) -> None:
 
 def _gone(context: Context, job: Job) -> Problem:
     days = f"{context.settings.keep_frames_days:g} days"
-    return Problem(
-        "frames-deleted", f"Frames are deleted {days} after the end of their job; send new ones.", job=job.id
-    )
+    never_any = job.status == "failed" and job.started_at is None
+    why = "It never had any" if never_any else f"Frames are deleted {days} after the end of their job"
+    return Problem("frames-deleted", f"{why}; send new ones.", job=job.id)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from contextlib import AbstractAsyncContextManager
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import TypeVar
 
 from fastapi import Request
@@ -62,10 +63,15 @@ def expecting(context: Context, venue_id: str) -> Venue:
     return stored
 
 
-def form_of(request: Request, most_files: int) -> AbstractAsyncContextManager[FormData]:
+@asynccontextmanager
+async def form_of(request: Request, context: Context, most_files: int) -> AsyncIterator[FormData]:
     """The form of a request, with so many files at most; a few too many get the answer that names them."""
     # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time.
-    return request.form(max_files=most_files + PARTS_TOO_MANY, max_fields=PARTS_TOO_MANY, max_part_size=LONGEST_OPTIONS)
+    files = most_files + PARTS_TOO_MANY
+    parsed = request.form(max_files=files, max_fields=PARTS_TOO_MANY, max_part_size=LONGEST_OPTIONS)
+    with context.uploads.admitted(request):
+        async with parsed as form:
+            yield form
 
 
 def most_frames(context: Context, venue: Venue) -> int:

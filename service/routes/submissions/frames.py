@@ -33,7 +33,7 @@ async def calibrate(venue_id: VenueIdPath, request: Request, context: InContext,
     """
     if forms.is_empty(request):
         stored = await run_in_threadpool(forms.expecting, context, venue_id)
-        return await run_in_threadpool(fetch, context, stored, Options(), sender)
+        return await run_in_threadpool(fetch, context, stored.id, Options(), sender)
     return await _uploaded(Options, venue_id, request, context, sender)
 
 
@@ -58,7 +58,7 @@ async def _uploaded(
 ) -> Response:
     forms.require_form(request)
     stored = await run_in_threadpool(forms.expecting, context, venue_id)
-    async with forms.form_of(request, forms.most_frames(context, stored)) as form:
+    async with forms.form_of(request, context, forms.most_frames(context, stored)) as form:
         return await run_in_threadpool(submit, context, stored, form, model, sender)
 
 
@@ -69,15 +69,15 @@ def submit(
     options = forms.options_of(form, model, context.settings)
     fetched = forms.has_no_frames(form) and any(camera.source for camera in venue.cameras)
     if fetched and isinstance(options, Options):
-        return fetch(context, venue, options, sender)
+        return fetch(context, venue.id, options, sender)
     files = forms.frames_of(venue, form, context)
     return taking.answer(*taking.take(context, venue, options, files, sender))
 
 
-def fetch(context: Context, venue: Venue, options: Options, sender: Sender) -> Response:
-    """Make what the cameras of `venue` show now a job."""
+def fetch(context: Context, venue_id: str, options: Options, sender: Sender) -> Response:
+    """Make what the cameras of a venue show now a job."""
     try:
-        job, new = context.from_sources.calibrate(venue, options, sender.idempotency_key, sender.origin)
+        job, new = context.from_sources.calibrate(venue_id, options, sender.idempotency_key, sender.origin)
     except Refusal as refusal:
-        raise taking.in_words(refusal, venue.id, context.settings) from None
+        raise taking.in_words(refusal, venue_id, context.settings) from None
     return taking.answer(job, new)

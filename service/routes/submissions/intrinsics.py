@@ -45,7 +45,7 @@ async def intrinsics(
     """Submit photos of a board: the job's result is the lens of the camera that took them, `coverage.jpg` its basis."""
     forms.require_form(request)
     await run_in_threadpool(forms.require_room, context)
-    async with forms.form_of(request, context.settings.max_photos) as form:
+    async with forms.form_of(request, context, context.settings.max_photos) as form:
         return await run_in_threadpool(_submit, context, form, sender)
 
 

@@ -55,7 +55,7 @@ async def locate(
     """
     forms.require_form(request)
     stored = await run_in_threadpool(forms.expecting, context, venue_id)
-    async with forms.form_of(request, 1) as form:
+    async with forms.form_of(request, context, 1) as form:
         job, new = await run_in_threadpool(_submit, context, stored, camera, form, sender)
     job = await at_its_end(context, job, wait)
     return job_answer(job, status=202 if new and job.open else 200)

@@ -84,6 +84,10 @@ def _submission(
     kind, job_id = kind_of(options), new_id()
     # The kind too: the same frames with the same key may be those of another job.
     content = hashlib.sha256(f"{kind} {options.model_dump_json()}".encode())
+    part = "photo" if venue is None else "camera"
+    for name, upload in ((name, upload) for name, several in files.items() for upload in several):
+        # All of them before the first is read: a size costs nothing.
+        images.check_length(upload.size or 0, settings, **{part: name})
     cameras = {camera.id: camera for camera in venue.cameras} if venue else {}
     for name, several in files.items():
         content.update(f"\n{name}".encode())

@@ -18,6 +18,7 @@ ERRORS = (
     "broken-image",
     "frame-size",
     "no-markings-in-view",
+    "source-failed",
     "model-missing",
     "provider-missing",
     "job-timeout",

@@ -50,6 +50,7 @@ class PastCalibrations(Repository):
         query = (
             sa.select(j.id, j.status, j.finished_at, j.result, j.error, j.options)
             .where(j.venue == venue, j.kind == "calibration", j.finished_at.is_not(None))
+            .with_hint(*tables.BY_VENUE)
             .order_by(j.id.desc())
             .limit(limit)
         )
@@ -61,6 +62,7 @@ class PastCalibrations(Repository):
         query = (
             sa.select(j.id)
             .where(j.venue == venue, j.kind == "calibration", j.result.is_not(None))
+            .with_hint(*tables.BY_VENUE)
             .order_by(j.id.desc())
             .limit(1)
         )

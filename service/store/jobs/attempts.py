@@ -97,7 +97,7 @@ class Attempts(Repository):
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
-            _fail(connection, task.job_id, _fence(task), error)
+            end_without_result(connection, task.job_id, _fence(task), error)
 
     def unchanged_for(self, seconds: float) -> list[str]:
         """Open jobs that nothing was heard of for a while."""
@@ -109,7 +109,7 @@ class Attempts(Repository):
     def abandon(self, job_id: str, error: JobError) -> bool:
         """End an open job that the queue has given up; False if it has ended meanwhile."""
         with writing(self._engine) as connection:
-            return _fail(connection, job_id, still_open(job_id), error)
+            return end_without_result(connection, job_id, still_open(job_id), error)
 
 
 def _fence(task: Task) -> Still:
@@ -141,7 +141,8 @@ def _move_poses(connection: sa.Connection, task: Task, result: Result) -> Result
     return result
 
 
-def _fail(connection: sa.Connection, job_id: str, still: Still, error: JobError) -> bool:
+def end_without_result(connection: sa.Connection, job_id: str, still: Still, error: JobError) -> bool:
+    """Fail a job inside the caller's transaction; False, and nothing is done, if the row is not `still` so."""
     row = connection.execute(sa.select(j.kind, j.venue, j.options).where(j.id == job_id)).one()
     brought_none = row.kind == "calibration" and not row.options["dry_run"]
     if brought_none:

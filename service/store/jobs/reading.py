@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.deliveries import delivery_of
+from service.store.deliveries import deliveries_of
 from service.store.engine import Repository, reading
 from service.store.jobs.files import picture_file, picture_folder
 from service.store.jobs.task import Origin
-from service.store.revisions import revision_of_job
+from service.store.revisions import revisions_of_jobs
 from service.store.venues import with_result
-from service.wire.job import Job, Status
+from service.wire.job import CallbackState, Job, Status
 from service.wire.results import Result
 from service.wire.venue import Venue
 
 j = tables.jobs.c
 # What pollers ask for, hundreds of times a second: to put the statement together takes longer than to run it.
 ONE = sa.select(tables.jobs).where(j.id == sa.bindparam("job_id"))
+# First poses have a queue of their own.
+PLACE = sa.func.row_number().over(partition_by=j.kind == "locate", order_by=(j.priority, j.id))
+QUEUE = sa.select(j.id, PLACE.label("position")).where(j.status == "queued").subquery()
 
 
 @dataclass(frozen=True)
@@ -57,13 +60,15 @@ class Jobs(Repository):
     ) -> list[Job]:
         """Up to `limit` jobs, newest first, those older than `before`."""
         query = sa.select(tables.jobs).order_by(j.id.desc()).limit(limit)
+        if venue is not None:
+            query = query.with_hint(*tables.BY_VENUE)
         for column, value in ((j.venue, venue), (j.status, status), (j.kind, kind)):
             if value is not None:
                 query = query.where(column == value)
         if before is not None:
             query = query.where(j.id < before)
         with reading(self._engine) as connection:
-            return [_job(connection, row) for row in connection.execute(query)]
+            return _jobs(connection, connection.execute(query).all())
 
     def states(self, job_ids: Collection[str]) -> dict[str, State]:
         """What waiters need to know about several jobs."""
@@ -94,7 +99,7 @@ class Jobs(Repository):
 
 def read_job(connection: sa.Connection, job_id: str) -> Job:
     """One job as clients see it, which is there."""
-    return _job(connection, connection.execute(ONE, {"job_id": job_id}).one())
+    return _jobs(connection, [connection.execute(ONE, {"job_id": job_id}).one()])[0]
 
 
 def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] | None:
@@ -116,32 +121,40 @@ def asked(row: Any) -> dict[str, Any]:
     }
 
 
-def _job(connection: sa.Connection, row: Any) -> Job:
+def _jobs(connection: sa.Connection, rows: Sequence[Any]) -> list[Job]:
+    """What is known of them beside their rows is read of all at once."""
+    positions = _positions(connection, [row.id for row in rows if row.status == "queued"])
+    callbacks = deliveries_of(connection, [row.id for row in rows if row.finished_at and row.options["callback_url"]])
+    taken = revisions_of_jobs(connection, [row.id for row in rows if row.kind == "calibration" and row.result])
+    return [_job(row, positions.get(row.id), callbacks.get(row.id), taken.get(row.id)) for row in rows]
+
+
+def _job(row: Any, position: int | None, callback: CallbackState | None, revision: int | None) -> Job:
     return Job(
         id=row.id,
         kind=row.kind,
         venue=row.venue,
         status=row.status,
         progress=row.progress,
-        queue_position=_position(connection, row) if row.status == "queued" else None,
+        queue_position=position,
         attempt=row.attempt,
         created_at=row.created_at,
         started_at=row.started_at,
         finished_at=row.finished_at,
         error=row.error,
         result=row.result,
-        callback=delivery_of(connection, row.id) if row.finished_at and row.options["callback_url"] else None,
-        venue_revision=revision_of_job(connection, row.id) if row.kind == "calibration" and row.result else None,
+        callback=callback,
+        venue_revision=revision,
         links=_links(row),
     )
 
 
-def _position(connection: sa.Connection, row: Any) -> int:
-    ahead = sa.or_(j.priority < row.priority, sa.and_(j.priority == row.priority, j.id < row.id))
-    # First poses have a queue of their own.
-    same_queue = (j.kind == "locate") if row.kind == "locate" else (j.kind != "locate")
-    count = connection.scalar(sa.select(sa.func.count()).where(j.status == "queued", same_queue, ahead))
-    return 1 + (count or 0)
+def _positions(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:
+    """The places of jobs that wait, from 1."""
+    if not job_ids:
+        return {}
+    query = sa.select(QUEUE).where(QUEUE.c.id.in_(job_ids))
+    return {row.id: row.position for row in connection.execute(query)}
 
 
 def _links(row: Any) -> dict[str, str]:

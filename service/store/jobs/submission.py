@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from datetime import datetime
+from typing import Any
 
 import sqlalchemy as sa
 
 from service.store import tables
 from service.store.engine import Repository, clock, reading, serialise, writing
+from service.store.jobs.attempts import end_without_result
 from service.store.jobs.files import frame_folder
 from service.store.jobs.reading import ONE, asked, read_job
 from service.store.jobs.task import Asked
 from service.store.venues import find_venue, venue_lock
-from service.wire.job import OPEN, Job, Kind
+from service.wire.job import Job, JobError, Kind, Status
+from service.wire.options import Options
 from service.wire.venue import Venue
 
 # Job, priority and kind, into the queue in the caller's transaction.
 Enqueue = Callable[[sa.Connection, str, int, Kind], None]
 PRIORITIES = {"live": 1, "routine": 100}
+# How the content hash of a job begins whose frames were fetched.
+FETCHED = "fetched "
 j = tables.jobs.c
 
 
@@ -26,6 +33,20 @@ class Submission(Asked):
 
     content_hash: str
     idempotency_key: str | None
+
+    @property
+    def hash_again(self) -> str:
+        """The content hash of these frames sent once more.
+
+        Frames that were fetched once are not what the cameras show now: who asks for that is to get another job.
+        """
+        fetched = self.content_hash.startswith(FETCHED)
+        return hashlib.sha256(self.job_id.encode()).hexdigest() if fetched else self.content_hash
+
+
+def fetched_hash(options: Options) -> str:
+    """The content hash of what the cameras show at the time, which is not known before."""
+    return FETCHED + hashlib.sha256(options.model_dump_json().encode()).hexdigest()[: 64 - len(FETCHED)]
 
 
 class Refusal(Exception):  # noqa: N818
@@ -79,33 +100,33 @@ class Submissions(Repository):
             # From here on the frames are the job's.
             folder = frame_folder(submission.job_id)
             connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
-            priority, now = PRIORITIES[submission.options.priority], clock(connection)
-            connection.execute(
-                sa.insert(tables.jobs).values(
-                    id=submission.job_id,
-                    kind=submission.kind,
-                    venue=venue_id,
-                    status="queued",
-                    priority=priority,
-                    options=submission.options.model_dump(mode="json"),
-                    content_hash=submission.content_hash,
-                    idempotency_key=submission.idempotency_key,
-                    venue_document=venue.model_dump(mode="json") if venue else None,
-                    frames=submission.frames,
-                    request_id=submission.origin.request_id,
-                    traceparent=submission.origin.traceparent,
-                    created_at=now,
-                    updated_at=now,
-                )
-            )
+            _insert(connection, submission, venue, "queued", clock(connection))
+            priority = PRIORITIES[submission.options.priority]
             enqueue(connection, submission.job_id, priority, submission.kind)
             # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
             serialise(connection, "queue")
-            waiting = connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
-            if waiting > queue_limit:
+            if _waiting(connection) > queue_limit:
                 raise QueueFull
         with reading(self._engine) as connection:
             return read_job(connection, submission.job_id), True
+
+    def fail(self, submission: Submission, error: JobError) -> Job:
+        """A job that failed before it had frames, or the job that the submission already is by its key."""
+        assert submission.venue is not None
+        with writing(self._engine) as connection:
+            serialise(connection, venue_lock(submission.venue.id))
+            same = _of_key(connection, submission.venue.id, submission.idempotency_key)
+            if same is None:
+                venue, now = _as_it_is_now(connection, submission.venue), clock(connection)
+                _insert(connection, submission, venue, "failed", now, frames_deleted_at=now)
+                end_without_result(connection, submission.job_id, [j.id == submission.job_id], error)
+        with reading(self._engine) as connection:
+            return read_job(connection, submission.job_id if same is None else same.id)
+
+    def waiting(self) -> int:
+        """How many jobs wait."""
+        with reading(self._engine) as connection:
+            return _waiting(connection)
 
     def same_as(
         self, venue_id: str | None, idempotency_key: str | None, content_hash: str, kind: Kind = "calibration"
@@ -124,6 +145,32 @@ class Submissions(Repository):
         return Submission(**asked(row), content_hash=row.content_hash, idempotency_key=row.idempotency_key)
 
 
+def _insert(
+    connection: sa.Connection, submission: Submission, venue: Venue | None, status: Status, now: datetime, **more: Any
+) -> None:
+    values = {
+        "id": submission.job_id,
+        "kind": submission.kind,
+        "venue": None if venue is None else venue.id,
+        "status": status,
+        "priority": PRIORITIES[submission.options.priority],
+        "options": submission.options.model_dump(mode="json"),
+        "content_hash": submission.content_hash,
+        "idempotency_key": submission.idempotency_key,
+        "venue_document": venue.model_dump(mode="json") if venue else None,
+        "frames": submission.frames,
+        "request_id": submission.origin.request_id,
+        "traceparent": submission.origin.traceparent,
+        "created_at": now,
+        "updated_at": now,
+    }
+    connection.execute(sa.insert(tables.jobs).values(values | more))
+
+
+def _waiting(connection: sa.Connection) -> int:
+    return connection.execute(sa.select(sa.func.count()).where(j.status == "queued")).scalar_one()
+
+
 def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:
     """The venue, if frames of the one that was read are frames of it."""
     venue = find_venue(connection, read.id)
@@ -137,21 +184,27 @@ def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:
 def _duplicate(
     connection: sa.Connection, kind: Kind, venue_id: str | None, idempotency_key: str | None, content_hash: str
 ) -> str | None:
-    if idempotency_key is not None:
-        # Of no venue is a place of its own.
-        here = j.venue.is_(None) if venue_id is None else j.venue == venue_id
-        query = sa.select(j.id, j.content_hash).where(here, j.idempotency_key == idempotency_key)
-        known = connection.execute(query).one_or_none()
-        if known is not None:
-            if known.content_hash != content_hash:
-                raise KeyReused(known.id)
-            return str(known.id)
+    known = _of_key(connection, venue_id, idempotency_key)
+    if known is not None:
+        if known.content_hash != content_hash:
+            raise KeyReused(known.id)
+        return str(known.id)
     if kind != "calibration":
         return None
-    query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, j.kind == "calibration", j.status.in_(OPEN))
+    query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, tables.ACTIVE)
     active = connection.execute(query).one_or_none()
     if active is None:
         return None
     if active.content_hash != content_hash:
         raise VenueBusy(active.id)
     return str(active.id)
+
+
+def _of_key(connection: sa.Connection, venue_id: str | None, idempotency_key: str | None) -> Any:
+    """Id and content hash of the job of a key, None if there is none."""
+    if idempotency_key is None:
+        return None
+    # Of no venue is a place of its own.
+    here = j.venue.is_(None) if venue_id is None else j.venue == venue_id
+    query = sa.select(j.id, j.content_hash).where(here, j.idempotency_key == idempotency_key)
+    return connection.execute(query).one_or_none()

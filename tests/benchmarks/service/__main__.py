@@ -10,13 +10,14 @@ import argparse
 import os
 from collections.abc import Callable
 
-from tests.benchmarks.service import crashes, endurance, load, outages
+from tests.benchmarks.service import crashes, endurance, lists, load, outages
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], list[str]]] = {
     "crashes": crashes.table,
     "outages": outages.table,
     "pollers": load.table,
     "longrun": endurance.table,
+    "lists": lists.table,
 }
 
 
@@ -29,6 +30,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7, help="jobs alone and jobs with pollers, alternately")
     parser.add_argument("--jobs", type=int, default=500, help="in a row, through the stub of the engine")
     parser.add_argument("--real-jobs", type=int, default=100, help="in a row, through the engine, at reduced size")
+    parser.add_argument("--listed-jobs", type=int, default=40_000, help="among which lists find theirs")
     options = parser.parse_args()
     for name in options.only:
         print(f"\n## {name}\n", flush=True)

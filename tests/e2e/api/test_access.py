@@ -10,6 +10,7 @@ import httpx
 import pytest
 from fastapi.routing import iter_route_contexts
 
+from service.api.auth import GUESSES
 from service.app import create_app
 from service.pages.shown import SIGN_IN, Page
 from service.routes.contract.guarded import Guarded
@@ -22,7 +23,7 @@ SCOPES = ("read", "calibrate", "admin")
 OPEN = {"/livez", "/readyz", "/problems/{kind}", "/docs", "/docs/rapidoc-min.js", "/docs/LICENSE.txt"}
 # The way to sign in, and what it is drawn with.
 OPEN |= {"/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
-NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "DELETE": "admin"}
+NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "PATCH": "admin", "DELETE": "admin"}
 # Pages that show nothing but how to change something, and a question that takes a body.
 OTHERWISE = {"/ui/venues/{venue_id}/calibrate": "calibrate", "/ui/new-venue": "admin", "/ui/new-venue/plan": "read"}
 JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"
@@ -174,6 +175,19 @@ def test_a_key_that_is_removed_opens_nothing_for_long(guarded):
     wait_for(lambda: guarded.http.get("/jobs", headers=bearer(key)).status_code == 401)
 
 
+@pytest.mark.parametrize("command", [("list",), ("remove", "cron")])
+def test_to_ask_for_the_keys_of_no_service_makes_none(tmp_path, command):
+    answer = esc(tmp_path, "key", *command)
+    assert (answer.returncode, "There is no service here" in answer.stderr) == (1, True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_first_key_of_a_folder_is_said_to_be_that(tmp_path):
+    first, second = (esc(tmp_path, "key", "add", name, "--scope", "read") for name in ("a", "b"))
+    assert (first.returncode, "no service has used it yet" in first.stderr) == (0, True)
+    assert (second.returncode, "no service has used it yet" in second.stderr) == (0, False)
+
+
 @pytest.mark.parametrize("arguments", [("Bad name", "--scope", "read"), ("x", "--scope", "all"), ("x",)])
 def test_a_key_needs_a_name_and_a_scope(tmp_path, arguments):
     assert esc(tmp_path, "key", "add", *arguments).returncode == 2
@@ -220,6 +234,19 @@ def test_where_a_proxy_decides_who_may_call_it_can_be_switched_off(start, tmp_pa
     service = start("serve", "--host", "0.0.0.0", ESC_AUTH="off")
     assert httpx.get(f"http://127.0.0.1:{httpx.URL(service.url).port}/jobs").status_code == 200
     assert "ESC_AUTH=off" in (service.data / "log").read_text()
+
+
+@pytest.mark.parametrize(("trusted", "second"), [("127.0.0.1", "key-unknown"), ("10.9.9.9", "too-many-unknown-keys")])
+def test_who_guesses_is_told_apart_by_what_a_proxy_says_where_it_is_trusted(start, tmp_path, trusted, second):
+    keys_in(tmp_path / "esc").add("ops", "admin")
+    service = start("serve", FORWARDED_ALLOW_IPS=trusted)
+
+    def guess(client):
+        answer = service.http.get("/jobs", headers=bearer("esc_guessed") | {"X-Forwarded-For": client})
+        return answer.json()["type"].rpartition("/")[2]
+
+    assert [guess("192.0.2.1") for _ in range(GUESSES + 1)][-1] == "too-many-unknown-keys"
+    assert guess("192.0.2.2") == second
 
 
 def test_the_log_names_the_key_and_does_not_hold_it(guarded, key):

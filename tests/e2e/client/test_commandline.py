@@ -1,15 +1,30 @@
 import json
+import os
 import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
 
 import httpx
 import pytest
+from typer.main import get_command
 
+from service.cli.main import app
 from service.store.engine import SCHEMA_TABLE, connect, migrate, writing
 from tests.e2e.commands import esc_here, esc_process
 from tests.e2e.running import FRAMES, png, venue, wait_for
+
+# An editor in which somebody changes the name, while somebody else may put another one.
+MEDDLING = """
+import os, sys, urllib.request
+path = sys.argv[1]
+text = open(path).read()
+if url := os.environ.get("MEDDLE"):
+    headers = {"Content-Type": "application/merge-patch+json"}
+    urllib.request.urlopen(urllib.request.Request(url, b'{"name": "theirs"}', headers, method="PATCH"))
+open(path, "w").write(text.replace('"name": "accept"', '"name": "mine"').replace('"name": "theirs"', '"name": "mine"'))
+"""
 
 
 def test_a_venue_is_put_read_listed_and_deleted(esc, name, tmp_path):
@@ -28,6 +43,65 @@ def test_a_wrong_venue_file_is_a_usage_error(esc, tmp_path):
     answer = esc("venue", "put", "venue.json")
     assert answer.returncode == 2
     assert "cameras" in answer.stderr
+
+
+def test_a_file_that_would_undo_a_calibration_is_not_put_unless_one_insists(service, esc, name, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name)))
+    assert esc("venue", "put", "venue.json").returncode == 0
+    service.calibrated(name)
+    calibrated = service.http.get(f"/venues/{name}").json()
+    refused = esc("venue", "put", "venue.json")
+    assert refused.returncode == 1
+    assert "the pose of camera left (calibrated " in refused.stderr
+    assert "by the file it stands 6.3" in refused.stderr
+    assert "--keep-poses" in refused.stderr
+    assert service.http.get(f"/venues/{name}").json() == calibrated
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name) | {"name": "Main pitch"}))
+    kept = esc("venue", "put", "venue.json", "--keep-poses")
+    assert (kept.returncode, json.loads(kept.stdout)) == (0, calibrated | {"name": "Main pitch"})
+    assert json.loads(esc("venue", "put", "venue.json", "--force").stdout)["cameras"][0]["pose"]["position"][1] == -50
+
+
+def test_settings_that_a_file_has_not_are_not_lost_unless_one_insists(service, esc, name, tmp_path):
+    document = venue(name)
+    (tmp_path / "old.json").write_text(json.dumps(document))
+    document["cameras"][0]["source"] = "http://127.0.0.1/x"
+    service.http.put(f"/venues/{name}", json=document | {"alarms": {"rejected_in_a_row": 2}}).raise_for_status()
+    refused = esc("venue", "put", "old.json")
+    assert refused.returncode == 1
+    assert "alarms: the file has none" in refused.stderr
+    assert "the source of camera left: the file has none" in refused.stderr
+    # What it gives, it takes.
+    (tmp_path / "new.json").write_text(esc("venue", "get", name).stdout)
+    assert esc("venue", "put", "new.json").returncode == 0
+
+
+def test_a_venue_that_others_change_meanwhile_is_not_put(service, esc, name, tmp_path, monkeypatch):
+    service.venue(name)
+    editor = tmp_path / "editor"
+    editor.write_text(f"#!{sys.executable}\n" + MEDDLING)
+    editor.chmod(0o755)
+    answer = esc("venue", "edit", name, EDITOR=str(editor), MEDDLE=f"{service.url}/venues/{name}")
+    assert (answer.returncode, "not the one the request expects" in answer.stderr) == (1, True), answer.stderr
+    assert service.http.get(f"/venues/{name}").json()["name"] == "theirs"
+    assert json.loads(esc("venue", "edit", name, EDITOR=str(editor)).stdout)["name"] == "mine"
+    assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 1
+    assert esc("venue", "edit", name, EDITOR="true").stderr == "Nothing was changed.\n"
+    assert esc("venue", "edit", name, EDITOR="false").returncode == 2
+
+
+def test_parts_of_a_venue_are_set_by_name(service, esc, name):
+    service.calibrated(service.venue(name))
+    before = service.http.get(f"/venues/{name}").json()
+    answer = esc(
+        "venue", "set", name, "name=Main pitch", "alarms.rejected_in_a_row=3", "cameras.left.source=http://127.0.0.1/x"
+    )
+    after = json.loads(answer.stdout)
+    assert (after["name"], after["alarms"]["rejected_in_a_row"]) == ("Main pitch", 3)
+    assert after["cameras"][0] == before["cameras"][0] | {"source": "http://127.0.0.1/x"}
+    assert json.loads(esc("venue", "set", name, "alarms=null").stdout)["alarms"] is None
+    for wrong in ("name", "=x", "a..b=1"):
+        assert esc("venue", "set", name, wrong).returncode == 2
 
 
 @pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3)])
@@ -78,13 +152,105 @@ def test_usage_errors_are_told_before_anything_is_sent(esc):
         assert esc("calibrate", "v", *arguments).returncode == 2
 
 
-def test_refused_frames_and_an_absent_service_are_failures(service, esc, name):
+def test_refused_frames_are_a_failure_and_an_absent_service_may_come_back(service, esc, name):
     service.venue(name)
     refused = esc("calibrate", name, "left=left.png")
     assert (refused.returncode, "right" in refused.stderr) == (1, True)
     absent = esc("calibrate", name, *FRAMES, ESC_URL="http://127.0.0.1:9")
-    assert (absent.returncode, "cannot be reached" in absent.stderr) == (1, True)
+    assert (absent.returncode, "cannot be reached" in absent.stderr) == (75, True)
     assert "Traceback" not in refused.stderr + absent.stderr
+
+
+@pytest.mark.parametrize("url", ["127.0.0.1:8000", "ftp://127.0.0.1", ""])
+def test_an_address_that_is_none_is_a_usage_error(esc, url):
+    answer = esc("venue", "list", "--url", url)
+    assert (answer.returncode, "no address such as http://" in answer.stderr) == (2, True), answer.stderr
+
+
+def test_a_file_that_cannot_be_written_is_told_in_a_line(service, esc, name):
+    service.venue(name)
+    answer = esc("venue", "poses", name, "-o", "nowhere/poses.json")
+    assert (answer.returncode, answer.stderr) == (1, "nowhere/poses.json: No such file or directory\n")
+
+
+def test_a_zip_that_is_not_called_one_is_said_to_be_one(service, esc, name):
+    service.venue(name)
+    assert "all.yml is a zip" in esc("venue", "poses", name, "--format", "opencv", "-o", "all.yml").stderr
+    assert esc("venue", "poses", name, "--format", "opencv", "-o", "all.zip").stderr == ""
+    assert esc("venue", "poses", name, "--format", "opencv", "--camera", "left", "-o", "left.yml").stderr == ""
+
+
+def test_jobs_are_listed_waited_for_and_submitted_again(service, esc, name):
+    first = service.calibrated(service.venue(name, "reject"))["id"]
+    second = json.loads(esc("job", "again", first).stdout)["job"]
+    waited = esc("job", "wait", second)
+    assert (waited.returncode, json.loads(waited.stdout)["id"]) == (3, second)
+    again = esc("job", "again", second, "--wait")
+    assert (again.returncode, json.loads(again.stdout)["status"]) == (3, "succeeded")
+    lines = [line.split("\t") for line in esc("job", "list", "--venue", name).stdout.splitlines()]
+    assert [line[0] for line in lines] == [json.loads(again.stdout)["id"], second, first]
+    assert lines[0][2:] == [name, "calibration", "succeeded", "rejected: the lines do not fit"]
+    assert esc("job", "list", "--venue", name, "--limit", "1").stdout.splitlines() == ["\t".join(lines[0])]
+    assert esc("job", "list", "--venue", name, "--kind", "locate").stdout == ""
+    (newest, *_) = json.loads(esc("job", "list", "--venue", name, "--json").stdout)["jobs"]
+    assert newest == service.job(newest["id"])
+    assert name in [one["id"] for one in json.loads(esc("venue", "list", "--json").stdout)["venues"]]
+    assert json.loads(esc("venue", "history", name, "--json").stdout)["revisions"][0]["cause"] == "put"
+    assert esc("job", "list", "--venue", name, "--status", "failed").stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("command", "says"), [(("job", "get", "01ABC"), "26 capital"), (("venue", "get", "A B"), "64 of a-z")]
+)
+def test_an_id_that_is_none_is_told_in_words(esc, command, says):
+    answer = esc(*command)
+    assert (answer.returncode, says in " ".join(answer.stderr.replace("│", " ").split())) == (2, True), answer.stderr
+
+
+def test_a_job_that_failed_is_listed_with_why(service, esc, name):
+    job = service.calibrated(service.venue(name, "fail"))["id"]
+    (line,) = esc("job", "list", "--venue", name).stdout.splitlines()
+    assert line.endswith("It is black.")
+    assert esc("job", "wait", job).returncode == 1
+
+
+def test_the_pictures_of_a_job_are_named_and_saved(service, esc, name, tmp_path):
+    job = service.calibrated(service.venue(name))["id"]
+    assert {"preview", "overlay/left"} <= set(esc("job", "picture", job).stdout.split())
+    assert esc("job", "picture", job, "overlay/left").stdout == "overlay_left.jpg\n"
+    assert (tmp_path / "overlay_left.jpg").read_bytes() == service.http.get(f"/jobs/{job}/overlay/left.jpg").content
+    assert esc("job", "picture", job, "preview", "-o", "wide.jpg").stdout == "wide.jpg\n"
+    none = esc("job", "picture", job, "self")
+    assert (none.returncode, "has no picture self" in none.stderr) == (1, True)
+
+
+def test_the_service_and_its_key_may_be_named_in_a_file(service, name, tmp_path):
+    service.venue(name)
+    (tmp_path / ".env").write_text(f"ESC_URL={service.url}\nESC_API_KEY=esc_of_the_file\nESC_QUEUE_LIMIT=5\n")
+    without = {variable: value for variable, value in os.environ.items() if not variable.startswith("ESC_")}
+    assert json.loads(esc_here(tmp_path, "venue", "get", name, **without).stdout)["id"] == name
+    # What is closer to the command goes before it.
+    elsewhere = esc_here(tmp_path, "venue", "get", name, **without | {"ESC_URL": "http://127.0.0.1:9"})
+    assert elsewhere.returncode == 75
+    assert esc_here(tmp_path, "venue", "get", name, "--url", "http://127.0.0.1:9", **without).returncode == 75
+
+
+def test_the_version_is_told(esc):
+    assert esc("--version").stdout == f"esc {version('esc-calibration')}\n"
+
+
+def test_every_option_and_argument_says_what_it_is_for():
+    for path, command in commands(get_command(app)):
+        for parameter in command.params:
+            said = getattr(parameter, "help", None) or ""
+            assert len(said.split()) >= 3, f"{path} {parameter.name}: {said!r}"
+
+
+def commands(command, *path):
+    """Every command below one, with the words that call it."""
+    for name, one in getattr(command, "commands", {}).items():
+        yield from commands(one, *path, name)
+    yield " ".join(path), command
 
 
 def test_a_frame_of_another_size_is_refused_with_both_sizes(service, esc, name, tmp_path):

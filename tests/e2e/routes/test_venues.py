@@ -42,6 +42,68 @@ def test_a_conditional_put_of_an_outdated_venue_is_refused(service, name):
     assert service.http.put(f"/venues/{name}", json=venue(name), headers={"If-None-Match": "*"}).status_code == 412
 
 
+def patched(service, name, patch, **headers):
+    sent = {"Content-Type": "application/merge-patch+json"} | headers
+    return service.http.patch(f"/venues/{name}", content=json.dumps(patch), headers=sent)
+
+
+def test_a_patch_changes_what_it_names_and_leaves_the_poses_that_were_calibrated(service, name):
+    service.calibrated(service.venue(name))
+    before = service.http.get(f"/venues/{name}").json()
+    answer = patched(service, name, {"name": "Main pitch", "alarms": {"rejected_in_a_row": 3}})
+    after = service.http.get(f"/venues/{name}")
+    assert (answer.status_code, answer.headers["etag"], answer.json()) == (200, after.headers["etag"], after.json())
+    assert after.json()["alarms"]["rejected_in_a_row"] == 3
+    assert after.json() | {"name": "accept", "alarms": None} == before
+    patched(service, name, {"alarms": {"not_calibrated_for_h": 24}})
+    assert (
+        patched(service, name, {"alarms": {"rejected_in_a_row": None}}).json()["alarms"]["not_calibrated_for_h"] == 24
+    )
+    assert patched(service, name, {"alarms": None}).json() == before | {"name": "Main pitch"}
+    assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 2
+
+
+def test_cameras_are_patched_by_their_ids(service, name):
+    service.venue(name)
+    left, right = patched(service, name, {"cameras": {"left": {"source": "http://127.0.0.1/x"}}}).json()["cameras"]
+    assert (left["source"], right["source"]) == ("http://127.0.0.1/x", None)
+    moved = patched(service, name, {"cameras": {"right": {"pose": {"position": [1, -50, 8]}}}}).json()["cameras"]
+    assert moved == [left, right | {"pose": moved[1]["pose"]}]
+    assert moved[1]["pose"]["position"] == [1, -50, 8]
+    assert service.http.get(f"/venues/{name}/history").json()["revisions"][0]["cause"] == "put"
+    assert [one["id"] for one in patched(service, name, {"cameras": {"left": None}}).json()["cameras"]] == ["right"]
+
+
+def test_a_conditional_patch_of_an_outdated_venue_is_refused(service, name):
+    old = service.http.put(f"/venues/{name}", json=venue(name)).headers["etag"]
+    new = patched(service, name, {"name": "a"}, **{"If-Match": old}).headers["etag"]
+    answer = patched(service, name, {"name": "b"}, **{"If-Match": old})
+    assert (answer.status_code, answer.json()["type"]) == (412, "/problems/venue-changed")
+    assert patched(service, name, {"name": "b"}, **{"If-Match": new}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("patch", "kind"),
+    [
+        ({"cameras": {"middle": {"source": "http://127.0.0.1/x"}}}, "invalid-request"),
+        ({"cameras": {"left": {"source": "http://10.0.0.1/x"}}}, "source-refused"),
+        ({"field": None}, "invalid-request"),
+        ({"naem": "a"}, "invalid-request"),
+        ({"id": "another"}, "venue-id-mismatch"),
+        ([], "invalid-request"),
+    ],
+)
+def test_a_patch_that_makes_no_venue_is_refused_and_changes_nothing(service, name, patch, kind):
+    before = service.http.put(f"/venues/{name}", json=venue(name)).json()
+    answer = patched(service, name, patch)
+    assert (answer.status_code, answer.json()["type"]) == (422, f"/problems/{kind}")
+    assert service.http.get(f"/venues/{name}").json() == before
+
+
+def test_there_is_nothing_to_patch_of_a_venue_that_is_not_there(service, name):
+    assert patched(service, name, {}).status_code == 404
+
+
 def test_an_unchanged_venue_is_not_sent_again(service, name):
     service.venue(name)
     tag = service.http.get(f"/venues/{name}").headers["etag"]

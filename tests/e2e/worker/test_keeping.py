@@ -19,6 +19,34 @@ def age(service, job: str, days: float) -> None:
 
 
 @in_both_homes
+def test_a_job_that_is_deleted_takes_its_frames_and_pictures_with_it(service, name):
+    job = service.calibrated(service.venue(name), headers={"Idempotency-Key": name})
+    poses = service.http.get(f"/venues/{name}").json()
+    assert [len(service.files(f"{kind}/{job['id']}")) > 0 for kind in ("frames", "pictures")] == [True, True]
+    assert service.http.delete(f"/jobs/{job['id']}").status_code == 204
+    assert service.files(f"frames/{job['id']}") == service.files(f"pictures/{job['id']}") == []
+    for path in ("", "/preview.jpg", "/overlay/left.jpg"):
+        assert service.http.get(f"/jobs/{job['id']}{path}").json()["type"] == "/problems/job-not-found"
+    assert service.http.delete(f"/jobs/{job['id']}").status_code == 404
+    with service.database() as connection:
+        assert job["id"] not in queued(connection)
+    assert service.http.get(f"/venues/{name}").json() == poses
+    # Nor does it stand in the way of anything.
+    assert service.calibrated(name, headers={"Idempotency-Key": name})["id"] != job["id"]
+    assert service.http.get(f"/ui/venues/{name}").status_code == 200
+
+
+def test_a_job_that_is_open_is_cancelled_before_it_is_deleted(service, esc, name):
+    job = service.submitted(service.venue(name, "hang"))
+    refused = service.http.delete(f"/jobs/{job}")
+    assert (refused.status_code, refused.json()["type"]) == (409, "/problems/job-open")
+    assert esc("job", "delete", job).returncode == 1
+    service.http.post(f"/jobs/{job}/cancel")
+    assert esc("job", "delete", job).returncode == 0
+    assert service.http.get(f"/jobs/{job}").status_code == 404
+
+
+@in_both_homes
 def test_what_is_past_its_time_goes_and_says_so(start):
     service = start("up", ESC_TIDY_EVERY_S="0.5").ready()
     service.venue("v", "reject")

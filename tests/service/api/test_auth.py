@@ -195,6 +195,38 @@ def test_a_key_in_use_is_not_held_up_by_guesses_from_its_address(gate, keys, clo
     assert kind(gate, key) == "passed"
 
 
+def test_keys_that_are_guessed_at_once_are_looked_up_no_more_often(gate, keys, clock, monkeypatch):
+    keys.add("ops", "admin")
+    assert kind(gate) == "key-missing"
+    looked_up, find = [], keys.find
+    monkeypatch.setattr(keys, "find", lambda hash_: looked_up.append(hash_) or find(hash_))
+
+    async def guess():
+        calls = [gate.admit(caller(f"esc_{number}"), "read") for number in range(10 * GUESSES)]
+        return await asyncio.gather(*calls, return_exceptions=True)
+
+    refused = [problem.kind for problem in asyncio.run(guess())]
+    assert (len(looked_up), refused.count("key-unknown")) == (GUESSES, GUESSES)
+    # Nor is anybody locked out for longer by them.
+    clock.now += GUESS_EVERY_S
+    assert kind(gate, "esc_x") == "key-unknown"
+
+
+def test_keys_that_are_known_use_up_no_guesses(gate, keys):
+    known = [keys.add(f"cron-{number}", "read") for number in range(2 * GUESSES)]
+    assert {kind(gate, key) for key in known} == {"passed"}
+
+
+def test_a_database_that_is_away_uses_up_no_guesses(gate, keys, monkeypatch):
+    key = keys.add("cron", "read")
+    with monkeypatch.context() as patch:
+        patch.setattr(keys, "find", lambda _: 1 / 0)
+        for _ in range(2 * GUESSES):
+            with pytest.raises(ZeroDivisionError):
+                asyncio.run(gate.admit(caller(key), "read"))
+    assert kind(gate, key) == "passed"
+
+
 def test_addresses_of_one_ipv6_network_guess_together(gate, keys):
     keys.add("ops", "admin")
     for number in range(GUESSES):

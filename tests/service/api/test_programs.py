@@ -1,13 +1,20 @@
 """Programs that are asked for something at once, one run after the other."""
 
+import asyncio
 import json
 import sys
 import threading
 
 import pytest
+from anyio.to_thread import current_default_thread_limiter
 
+from service.api import clicked_pose
+from service.api.clicked_pose import ClickedPoses
 from service.api.programs import OneAtATime
+from service.settings import Settings
+from service.wire.clicked_pose import ClickedCamera
 from service.wire.problems import Problem
+from tests.e2e.running import venue
 
 SLOW = [sys.executable, "-c", "import sys, time; time.sleep(0.5); sys.stdout.write(sys.stdin.read())"]
 HANGING = [sys.executable, "-c", "import time; time.sleep(600)"]
@@ -32,14 +39,46 @@ def begun():
         thread.join()
 
 
-def test_who_comes_meanwhile_waits_for_a_turn(begun):
-    programs = OneAtATime("pose", longest_s=30, again_s=1, patience_s=30)
-    begun(programs)
-    assert programs.run(QUICK, {}, b"second") == b"second"
+def clicked():
+    camera = venue("v")["cameras"][0]
+    points = [{"world": [x, y], "pixel": [x, y]} for x in (1.0, 20.0) for y in (1.0, 30.0)]
+    known = {"field": venue("v")["field"], "points": points}
+    return ClickedCamera.model_validate(known | {name: camera[name] for name in ("id", "image_size", "intrinsics")})
 
 
-def test_who_has_waited_long_enough_is_told_to_come_again(begun):
-    programs = OneAtATime("pose", longest_s=30, again_s=7, patience_s=0)
+def answering(after_s):
+    answer = '{"result": null, "error": null, "lines": [], "expected": []}'
+    return [sys.executable, "-c", f"import time; time.sleep({after_s}); print('{answer}')"]
+
+
+def test_who_waits_for_a_turn_holds_no_thread():
+    poses, threads, clicks = ClickedPoses(Settings(pose_program=answering(0))), [], 60
+
+    async def click():
+        found = [asyncio.create_task(poses.find(clicked())) for _ in range(clicks)]
+        while not all(one.done() for one in found):
+            threads.append(current_default_thread_limiter().borrowed_tokens)
+            await asyncio.sleep(0.01)
+        return [found.result() for found in found if found.exception() is None]
+
+    assert asyncio.run(click())
+    assert max(threads) == 1
+
+
+def test_who_has_waited_long_enough_for_a_turn_is_told_to_come_again(monkeypatch):
+    monkeypatch.setattr(clicked_pose, "PATIENCE_S", 0.1)
+    poses = ClickedPoses(Settings(pose_program=answering(1)))
+
+    async def click():
+        return await asyncio.gather(poses.find(clicked()), poses.find(clicked()), return_exceptions=True)
+
+    first, second = asyncio.run(click())
+    assert first.lines == []
+    assert (second.kind, second.headers) == ("unavailable", {"Retry-After": "1"})
+
+
+def test_who_comes_meanwhile_is_told_to_come_again(begun):
+    programs = OneAtATime("pose", longest_s=30, again_s=7)
     begun(programs)
     with pytest.raises(Problem, match="Another pose is being made") as told:
         programs.run(QUICK, {}, b"second")
@@ -47,7 +86,7 @@ def test_who_has_waited_long_enough_is_told_to_come_again(begun):
 
 
 def test_a_program_that_takes_too_long_is_given_up_and_the_next_one_runs():
-    programs = OneAtATime("pose", longest_s=3, again_s=1, patience_s=0)
+    programs = OneAtATime("pose", longest_s=3, again_s=1)
     with pytest.raises(Problem, match="not done after 3 s"):
         programs.run(HANGING, {}, b"")
     assert programs.run(QUICK, {}, b"next") == b"next"
@@ -57,7 +96,7 @@ def test_a_program_sees_no_secret_of_the_service(monkeypatch):
     secrets = ("ESC_DATABASE_URL", "ESC_WEBHOOK_SECRET", "AWS_SECRET_ACCESS_KEY")
     for name in (*secrets, "LD_LIBRARY_PATH"):
         monkeypatch.setenv(name, "x")
-    programs = OneAtATime("pose", longest_s=30, again_s=1, patience_s=0)
+    programs = OneAtATime("pose", longest_s=30, again_s=1)
     seen = json.loads(programs.run(TELLING, {"OMP_NUM_THREADS": "1"}, b""))
     assert {"PATH", "LD_LIBRARY_PATH", "OMP_NUM_THREADS"} <= seen.keys()
     assert not seen.keys() & set(secrets)

@@ -38,6 +38,18 @@ def test_what_is_neither_a_name_nor_a_network_is_no_setting(pattern):
         Settings(sources=[pattern])
 
 
+@pytest.mark.parametrize("pattern", ["10.1.0.*", "10.*", "192.168.1.1*", "10.1.0.1-*"])
+def test_a_pattern_of_part_of_an_address_is_refused_with_what_to_write_instead(pattern):
+    # It would match no address, but the name 10.1.0.evil.example.
+    with pytest.raises(ValueError, match=r"write a network such as 10\.1\.0\.0/24"):
+        Settings(sources=[pattern])
+
+
+@pytest.mark.parametrize("pattern", ["*", "cam-*", "cam7.*", "*.cams.lan", "2.cams.lan"])
+def test_a_pattern_of_names_may_have_figures(pattern):
+    assert Settings(sources=[pattern]).sources == [pattern]
+
+
 def test_user_and_password_are_told_apart_from_the_rest():
     assert without_credentials("rtsp://u:p%40ss@10.1.0.7:554/live?x=1") == (
         "rtsp://***@10.1.0.7:554/live?x=1",

@@ -8,9 +8,10 @@ from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context
 from service.intake import submit
-from service.routes.submissions import again, frames
+from service.routes.submissions import again, frames, taking
 from service.routes.submissions.taking import Sender
 from service.settings import Settings
+from service.store.jobs.submission import VenueBusy
 from service.store.jobs.task import Origin
 from service.wire.options import Options
 from service.wire.problems import Problem
@@ -107,6 +108,56 @@ def test_frames_that_are_submitted_again_are_copied_by_the_store(context, read, 
     assert old.keys() == new.keys()
     for camera, paths in new.items():
         assert [context.blobs.get(path) for path in paths] == [png()] == [context.blobs.get(old[camera][0])]
+
+
+def test_a_frame_that_is_too_large_is_refused_before_any_is_read(context, read):
+    # There is nothing to read in them.
+    files = {"left": [UploadFile(None, size=1)], "right": [UploadFile(None, size=244_000_000)]}
+    with pytest.raises(Problem) as refused:
+        taking.take(context, read, Options(), files, Sender(None, Origin()))
+    assert (refused.value.kind, refused.value.parts) == ("frame-too-large", {"camera": "right"})
+
+
+def test_frames_that_were_fetched_once_are_not_what_the_cameras_show_now(context, read, monkeypatch):
+    sources = [camera.model_copy(update={"source": f"http://127.0.0.1/{camera.id}"}) for camera in read.cameras]
+    context.venues.put(read.model_copy(update={"cameras": sources}), lambda _: None)
+    monkeypatch.setattr(context.snapshots, "take", lambda cameras, _: {camera.id: png() for camera in cameras})
+
+    def fetched(key=None):
+        return context.from_sources.calibrate("v", Options(), key, Origin())
+
+    first, _ = fetched()
+    assert fetched() == (first, False)
+    context.decisions.cancel(first.id)
+    old = context.jobs.get(first.id)
+    assert [again.submit(context, old, Origin()).status_code for _ in range(2)] == [202, 200]
+    with pytest.raises(VenueBusy):
+        fetched()
+    with pytest.raises(VenueBusy):
+        fetched("schedule-1")
+    # Once more of the same frames is the job that computes them.
+    (second, _) = context.jobs.page("v", None, None, 10)
+    assert again.submit(context, second, Origin()).status_code == 200
+
+
+def test_a_password_goes_to_the_source_that_it_was_put_with(context, read, monkeypatch):
+    def put(host):
+        sources = [camera.model_copy(update={"source": f"http://***@{host}/x"}) for camera in read.cameras]
+        passwords = {camera.id: f"user:of-{host}" for camera in read.cameras}
+        context.venues.put(read.model_copy(update={"cameras": sources}), lambda _: None, lambda *_: passwords)
+
+    put("old")
+    stale = context.venues.get("v")
+    put("new")
+    seen = []
+
+    def take(cameras, credentials):
+        seen.extend((camera.source, credentials[camera.id]) for camera in cameras)
+        return {camera.id: png() for camera in cameras}
+
+    monkeypatch.setattr(context.snapshots, "take", take)
+    frames.fetch(context, stale.id, Options(), Sender(None, Origin()))
+    assert set(seen) == {("http://***@new/x", "user:of-new")}
 
 
 def test_frames_that_are_gone_from_the_store_become_no_job(context, read, form):

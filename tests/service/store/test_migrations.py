@@ -88,7 +88,15 @@ ROWS = {
     "sessions": [{"hash": "1" * 64, "key_hash": "0" * 64, "expires_at": NOON + timedelta(days=36500)}],
     "leftovers": [{"folder": "frames/lost", "due_at": NOON}],
     "deliveries": [
-        {"id": DONE, "url": RECEIVER, "status": "waiting", "attempts": 1, "due_at": NOON, "last_error": "timed out"}
+        {
+            "id": DONE,
+            "url": RECEIVER,
+            "receiver": "example.com",
+            "status": "waiting",
+            "attempts": 1,
+            "due_at": NOON,
+            "last_error": "timed out",
+        }
     ],
     "alarms": [{"venue": VENUE.id, "rule": "not-calibrated", "camera": "", "since": NOON, "why": "No poses."}],
     "credentials": [{"venue": VENUE.id, "camera": "left", "userinfo": "user:secret"}],
@@ -172,7 +180,7 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(upgraded, revis
     health = venues.health(VENUE.id)
     assert [alarm.why for alarm in health.alarms] == ["No poses."]
     assert (health.revision, health.rejected_in_a_row, health.schedule.last_job) == (2, 0, DONE)
-    assert venues.credentials(VENUE.id) == {"left": "user:secret"}
+    assert venues.with_credentials(VENUE.id)[1] == {"left": "user:secret"}
     seen = look(stores.engine, 10)
     assert seen.tallies == {(ENDED, ("succeeded", "accepted", "")): 3}
     assert seen.venues == [VenueQuality(VENUE.id, 0.2, 2.0, NOON)]

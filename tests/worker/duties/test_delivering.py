@@ -2,6 +2,7 @@ import json
 import shutil
 import socket
 import subprocess
+import threading
 import time
 from base64 import b64decode, b64encode
 from concurrent.futures import ThreadPoolExecutor
@@ -12,12 +13,13 @@ import pytest
 import sqlalchemy as sa
 
 from service.settings import Settings
+from service.store.deliveries import AT_ONCE_PER_RECEIVER
 from service.wire.health import Alarms
 from tests.homes import in_both_homes
 from tests.worker.receiver import Dripping, Endless, NulSaying, Receiver, Silent
 from tests.worker.stock import Stock, anyway
-from worker.duties import webhook
-from worker.duties.delivering import ATTEMPT, Delivering
+from worker.duties import outgoing, webhook
+from worker.duties.delivering import AT_ONCE, ATTEMPT, Delivering
 
 SECRET, OTHER_SECRET = ("whsec_" + b64encode(bytes([n]) * 32).decode() for n in (7, 8))
 LOCAL = {"webhook_secret": SECRET, "callback_allow_http": True, "callback_allow_private": True}
@@ -72,6 +74,12 @@ def callbacks(stock, clock) -> Delivering:
     return Delivering(stock.settings, stock.deliveries, stock.jobs, clock)
 
 
+def look(sender: Delivering) -> None:
+    """Look once, and wait for what comes of it."""
+    sender.look()
+    sender.finish()
+
+
 def ended(stock, url: str, **more) -> str:
     return stock.ended("v", datetime.now(UTC), callback_url=url, **more)
 
@@ -80,7 +88,7 @@ def ended(stock, url: str, **more) -> str:
 def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
     home, hook = stock(), receiver()
     job = ended(home, hook.url)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     (told,) = hook.received
     event = json.loads(told.body)
     assert event["type"] == "job.succeeded"
@@ -90,7 +98,7 @@ def test_the_end_of_a_job_is_told_with_the_job(stock, receiver, clock):
     assert told.headers["host"] == f"127.0.0.1:{hook.port}"
     assert home.callbacks() == {"delivered": 1}
     clock.goes_on(days=2)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert len(hook.received) == 1
 
 
@@ -102,7 +110,7 @@ def test_every_end_is_told(stock, receiver, clock, how):
         ended(home, hook.url, accepted=None)
     else:
         home.decisions.cancel(home.submitted("v", callback_url=hook.url))
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert json.loads(hook.received[0].body)["type"] == how
 
 
@@ -113,11 +121,11 @@ def test_an_alarm_is_told_when_it_begins_and_when_it_is_over_and_nothing_is_left
     home.venues.put(home.venue("v").model_copy(update={"alarms": rules}), anyway)
     home.calibrated("v", accepted=False)
     duty = callbacks(home, clock)
-    duty.look()
+    look(duty)
     clock.goes_on(minutes=1)
-    duty.look()
+    look(duty)
     home.calibrated("v")
-    duty.look()
+    look(duty)
     failed, began, ended = hook.received
     assert failed.headers["webhook-id"] == began.headers["webhook-id"] != ended.headers["webhook-id"]
     event = json.loads(began.body)
@@ -164,7 +172,7 @@ def test_signatures_are_those_of_standard_webhooks():
 def test_while_a_secret_is_replaced_both_sign(stock, receiver, clock):
     home, hook = stock(webhook_secret=f"{SECRET} {OTHER_SECRET}"), receiver()
     job = ended(home, hook.url)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     (told,) = hook.received
     each = [
         webhook.headers(job, clock.now, told.body, Settings(webhook_secret=secret).webhook_keys)
@@ -184,9 +192,9 @@ def test_what_fails_is_sent_again_after_ever_longer_pauses_with_the_same_id(stoc
     sender = callbacks(home, clock)
     for pause_s in (0, 6, 33, 132):
         clock.goes_on(seconds=pause_s - 4)
-        sender.look()
+        look(sender)
         clock.goes_on(seconds=4)
-        sender.look()
+        look(sender)
     assert [told.headers["webhook-id"] for told in hook.received] == [job] * 4
     assert len({told.headers["webhook-timestamp"] for told in hook.received}) == 4
     assert len({told.body for told in hook.received}) == 1
@@ -204,13 +212,13 @@ def test_the_job_says_how_far_the_telling_has_come(stock, receiver, clock):
         "attempts": 0,
         "last_error": None,
     }
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     failed = home.jobs.get(waiting).callback
     assert (failed.state, failed.attempts) == ("waiting", 1)
     assert failed.last_error == "answered 500: no use"
     assert failed.next_attempt_at > clock.now
     clock.goes_on(seconds=6)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     told = home.jobs.get(waiting).callback
     assert (told.state, told.attempts, told.next_attempt_at) == ("delivered", 2, None)
     assert [job.callback for job in home.jobs.page(None, None, None, 10)] == [told]
@@ -221,11 +229,11 @@ def test_a_receiver_that_is_gone_is_left_alone_and_the_job_says_why(stock, recei
     home, hook = stock(), receiver(Receiver, 410)
     job = ended(home, hook.url)
     sender = callbacks(home, clock)
-    sender.look()
+    look(sender)
     end = home.jobs.get(job).callback
     assert (end.state, end.last_error, end.next_attempt_at) == ("given-up", "its receiver is gone (410)", None)
     clock.goes_on(days=1)
-    sender.look()
+    look(sender)
     assert len(hook.received) == 1
 
 
@@ -235,7 +243,7 @@ def test_after_a_day_it_is_given_up(stock, receiver, clock):
     sender, begun, last = callbacks(home, clock), clock.now, clock.now
     while home.callbacks() == {"waiting": 1}:
         before = len(hook.received)
-        sender.look()
+        look(sender)
         if len(hook.received) > before:
             last = clock.now
         clock.goes_on(minutes=10)
@@ -250,7 +258,7 @@ def test_a_receiver_may_ask_for_a_longer_pause(stock, receiver, clock):
     sender = callbacks(home, clock)
     for seconds, arrived in ((0, 1), (590, 1), (80, 2)):
         clock.goes_on(seconds=seconds)
-        sender.look()
+        look(sender)
         assert len(hook.received) == arrived
 
 
@@ -260,10 +268,10 @@ def test_a_sender_that_died_over_an_attempt_loses_nothing(stock, receiver, clock
     ended(home, hook.url)
     assert home.deliveries.attempt(clock.now, clock.now + ATTEMPT, 8)
     sender = callbacks(home, clock)
-    sender.look()
+    look(sender)
     assert hook.received == []
     clock.goes_on(seconds=ATTEMPT.total_seconds())
-    sender.look()
+    look(sender)
     assert home.callbacks() == {"delivered": 1}
 
 
@@ -289,7 +297,7 @@ def test_workers_that_look_at_once_do_not_attempt_the_same(stock, clock):
 def test_a_worker_without_a_secret_sends_nothing_unsigned(stock, receiver, clock):
     home, hook = stock(webhook_secret=None), receiver()
     ended(home, hook.url)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert (hook.received, home.callbacks()) == ([], {"waiting": 1})
 
 
@@ -297,8 +305,33 @@ def test_one_address_that_cannot_be_called_holds_up_no_other(stock, receiver, cl
     home, hook = stock(), receiver()
     for url in ("https://a..b/", "https://" + "a" * 70 + ".example/", "http://127.0.0.1:1/", hook.url):
         ended(home, url)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert home.callbacks() == {"delivered": 1, "waiting": 3}
+
+
+def test_a_receiver_that_takes_its_time_holds_up_no_other(stock, receiver, clock, monkeypatch):
+    monkeypatch.setattr(webhook, "TIMEOUT_S", 3)
+    home, slow, hook = stock(), receiver(Silent), receiver()
+    # All of them were due before.
+    names(monkeypatch, ["127.0.0.1"])
+    for _ in range(3 * AT_ONCE):
+        ended(home, f"http://slow.example:{slow.port}/")
+    ended(home, hook.url)
+    sender, begun = callbacks(home, clock), time.monotonic()
+    while not hook.received:
+        sender.look()
+        assert time.monotonic() - begun < 2
+    assert len(slow.received) <= AT_ONCE_PER_RECEIVER
+    sender.finish()
+
+
+def test_many_ends_are_told_to_one_receiver_without_pauses(stock, receiver, clock):
+    home, hook = stock(), receiver()
+    for _ in range(3 * AT_ONCE_PER_RECEIVER):
+        ended(home, hook.url)
+    sender = callbacks(home, clock)
+    while home.callbacks() != {"delivered": 3 * AT_ONCE_PER_RECEIVER}:
+        assert sender.look() == 0.0
 
 
 # Receivers that mean no good
@@ -311,7 +344,7 @@ def test_no_receiver_holds_a_sender_longer_than_the_limit(stock, receiver, clock
     home, hook = stock(), receiver(kind)
     ended(home, hook.url)
     begun = time.monotonic()
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert time.monotonic() - begun < 60
     assert (len(hook.received), home.callbacks()) == (1, {"waiting": 1})
 
@@ -319,7 +352,7 @@ def test_no_receiver_holds_a_sender_longer_than_the_limit(stock, receiver, clock
 def test_of_an_endless_answer_only_the_beginning_is_read(stock, receiver, clock):
     home, hook = stock(), receiver(Endless, 200)
     ended(home, hook.url)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert home.callbacks() == {"delivered": 1}
     assert hook.broken_off.wait(10)
 
@@ -328,7 +361,7 @@ def test_redirects_are_not_followed(stock, receiver, clock):
     home, secret_place = stock(), receiver()
     hook = receiver(Receiver, 307, headers={"Location": secret_place.url})
     ended(home, hook.url)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert (len(hook.received), secret_place.received) == (1, [])
     assert home.callbacks() == {"waiting": 1}
 
@@ -346,11 +379,25 @@ def names(monkeypatch, *answers: list[str]) -> list[str]:
     return asked
 
 
+def test_a_name_that_nobody_looks_up_holds_up_a_sender_for_seconds(stock, receiver, clock, monkeypatch):
+    monkeypatch.setattr(outgoing, "LOOK_UP_S", 0.2)
+    home, resolver = stock(), threading.Event()
+    ended(home, "http://lame.example/")
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: resolver.wait(60) and [])
+    sender, begun = callbacks(home, clock), time.monotonic()
+    look(sender)
+    resolver.set()
+    assert time.monotonic() - begun < 30
+    assert home.callbacks() == {"waiting": 1}
+    (told,) = home.jobs.page(None, None, None, 1)
+    assert told.callback.last_error == "lame.example cannot be looked up within 0.2 s"
+
+
 def test_a_name_with_any_address_inside_is_not_called(stock, receiver, clock, monkeypatch):
     home, hook = stock(callback_allow_private=False), receiver()
     ended(home, f"http://rebound.example:{hook.port}/")
     names(monkeypatch, ["93.184.216.34", "127.0.0.1"])
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert (hook.received, home.callbacks()) == ([], {"waiting": 1})
 
 
@@ -358,7 +405,7 @@ def test_the_connection_goes_to_the_address_that_was_checked(stock, receiver, cl
     home, hook = stock(), receiver()
     ended(home, f"http://rebound.example:{hook.port}/")
     asked = names(monkeypatch, ["127.0.0.1"], ["127.0.0.99"])
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert hook.received[0].headers["host"] == f"rebound.example:{hook.port}"
     assert asked == ["rebound.example"]
 
@@ -367,7 +414,7 @@ def test_an_address_that_does_not_answer_is_passed_over_for_the_next(stock, rece
     home, hook = stock(), receiver()
     ended(home, f"http://two.example:{hook.port}/")
     names(monkeypatch, ["127.0.0.99", "127.0.0.1"])
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert home.callbacks() == {"delivered": 1}
 
 
@@ -376,7 +423,7 @@ def test_proxies_of_the_environment_are_not_used(stock, receiver, clock, monkeyp
     monkeypatch.setenv("HTTP_PROXY", proxy.url)
     monkeypatch.setenv("ALL_PROXY", proxy.url)
     ended(home, hook.url)
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert (len(hook.received), proxy.received) == (1, [])
 
 
@@ -386,7 +433,7 @@ def test_the_certificate_is_checked_against_the_name(stock, receiver, clock, mon
     monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "certificate.pem"))
     names(monkeypatch, ["127.0.0.1"])
     ended(home, f"https://{name}:{hook.port}/")
-    callbacks(home, clock).look()
+    look(callbacks(home, clock))
     assert len(hook.received) == told
 
 

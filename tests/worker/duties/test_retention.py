@@ -203,3 +203,32 @@ def test_a_full_disk_does_not_wait_for_the_next_round(home, tmp_path, forgotten)
     retention.look()
     assert stock.files() == set()
     stock.engine.dispose()
+
+
+def test_poses_that_calibrations_brought_go_after_years_and_what_people_did_stays(stock, retention):
+    for _ in range(4):
+        stock.calibrated("a")
+    stock.venues.restore("a", 2, lambda _: None)
+    for _ in range(3):
+        stock.calibrated("a")
+    stock.calibrated("b")
+    in_years(stock, 4.9)
+    retention.round(datetime.now(UTC))
+    assert numbers(stock, "a") == [9, 8, 7, 6, 5, 4, 3, 2, 1]
+    in_years(stock, 0.2)
+    retention.round(datetime.now(UTC))
+    # Those that hold, those to go back to, what was put and what was put back.
+    assert numbers(stock, "a") == [9, 8, 6, 1]
+    assert numbers(stock, "b") == [2, 1]
+    # Drift goes on from where it was measured, and the last result can still be rejected.
+    assert [camera.drift_since for camera in stock.venues.history("a", None, 1)[0].cameras] == [1, 1]
+    stock.decisions.reject(stock.venues.history("a", None, 1)[0].job)
+    assert [(one.revision, one.restored_from) for one in stock.venues.history("a", None, 1)] == [(10, 8)]
+
+
+def in_years(stock, years):
+    stock.time_passes(days=365.25 * years)
+
+
+def numbers(stock, venue):
+    return [revision.revision for revision in stock.venues.history(venue, None, 100)]

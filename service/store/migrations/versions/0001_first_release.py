@@ -41,6 +41,7 @@ def _venues() -> None:
     )
     op.create_index("revisions_by_venue", "revisions", ["venue", "number"], unique=True)
     op.create_index("revisions_by_job", "revisions", ["job"])
+    op.create_index("revisions_by_time", "revisions", ["cause", "at"])
 
 
 def _jobs() -> None:
@@ -72,7 +73,10 @@ def _jobs() -> None:
         sa.Column("request_id", sa.String(64)),
         sa.Column("traceparent", sa.String(55)),
     )
-    op.create_index("jobs_by_venue", "jobs", ["venue", "id"])
+    op.create_index("jobs_by_venue", "jobs", ["venue", "id", "status", "kind"])
+    op.create_index("jobs_of_status", "jobs", ["status", "id"])
+    op.create_index("jobs_of_kind", "jobs", ["kind", "id"])
+    op.create_index("jobs_of_kind_and_status", "jobs", ["kind", "status", "id"])
     op.create_index("jobs_by_status", "jobs", ["status", "priority", "id"])
     op.create_index("jobs_by_end", "jobs", ["finished_at"])
     op.create_index("one_job_per_key", "jobs", ["venue", "idempotency_key"], unique=True)
@@ -140,6 +144,7 @@ def _beside_jobs() -> None:
         "deliveries",
         sa.Column("id", sa.String(26), primary_key=True),
         sa.Column("url", sa.String(2048), nullable=False),
+        sa.Column("receiver", sa.String(255), nullable=False),
         sa.Column("status", sa.String(16), nullable=False),
         sa.Column("attempts", sa.Integer, nullable=False),
         sa.Column("due_at", moment, nullable=False),
