@@ -70,13 +70,20 @@ class Movement:
 class CameraResult(FinishedCamera):
     """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
 
-    `view`: whether its frame could be used, and what is wrong with it if not; `iou`: see `markings_iou`.
+    `view`: whether its frame could be used, and what is wrong with it if not; `iou`: see `markings_iou`;
+    `rejected_because`: why its pose must not replace the stored one, None when it may.
     """
 
     view: ViewCondition
     iou: float
     evidence_before: Evidence
     moved: Movement
+    rejected_because: str | None = None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the gate lets its pose replace the stored one."""
+        return self.rejected_because is None
 
 
 def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> float:
@@ -106,7 +113,8 @@ def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) ->
 def believable(deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate) -> list[Deviation]:
     """Those deviations that were read off cameras which see the pitch where they expect it."""
     lost = {result.camera.id for result in results if result.evidence.agreement < gate.least_agreement}
-    return [d for d in deviations if (not lost if d.camera is None else d.camera not in lost)]
+    of_field = not lost or any(result.accepted for result in results)
+    return [d for d in deviations if (of_field if d.camera is None else d.camera not in lost)]
 
 
 def ridge_rejection(pitch: Field, gate: Gate) -> str | None:
@@ -120,34 +128,8 @@ def ridge_rejection(pitch: Field, gate: Gate) -> str | None:
     )
 
 
-def rejection(
-    results: Sequence[CameraResult],
-    in_common: Sequence[tuple[Camera, Camera]],
-    stitch_error_px: float | None,
-    gate: Gate,
-) -> str | None:
-    """Why a result must not replace the stored poses, naming each camera and what to do; None when it may.
-
-    `in_common`: the pairs of cameras whose views should register; `stitch_error_px` is None when they do not.
-    """
-    unusable = [result for result in results if not result.view.usable]
-    # Where a view cannot be used nothing was searched, and the other cameras are not to blame for where they stand.
-    reasons = [(result.camera.id, _camera_rejection(result, gate)) for result in unusable or results]
-    bad = [f"camera {name}: {reason}" for name, reason in reasons if reason is not None]
-    if bad:
-        return "; ".join(bad)
-    if in_common and stitch_error_px is None:
-        pairs = ", ".join(f"{first.id} and {second.id}" for first, second in in_common)
-        return f"the views of {pairs} should show the same markings but cannot be brought together; look at the preview"
-    if stitch_error_px is not None and stitch_error_px > gate.largest_stitch_error_px:
-        return (
-            f"the cameras do not fit each other: stitch error {stitch_error_px:.2f} px, at most "
-            f"{gate.largest_stitch_error_px} allowed; look at the preview, and check intrinsics and ridge"
-        )
-    return None
-
-
-def _camera_rejection(result: CameraResult, gate: Gate) -> str | None:
+def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
+    """Why a camera's pose must not replace the stored one whatever the others say, and what to do; None when it may."""
     if not result.view.usable:
         return result.view.words
     moved, seen = result.moved, result.evidence

@@ -7,12 +7,11 @@ import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, pair, pair_markings
 from worker.calibration.finish.uncertainty import Sigma
-from worker.calibration.judge.quality import CameraResult, Gate, Movement, markings_iou, rejection
+from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection, markings_iou
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition, ViewFigures
 
 LEFT = pair(())[0]
-PAIR = [(LEFT, LEFT)]
 
 
 def scene():
@@ -80,7 +79,7 @@ def test_a_pose_that_sees_no_pitch_explains_nothing():
 
 
 def test_a_good_result_passes_the_gate():
-    assert rejection([good(), good()], PAIR, 0.3, Gate()) is None
+    assert alone_rejection(good(), Gate()) is None
 
 
 @pytest.mark.parametrize(
@@ -101,29 +100,8 @@ def test_a_good_result_passes_the_gate():
         ({"evidence": seen(0.8), "evidence_before": seen(0.95)}, "stored pose fits the frame better"),
     ],
 )
-def test_the_gate_names_the_camera_and_the_cause(change, cause):
-    reason = rejection([replace(good(), **change)], [], None, Gate())
-    assert reason.startswith("camera left: ")
-    assert cause in reason
-
-
-def test_cameras_that_do_not_fit_each_other_do_not_pass():
-    assert "stitch error 4.00 px" in rejection([good(), good()], PAIR, 4.0, Gate())
-
-
-def test_cameras_that_should_overlap_and_cannot_be_compared_do_not_pass():
-    assert "left and left should show the same markings" in rejection([good(), good()], PAIR, None, Gate())
-    assert rejection([good(), good()], [], None, Gate()) is None
-
-
-def test_every_bad_camera_is_named():
-    left, right = (
-        replace(good(), evidence=seen(0.1)),
-        replace(good(), camera=replace(scene()[0], id="right"), residual_px=9.0),
-    )
-    reason = rejection([left, right], [], None, Gate())
-    assert "camera left: " in reason
-    assert "camera right: " in reason
+def test_the_gate_names_the_cause(change, cause):
+    assert cause in alone_rejection(replace(good(), **change), Gate())
 
 
 def test_movement_is_told_in_degrees_metres_and_pixels():
