@@ -68,11 +68,9 @@ def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None
     return None if row is None else _revision(row)
 
 
-def first_revision_at(connection: sa.Connection, venue_id: str) -> datetime:
-    """When the venue was made."""
-    at: datetime = connection.execute(
-        sa.select(r.at).where(r.venue == venue_id).order_by(r.number).limit(1)
-    ).scalar_one()
+def revision_at(connection: sa.Connection, venue_id: str, number: int) -> datetime:
+    """When a revision came; the first one with the venue."""
+    at: datetime = connection.execute(sa.select(r.at).where(r.venue == venue_id, r.number == number)).scalar_one()
     return at
 
 
@@ -88,6 +86,15 @@ def revision_of_job(connection: sa.Connection, job_id: str) -> int | None:
     """The number of the revision that a job's poses became last."""
     query = sa.select(sa.func.max(r.number)).where(r.job == job_id, r.cause.in_(TAKEN))
     number: int | None = connection.scalar(query)
+    return number
+
+
+def revision_before(connection: sa.Connection, venue_id: str, job_id: str) -> int:
+    """The number of the last revision that is not a job's, or that gave its poses back."""
+    of_job = sa.and_(sa.func.coalesce(r.job, "") == job_id, r.cause.in_(TAKEN))
+    number: int = connection.execute(
+        sa.select(sa.func.max(r.number)).where(r.venue == venue_id, sa.not_(of_job))
+    ).scalar_one()
     return number
 
 
