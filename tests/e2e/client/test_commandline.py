@@ -30,7 +30,7 @@ def test_a_wrong_venue_file_is_a_usage_error(esc, tmp_path):
     assert "cameras" in answer.stderr
 
 
-@pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3)])
+@pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3), ("partly", 3)])
 def test_the_exit_code_tells_how_a_calibration_ended(service, esc, name, behaviour, code):
     service.venue(name, behaviour)
     answer = esc("calibrate", name, *FRAMES, "--wait")
@@ -40,7 +40,9 @@ def test_the_exit_code_tells_how_a_calibration_ended(service, esc, name, behavio
     if behaviour == "fail":
         assert "It is black." in answer.stderr
     if behaviour == "reject":
-        assert "the lines do not fit" in answer.stderr
+        assert "Rejected: the lines do not fit" in answer.stderr
+    if behaviour == "partly":
+        assert "Accepted: left. Not all cameras: the lines do not fit" in answer.stderr
 
 
 def test_a_job_that_was_cancelled_is_told(service, esc, name):
