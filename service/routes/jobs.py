@@ -113,7 +113,7 @@ def accept_job(
     """
     ids = [one.id for one in job.result.cameras] if isinstance(job.result, Result) else []
     if camera is not None and ids and camera not in ids:
-        raise Problem("unknown-camera", f"Take one of {', '.join(ids)}.", camera=camera, expected=ids)
+        raise Problem("poses-not-found", f"It found those of {', '.join(ids)}.", camera=camera, expected=ids)
     cameras = None if camera is None else [camera]
     return _decided(context, job, lambda job_id: context.decisions.accept(job_id, cameras))
 

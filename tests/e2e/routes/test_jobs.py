@@ -68,7 +68,7 @@ def test_a_camera_that_was_rejected_is_accepted_by_hand(service, name):
     stored = service.http.get(f"/venues/{name}").json()["cameras"]
     assert [camera["pose"] for camera in stored] == [camera["pose"] for camera in job["result"]["cameras"]]
     nobody = service.http.post(f"/jobs/{job['id']}/accept", params={"camera": "nobody"})
-    assert (nobody.status_code, nobody.json()["type"]) == (422, "/problems/unknown-camera")
+    assert (nobody.status_code, nobody.json()["type"]) == (404, "/problems/poses-not-found")
     assert nobody.json()["expected"] == ["left", "right"]
 
 
