@@ -158,11 +158,6 @@ class Settled:
     loss: float
     generations: int
 
-    @property
-    def cameras(self) -> list[Camera]:
-        """Where they stand."""
-        return [result.camera for result in self.results]
-
 
 def settle(here: Situation) -> Settled:
     """Search for all cameras that can be seen from their stored poses, and finish; see the module."""
@@ -172,7 +167,8 @@ def settle(here: Situation) -> Settled:
     begun = list(here.cameras)
     for n, camera in zip(together, found.cameras, strict=True):
         begun[n] = camera
-    alone = {n: _left(here.of([n])) for n in range(len(begun)) if n not in together}
+    everyone = range(len(begun))
+    alone = {n: _left(here.of([n])) for n in everyone if n not in together}
     results = {n: attempt.result for n, attempt in alone.items()}
     finished = Finished(here.pitch, [], [], [])
     while together:
@@ -190,16 +186,9 @@ def settle(here: Situation) -> Settled:
             if tried_before or not alone[n].result.accepted:
                 together = [other for other in together if other != n]
                 results[n] = alone[n].result
-    apart = [alone[n] for n in range(len(begun)) if n not in together]
-    return Settled(
-        finished.pitch,
-        begun,
-        [results[n] for n in range(len(begun))],
-        together,
-        _deviations(finished, [attempt.finished for attempt in apart]),
-        found.loss,
-        found.generations,
-    )
+    deviations = _deviations(finished, [alone[n].finished for n in everyone if n not in together])
+    in_order = [results[n] for n in everyone]
+    return Settled(finished.pitch, begun, in_order, together, deviations, found.loss, found.generations)
 
 
 def settle_without(out: Collection[int], here: Situation, settled: Settled) -> Settled:
