@@ -69,8 +69,9 @@ def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None
 
 
 def revision_at(connection: sa.Connection, venue_id: str, number: int) -> datetime:
-    """When a revision came; the first one with the venue."""
-    at: datetime = connection.execute(sa.select(r.at).where(r.venue == venue_id, r.number == number)).scalar_one()
+    """When a revision came, or the oldest after it that is kept; the first one came with the venue."""
+    query = sa.select(r.at).where(r.venue == venue_id, r.number >= number).order_by(r.number).limit(1)
+    at: datetime = connection.execute(query).scalar_one()
     return at
 
 
