@@ -13,10 +13,13 @@ from tests.worker.calibration.see.spoiling import fogged
 from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
 from tests.worker.calibration.test_sports import field
+from worker.calibration import calibrate as engine
 from worker.calibration.calibrate import calibrate
+from worker.calibration.judge.pairs import Pair
 from worker.calibration.records import Calibration, Options
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
+from worker.calibration.settle import Situation
 
 Pictures = dict[str, NDArray[np.uint8]]
 
@@ -108,3 +111,26 @@ def test_two_good_cameras_of_four_are_accepted_whatever_the_others_see() -> None
     assert verdicts(found) == {"sw": True, "se": False, "nw": False, "ne": True}
     off = off_m(found, court())
     assert max(off["sw"], off["ne"]) < 0.02
+
+
+def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeypatch) -> None:
+    finished = []
+
+    def contradicted(_, cameras) -> list[Pair]:
+        agree, disagree = Pair("west", "middle", 0.1, True, True), Pair("middle", "east", 4.0, True, False)
+        return [pair for pair in (agree, disagree) if {*pair.cameras} <= {one.camera.id for one in cameras}]
+
+    def finishing(here, begun):
+        finished.append([camera.id for camera in begun])
+        return finish(here, begun)
+
+    finish = Situation.finished
+    monkeypatch.setattr(Situation, "finished", finishing)
+    monkeypatch.setattr(engine, "compared", contradicted)
+    found = run(mast)
+    assert verdicts(found) == {"west": True, "middle": True, "east": False}
+    assert finished == [["west", "middle", "east"], ["west", "middle"]]
+    assert found.rejected_because.startswith("camera east: the cameras middle and east do not fit each other")
+    assert found.stitch_error_px == 0.1
+    off = off_m(found, mast())
+    assert max(off["west"], off["middle"]) < 0.03
