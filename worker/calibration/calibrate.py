@@ -54,11 +54,11 @@ def calibrate(
     with journey.measuring("quality"):
         evidence_before = [one.evidence_before for one in answer.cameras]
         stored = [Seeing(*each) for each in zip(cameras, seen.sight.responses, evidence_before, strict=True)]
-        stitch_before = stitch_error_px(compared(pitch, [stored[n] for n in _comparable(answer.cameras)]))
+        before = compared(pitch, [stored[n] for n in _comparable(answer.cameras)])
         journey.at("refinement", 1.0)
     return Calibration(
         **vars(answer),
-        stitch_error_before_px=stitch_before,
+        stitch_error_before_px=stitch_error_px(before, Gate()),
         loss=settled.loss,
         generations=settled.generations,
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
@@ -108,7 +108,7 @@ def judge(pitch: Field, results: Sequence[CameraResult], sight: Sight, journey: 
         of_pairs = "; ".join(one.pair.words(gate) for one in against if result.camera.id in one.blamed)
         judged.append(replace(result, rejected_because=result.rejected_because or of_pairs or ridge))
     held = {result.camera.id for result in judged if result.accepted}
-    stitch = stitch_error_px([pair for pair in pairs if not held or held.issuperset(pair.cameras)])
+    stitch = stitch_error_px([pair for pair in pairs if not held or held.issuperset(pair.cameras)], gate)
     return Answer(pitch, judged, "; ".join(reasons) or None, stitch, journey.seconds)
 
 

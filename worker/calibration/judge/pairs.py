@@ -104,13 +104,6 @@ def _both_see(first: Evidence, second: Evidence) -> bool:
     return len(a) > 0 and float(np.mean(first.found[a] & second.found[b])) >= MOST
 
 
-def stitch_error_px(pairs: Sequence[Pair]) -> float | None:
-    """The worst disagreement of pairs that can be compared; None if none can, or if one cannot that should be."""
-    if any(pair.missed for pair in pairs):
-        return None
-    return max((pair.error_px for pair in pairs if pair.error_px is not None), default=None)
-
-
 def contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction]:
     """Who is to blame for pairs that disagree: whoever agrees with nobody, or else both.
 
@@ -123,3 +116,14 @@ def contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction]:
         if pair.disagrees(gate) and (loose or (pair.plenty and pair.error_px is not None)):
             found.append(Contradiction(pair, loose or pair.cameras))
     return found
+
+
+def stitch_error_px(pairs: Sequence[Pair], gate: Gate) -> float | None:
+    """The worst disagreement of pairs that confirm or contradict each other.
+
+    None if none does, or if one cannot be brought together that should be.
+    """
+    telling = [pair for pair in pairs if pair.agrees(gate)] + [one.pair for one in contradictions(pairs, gate)]
+    if any(pair.missed for pair in telling):
+        return None
+    return max((pair.error_px for pair in telling if pair.error_px is not None), default=None)

@@ -68,10 +68,15 @@ def test_a_contradiction_is_told_with_both_names_and_with_whose_fault_it_is() ->
 
 
 def test_the_stitch_error_is_that_of_the_worst_pair_that_can_be_compared() -> None:
-    assert stitch_error_px([pair("ab", 0.2), pair("bc", 0.4), pair("ac", None, plenty=False)]) == 0.4
-    assert stitch_error_px([pair("ab", 0.2), pair("bc", None)]) is None
-    assert stitch_error_px([pair("ab", None, plenty=False)]) is None
-    assert stitch_error_px([]) is None
+    assert stitch_error_px([pair("ab", 0.2), pair("bc", 0.4), pair("ac", None, plenty=False)], GATE) == 0.4
+    assert stitch_error_px([pair("ab", 4.0)], GATE) == 4.0
+    assert stitch_error_px([pair("ab", 0.2), pair("bc", None)], GATE) is None
+    assert stitch_error_px([pair("ab", None, plenty=False)], GATE) is None
+    assert stitch_error_px([], GATE) is None
+
+
+def test_two_that_others_hold_and_that_share_little_have_no_say_in_the_stitch_error() -> None:
+    assert stitch_error_px([pair("ab", 0.2), pair("bc", 0.3), pair("ac", 2.0, plenty=False)], GATE) == 0.3
 
 
 def test_of_three_in_a_row_the_neighbours_are_compared() -> None:
@@ -83,7 +88,7 @@ def test_of_three_in_a_row_the_neighbours_are_compared() -> None:
     assert max(one.error_px or 0.0 for one in agreeing) < 0.3
     apart = [*row[:2], moved(row[2], by=(0.2, 0.0, 0.0))]
     disagreeing = compared(PITCH, [seeing(*each) for each in zip(apart, masks, strict=True)])
-    assert stitch_error_px(disagreeing) == pytest.approx(2.0, abs=0.4)
+    assert stitch_error_px(disagreeing, GATE) == pytest.approx(2.0, abs=0.4)
 
 
 def test_what_two_cameras_share_confirms_them_where_both_find_most_of_it() -> None:
