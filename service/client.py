@@ -192,9 +192,10 @@ class AsyncClient:
         """End a job."""
         return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/cancel"))
 
-    async def accept(self, job_id: str) -> Job:
-        """Let the poses that a calibration found hold, whatever the gate said."""
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/accept"))
+    async def accept(self, job_id: str, camera: str | None = None) -> Job:
+        """Let the poses that a calibration found hold, of one camera or all, whatever the gate said."""
+        params = {"camera": camera} if camera else {}
+        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/accept", params=params))
 
     async def reject(self, job_id: str) -> Job:
         """Put back what was before the poses of a calibration."""

@@ -11,7 +11,7 @@ from opentelemetry.trace import Span, SpanKind, StatusCode
 
 from service.observe import tracing
 from service.store.jobs.task import Task
-from service.wire.results import IntrinsicsResult
+from service.wire.results import IntrinsicsResult, Result
 from worker.message import Message
 
 # Before a job's program says how far it is: it starts, fetches and decodes the frames.
@@ -66,6 +66,8 @@ class Spans:
             self._whole.set_attribute("esc.outcome", "taken away")
         elif isinstance(last.result, IntrinsicsResult):
             self._whole.set_attribute("esc.outcome", "succeeded")
+        elif isinstance(last.result, Result):
+            self._whole.set_attribute("esc.outcome", last.result.verdict)
         elif last.result is not None:
             self._whole.set_attribute("esc.outcome", "accepted" if last.result.accepted else "rejected")
         elif last.error is not None:

@@ -50,7 +50,7 @@ def calibrate(
 ) -> None:
     """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the gate, 75 busy or away.
 
-    Without frames the service fetches them from the sources of the cameras.
+    3 as well where only some cameras are accepted. Without frames the service fetches them from the cameras' sources.
     """
     files, chosen = files_of(frames or []), options_of(options)
     with Client(url, api_key) as client:

@@ -116,10 +116,10 @@ def job_poses(
 
 
 @app.command("accept")
-def accept_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def accept_job(job: JobId, camera: OneCamera = None, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Let the poses of a job hold that the gate rejected, or that was a dry run."""
     with Client(url, api_key) as client:
-        say(client.accept(job))
+        say(client.accept(job, camera))
 
 
 @app.command("reject")

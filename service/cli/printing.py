@@ -81,7 +81,10 @@ def gate(result: Result) -> int:
     """The exit code for what a calibration found."""
     if result.accepted:
         return ACCEPTED
-    err.print(f"Rejected: {result.rejected_because}")
+    if result.verdict == "partly":
+        err.print(f"Accepted: {', '.join(result.accepted_cameras)}. Not all cameras: {result.rejected_because}")
+    else:
+        err.print(f"Rejected: {result.rejected_because}")
     return REJECTED
 
 

@@ -99,6 +99,7 @@ def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
     return {
         "at": [end.finished_at.timestamp() for end in ends],
         "job": [end.job for end in ends],
+        "verdict": [end.verdict for end in ends],
         "accepted": [end.accepted for end in ends],
         "stitch_error_px": [end.stitch_error_px for end in ends],
         "stitch_error_limit_px": next((end.stitch_error_limit_px for end in reversed(ends)), None),

@@ -27,6 +27,7 @@ from service.store.revisions import RevisionUnfit
 from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
 from service.wire.job import OPEN, Job, Jobs, Kind, Status
 from service.wire.problems import Problem
+from service.wire.results import Result
 
 log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
@@ -123,12 +124,20 @@ def delete_job(job: Existing, context: InContext) -> None:
 
 
 @router.post("/{job_id}/accept", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))
-def accept_job(job: Existing, context: InContext) -> Response:
+def accept_job(
+    job: Existing,
+    context: InContext,
+    camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None,
+) -> Response:
     """Let the poses of a calibration hold that the gate rejected, or that was a dry run. Nothing changes if they do.
 
-    Only while the venue is as the calibration found it.
+    Only while the venue is as the calibration found or left it.
     """
-    return _decided(context, job, context.decisions.accept)
+    ids = [one.id for one in job.result.cameras] if isinstance(job.result, Result) else []
+    if camera is not None and ids and camera not in ids:
+        raise Problem("poses-not-found", f"It found those of {', '.join(ids)}.", camera=camera, expected=ids)
+    cameras = None if camera is None else [camera]
+    return _decided(context, job, lambda job_id: context.decisions.accept(job_id, cameras))
 
 
 @router.post("/{job_id}/reject", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))

@@ -5,6 +5,7 @@ They are looked at in each transaction that can make one begin or end; that a ti
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -12,16 +13,18 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.counts import tallies
+from service.store.counts.courses import Course, courses_of
 from service.store.counts.figures import note
 from service.store.deliveries import add_alarm_delivery
 from service.store.engine import clock
-from service.store.revisions import TAKEN, first_revision_at, newest_revision
+from service.store.revisions import TAKEN, newest_revision, revision_at
 from service.store.schedules import schedule_of
-from service.wire.health import Alarm, AlarmEvent, AlarmRule, Alarms, VenueAlarm, VenueHealth
+from service.wire.health import Alarm, AlarmEvent, AlarmRule, Alarms, CameraHealth, VenueAlarm, VenueHealth
 from service.wire.history import Revision, RevisionCamera
 from service.wire.venue import Venue
 
 BEGUN = "alarms_begun"
+MINUTE = "%Y-%m-%d %H:%M"
 # Rule and camera, which is empty where the alarm is of the whole venue.
 Key = tuple[AlarmRule, str]
 a = tables.alarms.c
@@ -60,11 +63,12 @@ def health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
         return None
     quality = connection.execute(sa.select(tables.venue_quality).where(q.venue == venue_id)).one_or_none()
     alarms = alarms_of(connection, venue_id)
+    courses = courses_of(connection, venue_id)
     return VenueHealth(
         state="alarm" if alarms else "ok",
         alarms=alarms,
         revision=newest.revision,
-        cameras=newest.cameras,
+        cameras=[_doing(camera, courses.get(camera.id, Course())) for camera in newest.cameras],
         stitch_error_px=quality.stitch_error_px if quality else None,
         accepted_at=quality.accepted_at if quality else None,
         rejected_in_a_row=quality.rejected_in_a_row if quality else 0,
@@ -72,24 +76,63 @@ def health_of(connection: sa.Connection, venue_id: str) -> VenueHealth | None:
     )
 
 
+def _doing(camera: RevisionCamera, course: Course) -> CameraHealth:
+    return CameraHealth(**dict(camera), accepted_at=course.accepted_at, rejected_in_a_row=course.rejected_in_a_row)
+
+
 def _rings(connection: sa.Connection, venue: Venue, now: datetime) -> tuple[dict[Key, str], datetime | None]:
-    """What rings now and why, and when to look again if nothing happens before."""
-    rules, newest = venue.alarms, newest_revision(connection, venue.id)
-    if rules is None or newest is None:
+    """What rings now and why, and when to look again if nothing happens before.
+
+    What is so of the whole venue rings once, and not for each of its cameras.
+    """
+    newest = newest_revision(connection, venue.id)
+    if venue.alarms is None or newest is None:
         return {}, None
     quality = connection.execute(sa.select(tables.venue_quality).where(q.venue == venue.id)).one_or_none()
-    rings = _moved(rules, newest)
-    rejected = quality.rejected_in_a_row if quality else 0
-    if rules.rejected_in_a_row is not None and rejected >= rules.rejected_in_a_row:
-        rings["rejected-in-a-row", ""] = f"The last {rejected} calibrations were rejected or failed."
-    if rules.not_calibrated_for_h is None:
-        return rings, None
-    last = (quality.accepted_at if quality else None) or first_revision_at(connection, venue.id)
-    due_at = last + timedelta(hours=rules.not_calibrated_for_h)
-    if now < due_at:
-        return rings, due_at
-    rings["not-calibrated", ""] = f"No poses were accepted since {last:%Y-%m-%d %H:%M} UTC."
-    return rings, None
+    known = courses_of(connection, venue.id)
+    courses = {camera.id: known.get(camera.id, Course()) for camera in newest.cameras}
+    overdue, due_at = _overdue(connection, venue, newest, quality, courses, now)
+    return _moved(venue.alarms, newest) | _rejected(venue.alarms, quality, courses) | overdue, due_at
+
+
+def _rejected(rules: Alarms, quality: Any, courses: Mapping[str, Course]) -> dict[Key, str]:
+    limit = rules.rejected_in_a_row
+    if limit is None or quality is None:
+        return {}
+    if quality.rejected_in_a_row >= limit:
+        why = f"The last {quality.rejected_in_a_row} calibrations were rejected or failed."
+        return {("rejected-in-a-row", ""): why}
+    return {
+        ("rejected-in-a-row", camera): f"The last {count} calibrations brought no pose of camera {camera}."
+        for camera, course in courses.items()
+        if (count := course.rejected_in_a_row) >= limit
+    }
+
+
+def _overdue(
+    connection: sa.Connection,
+    venue: Venue,
+    newest: Revision,
+    quality: Any,
+    courses: Mapping[str, Course],
+    now: datetime,
+) -> tuple[dict[Key, str], datetime | None]:
+    if venue.alarms is None or venue.alarms.not_calibrated_for_h is None:
+        return {}, None
+    patience = timedelta(hours=venue.alarms.not_calibrated_for_h)
+    last = (quality.accepted_at if quality else None) or revision_at(connection, venue.id, 1)
+    if last + patience <= now:
+        return {("not-calibrated", ""): f"No poses were accepted since {last:{MINUTE}} UTC."}, None
+    since = {
+        camera.id: courses[camera.id].accepted_at or revision_at(connection, venue.id, camera.drift_since)
+        for camera in newest.cameras
+    }
+    rings: dict[Key, str] = {
+        ("not-calibrated", camera): f"No pose of camera {camera} was accepted since {at:{MINUTE}} UTC."
+        for camera, at in since.items()
+        if at + patience <= now
+    }
+    return rings, min(at + patience for at in (last, *since.values()) if at + patience > now)
 
 
 def _moved(rules: Alarms, newest: Revision) -> dict[Key, str]:

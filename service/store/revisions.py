@@ -69,11 +69,10 @@ def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None
     return None if row is None else _revision(row)
 
 
-def first_revision_at(connection: sa.Connection, venue_id: str) -> datetime:
-    """When the venue was made."""
-    at: datetime = connection.execute(
-        sa.select(r.at).where(r.venue == venue_id).order_by(r.number).limit(1)
-    ).scalar_one()
+def revision_at(connection: sa.Connection, venue_id: str, number: int) -> datetime:
+    """When a revision came, or the oldest after it that is kept; the first one came with the venue."""
+    query = sa.select(r.at).where(r.venue == venue_id, r.number >= number).order_by(r.number).limit(1)
+    at: datetime = connection.execute(query).scalar_one()
     return at
 
 
@@ -99,6 +98,15 @@ def revisions_of_jobs(connection: sa.Connection, job_ids: Collection[str]) -> di
     newest = sa.func.max(r.number).label("newest")
     query = sa.select(r.job, newest).where(r.job.in_(job_ids), r.cause.in_(TAKEN)).group_by(r.job)
     return {row.job: row.newest for row in connection.execute(query)}
+
+
+def revision_before(connection: sa.Connection, venue_id: str, job_id: str) -> int:
+    """The number of the last revision that is not a job's, or that gave its poses back."""
+    of_job = sa.and_(sa.func.coalesce(r.job, "") == job_id, r.cause.in_(TAKEN))
+    number: int = connection.execute(
+        sa.select(sa.func.max(r.number)).where(r.venue == venue_id, sa.not_(of_job))
+    ).scalar_one()
+    return number
 
 
 def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venue, Revision]:

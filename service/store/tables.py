@@ -181,10 +181,10 @@ venue_quality = sa.Table(
     sa.Column("accepted_at", Instant),
     # Of the camera that is furthest from where it was put.
     sa.Column("drift_px", sa.Double),
-    # Calibrations since the last accepted one that were not, nor dry runs.
+    # Calibrations since then that brought no pose for any camera; dry runs do not count.
     sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
-    # By camera: what the frames of the last accepted calibration were like.
-    sa.Column("views", sa.JSON(none_as_null=True)),
+    # counts.courses.Course by camera.
+    sa.Column("cameras", sa.JSON(none_as_null=True)),
     # When an alarm rings if nothing happens before.
     sa.Column("alarm_due_at", Instant),
     sa.Index("venues_by_stitch_error", "stitch_error_px"),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import sqlalchemy as sa
 
 from service.store import tables
 from service.store.alarms import health_of, settle_alarms
+from service.store.counts.courses import note_held
 from service.store.counts.figures import note
 from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.revisions import add_revision, revisions_of, state_at
@@ -153,18 +154,24 @@ def save_venue(connection: sa.Connection, venue: Venue) -> None:
         connection.execute(sa.insert(table).values(id=venue.id, **values))
 
 
-def let_hold(connection: sa.Connection, venue: Venue, result: Result, cause: Cause, job_id: str) -> None:
-    """Let a venue be as a calibration found it, inside the caller's serialised transaction."""
-    found = with_result(venue, result)
+def let_hold(
+    connection: sa.Connection, venue: Venue, result: Result, cameras: Collection[str], cause: Cause, job_id: str
+) -> None:
+    """Let some cameras of a venue be as a calibration found them, inside the caller's serialised transaction."""
+    found = with_result(venue, result, cameras)
     save_venue(connection, found)
+    note_held(connection, venue.id, result, cameras, clock(connection))
     add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
     settle_alarms(connection, found)
 
 
-def with_result(venue: Venue, result: Result) -> Venue:
-    """The same venue as an accepted calibration found it: poses, and the lenses and the ridge they belong to."""
-    found = {camera.id: camera for camera in result.cameras}
-    cameras = [
+def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = None) -> Venue:
+    """The same venue as a calibration found it: poses, and the lenses and the ridge they belong to.
+
+    `cameras`: only those are as it found them; None: all.
+    """
+    found = {camera.id: camera for camera in result.cameras if cameras is None or camera.id in cameras}
+    standing = [
         camera.model_copy(
             update={"pose": found[camera.id].pose, "intrinsics": found[camera.id].intrinsics or camera.intrinsics}
         )
@@ -173,7 +180,7 @@ def with_result(venue: Venue, result: Result) -> Venue:
         for camera in venue.cameras
     ]
     field = venue.field if result.ridge is None else venue.field.model_copy(update={"ridge": result.ridge})
-    return venue.model_copy(update={"cameras": cameras, "field": field})
+    return venue.model_copy(update={"cameras": standing, "field": field})
 
 
 def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job: str | None = None) -> Venue:

@@ -32,10 +32,10 @@ class Alarms(Wire):
         None, description="A camera's picture is further than this from where the camera was put."
     )
     rejected_in_a_row: Annotated[Whole, Field(ge=1, le=1000)] | None = Field(
-        None, description="So many calibrations one after the other are rejected or fail."
+        None, description="So many calibrations one after the other fail, or bring no pose of a camera or of any."
     )
     not_calibrated_for_h: Annotated[Number, Field(gt=0, le=10000)] | None = Field(
-        None, description="No poses are accepted for so many hours."
+        None, description="No pose is accepted for so many hours, of a camera or of any."
     )
     callback_url: CallbackUrl | None = Field(
         None, description="Told when an alarm begins and when it is over, signed (Standard Webhooks)."
@@ -54,16 +54,23 @@ class Alarm(Wire):
     why: str
 
 
+class CameraHealth(RevisionCamera):
+    """Where a camera stands, and how its calibrations went."""
+
+    accepted_at: datetime | None = Field(description="When its pose was last accepted.")
+    rejected_in_a_row: int = Field(description="Calibrations since then that failed or did not bring its pose.")
+
+
 class VenueHealth(Wire):
     """How a venue is doing. `state` is `alarm` while one of its alarms rings."""
 
     state: Literal["ok", "alarm"]
     alarms: list[Alarm]
     revision: int = Field(description="The one that holds.")
-    cameras: list[RevisionCamera] = Field(description="Where they stand, and how far that is from where they were put.")
+    cameras: list[CameraHealth] = Field(description="Where they stand, and how far that is from where they were put.")
     stitch_error_px: float | None = Field(description="Of the poses that hold, by the last result.")
-    accepted_at: datetime | None = Field(description="When poses were last accepted.")
-    rejected_in_a_row: int = Field(description="Calibrations that were rejected or failed since then.")
+    accepted_at: datetime | None = Field(description="When poses were last accepted, of any camera.")
+    rejected_in_a_row: int = Field(description="Calibrations since then that failed or brought no pose at all.")
     schedule: ScheduleState | None = None
 
 

@@ -41,6 +41,8 @@ class CameraResult(Wire):
     """One camera's answer."""
 
     id: Id
+    accepted: bool = Field(description="Whether the gate lets its pose replace the stored one.")
+    rejected_because: str | None
     pose: Pose
     intrinsics: Intrinsics | None = Field(None, description="With fit_focal_length: those the pose belongs to.")
     sigma: Sigma | None
@@ -79,11 +81,15 @@ class Suspicion(Wire):
     detail: str
 
 
+Verdict = Literal["accepted", "partly", "rejected"]
+
+
 class Result(Wire):
     """Poses and what they are worth. Stitch errors: 1 px is 10 cm on the pitch; one camera has none."""
 
-    accepted: bool
-    rejected_because: str | None
+    verdict: Verdict = Field(description="Whether the poses of all cameras are accepted, of some or of none.")
+    accepted: bool = Field(description="Whether those of all cameras are.")
+    rejected_because: str | None = Field(description="All reasons, with the cameras they are about.")
     cameras: list[CameraResult]
     ridge: list[Row] | None = Field(None, description="With fit_ridge: as it was found.")
     diagnosis: list[Suspicion] = Field([], description="What the lines say is wrong with what the venue says.")
@@ -94,6 +100,21 @@ class Result(Wire):
     generations: int
     timings_s: dict[str, float]
     provenance: Provenance
+
+    @property
+    def accepted_cameras(self) -> list[str]:
+        """Those whose poses may replace the stored ones."""
+        return [camera.id for camera in self.cameras if camera.accepted]
+
+    def refused(self, because: str) -> Result:
+        """The same result of which no pose is to hold, for a reason beside those of the gate."""
+        cameras = [
+            camera.model_copy(update={"accepted": False, "rejected_because": camera.rejected_because or because})
+            for camera in self.cameras
+        ]
+        reasons = [because] if self.rejected_because is None else [self.rejected_because, because]
+        told = {"verdict": "rejected", "accepted": False, "rejected_because": "; ".join(reasons), "cameras": cameras}
+        return self.model_copy(update=told)
 
 
 class PhotoResult(Wire):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -12,6 +12,11 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Pose, PosedCamera, PoseIn, UnposedCamera
 from service.wire.health import Alarms
 from service.wire.schedule import Schedule
+
+Accept = Annotated[
+    Literal["each", "all"],
+    Field(description="Of a calibration: `each` pose that passes the gate, or `all` of them if all do and else none."),
+]
 
 
 class CameraIn(UnposedCamera):
@@ -95,6 +100,7 @@ class VenueIn(_Place):
     model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
 
     cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
+    accept: Accept = "each"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
 
@@ -131,6 +137,7 @@ class Venue(_Place):
     """A venue with the poses that hold now."""
 
     cameras: list[Camera]
+    accept: Accept = "each"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
 

@@ -125,7 +125,16 @@ def result() -> Message:
     pose = Pose.at([1.6123456789, 0.1123456789, -0.2123456789], [-1.0123456789, -50.0123456789, 8.0123456789])
     moved = Moved(rotation_deg=0.8123456789, position_m=0.1123456789, pixels=22.0123456789)
     cameras = [
-        CameraResult(id=camera, pose=pose, sigma=None, moved=moved, iou=0.9712345678, residual_px=1.2123456789)
+        CameraResult(
+            id=camera,
+            accepted=True,
+            rejected_because=None,
+            pose=pose,
+            sigma=None,
+            moved=moved,
+            iou=0.9712345678,
+            residual_px=1.2123456789,
+        )
         for camera in CAMERAS
     ]
     stages = ("decode", "segmentation", "evolution", "refinement", "quality", "preview")
@@ -133,6 +142,7 @@ def result() -> Message:
         software="0.1.0", model_sha256="f" * 64, seed=7, options=Options(seed=7).model_dump(exclude={"callback_url"})
     )
     found = Result(
+        verdict="accepted",
         accepted=True,
         rejected_because=None,
         cameras=cameras,

@@ -74,6 +74,21 @@ def test_a_rejected_result_is_accepted_by_hand(stub, ended, visit):
     assert stub.http.get("/venues/poor").json()["cameras"][0]["pose"]["position"][0] == -0.875
 
 
+def test_a_result_that_is_accepted_in_part_says_of_which_camera_and_the_rest_can_be_taken(stub, visit):
+    job = stub.calibrated(stub.venue("part", "partly"))
+    page = visit(stub.url, "/ui/venues/part")
+    expect(page.locator(".verdict-big")).to_have_text(re.compile("Partly accepted"))
+    expect(page.get_by_text("Those that were accepted hold now")).to_be_visible()
+    left, right = (page.get_by_role("article", name=camera) for camera in ("left", "right"))
+    expect(left.locator(".badge")).to_have_text("Accepted")
+    expect(right.locator(".badge")).to_have_text("Rejected")
+    expect(right.get_by_text("the lines do not fit")).to_be_visible()
+    assert stub.http.get("/venues/part").json()["cameras"][1]["pose"] != job["result"]["cameras"][1]["pose"]
+    right.get_by_role("button", name="Accept right anyway").click()
+    expect(page.get_by_text("as revision 3")).to_be_visible()
+    assert stub.http.get("/venues/part").json()["cameras"][1]["pose"] == job["result"]["cameras"][1]["pose"]
+
+
 def test_the_chart_has_the_results_the_movements_and_the_line_of_the_gate(stub, years, visit):
     page = visit(stub.url, "/ui/venues/years")
     chart = page.locator("#chart canvas")

@@ -47,6 +47,8 @@ def submission(name, content="c"):
 def found():
     moved = CameraResult(
         id="left",
+        accepted=True,
+        rejected_because=None,
         pose=Pose.at([1.6, 0.1, -0.2], SHIFTED),
         sigma=None,
         moved=Moved(rotation_deg=0, position_m=1, pixels=None),
@@ -54,6 +56,7 @@ def found():
         residual_px=None,
     )
     return Result(
+        verdict="accepted",
         accepted=True,
         rejected_because=None,
         cameras=[moved],

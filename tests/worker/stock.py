@@ -1,5 +1,6 @@
 """A home on a real database with real files, filled with jobs that ended when a test says."""
 
+from collections.abc import Collection
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -58,7 +59,7 @@ class Stock(Stores):
             connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job_id).values(finished_at=at))
         return job_id
 
-    def calibrated(self, venue_id: str, *, accepted: bool = True, **options) -> str:
+    def calibrated(self, venue_id: str, *, accepted: bool | Collection[str] = True, **options) -> str:
         """A job that has just ended."""
         job_id = self.submitted(venue_id, **options)
         task = self.attempts.begin(job_id)
@@ -117,11 +118,14 @@ def anyway(_: object) -> None:
     """Allow it."""
 
 
-def result(of: Venue, accepted: bool) -> Result:
-    """A calibration that moved every camera by a millimetre."""
+def result(of: Venue, accepted: bool | Collection[str]) -> Result:
+    """A calibration that moved every camera by a millimetre; `accepted`: all cameras, none, or these."""
+    good = accepted if isinstance(accepted, Collection) else [camera.id for camera in of.cameras if accepted]
     cameras = [
         CameraResult(
             id=camera.id,
+            accepted=camera.id in good,
+            rejected_because=None if camera.id in good else "the lines do not fit",
             pose=Pose.at(camera.pose.rotation, [camera.pose.position[0] + 0.001, *camera.pose.position[1:]]),
             sigma=None,
             moved=Moved(rotation_deg=0, position_m=0.001, pixels=1.0),
@@ -130,9 +134,11 @@ def result(of: Venue, accepted: bool) -> Result:
         )
         for camera in of.cameras
     ]
+    everyone = len(good) == len(cameras)
     return Result(
-        accepted=accepted,
-        rejected_because=None if accepted else "the lines do not fit",
+        verdict="accepted" if everyone else "partly" if good else "rejected",
+        accepted=everyone,
+        rejected_because=None if everyone else "the lines do not fit",
         cameras=cameras,
         stitch_error_px=0.2,
         stitch_error_before_px=10.0,

@@ -19,6 +19,7 @@ from worker.calibration.see.segmentation import Region
 
 Preset = Literal["esc", "paper", "scpr"]
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
+Verdict = Literal["accepted", "partly", "rejected"]
 
 SHARE_OF_JOB = {"segmentation": (0.0, 0.65), "evolution": (0.65, 0.85), "refinement": (0.85, 0.92)}
 """Where on the way of a whole job each stage begins and ends; the pictures are the rest."""
@@ -61,7 +62,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the engine says of cameras around a pitch. `rejected_because`: None when accepted.
+    """What the engine says of cameras around a pitch. `rejected_because`: all reasons in a sentence, None without any.
 
     `pitch`: the given one but for what of it was to be found; `timings_s`: of each stage.
     """
@@ -74,8 +75,14 @@ class Answer:
 
     @property
     def accepted(self) -> bool:
-        """Whether the gate lets what was found replace what is stored."""
+        """Whether the gate lets all that was found replace what is stored."""
         return self.rejected_because is None
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether it lets the poses of all cameras, of some or of none."""
+        accepted = [camera.accepted for camera in self.cameras]
+        return "accepted" if all(accepted) else "partly" if any(accepted) else "rejected"
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def solve(
             given.pitch, given.cameras, given.frames, given.network, asked, step, usual=usual
         ),
         draw,
-        lambda found, timings_s, provenance: _result(found, options, timings_s, provenance),
+        lambda found, timings_s, provenance: _allowed(venue, options, _result(found, options, timings_s, provenance)),
     )
 
 
@@ -57,6 +57,7 @@ def _result(
 ) -> Result:
     ridge = found.pitch.ridge
     return Result(
+        verdict=found.verdict,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
         cameras=[
@@ -73,3 +74,14 @@ def _result(
         timings_s=dict(timings_s),
         provenance=provenance,
     )
+
+
+def _allowed(venue: Venue, options: Options, result: Result) -> Result:
+    """What of it may hold: poses that belong together only together."""
+    if result.verdict != "partly":
+        return result
+    if venue.accept == "all":
+        return result.refused("the venue accepts the poses of all cameras or none")
+    if options.fit_ridge:
+        return result.refused("a ridge is accepted with the poses of all cameras or not at all")
+    return result

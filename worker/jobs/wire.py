@@ -164,6 +164,8 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
     """What a finish has to say of a camera; `lens` where it was found as well."""
     return CameraResult(
         id=found.camera.id,
+        accepted=found.accepted,
+        rejected_because=found.rejected_because,
         pose=wire_pose(found.camera.pose),
         intrinsics=lens,
         sigma=_sigma(found.sigma),

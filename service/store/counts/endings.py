@@ -29,6 +29,7 @@ ERRORS = (
 # Status, verdict of the gate, kind of the error: every way to end.
 OUTCOMES = (
     ("succeeded", "accepted", ""),
+    ("succeeded", "partly", ""),
     ("succeeded", "rejected", ""),
     ("cancelled", "", ""),
     *(("failed", "", error) for error in ERRORS),
@@ -71,9 +72,7 @@ class Ending:
         return total([ended, restarts, *self._course(), *self._stages(), *self._quality(), *self._views()])
 
     def _outcome(self) -> tuple[str, str, str]:
-        verdict = ""
-        if isinstance(self.result, Result):
-            verdict = "accepted" if self.result.accepted else "rejected"
+        verdict = self.result.verdict if isinstance(self.result, Result) else ""
         return self.status, verdict, "" if self.error is None else _kind(self.error)
 
     def _course(self) -> list[Amounts]:

@@ -15,7 +15,7 @@ from service.store.counts.tallies import Key
 from service.store.engine import clock, reading
 from service.store.workers import SeenWorker, seen
 from service.wire.job import OPEN
-from service.wire.results import Result, View
+from service.wire.results import Result
 
 j = tables.jobs.c
 q = tables.venue_quality.c
@@ -85,10 +85,10 @@ def look(engine: sa.Engine, most_venues: int) -> Figures:
         )
 
 
-def note_quality(connection: sa.Connection, venue_id: str, result: Result, now: datetime, *, moved: bool) -> None:
+def note_quality(connection: sa.Connection, venue_id: str, result: Result, *, moved: bool) -> None:
     """Write down what a result says about its venue, inside the caller's serialised transaction.
 
-    `moved`: its poses hold from now on.
+    `moved`: poses of it hold from now on.
     """
     shifts = [camera.moved.pixels for camera in result.cameras if camera.moved.pixels is not None]
     note(
@@ -96,25 +96,7 @@ def note_quality(connection: sa.Connection, venue_id: str, result: Result, now: 
         venue_id,
         stitch_error_px=result.stitch_error_px if moved else result.stitch_error_before_px,
         moved_px=max(shifts, default=None),
-        **({"accepted_at": now, "rejected_in_a_row": 0, "views": _views_in(result)} if moved else {}),
     )
-
-
-def views_of(connection: sa.Connection, venue_id: str) -> dict[str, View]:
-    """What the frames of a venue's last accepted calibration were like, by camera; empty without one."""
-    views = connection.scalar(sa.select(q.views).where(q.venue == venue_id)) or {}
-    return {camera: View.model_validate(view) for camera, view in views.items()}
-
-
-def _views_in(result: Result) -> dict[str, Any]:
-    return {camera.id: camera.view.model_dump(mode="json") for camera in result.cameras if camera.view is not None}
-
-
-def note_unaccepted(connection: sa.Connection, venue_id: str) -> None:
-    """A calibration brought no poses, inside the caller's serialised transaction."""
-    note(connection, venue_id)
-    one_more = {"rejected_in_a_row": q.rejected_in_a_row + 1}
-    connection.execute(sa.update(tables.venue_quality).where(q.venue == venue_id).values(**one_more))
 
 
 def note(connection: sa.Connection, venue_id: str, **values: Any) -> None:

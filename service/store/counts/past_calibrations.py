@@ -13,6 +13,7 @@ from service.store import tables
 from service.store.engine import Repository, reading
 from service.wire.geometry import Moved
 from service.wire.job import OPEN, Status
+from service.wire.results import Verdict
 
 j = tables.jobs.c
 
@@ -21,12 +22,13 @@ j = tables.jobs.c
 class PastCalibration:
     """A calibration that has ended; what needs a result is None, or empty, without one.
 
-    `accepted`: the gate's verdict. `moved` by camera, from the pose that was stored to the one that was found.
+    `verdict`: the gate's; `accepted`: of all cameras. `moved` by camera, from the stored pose to the new one.
     """
 
     job: str
     status: Status
     finished_at: datetime
+    verdict: Verdict | None
     accepted: bool | None
     rejected_because: str | None
     error: str | None
@@ -82,6 +84,7 @@ def _past(row: Any) -> PastCalibration:
         job=row.id,
         status=row.status,
         finished_at=row.finished_at,
+        verdict=result.get("verdict"),
         accepted=result.get("accepted"),
         rejected_because=result.get("rejected_because"),
         error=(row.error or {}).get("detail"),

@@ -14,7 +14,8 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.alarms import settle_alarms
-from service.store.counts.figures import note_quality, note_unaccepted, views_of
+from service.store.counts.courses import note_missed, note_none_held, views_of
+from service.store.counts.figures import note_quality
 from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.jobs.ending import Still, changed, end, still_open
 from service.store.jobs.reading import ONE, asked
@@ -75,7 +76,7 @@ class Attempts(Repository):
     def finish(self, task: Task, result: AnyResult, pictures: Sequence[str]) -> None:
         """End a job with a result and the names of its pictures.
 
-        If the result is that of a calibration and accepted, the stored poses move in the same transaction.
+        If it is that of a calibration, the poses that are accepted become the stored ones in the same transaction.
         """
         with writing(self._engine) as connection:
             if task.venue is not None:
@@ -122,7 +123,7 @@ def _locked(connection: sa.Connection, still: Still) -> bool:
 
 
 def _move_poses(connection: sa.Connection, task: Task, result: Result) -> Result:
-    """Let the new poses hold if they are accepted, and note what the result says about the venue.
+    """Let the poses hold that are accepted, and note what the result says about the venue.
 
     Gives the result with what the venue has to say about that.
     """
@@ -130,12 +131,12 @@ def _move_poses(connection: sa.Connection, task: Task, result: Result) -> Result
     assert isinstance(task.options, Options)
     now_stored = find_venue(connection, task.venue.id)
     if now_stored is None or not now_stored.calibrates_like(task.venue):
-        replaced = {"accepted": False, "rejected_because": "the venue was changed while the job ran"}
-        return result.model_copy(update=replaced) if result.accepted else result
-    moves = result.accepted and not task.options.dry_run
-    note_quality(connection, task.venue.id, result, clock(connection), moved=moves)
-    if moves:
-        let_hold(connection, now_stored, result, "calibrated", task.job_id)
+        return result.refused("the venue was changed while the job ran") if result.accepted_cameras else result
+    held = [] if task.options.dry_run else result.accepted_cameras
+    note_quality(connection, task.venue.id, result, moved=bool(held))
+    if held:
+        note_missed(connection, task.venue.id, now_stored.poses.keys() - held)
+        let_hold(connection, now_stored, result, held, "calibrated", task.job_id)
     elif not task.options.dry_run:
         _miss(connection, now_stored)
     return result
@@ -158,5 +159,5 @@ def end_without_result(connection: sa.Connection, job_id: str, still: Still, err
 
 def _miss(connection: sa.Connection, venue: Venue) -> None:
     """A calibration that was to bring poses brought none."""
-    note_unaccepted(connection, venue.id)
+    note_none_held(connection, venue.id, venue.poses.keys())
     settle_alarms(connection, venue)

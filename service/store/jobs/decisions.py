@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import sqlalchemy as sa
 
 from service.store import tables
@@ -10,8 +12,8 @@ from service.store.counts.figures import note_quality
 from service.store.engine import Repository, clock, serialise, writing
 from service.store.jobs.ending import changed, end, still_open
 from service.store.jobs.reading import found_poses
-from service.store.revisions import TAKEN, newest_revision, revision_of_job
-from service.store.venues import find_venue, let_hold, put_back, venue_lock
+from service.store.revisions import TAKEN, newest_revision, revision_before, revision_of_job
+from service.store.venues import find_venue, let_hold, put_back, venue_lock, with_result
 from service.wire.history import Revision
 from service.wire.results import Result
 from service.wire.venue import Venue
@@ -38,20 +40,24 @@ class Decisions(Repository):
         with writing(self._engine) as connection:
             end(connection, job_id, still_open(job_id), "cancelled")
 
-    def accept(self, job_id: str) -> None:
+    def accept(self, job_id: str, cameras: Collection[str] | None = None) -> None:
         """Let the poses that a calibration found hold, whatever the gate said; nothing to do if they do.
 
-        Raises `MovedOn` if the venue is not the one that the calibration began with, `NoPoses` if it found none.
+        `cameras`: only theirs, None: those of all. Raises `MovedOn` if the venue is neither as the calibration began
+        with it nor as it left it, `NoPoses` if it found none.
         """
         with writing(self._engine) as connection:
             began_with, result, newest = _found(connection, job_id)
-            if newest is not None and newest.job == job_id and newest.cause in TAKEN:
-                return
+            chosen = list(began_with.poses) if cameras is None else cameras
             now_stored = find_venue(connection, began_with.id)
-            if now_stored is None or not now_stored.calibrates_like(began_with):
+            left_by_it = newest is not None and newest.job == job_id and newest.cause in TAKEN
+            if now_stored and left_by_it and with_result(now_stored, result, chosen).stands_like(now_stored):
+                return
+            untouched = _lies_between if left_by_it else _is_as_it_was
+            if now_stored is None or not untouched(now_stored, began_with, result):
                 raise MovedOn(newest)
-            note_quality(connection, began_with.id, result, clock(connection), moved=True)
-            let_hold(connection, now_stored, result, "accepted", job_id)
+            note_quality(connection, began_with.id, result, moved=True)
+            let_hold(connection, now_stored, result, chosen, "accepted", job_id)
             _touch(connection, job_id)
 
     def reject(self, job_id: str) -> None:
@@ -68,7 +74,8 @@ class Decisions(Repository):
             if newest.cause in TAKEN:
                 now_stored = find_venue(connection, began_with.id)
                 assert now_stored is not None
-                settle_alarms(connection, put_back(connection, now_stored, newest.revision - 1, rejected_job=job_id))
+                before = revision_before(connection, now_stored.id, job_id)
+                settle_alarms(connection, put_back(connection, now_stored, before, rejected_job=job_id))
                 _touch(connection, job_id)
 
 
@@ -80,6 +87,21 @@ def _found(connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revis
     began_with, result = found
     serialise(connection, venue_lock(began_with.id))
     return began_with, result, newest_revision(connection, began_with.id)
+
+
+def _is_as_it_was(now_stored: Venue, began_with: Venue, _: Result) -> bool:
+    """Whether a calibration would begin with the same again."""
+    return now_stored.calibrates_like(began_with)
+
+
+def _lies_between(now_stored: Venue, began_with: Venue, result: Result) -> bool:
+    """Whether each camera stands where a calibration began with it or where it found it, and all else is the same."""
+    found = with_result(began_with, result)
+    return (
+        now_stored.field in (began_with.field, found.field)
+        and now_stored.poses.keys() == began_with.poses.keys()
+        and all(now in ways for now, *ways in zip(now_stored.posed, began_with.posed, found.posed, strict=True))
+    )
 
 
 def _touch(connection: sa.Connection, job_id: str) -> None:

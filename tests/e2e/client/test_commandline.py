@@ -104,7 +104,7 @@ def test_parts_of_a_venue_are_set_by_name(service, esc, name):
         assert esc("venue", "set", name, wrong).returncode == 2
 
 
-@pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3)])
+@pytest.mark.parametrize(("behaviour", "code"), [("accept", 0), ("fail", 1), ("reject", 3), ("partly", 3)])
 def test_the_exit_code_tells_how_a_calibration_ended(service, esc, name, behaviour, code):
     service.venue(name, behaviour)
     answer = esc("calibrate", name, *FRAMES, "--wait")
@@ -114,7 +114,9 @@ def test_the_exit_code_tells_how_a_calibration_ended(service, esc, name, behavio
     if behaviour == "fail":
         assert "It is black." in answer.stderr
     if behaviour == "reject":
-        assert "the lines do not fit" in answer.stderr
+        assert "Rejected: the lines do not fit" in answer.stderr
+    if behaviour == "partly":
+        assert "Accepted: left. Not all cameras: the lines do not fit" in answer.stderr
 
 
 def test_a_job_that_was_cancelled_is_told(service, esc, name):

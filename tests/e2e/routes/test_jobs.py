@@ -51,6 +51,27 @@ def test_any_other_result_leaves_them_untouched(service, name, behaviour, option
     assert (answer.json(), answer.headers["etag"]) == (before.json(), before.headers["etag"])
 
 
+def test_of_a_result_that_is_accepted_in_part_only_that_part_is_stored(service, name):
+    before = service.http.get(f"/venues/{service.venue(name, 'partly')}").json()["cameras"]
+    result = service.calibrated(name)["result"]
+    assert (result["verdict"], result["accepted"]) == ("partly", False)
+    assert [camera["accepted"] for camera in result["cameras"]] == [True, False]
+    left, right = service.http.get(f"/venues/{name}").json()["cameras"]
+    assert left["pose"] == result["cameras"][0]["pose"] != before[0]["pose"]
+    assert right["pose"] == before[1]["pose"] != result["cameras"][1]["pose"]
+
+
+def test_a_camera_that_was_rejected_is_accepted_by_hand(service, name):
+    job = service.calibrated(service.venue(name, "partly"))
+    accepted = service.http.post(f"/jobs/{job['id']}/accept", params={"camera": "right"})
+    assert (accepted.status_code, accepted.json()["venue_revision"]) == (200, 3)
+    stored = service.http.get(f"/venues/{name}").json()["cameras"]
+    assert [camera["pose"] for camera in stored] == [camera["pose"] for camera in job["result"]["cameras"]]
+    nobody = service.http.post(f"/jobs/{job['id']}/accept", params={"camera": "nobody"})
+    assert (nobody.status_code, nobody.json()["type"]) == (404, "/problems/poses-not-found")
+    assert nobody.json()["expected"] == ["left", "right"]
+
+
 def test_a_rejection_gives_its_reason_and_its_pictures(service, name):
     job = service.calibrated(service.venue(name, "reject"))
     assert (job["result"]["accepted"], job["result"]["rejected_because"]) == (False, "the lines do not fit")

@@ -30,11 +30,14 @@ RECEIVER = "https://example.com/"
 FIRST_POSE = VENUE.cameras[0].pose.model_copy(update={"position": [-1.5, -49.5, 7.9]})
 FRAMES = {"left": [f"frames/{WAITING}/left/0"]}
 RESULT = {
+    "verdict": "accepted",
     "accepted": True,
     "rejected_because": None,
     "cameras": [
         {
             "id": "left",
+            "accepted": True,
+            "rejected_because": None,
             "pose": VENUE.cameras[0].pose.model_dump(),
             "sigma": None,
             "moved": {"rotation_deg": 0.0, "position_m": 0.1, "pixels": 2.0},

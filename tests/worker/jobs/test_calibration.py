@@ -47,8 +47,11 @@ def files():
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The engine, replaced by one that keeps what it was asked and moves each camera by 5 cm."""
-    asked = {}
+    """The engine, replaced by one that keeps what it was asked and moves each camera by 5 cm.
+
+    It has a reason against the cameras in `asked["against"]`.
+    """
+    asked = {"against": {}}
 
     def calibrate(pitch, cameras, frames, segment, options, report, usual):
         asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options, usual=usual)
@@ -64,15 +67,19 @@ def asked(monkeypatch):
                 residual_px=None,
                 covariance=np.diag([np.inf] * 3 + [0.1] * 3),
                 repeatability=Sigma(0.01, 0.02),
+                zoom=None,
+                elsewhere_m=0.0,
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
                 iou=0.9,
                 evidence_before=seen,
                 moved=Movement(0.0, 0.05, float("nan")),
+                rejected_because=asked["against"].get(camera.id),
             )
             for camera in cameras
         ]
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
-        return engine.Calibration(pitch, results, None, 0.2, {"evolution": 1.0}, None, 0.1, 3, [doubt])
+        against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
+        return engine.Calibration(pitch, results, against, 0.2, {"evolution": 1.0}, None, 0.1, 3, [doubt])
 
     class Segmenter:
         sha256 = "f" * 64
@@ -137,6 +144,33 @@ def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue,
     assert fitted.cameras[0].intrinsics.matrix == venue.cameras[0].intrinsics.matrix
     assert fitted.ridge == venue.field.ridge
     assert asked["options"] == engine.Options(fit_focal_length=True, fit_ridge=True)
+
+
+def test_each_camera_has_its_verdict_and_the_job_the_sum_of_them(venue, files, asked, settings):
+    asked["against"] = {"right": "it is dark"}
+    result = calibration.solve(venue, files, Options(), settings, lambda _: None).result
+    assert (result.verdict, result.accepted, result.rejected_because) == ("partly", False, "camera right: it is dark")
+    assert [(c.accepted, c.rejected_because) for c in result.cameras] == [(True, None), (False, "it is dark")]
+    asked["against"] = {"left": "it is dark", "right": "it is dark"}
+    assert calibration.solve(venue, files, Options(), settings, lambda _: None).result.verdict == "rejected"
+    asked["against"] = {}
+    assert calibration.solve(venue, files, Options(), settings, lambda _: None).result.verdict == "accepted"
+
+
+def test_a_venue_that_takes_all_or_nothing_refuses_what_is_accepted_in_part(venue, files, asked, settings):
+    asked["against"] = {"right": "it is dark"}
+    every = venue.model_copy(update={"accept": "all"})
+    result = calibration.solve(every, files, Options(), settings, lambda _: None).result
+    assert (result.verdict, result.accepted_cameras) == ("rejected", [])
+    assert result.rejected_because == "camera right: it is dark; the venue accepts the poses of all cameras or none"
+    assert result.cameras[0].rejected_because == "the venue accepts the poses of all cameras or none"
+    assert result.cameras[1].rejected_because == "it is dark"
+
+
+def test_a_ridge_that_was_found_is_accepted_with_all_poses_or_not_at_all(venue, files, asked, settings):
+    asked["against"] = {"right": "it is dark"}
+    result = calibration.solve(venue, files, Options(fit_ridge=True), settings, lambda _: None).result
+    assert (result.verdict, result.cameras[0].accepted) == ("rejected", False)
 
 
 def test_what_the_lines_contradict_is_told(venue, files, asked, settings):

@@ -37,11 +37,12 @@ class Suspicion:
 
 def suspicions(deviations: Sequence[Deviation]) -> list[Suspicion]:
     """What the lines contradict, each with its numbers and what to do."""
-    return [
-        Suspicion(d.camera, d.name, d.value, d.sigma, _detail(d))
-        for d in deviations
-        if abs(d.value) > max(SURE * d.sigma, NOTABLE * d.expected)
-    ]
+    return [Suspicion(d.camera, d.name, d.value, d.sigma, _detail(d)) for d in deviations if is_sure(d)]
+
+
+def is_sure(deviation: Deviation) -> bool:
+    """Whether the lines contradict a number that was given."""
+    return abs(deviation.value) > max(SURE * deviation.sigma, NOTABLE * deviation.expected)
 
 
 def _detail(found: Deviation) -> str:

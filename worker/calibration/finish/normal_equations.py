@@ -41,8 +41,8 @@ def normal_equations(rows: Residuals, unknowns: Unknowns) -> NormalEquations:
 def error_of_measurement(rows: Residuals, unknowns: Unknowns) -> Array:
     """Covariance (U, U) of the gradient by the residuals themselves, those of ten metres of line taken as one.
 
-    Neighbours on a line share the error of its paint and of the lens, so they are not as many as they seem (the sandwich
-    of Liang and Zeger, 1986). On top, a fifth of what their expected errors say: no picture is perfect.
+    Neighbours on a line share the error of its paint and of the lens, so they are not as many as they seem (the
+    sandwich of Liang and Zeger, 1986). On top, a fifth of what their expected errors say: no picture is perfect.
     """
     patches, patch = np.unique(rows.point // CLUSTER_POINTS, return_inverse=True)
     weighted = rows.jacobian * rows.weight[:, None]

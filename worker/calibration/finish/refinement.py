@@ -44,6 +44,10 @@ class Sight:
     channels: Sequence[Channels]
     responses: Sequence[NDArray[np.float32]]
 
+    def of(self, numbers: Sequence[int]) -> Sight:
+        """That of some of the cameras."""
+        return Sight([self.channels[n] for n in numbers], [self.responses[n] for n in numbers])
+
 
 def refine(
     pitch: Field,

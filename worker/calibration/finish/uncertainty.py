@@ -84,7 +84,8 @@ class FinishedCamera:
 
     None where it had too few measurements: `residual_px`, the rms of its lines, `covariance` (6, 6) of (rotation in the
     camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens, field and ground,
-    which do not change.
+    which do not change. `zoom`: what the lines say of the focal length, None where it was found with the pose;
+    `elsewhere_m`: how far from here the camera is if lens and field are what the lines say.
     """
 
     camera: Camera
@@ -92,6 +93,8 @@ class FinishedCamera:
     residual_px: float | None
     covariance: Array | None
     repeatability: Sigma | None
+    zoom: Deviation | None
+    elsewhere_m: float | None
 
     @property
     def sigma(self) -> Sigma | None:
@@ -134,31 +137,39 @@ def judged(
     unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(here.pitch, lines)
     told = _told(here, measured, unknowns, solved.dense, stitch_weight)
     found = posterior(told.information, told.pull, _blocks(here, stored, unknowns, len(solved.parameters)))
-    enough = [len(seen) >= FEWEST_MEASUREMENTS for seen in measured]
-    first = POSE_NUMBERS * unknowns.cameras
+    deviations = [
+        Deviation(
+            cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
+            suspect.name,
+            float(found.value[number]),
+            float(np.sqrt(found.covariance[number, number])),
+            suspect.expected,
+        )
+        for number, suspect in enumerate(suspects, solved.dense)
+    ]
+    zooms = {deviation.camera: deviation for deviation in deviations if deviation.name == "focal_length_px"}
+
+    def finished(number: int, camera: Camera, seen: Evidence, its: Measurements) -> FinishedCamera:
+        residual = rms_px(lines.position, camera, its)
+        if len(its) < FEWEST_MEASUREMENTS:
+            return FinishedCamera(camera, seen, residual, None, None, None, None)
+        pose = slice(POSE_NUMBERS * number, POSE_NUMBERS * (number + 1))
+        away = found.value[pose]
+        return FinishedCamera(
+            camera,
+            seen,
+            residual,
+            found.covariance[pose, pose] + np.outer(away, away),
+            Sigma.from_covariance(told.repeated[pose, pose]),
+            zooms.get(camera.id),
+            float(np.linalg.norm(away[3:])),
+        )
+
     return Finished(
         here.pitch,
-        [
-            FinishedCamera(
-                camera,
-                seen,
-                rms_px(lines.position, camera, of_lines),
-                _second_moment(found, i) if known else None,
-                _repeatability(told.repeated, i) if known else None,
-            )
-            for i, (camera, seen, of_lines, known) in enumerate(zip(cameras, evidence, measured, enough, strict=True))
-        ],
-        [
-            Deviation(
-                cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
-                suspect.name,
-                float(found.value[number]),
-                float(np.sqrt(found.covariance[number, number])),
-                suspect.expected,
-            )
-            for number, suspect in enumerate(suspects, solved.dense)
-        ],
-        [_determined(number, unknowns, found) for number in range(first, solved.dense)],
+        [finished(*each) for each in zip(range(len(cameras)), cameras, evidence, measured, strict=True)],
+        deviations,
+        [_determined(number, unknowns, found) for number in range(POSE_NUMBERS * len(cameras), solved.dense)],
     )
 
 
@@ -254,14 +265,3 @@ def _determined(number: int, unknowns: Unknowns, found: Posterior) -> Determined
         float(np.hypot(np.sqrt(found.covariance[number, number]), found.value[number])),
         None if most == number - first else (unknowns.parameters[most], float(correlation[most])),
     )
-
-
-def _second_moment(found: Posterior, camera: int) -> Array:
-    """That (6, 6) of one pose's error: its variance, and how far it is from where it should be."""
-    its = slice(POSE_NUMBERS * camera, POSE_NUMBERS * (camera + 1))
-    return np.asarray(found.covariance[its, its] + np.outer(found.value[its], found.value[its]))
-
-
-def _repeatability(repeated: Array, camera: int) -> Sigma:
-    its = slice(POSE_NUMBERS * camera, POSE_NUMBERS * (camera + 1))
-    return Sigma.from_covariance(repeated[its, its])

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from worker.calibration.finish.diagnosis import is_sure
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS
 from worker.calibration.finish.uncertainty import Deviation, FinishedCamera
 from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
@@ -26,14 +27,17 @@ class Gate:
 
     `least_agreement`: right poses find 0.8 and more of the lines beyond chance on fields of every kind, poses that have
     settled on other lines up to 0.5. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
+    `largest_sigma_deg`: a principal point that is off turns a camera by as much and harms nothing. `largest_zoomed_m`:
+    how far from here a camera may be whose focal length the lines contradict.
     """
 
     least_agreement: float = 0.6
     agreement_loss: float = 0.05
     largest_residual_px: float = 2.5
     residual_floor_px: float = 1.25
-    largest_sigma_deg: float = 0.2
+    largest_sigma_deg: float = 1.0
     largest_sigma_m: float = 0.5
+    largest_zoomed_m: float = 0.2
     largest_rotation_deg: float = 8.0
     largest_shift_m: float = 1.5
     largest_stitch_error_px: float = 1.5
@@ -70,13 +74,20 @@ class Movement:
 class CameraResult(FinishedCamera):
     """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
 
-    `view`: whether its frame could be used, and what is wrong with it if not; `iou`: see `markings_iou`.
+    `view`: whether its frame could be used, and what is wrong with it if not; `iou`: see `markings_iou`;
+    `rejected_because`: why its pose must not replace the stored one, None when it may.
     """
 
     view: ViewCondition
     iou: float
     evidence_before: Evidence
     moved: Movement
+    rejected_because: str | None = None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the gate lets its pose replace the stored one."""
+        return self.rejected_because is None
 
 
 def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> float:
@@ -106,7 +117,8 @@ def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) ->
 def believable(deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate) -> list[Deviation]:
     """Those deviations that were read off cameras which see the pitch where they expect it."""
     lost = {result.camera.id for result in results if result.evidence.agreement < gate.least_agreement}
-    return [d for d in deviations if (not lost if d.camera is None else d.camera not in lost)]
+    of_field = not lost or any(result.accepted for result in results)
+    return [d for d in deviations if (of_field if d.camera is None else d.camera not in lost)]
 
 
 def ridge_rejection(pitch: Field, gate: Gate) -> str | None:
@@ -120,34 +132,8 @@ def ridge_rejection(pitch: Field, gate: Gate) -> str | None:
     )
 
 
-def rejection(
-    results: Sequence[CameraResult],
-    in_common: Sequence[tuple[Camera, Camera]],
-    stitch_error_px: float | None,
-    gate: Gate,
-) -> str | None:
-    """Why a result must not replace the stored poses, naming each camera and what to do; None when it may.
-
-    `in_common`: the pairs of cameras whose views should register; `stitch_error_px` is None when they do not.
-    """
-    unusable = [result for result in results if not result.view.usable]
-    # Where a view cannot be used nothing was searched, and the other cameras are not to blame for where they stand.
-    reasons = [(result.camera.id, _camera_rejection(result, gate)) for result in unusable or results]
-    bad = [f"camera {name}: {reason}" for name, reason in reasons if reason is not None]
-    if bad:
-        return "; ".join(bad)
-    if in_common and stitch_error_px is None:
-        pairs = ", ".join(f"{first.id} and {second.id}" for first, second in in_common)
-        return f"the views of {pairs} should show the same markings but cannot be brought together; look at the preview"
-    if stitch_error_px is not None and stitch_error_px > gate.largest_stitch_error_px:
-        return (
-            f"the cameras do not fit each other: stitch error {stitch_error_px:.2f} px, at most "
-            f"{gate.largest_stitch_error_px} allowed; look at the preview, and check intrinsics and ridge"
-        )
-    return None
-
-
-def _camera_rejection(result: CameraResult, gate: Gate) -> str | None:
+def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
+    """Why a camera's pose must not replace the stored one whatever the others say, and what to do; None when it may."""
     if not result.view.usable:
         return result.view.words
     moved, seen = result.moved, result.evidence
@@ -165,11 +151,14 @@ def _camera_rejection(result: CameraResult, gate: Gate) -> str | None:
             f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
             "check intrinsics and the field's measures"
         )
+    if result.zoom is not None and is_sure(result.zoom) and (result.elsewhere_m or 0) > gate.largest_zoomed_m:
+        return _zoomed(result.zoom, result)
     sigma = result.sigma
     if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
         return (
-            f"the visible lines do not determine the pose (sigma {sigma.rotation_deg:.2f} degrees, "
-            f"{sigma.position_m:.2f} m)"
+            f"the visible lines do not determine the pose: sigma {sigma.rotation_deg:.2f} degrees (at most "
+            f"{gate.largest_sigma_deg} allowed), {sigma.position_m:.2f} m (at most {gate.largest_sigma_m}); let the "
+            "camera see lines in more than one direction, or calibrate its lens again"
         )
     if moved.rotation_deg > gate.largest_rotation_deg or moved.position_m > gate.largest_shift_m:
         return (
@@ -183,6 +172,16 @@ def _camera_rejection(result: CameraResult, gate: Gate) -> str | None:
             f"seen where it puts them, with the new pose {seen.share:.0%}"
         )
     return None
+
+
+def _zoomed(zoom: Deviation, result: CameraResult) -> str:
+    focal = float(result.camera.intrinsics.matrix[0, 0])
+    more = "longer" if zoom.value > 0 else "shorter"
+    return (
+        f"the lines fit a focal length {abs(zoom.value) / focal:.2%} ± {zoom.sigma / focal:.2%} {more} than the venue "
+        f"says, which puts the camera {result.elsewhere_m:.2f} m from where it seems to be: zoom or focus have moved, "
+        "or the lens is not this one; calibrate with fit_focal_length, or calibrate the lens again"
+    )
 
 
 def _strongest(response: NDArray[np.float32], distance: float) -> NDArray[np.float32]:

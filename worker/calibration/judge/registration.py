@@ -10,7 +10,7 @@ Unit: 1 px = 10 cm on the pitch.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -87,20 +87,6 @@ class Registration:
         return float(np.hypot(self.dx_px, self.dy_px))
 
 
-def stitch_error_px(pitch: Field, cameras: Sequence[Camera], responses: Mapping[str, Response]) -> float | None:
-    """The worst disagreement of any two cameras around the pitch centre, 1 px = 10 cm.
-
-    None if no two cameras have markings in common, or if those of two that have (`pairs_in_common`) do not register.
-    `responses[camera.id]`: float32 (height, width), probability 0..1 of a marking in each pixel of the raw frame.
-    """
-    found = [
-        register_pair(pitch, first, second, responses[first.id], responses[second.id])
-        for first, second in pairs_in_common(pitch, cameras)
-    ]
-    errors = [pair.error_px for pair in found if pair is not None]
-    return max(errors) if errors and len(errors) == len(found) else None
-
-
 def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camera, Camera]]:
     """The pairs of cameras that, by their poses, see enough of the same markings to be compared."""
     return [
@@ -111,12 +97,19 @@ def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camer
     ]
 
 
+def shares_plenty(pitch: Field, first: Camera, second: Camera) -> bool:
+    """Whether two cameras, by their poses, see so many of the same markings that their views have to register."""
+    centre = _reference_point(pitch, first, second)
+    return centre is not None and _directions_in_common(pitch, first, second, centre) == 2
+
+
 def register_pair(
     pitch: Field, first: Camera, second: Camera, first_response: Response, second_response: Response
 ) -> Registration | None:
     """Register the bird's-eye views of two cameras around the pitch centre, or the markings in common nearest to it.
 
-    Responses as in `stitch_error_px`. None if the cameras show no markings in common, or show them too far apart.
+    Responses: float32 (height, width), probability 0..1 of a marking in each pixel of the raw frame. None if the
+    cameras show no markings in common, or show them too far apart.
     """
     centre = _reference_point(pitch, first, second)
     if centre is None:

@@ -12,14 +12,15 @@ from typing import Literal, cast
 
 import numpy as np
 
-from worker.calibration.calibrate import METHODS, judge, look, settle
-from worker.calibration.finish.refinement import SEARCH_PX, Sight, assess, refine
+from worker.calibration.calibrate import judge, look
+from worker.calibration.finish.refinement import SEARCH_PX, Sight, refine
 from worker.calibration.finish.uncertainty import Determined, Finished
 from worker.calibration.measures.ridge import TriedRidges, try_ridges
 from worker.calibration.records import Answer, Journey, Options, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import FieldParameter, LensParameter, Parameter, free_field
+from worker.calibration.settle import METHODS, Situation, settle
 
 FIRST_SEARCH_PX = (40.0, 24.0)
 """A pitch whose measures are guesses has its lines farther from where they are expected than one that is known."""
@@ -82,15 +83,17 @@ def fit_field(
     """
     options, journey = Options(seed=seed), Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey)
-    end = settle(METHODS["esc"], pitch, cameras, seen, options, journey)
-    with journey.measuring("refinement"):
-        fit = fit_measures if seen.usable else leave_measures
-        finished, measures = fit(pitch, end.found.cameras, seen.sight, options.stitch_weight)
-    with journey.measuring("quality"):
-        journey.at("refinement", 0.9)
-        answer = judge(pitch, cameras, seen, finished, journey)
-        journey.at("refinement", 1.0)
-    answer = replace(answer, rejected_because=answer.rejected_because or _implausible(finished.pitch))
+    here = Situation(METHODS["esc"], pitch, cameras, seen, options, journey)
+    settled = settle(here)
+    if len(here.usable) < len(cameras):
+        fitted, results, measures = pitch, settled.results, leave_measures(pitch)
+    else:
+        with journey.measuring("refinement"):
+            finished, measures = fit_measures(pitch, settled.begun, seen.sight, options.stitch_weight)
+        fitted, results = finished.pitch, here.judged(finished)
+    answer = judge(fitted, results, seen.sight, journey)
+    journey.at("refinement", 1.0)
+    answer = replace(answer, rejected_because=answer.rejected_because or _implausible(fitted))
     return FieldFit(**vars(answer), measures=measures)
 
 
@@ -115,17 +118,14 @@ def fit_measures(
     return final, [*told, ridge]
 
 
-def leave_measures(
-    pitch: Field, cameras: Sequence[Camera], sight: Sight, stitch_weight: float
-) -> tuple[Finished, list[Measure]]:
-    """Cameras and pitch as they are, where frames cannot be used to find any measure."""
+def leave_measures(pitch: Field) -> list[Measure]:
+    """The measures as they are, where not all frames can be used to find them."""
     given = [(p.name, p.read(pitch), p.expected) for p in free_field(pitch)]
     given.append(("ridge_length_m", pitch.ridge_length, _open_ridge_length(pitch)))
-    measures = [
+    return [
         Measure(cast(MeasureName, name), value, value, open_m, open_m, False, "not every view can be used")
         for name, value, open_m in given
     ]
-    return assess(pitch, cameras, sight, stitch_weight), measures
 
 
 def _measure(

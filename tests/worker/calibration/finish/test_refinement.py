@@ -21,7 +21,7 @@ from tests.worker.calibration.synthetic import (
 from worker.calibration.finish.refinement import Sight, assess, refine
 from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.judge.quality import Gate
-from worker.calibration.judge.registration import stitch_error_px
+from worker.calibration.judge.registration import register_pair
 from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import free_focal_lengths, free_ridge, lens_parameters
@@ -150,13 +150,12 @@ def test_the_error_is_of_the_size_of_its_sigma():
 
 def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
     cameras, channels, responses = scene()
-    by_id = {c.id: r for c, r in zip(cameras, responses, strict=True)}
     longer, _ = free_focal_lengths(cameras)[0].applied(cameras, CROWNED, 2.0)
     alone, together = (
-        stitch_error_px(CROWNED, refine(CROWNED, longer, Sight(channels, responses), weight).cameras, by_id)
+        register_pair(CROWNED, *refine(CROWNED, longer, Sight(channels, responses), weight).cameras, *responses)
         for weight in (0.0, 0.9)
     )
-    assert together < alone / 2
+    assert together.error_px < alone.error_px / 2
 
 
 def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
@@ -192,7 +191,7 @@ def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(disto
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], sight, 0.5)
     assert refined.each[0].residual_px is not None
     assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
-    assert refined.each[0].repeatability.position_m > Gate().largest_sigma_m
+    assert refined.each[0].sigma.position_m > Gate().largest_sigma_m
 
 
 @pytest.mark.parametrize("colour", [0, 2])

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, pair, pair_markings
-from worker.calibration.finish.uncertainty import Sigma
-from worker.calibration.judge.quality import CameraResult, Gate, Movement, markings_iou, rejection
+from worker.calibration.finish.uncertainty import Deviation, Sigma
+from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection, markings_iou
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition, ViewFigures
 
 LEFT = pair(())[0]
-PAIR = [(LEFT, LEFT)]
 
 
 def scene():
@@ -28,6 +27,7 @@ def seen(share: float, by_chance: float = 0.2) -> Evidence:
 
 FIGURES = ViewFigures(*[0.5] * len(fields(ViewFigures)))
 IN_VIEW = ViewCondition(True, None, None, "The field can be seen.", FIGURES)
+ZOOMED = Deviation("left", "focal_length_px", 0.02 * LEFT.intrinsics.matrix[0, 0], 0.002 * 600.0, 3e-4 * 600.0)
 FOGGED = ViewCondition(False, "fogged", "far half", "Fogged (far half): most likely fog.", FIGURES)
 
 
@@ -38,6 +38,8 @@ def good():
         residual_px=0.2,
         covariance=np.diag([0.005**2] * 3 + [0.05**2] * 3),
         repeatability=Sigma(0.01, 0.01),
+        zoom=None,
+        elsewhere_m=0.0,
         view=IN_VIEW,
         iou=0.9,
         evidence_before=seen(0.3),
@@ -80,7 +82,7 @@ def test_a_pose_that_sees_no_pitch_explains_nothing():
 
 
 def test_a_good_result_passes_the_gate():
-    assert rejection([good(), good()], PAIR, 0.3, Gate()) is None
+    assert alone_rejection(good(), Gate()) is None
 
 
 @pytest.mark.parametrize(
@@ -92,38 +94,22 @@ def test_a_good_result_passes_the_gate():
         ),
         ({"view": FOGGED, "evidence": seen(0.1)}, "Fogged (far half)"),
         ({"residual_px": None}, "fewer than 30 points"),
-        ({"repeatability": None}, "fewer than 30 points"),
+        ({"covariance": None}, "fewer than 30 points"),
         ({"residual_px": 9.0}, "px from where the pose puts them"),
-        ({"repeatability": Sigma(1.0, 0.1)}, "do not determine"),
-        ({"repeatability": Sigma(0.01, 2.0)}, "do not determine"),
+        ({"covariance": np.diag([0.02**2] * 3 + [0.01**2] * 3)}, "sigma 1.98 degrees (at most 1.0 allowed)"),
+        ({"covariance": np.diag([1e-4**2] * 3 + [1.0**2] * 3)}, "1.73 m (at most 0.5)"),
+        ({"zoom": ZOOMED, "elsewhere_m": 0.5}, "a focal length 2.00% ± 0.20% longer than the venue says"),
         ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
         ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
         ({"evidence": seen(0.8), "evidence_before": seen(0.95)}, "stored pose fits the frame better"),
     ],
 )
-def test_the_gate_names_the_camera_and_the_cause(change, cause):
-    reason = rejection([replace(good(), **change)], [], None, Gate())
-    assert reason.startswith("camera left: ")
-    assert cause in reason
+def test_the_gate_names_the_cause(change, cause):
+    assert cause in alone_rejection(replace(good(), **change), Gate())
 
 
-def test_cameras_that_do_not_fit_each_other_do_not_pass():
-    assert "stitch error 4.00 px" in rejection([good(), good()], PAIR, 4.0, Gate())
-
-
-def test_cameras_that_should_overlap_and_cannot_be_compared_do_not_pass():
-    assert "left and left should show the same markings" in rejection([good(), good()], PAIR, None, Gate())
-    assert rejection([good(), good()], [], None, Gate()) is None
-
-
-def test_every_bad_camera_is_named():
-    left, right = (
-        replace(good(), evidence=seen(0.1)),
-        replace(good(), camera=replace(scene()[0], id="right"), residual_px=9.0),
-    )
-    reason = rejection([left, right], [], None, Gate())
-    assert "camera left: " in reason
-    assert "camera right: " in reason
+def test_a_doubt_of_the_focal_length_that_moves_no_camera_rejects_none():
+    assert alone_rejection(replace(good(), zoom=ZOOMED, elsewhere_m=0.05), Gate()) is None
 
 
 def test_movement_is_told_in_degrees_metres_and_pixels():

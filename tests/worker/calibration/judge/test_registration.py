@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fields.template import load
 from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings, pair
-from worker.calibration.judge.registration import PIXEL_M, Registration, pairs_in_common, register_pair, stitch_error_px
+from worker.calibration.judge.registration import PIXEL_M, Registration, pairs_in_common, register_pair, shares_plenty
 from worker.calibration.scene.camera import Array, Camera, Pose, rotation_matrices, rotation_vectors
 from worker.calibration.scene.field import Field
 
@@ -117,37 +117,22 @@ def test_players_do_not_pull() -> None:
     assert found.error_px < 0.3
 
 
-def test_one_camera_has_nothing_to_agree_with() -> None:
-    assert stitch_error_px(PITCH, [LEFT], {"left": mask_of("left")}) is None
-
-
-def test_of_three_in_a_row_the_worst_overlapping_pair_counts() -> None:
-    row = [camera(name, (x, -48.0, 10.0), (x * 1.5, 0.0), focal=750.0) for name, x in (("a", -28), ("b", 0), ("c", 28))]
-    masks = {one.id: paint_markings(PITCH, one) for one in row}
-    agreeing = stitch_error_px(PITCH, row, masks)
-    assert agreeing is not None
-    # Over the sides of the pictures, where a pixel is half a metre long.
-    assert agreeing < 0.3
-    apart = stitch_error_px(PITCH, [*row[:2], moved(row[2], by=(0.2, 0.0, 0.0))], masks)
-    assert apart == pytest.approx(2.0, abs=0.4)
-
-
 def test_cameras_that_share_no_marking_cannot_be_compared() -> None:
     ends = [camera(name, (x, -48.0, 10.0), (x, 0.0), focal=1400.0) for name, x in (("a", -40.0), ("b", 40.0))]
-    masks = {one.id: paint_markings(PITCH, one) for one in ends}
-    assert stitch_error_px(PITCH, ends, masks) is None
+    assert register_pair(PITCH, *ends, *(paint_markings(PITCH, one) for one in ends)) is None
+    assert pairs_in_common(PITCH, ends) == []
 
 
 def test_a_camera_that_sees_no_marking_cannot_be_compared() -> None:
     black = np.zeros_like(mask_of("right"))
-    assert stitch_error_px(PITCH, [LEFT, RIGHT], {"left": mask_of("left"), "right": black}) is None
-    assert stitch_error_px(PITCH, [LEFT, RIGHT], {"left": black, "right": black}) is None
+    assert register_pair(PITCH, LEFT, RIGHT, mask_of("left"), black) is None
+    assert register_pair(PITCH, LEFT, RIGHT, black, black) is None
 
 
 def test_noise_is_no_marking() -> None:
     random = np.random.default_rng(1)
-    noise = {one.id: random.uniform(0, 0.3, (540, 960)).astype(np.float32) for one in (LEFT, RIGHT)}
-    assert stitch_error_px(PITCH, [LEFT, RIGHT], noise) is None
+    noise = [random.uniform(0, 0.3, (540, 960)).astype(np.float32) for _ in (LEFT, RIGHT)]
+    assert register_pair(PITCH, LEFT, RIGHT, *noise) is None
 
 
 def test_the_number_of_threads_changes_no_digit() -> None:
@@ -180,7 +165,7 @@ def test_a_halfway_line_that_has_slid_along_itself_is_no_registration(degrees: f
     turn = rotation_matrices(np.radians([degrees, 0.0, 0.0]))
     pitched = RIGHT.with_pose(Pose(rotation_vectors(turn @ RIGHT.pose.matrix), RIGHT.pose.position))
     assert register_pair(PITCH, LEFT, pitched, mask_of("left"), mask_of("right")) is None
-    assert pairs_in_common(PITCH, [LEFT, pitched]) == [(LEFT, pitched)]
+    assert shares_plenty(PITCH, LEFT, pitched)
 
 
 def test_where_nothing_holds_the_views_along_a_line_the_displacement_across_it_is_told() -> None:

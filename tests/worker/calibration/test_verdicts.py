@@ -1,0 +1,136 @@
+"""A verdict per camera: a bad one is refused, and drags no good one along."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fields.template import load
+from tests.worker.calibration.see.spoiling import fogged
+from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame
+from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
+from tests.worker.calibration.test_sports import field
+from worker.calibration import calibrate as engine
+from worker.calibration.calibrate import calibrate
+from worker.calibration.judge.pairs import Pair
+from worker.calibration.records import Calibration, Options
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.field import Field
+from worker.calibration.settle import Situation
+
+Pictures = dict[str, NDArray[np.uint8]]
+
+
+def mast() -> list[Camera]:
+    """Three in a row on one mast: the neighbours overlap, the outer two share hardly more than the halfway line."""
+    aims = (("west", -0.5, -34.0), ("middle", 0.0, 0.0), ("east", 0.5, 34.0))
+    return [camera(name, (x, -50.0, 14.0), (aim, 0.0), focal=725.0, distortion=BARREL) for name, x, aim in aims]
+
+
+def court() -> list[Camera]:
+    """Two at each long side of a tennis court."""
+    places = {"sw": (-4.0, -11.0), "se": (4.0, -11.0), "nw": (-4.0, 11.0), "ne": (4.0, 11.0)}
+    return [
+        camera(name, (x, y, 4.5), (0.9 * x, 0.0), focal=520.0, distortion=BARREL) for name, (x, y) in places.items()
+    ]
+
+
+@cache
+def pictures_of(rig) -> Pictures:
+    pitch = CROWNED if rig is mast else field("tennis")
+    return {one.id: paint_frame(pitch, one) for one in rig()}
+
+
+def run(rig, by: float = 1.0, **spoiled: NDArray[np.uint8]) -> Calibration:
+    """Calibrate from outdated poses, some of the frames replaced."""
+    outdated = [moved(one, tuple(by * np.array(TURN)), tuple(by * np.array(SHIFT))) for one in rig()]
+    frames = {name: (spoiled.get(name, frame),) for name, frame in pictures_of(rig).items()}
+    pitch = CROWNED if rig is mast else field("tennis")
+    return calibrate(pitch, outdated, frames, white_on_green, Options(seed=3))
+
+
+def verdicts(found: Calibration) -> dict[str, bool]:
+    return {one.camera.id: one.accepted for one in found.cameras}
+
+
+def off_m(found: Calibration, truth: Sequence[Camera]) -> dict[str, float]:
+    return {
+        one.camera.id: float(np.linalg.norm(one.camera.pose.position - true.pose.position))
+        for one, true in zip(found.cameras, truth, strict=True)
+    }
+
+
+def of_another_pitch(one: Camera) -> NDArray[np.uint8]:
+    """What the camera would see if there were other lines on the ground."""
+    return paint_frame(Field(90.0, 50.0, 0.12, template=load("handball")), one)
+
+
+def test_cameras_in_a_row_are_accepted_though_the_outer_two_share_hardly_anything() -> None:
+    found = run(mast)
+    assert (found.verdict, found.rejected_because) == ("accepted", None)
+    assert found.accepted
+    assert max(off_m(found, mast()).values()) < 0.03
+
+
+def test_a_fogged_camera_keeps_its_stored_pose_and_the_others_are_found_as_if_it_did_not_exist() -> None:
+    found = run(mast, middle=fogged(pictures_of(mast)["middle"]))
+    assert found.verdict == "partly"
+    assert not found.accepted
+    assert verdicts(found) == {"west": True, "middle": False, "east": True}
+    assert found.cameras[1].rejected_because == found.cameras[1].view.words
+    assert found.rejected_because == f"camera middle: {found.cameras[1].view.words}"
+    assert found.cameras[1].moved.position_m == 0.0
+    off = off_m(found, mast())
+    assert max(off["west"], off["east"]) < 0.03
+
+
+def test_where_no_frame_can_be_used_nothing_is_searched_and_all_are_rejected() -> None:
+    found = run(mast, **{name: fogged(frame) for name, frame in pictures_of(mast).items()})
+    assert (found.verdict, found.generations) == ("rejected", 0)
+    assert [one.moved.position_m for one in found.cameras] == [0.0] * 3
+    assert found.stitch_error_px is None
+
+
+def test_a_camera_that_sees_something_else_does_not_drag_the_others_along() -> None:
+    found = run(mast, east=of_another_pitch(mast()[2]))
+    assert verdicts(found) == {"west": True, "middle": True, "east": False}
+    assert "do not fit this pitch" in found.cameras[2].rejected_because
+    assert found.rejected_because.startswith("camera east: ")
+    alone = off_m(found, mast())
+    assert max(alone["west"], alone["middle"]) < 0.03
+    assert found.stitch_error_px is not None
+    assert found.stitch_error_px < 0.3
+
+
+def test_two_good_cameras_of_four_are_accepted_whatever_the_others_see() -> None:
+    other = {one.id: paint_frame(field("volleyball"), one) for one in court() if one.id in ("nw", "se")}
+    found = run(court, by=0.5, **other)
+    assert verdicts(found) == {"sw": True, "se": False, "nw": False, "ne": True}
+    off = off_m(found, court())
+    assert max(off["sw"], off["ne"]) < 0.02
+
+
+def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeypatch) -> None:
+    finished = []
+
+    def contradicted(_, cameras) -> list[Pair]:
+        agree, disagree = Pair("west", "middle", 0.1, True, True), Pair("middle", "east", 4.0, True, False)
+        return [pair for pair in (agree, disagree) if {*pair.cameras} <= {one.camera.id for one in cameras}]
+
+    def finishing(here, begun):
+        finished.append([camera.id for camera in begun])
+        return finish(here, begun)
+
+    finish = Situation.finished
+    monkeypatch.setattr(Situation, "finished", finishing)
+    monkeypatch.setattr(engine, "compared", contradicted)
+    found = run(mast)
+    assert verdicts(found) == {"west": True, "middle": True, "east": False}
+    assert finished == [["west", "middle", "east"], ["west", "middle"]]
+    assert found.rejected_because.startswith("camera east: the cameras middle and east do not fit each other")
+    assert found.stitch_error_px == 0.1
+    off = off_m(found, mast())
+    assert max(off["west"], off["middle"]) < 0.03
