@@ -34,10 +34,11 @@ class Group:
 
 @dataclass(frozen=True)
 class Posterior:
-    """What the numbers (A,) are: their mean `value` and `covariance` (A, A)."""
+    """What the numbers (A,) are: their mean `value` and `covariance` (A, A), at prior information `certainty` (A,)."""
 
     value: Array
     covariance: Array
+    certainty: Array
 
 
 def posterior(information: Array, pull: Array, blocks: Sequence[Sequence[Group]]) -> Posterior:
@@ -58,7 +59,7 @@ def posterior(information: Array, pull: Array, blocks: Sequence[Sequence[Group]]
         if np.array_equal(certainty, before):
             break
     covariance = np.asarray(np.linalg.inv(information + np.diag(certainty)), dtype=float)
-    return Posterior(covariance @ (pull + certainty * mean), covariance)
+    return Posterior(covariance @ (pull + certainty * mean), covariance, certainty)
 
 
 def _with_scales(certainty: Array, block: Sequence[Group], scales: Sequence[float]) -> Array:

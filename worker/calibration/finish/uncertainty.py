@@ -17,7 +17,7 @@ from worker.calibration.finish.estimate import Estimate
 from worker.calibration.finish.normal_equations import error_of_measurement, normal_equations
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS, Unknowns, residuals, rms_px
 from worker.calibration.finish.robust import tukey_slopes, tukey_weights
-from worker.calibration.finish.scales import Group, Posterior, posterior
+from worker.calibration.finish.scales import Group, posterior
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.motion import POSE_NUMBERS, change_between
@@ -33,8 +33,6 @@ LENS_SCALES: Array = 2.0 ** np.arange(8.0)
 """A lens is off by what is expected of it, or by so many times more; never by less: lines that fit say little of it."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
 """A measure of the field may have been taken better than expected, or worse."""
-WEAK = 1e-9
-"""Part of what is known of a number that keeps equations solvable where nothing is known of another."""
 LEAST_HELD, TINY = 1e-9, 1e-300
 """Directions of which the lines say less than this part of what they say of single numbers are said nothing of."""
 
@@ -137,6 +135,11 @@ def judged(
     unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(here.pitch, lines)
     told = _told(here, measured, unknowns, solved.dense, stitch_weight)
     found = posterior(told.information, told.pull, _blocks(here, stored, unknowns, len(solved.parameters)))
+    # How far a camera moved helps to tell a zoom from a move. That it has not is no measurement of where it is: if the
+    # lenses are what they are said to be, lines alone have to determine it.
+    certainty = np.maximum(found.certainty, [*np.zeros(solved.dense), *(p.expected**-2 for p in suspects)])
+    certainty[: solved.dense] = np.diag(here.prior(solved))[: solved.dense]
+    by_lines = np.asarray(np.linalg.inv(told.information + np.diag(certainty)), dtype=float)
     deviations = [
         Deviation(
             cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
@@ -155,11 +158,14 @@ def judged(
             return FinishedCamera(camera, seen, residual, None, None, None, None)
         pose = slice(POSE_NUMBERS * number, POSE_NUMBERS * (number + 1))
         away = found.value[pose]
+        covariance = max(
+            by_lines[pose, pose], found.covariance[pose, pose], key=lambda one: float(np.trace(one[3:, 3:]))
+        )
         return FinishedCamera(
             camera,
             seen,
             residual,
-            found.covariance[pose, pose] + np.outer(away, away),
+            covariance + np.outer(away, away),
             Sigma.from_covariance(told.repeated[pose, pose]),
             zooms.get(camera.id),
             float(np.linalg.norm(away[3:])),
@@ -169,7 +175,10 @@ def judged(
         here.pitch,
         [finished(*each) for each in zip(range(len(cameras)), cameras, evidence, measured, strict=True)],
         deviations,
-        [_determined(number, unknowns, found) for number in range(POSE_NUMBERS * len(cameras), solved.dense)],
+        [
+            _determined(number, unknowns, by_lines, found.value)
+            for number in range(POSE_NUMBERS * len(cameras), solved.dense)
+        ],
     )
 
 
@@ -194,8 +203,9 @@ def _told(
     slopes = residuals(position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_slopes)
     bread, gradient = normal_equations(slopes, unknowns).information, normal_equations(rows, unknowns).gradient
     spread = error_of_measurement(rows, unknowns)
-    part = np.linalg.inv(bread[:solved, :solved] + WEAK * np.diag(np.diag(bread[:solved, :solved])))
-    repeated = part @ spread[:solved, :solved] @ part
+    weak = here.prior(unknowns)[:solved, :solved]
+    part = np.linalg.inv(bread[:solved, :solved] + weak)
+    repeated = part @ (spread[:solved, :solved] + weak) @ part
 
     level = unknowns.ground.precision / here.uneven_m**2
     effect = np.linalg.solve(bread[dense:, dense:] + level, bread[dense:, :dense])
@@ -218,7 +228,8 @@ def _believed(information: Array, spread: Array) -> Array:
     directions, root = vectors[:, held], np.sqrt(values[held])
     whitening = directions / root / scale[:, None]
     variance = whitening.T @ spread @ whitening
-    variance = (variance + np.trace(variance) / len(variance) * np.eye(len(variance))) / 2
+    usual = np.trace(variance) / max(len(variance), 1)
+    variance = (variance + usual * np.eye(len(variance))) / 2
     back = directions * root * scale[:, None]
     return np.asarray(back @ np.linalg.solve(variance, back.T))
 
@@ -253,15 +264,15 @@ def _suspects(pitch: Field, cameras: Sequence[Camera], solved: Unknowns) -> list
     return [p for p in everything if (getattr(p, "camera", None), p.name) not in known]
 
 
-def _determined(number: int, unknowns: Unknowns, found: Posterior) -> Determined:
+def _determined(number: int, unknowns: Unknowns, covariance: Array, value: Array) -> Determined:
     """What is known of the free parameter that is this number of all unknowns."""
     first = POSE_NUMBERS * unknowns.cameras
-    variance = np.diag(found.covariance)[first:]
-    together = np.sqrt(variance * found.covariance[number, number])
-    correlation = np.divide(found.covariance[number, first:], together, out=np.zeros_like(together), where=together > 0)
+    variance = np.diag(covariance)[first:]
+    together = np.sqrt(variance * covariance[number, number])
+    correlation = np.divide(covariance[number, first:], together, out=np.zeros_like(together), where=together > 0)
     correlation[number - first] = 0.0
     most = int(np.argmax(np.abs(correlation)))
     return Determined(
-        float(np.hypot(np.sqrt(found.covariance[number, number]), found.value[number])),
+        float(np.hypot(np.sqrt(covariance[number, number]), value[number])),
         None if most == number - first else (unknowns.parameters[most], float(correlation[most])),
     )
