@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check wheel bench bench-real bench-fields bench-segmentation bench-service bench-rate train lock clean
+.PHONY: setup demo test check wheel bench bench-real bench-fields bench-segmentation bench-truth bench-service bench-rate train lock clean
 
 setup: $(VENV)/.installed
 
@@ -52,6 +52,10 @@ $(VENV)/.bench: $(VENV)/.installed
 # One BLAS thread, as the worker sets it.
 bench: $(VENV)/.bench
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.accuracy
+
+# One BLAS thread, as the worker sets it.
+bench-truth: $(VENV)/.train
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.lenses
 
 bench-rate: setup
 	$(BIN)/python -m tests.benchmarks.rate

@@ -103,7 +103,7 @@ def scene(name: str, light: str | None = None) -> Scene:
         wobble=0.0 if matches else 1.0,
     )
     frames = {
-        camera.id: [_frame(f"{name}-{light or usual}-{camera.id}".replace(" ", "-"), pitch, camera, conditions)]
+        camera.id: [rendered(f"{name}-{light or usual}-{camera.id}".replace(" ", "-"), pitch, camera, conditions)]
         for camera in real
     }
     return Scene(name, matches, pitch, believed, real, frames)
@@ -137,7 +137,8 @@ def _as_built(camera: Camera, rng: np.random.Generator) -> Camera:
     return Camera(camera.id, Intrinsics(matrix, distortion, lens.size), camera.pose)
 
 
-def _frame(name: str, pitch: Field, camera: Camera, conditions: Conditions) -> Frame:
+def rendered(name: str, pitch: Field, camera: Camera, conditions: Conditions) -> Frame:
+    """A frame from the folder, rendered before or now."""
     path = FOLDER / f"{name}.png"
     # Whoever changes a venue above gets new frames.
     recipe = json.dumps(
