@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.diagnosis import is_sure
+from worker.calibration.finish.diagnosis import BEYOND_DOUBT, is_sure
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS
 from worker.calibration.finish.uncertainty import Deviation, FinishedCamera
 from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
@@ -32,7 +32,7 @@ class Gate:
     """
 
     least_agreement: float = 0.6
-    agreement_loss: float = 0.05
+    agreement_loss: float = 0.1
     largest_residual_px: float = 2.5
     residual_floor_px: float = 1.25
     largest_sigma_deg: float = 1.0
@@ -151,8 +151,9 @@ def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
             f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
             "check intrinsics and the field's measures"
         )
-    if result.zoom is not None and is_sure(result.zoom) and (result.elsewhere_m or 0) > gate.largest_zoomed_m:
-        return _zoomed(result.zoom, result)
+    zoom = result.zoom
+    if zoom and is_sure(zoom, BEYOND_DOUBT) and (result.elsewhere_m or 0) > gate.largest_zoomed_m:
+        return _zoomed(zoom, result)
     sigma = result.sigma
     if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
         return (
