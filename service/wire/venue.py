@@ -17,6 +17,13 @@ Accept = Annotated[
     Literal["each", "all"],
     Field(description="Of a calibration: `each` pose that passes the gate, or `all` of them if all do and else none."),
 ]
+Lens = Annotated[
+    Literal["fixed", "may-drift"],
+    Field(
+        description="Of a camera whose zoom or focus has moved: `fixed` rejects its pose, `may-drift` accepts it with the "
+        "focal length that was found."
+    ),
+]
 
 
 class CameraIn(UnposedCamera):
@@ -101,6 +108,7 @@ class VenueIn(_Place):
 
     cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
     accept: Accept = "each"
+    lens: Lens = "fixed"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
 
@@ -138,6 +146,7 @@ class Venue(_Place):
 
     cameras: list[Camera]
     accept: Accept = "each"
+    lens: Lens = "fixed"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
 

@@ -22,6 +22,7 @@ from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
 from worker.calibration.settle import CAPTURE_RAD, METHODS, Seen, Settled, Situation, ridges_of, settle, settle_without
+from worker.calibration.zoom import refit_zoomed
 
 FEWEST_VISIBLE_POINTS = 60
 """Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""
@@ -50,7 +51,7 @@ def calibrate(
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey, usual)
     here = Situation(method, pitch, cameras, seen, options, journey)
-    settled, answer = agree(here, settle(here))
+    settled, answer = agree(here, refit_zoomed(here, settle(here)))
     with journey.measuring("quality"):
         evidence_before = [one.evidence_before for one in answer.cameras]
         stored = [Seeing(*each) for each in zip(cameras, seen.sight.responses, evidence_before, strict=True)]

@@ -36,7 +36,8 @@ class Segment(Protocol):
 class Options:
     """What a caller may choose; in the paper mu, lambda, G and the trade-off lambda of section III.
 
-    `fit_focal_length`: of each camera, as heat changes it; `fit_ridge`: its height. Both are for preset `esc`.
+    `fit_focal_length`: of each camera, as heat changes it; `fit_ridge`: its height; `lens_may_drift`: whether a pose
+    may be accepted with another focal length than the stored one. All are for preset `esc`.
     """
 
     preset: Preset = "esc"
@@ -48,6 +49,7 @@ class Options:
     flat: bool = False
     fit_focal_length: bool = False
     fit_ridge: bool = False
+    lens_may_drift: bool = False
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def solve(
     last_views: Mapping[str, View] = NO_VIEWS,
 ) -> Solution[Result]:
     """Calibrate a venue from the files of its cameras; `last_views`: those of its last accepted calibration."""
-    asked = _engine_options(options)
+    asked = _engine_options(venue, options)
     usual = {camera: UsualView(view.lines_found, view.blur_px) for camera, view in last_views.items()}
     return from_frames.solve(
         venue,
@@ -47,9 +47,11 @@ def solve(
     )
 
 
-def _engine_options(options: Options) -> engine.Options:
+def _engine_options(venue: Venue, options: Options) -> engine.Options:
     asked = {field.name for field in fields(engine.Options)}
-    return engine.Options(**options.model_dump(include=asked, exclude_none=True))
+    return engine.Options(
+        **options.model_dump(include=asked, exclude_none=True), lens_may_drift=venue.lens == "may-drift"
+    )
 
 
 def _result(
@@ -61,7 +63,9 @@ def _result(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
         cameras=[
-            wire_camera(camera, wire_lens(camera.camera.intrinsics) if options.fit_focal_length else None)
+            wire_camera(
+                camera, wire_lens(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None
+            )
             for camera in found.cameras
         ],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,

@@ -97,7 +97,7 @@ class Year:
         return {c.id: paint_frame(pitch, c) for c in self.truth()}
 
     def day(self, called: str, frames: Frames) -> bool:
-        """A calibration; says whether all its poses were taken. Those that were are right, the others what they were."""
+        """A calibration; says whether all its poses were taken. Those taken are right, the others what they were."""
         files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
         task = self.home.attempts.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
         before = self.home.venues.get("v").cameras
@@ -108,7 +108,9 @@ class Year:
         now = self.home.venues.get("v").cameras
         for result, wrong_px, was, held in zip(found.result.cameras, self.wrong_by(), before, now, strict=True):
             if result.accepted:
-                assert wrong_px < RIGHT_PX, f"{called}: a pose of {result.id} that is {wrong_px:.1f} px off was accepted"
+                assert wrong_px < RIGHT_PX, (
+                    f"{called}: a pose of {result.id} that is {wrong_px:.1f} px off was accepted"
+                )
             else:
                 assert held == was
         return found.result.accepted

@@ -68,7 +68,7 @@ def asked(monkeypatch):
                 covariance=np.diag([np.inf] * 3 + [0.1] * 3),
                 repeatability=Sigma(0.01, 0.02),
                 zoom=None,
-                elsewhere_m=0.0,
+                likelier=None,
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
                 iou=0.9,
                 evidence_before=seen,

@@ -20,8 +20,14 @@ from worker.calibration.finish.robust import tukey_slopes, tukey_weights
 from worker.calibration.finish.scales import Group, posterior
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.scene.motion import POSE_NUMBERS, change_between
-from worker.calibration.scene.parameters import LensParameter, Parameter, field_parameters, lens_parameters
+from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved
+from worker.calibration.scene.parameters import (
+    LensParameter,
+    Parameter,
+    field_parameters,
+    lens_parameters,
+    with_focal_length,
+)
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.line_measurement import Measurements
 
@@ -83,7 +89,7 @@ class FinishedCamera:
     None where it had too few measurements: `residual_px`, the rms of its lines, `covariance` (6, 6) of (rotation in the
     camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens, field and ground,
     which do not change. `zoom`: what the lines say of the focal length, None where it was found with the pose;
-    `elsewhere_m`: how far from here the camera is if lens and field are what the lines say.
+    `likelier`: the camera with that focal length, where it then is.
     """
 
     camera: Camera
@@ -92,7 +98,12 @@ class FinishedCamera:
     covariance: Array | None
     repeatability: Sigma | None
     zoom: Deviation | None
-    elsewhere_m: float | None
+    likelier: Camera | None
+
+    @property
+    def elsewhere_m(self) -> float:
+        """How far from here the camera is if its lens is what the lines say."""
+        return 0.0 if self.likelier is None else _metres_between(self.camera, self.likelier)
 
     @property
     def sigma(self) -> Sigma | None:
@@ -158,6 +169,7 @@ def judged(
             return FinishedCamera(camera, seen, residual, None, None, None, None)
         pose = slice(POSE_NUMBERS * number, POSE_NUMBERS * (number + 1))
         away = found.value[pose]
+        zoom = zooms.get(camera.id)
         covariance = max(
             by_lines[pose, pose], found.covariance[pose, pose], key=lambda one: float(np.trace(one[3:, 3:]))
         )
@@ -167,8 +179,8 @@ def judged(
             residual,
             covariance + np.outer(away, away),
             Sigma.from_covariance(told.repeated[pose, pose]),
-            zooms.get(camera.id),
-            float(np.linalg.norm(away[3:])),
+            zoom,
+            None if zoom is None else moved(with_focal_length(camera, zoom.value), away),
         )
 
     return Finished(
@@ -276,3 +288,7 @@ def _determined(number: int, unknowns: Unknowns, covariance: Array, value: Array
         float(np.hypot(np.sqrt(covariance[number, number]), value[number])),
         None if most == number - first else (unknowns.parameters[most], float(correlation[most])),
     )
+
+
+def _metres_between(one: Camera, other: Camera) -> float:
+    return float(np.linalg.norm(one.pose.position - other.pose.position))

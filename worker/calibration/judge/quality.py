@@ -75,7 +75,8 @@ class CameraResult(FinishedCamera):
     """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
 
     `view`: whether its frame could be used, and what is wrong with it if not; `iou`: see `markings_iou`;
-    `rejected_because`: why its pose must not replace the stored one, None when it may.
+    `rejected_because`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
+    camera's lens is not the stored one but what the lines say.
     """
 
     view: ViewCondition
@@ -83,6 +84,7 @@ class CameraResult(FinishedCamera):
     evidence_before: Evidence
     moved: Movement
     rejected_because: str | None = None
+    lens_found: bool = False
 
     @property
     def accepted(self) -> bool:
@@ -151,9 +153,11 @@ def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
             f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
             "check intrinsics and the field's measures"
         )
-    zoom = result.zoom
-    if zoom and is_sure(zoom, BEYOND_DOUBT) and (result.elsewhere_m or 0) > gate.largest_zoomed_m:
-        return _zoomed(zoom, result)
+    if result.zoom is not None and zoomed_beyond_doubt(result, gate):
+        return (
+            f"{zoom_in_words(result.camera, result.zoom)}, which puts the camera {result.elsewhere_m:.2f} m from where "
+            "it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again"
+        )
     sigma = result.sigma
     if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
         return (
@@ -175,14 +179,17 @@ def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
     return None
 
 
-def _zoomed(zoom: Deviation, result: CameraResult) -> str:
-    focal = float(result.camera.intrinsics.matrix[0, 0])
-    more = "longer" if zoom.value > 0 else "shorter"
-    return (
-        f"the lines fit a focal length {abs(zoom.value) / focal:.2%} ± {zoom.sigma / focal:.2%} {more} than the venue "
-        f"says, which puts the camera {result.elsewhere_m:.2f} m from where it seems to be: zoom or focus have moved, "
-        "or the lens is not this one; calibrate with fit_focal_length, or calibrate the lens again"
-    )
+def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:
+    """Whether the lines contradict the focal length, and the pose with it."""
+    sure = result.zoom is not None and is_sure(result.zoom, BEYOND_DOUBT)
+    return sure and result.elsewhere_m > gate.largest_zoomed_m
+
+
+def zoom_in_words(camera: Camera, zoom: Deviation) -> str:
+    """By how much the focal length is not what the venue says."""
+    focal = float(camera.intrinsics.matrix[0, 0])
+    by = f"{abs(zoom.value) / focal:.2%} ± {zoom.sigma / focal:.2%}"
+    return f"the lines fit a focal length {by} {'longer' if zoom.value > 0 else 'shorter'} than the venue says"
 
 
 def _strongest(response: NDArray[np.float32], distance: float) -> NDArray[np.float32]:

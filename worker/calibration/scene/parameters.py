@@ -111,6 +111,11 @@ def field_parameters(pitch: Field) -> list[Parameter]:
     ]
 
 
+def with_focal_length(camera: Camera, longer_px: float) -> Camera:
+    """The camera with a focal length that is so much longer."""
+    return replace(camera, intrinsics=_longer(camera.intrinsics, longer_px))
+
+
 def free_focal_lengths(cameras: Sequence[Camera]) -> list[Parameter]:
     """The focal length of each camera, to be found along with its pose."""
     lengths = [p for p in lens_parameters(cameras) if p.name == "focal_length_px"]

@@ -39,7 +39,7 @@ def good():
         covariance=np.diag([0.005**2] * 3 + [0.05**2] * 3),
         repeatability=Sigma(0.01, 0.01),
         zoom=None,
-        elsewhere_m=0.0,
+        likelier=None,
         view=IN_VIEW,
         iou=0.9,
         evidence_before=seen(0.3),
@@ -98,7 +98,10 @@ def test_a_good_result_passes_the_gate():
         ({"residual_px": 9.0}, "px from where the pose puts them"),
         ({"covariance": np.diag([0.02**2] * 3 + [0.01**2] * 3)}, "sigma 1.98 degrees (at most 1.0 allowed)"),
         ({"covariance": np.diag([1e-4**2] * 3 + [1.0**2] * 3)}, "1.73 m (at most 0.5)"),
-        ({"zoom": ZOOMED, "elsewhere_m": 0.5}, "a focal length 2.00% ± 0.20% longer than the venue says"),
+        (
+            {"zoom": ZOOMED, "likelier": moved(LEFT, by=(0.5, 0.0, 0.0))},
+            "a focal length 2.00% ± 0.20% longer than the venue says",
+        ),
         ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
         ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
         ({"evidence": seen(0.8), "evidence_before": seen(0.95)}, "stored pose fits the frame better"),
@@ -109,7 +112,7 @@ def test_the_gate_names_the_cause(change, cause):
 
 
 def test_a_doubt_of_the_focal_length_that_moves_no_camera_rejects_none():
-    assert alone_rejection(replace(good(), zoom=ZOOMED, elsewhere_m=0.05), Gate()) is None
+    assert alone_rejection(replace(good(), zoom=ZOOMED, likelier=moved(LEFT, by=(0.05, 0.0, 0.0))), Gate()) is None
 
 
 def test_movement_is_told_in_degrees_metres_and_pixels():

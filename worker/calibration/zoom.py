@@ -1,0 +1,70 @@
+"""Cameras whose zoom or focus has moved: the focal length that the lines say, and the pose with it.
+
+Where lines and movement contradict the focal length beyond doubt, the pose that was found with it is wrong, and a
+better one is known. Whether that may be stored is the venue's choice: a lens that was screwed tight has not moved, and
+then something else is wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from worker.calibration.finish.diagnosis import is_sure
+from worker.calibration.judge.quality import CameraResult, zoom_in_words, zoomed_beyond_doubt
+from worker.calibration.scene.camera import Camera
+from worker.calibration.settle import Settled, Situation
+
+MOST_ROUNDS = 5
+ARRIVED = 0.25
+"""Of its sigma: a focal length that changes less has been found."""
+WHAT_TO_DO = (
+    "zoom or focus have moved. Pose and intrinsics of the answer fit the lines: accept the job by hand to store both, "
+    "let the venue's lens be may-drift, or set the zoom back"
+)
+
+
+def refit_zoomed(here: Situation, settled: Settled) -> Settled:
+    """The same, but those cameras that zoomed are where their lines put them with another focal length."""
+    results = [
+        (_refitted(here, number, result) or result) if _asks_for_it(here, result) else result
+        for number, result in enumerate(settled.results)
+    ]
+    return replace(settled, results=results)
+
+
+def _asks_for_it(here: Situation, result: CameraResult) -> bool:
+    """A lens that may drift is followed as soon as it is seen to; another one must be wrong beyond doubt."""
+    if here.options.lens_may_drift and result.accepted:
+        return result.zoom is not None and is_sure(result.zoom)
+    return zoomed_beyond_doubt(result, here.gate)
+
+
+def _refitted(here: Situation, number: int, result: CameraResult) -> CameraResult | None:
+    """A camera by itself with the focal length that its lines say, None where even that does not pass the gate."""
+    stored, found = here.cameras[number], result
+    for _ in range(MOST_ROUNDS):
+        zoom, likelier = found.zoom, found.likelier
+        if zoom is None or likelier is None:
+            return None
+        changed_px = _focal(likelier) - _focal(stored)
+        if abs(zoom.value) >= ARRIVED * zoom.sigma:
+            # Until it is found it may be off by all that it has changed.
+            found = _with_lens(here, number, likelier, abs(changed_px))
+            continue
+        found = _with_lens(here, number, likelier, zoom.sigma)
+        change = replace(zoom, value=changed_px)
+        refused = None if here.options.lens_may_drift else f"{zoom_in_words(stored, change)}: {WHAT_TO_DO}"
+        return replace(found, zoom=change, rejected_because=refused, lens_found=True) if found.accepted else None
+    return None
+
+
+def _with_lens(here: Situation, number: int, begun: Camera, sigma_px: float) -> CameraResult:
+    """What becomes of a camera by itself with the lens it has begun with, whose focal length is known to so much."""
+    lens = replace(begun.intrinsics, sigma={**here.cameras[number].intrinsics.sigma, "fx": sigma_px})
+    alone = here.by_itself(number)
+    alone = replace(alone, cameras=[replace(here.cameras[number], intrinsics=lens)])
+    return alone.judged(alone.finished([replace(begun, intrinsics=lens)]))[0]
+
+
+def _focal(camera: Camera) -> float:
+    return float(camera.intrinsics.matrix[0, 0])
