@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
-from math import isfinite
+from math import isfinite, isnan
 from typing import Any, Generic, TypeVar
 
 import cv2
@@ -129,7 +129,7 @@ def wire_lens(lens: Intrinsics) -> geometry.Intrinsics:
     sigma = {
         name: min(max(value, geometry.LEAST_SIGMA), geometry.LARGEST_SIGMA)
         for name, value in lens.sigma.items()
-        if isfinite(value)
+        if not isnan(value)
     }
     return geometry.Intrinsics(
         model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist(), sigma=sigma or None

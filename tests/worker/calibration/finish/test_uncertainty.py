@@ -47,3 +47,22 @@ def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
             said.append(judged(here, [one], found, [nothing], unknowns, 0.5).each[0].repeatability.position_m)
     spread = np.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
     assert np.mean(said) == pytest.approx(spread, rel=0.15)
+
+
+def said_of_a_box(**sigma):
+    """What is said of a long camera that sees one end of a court and nothing else, its lens known so well."""
+    court = Field(40.0, 20.0, 0.05, template=load("handball"))
+    one = camera("left", (-9.0, -35.0, 9.0), (-16.0, 0.0), focal=1800.0)
+    one = one.with_lens(replace(one.intrinsics, sigma=sigma))
+    lines = court.line_points()
+    exact, unknowns = measured(lines, one), Unknowns(1, [], Ground.under(lines))
+    here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
+    nothing = Evidence(np.empty(0, int), np.empty(0, int), np.empty(0), np.empty(0, bool), np.empty(0))
+    (said,) = judged(here, [one], [exact], [nothing], unknowns, 0.5).each
+    return said.sigma.position_m
+
+
+def test_a_camera_whose_lens_is_known_badly_is_less_sure_where_it_stands():
+    board = said_of_a_box()
+    print(board, *[said_of_a_box(fx=f) for f in (0.1, 0.54, 5, 18, 90)], said_of_a_box(fy=18), said_of_a_box(aspect=0.01), said_of_a_box(k1=0.05))
+    assert 0
