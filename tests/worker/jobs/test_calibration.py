@@ -125,7 +125,9 @@ def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, settings)
 
 def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_lens(venue, files, asked, settings):
     left, right = venue.cameras
-    known = left.model_copy(update={"intrinsics": left.intrinsics.model_copy(update={"sigma": {"fx": 2.0, "k1": 0.01}})})
+    known = left.model_copy(
+        update={"intrinsics": left.intrinsics.model_copy(update={"sigma": {"fx": 2.0, "k1": 0.01}})}
+    )
     given = venue.model_copy(update={"cameras": [known, right]})
     result = calibration.solve(given, files, Options(fit_focal_length=True), settings, lambda _: None).result
     assert [camera.intrinsics.sigma for camera in asked["cameras"]] == [{"fx": 2.0, "k1": 0.01}, {}]
