@@ -183,6 +183,12 @@ class _Tried:
     def trial(self) -> LensTrial:
         return LensTrial(self.rung.terms, rms(self.fit.by_photo), rms(self.left_out_by_photo))
 
+    @property
+    def deviations(self) -> tuple[dict[str, float], dict[str, float]]:
+        """One standard deviation per free number: by the fit, and by leaving out photos."""
+        lens = self.fit.lens
+        return _by_name(self.fit.sigma, self.rung, lens), _by_name(self.spread, self.rung, lens)
+
 
 @dataclass(frozen=True)
 class _Chosen:
@@ -258,10 +264,10 @@ def _result(
         for turn, shift, s in zip(fit.turns, fit.shifts, used.values(), strict=True)
     ]
     corners = np.concatenate([s.pixel for s in used.values()])
-    sigma, spread = _by_name(fit.sigma, best.rung, lens), _by_name(best.spread, best.rung, lens)
+    sigma, spread = best.deviations
     coverage = cover(corners, size)
     return LensCalibration(
-        replace(lens, sigma=_known_to(sigma, spread, best.aspect_spread)),
+        replace(lens, sigma=_known_to(chosen)),
         best.rung.terms,
         best.trial.rms_px,
         best.trial.left_out_px,
@@ -314,13 +320,19 @@ def _by_name(values: Array, rung: Rung, lens: Intrinsics) -> dict[str, float]:
     return {term: known[term] for term in rung.terms}
 
 
-def _known_to(sigma: Mapping[str, float], spread: Mapping[str, float], aspect_spread: float) -> dict[str, float]:
-    """One standard deviation per number as a lens names it: the worse of two opinions, both focal lengths apart."""
-    known = _worse(sigma, spread)
+def _known_to(chosen: _Chosen) -> dict[str, float]:
+    """One standard deviation per number as a lens names it: the worse of two opinions, both focal lengths apart.
+
+    A principal point that was left in the middle is known as well as by the simplest lens that has it free.
+    """
+    known = _worse(*chosen.best.deviations)
+    if "cx" not in known:
+        free = next((_worse(*one.deviations) for one in chosen.tried if "cx" in one.rung.terms), {})
+        known |= {name: free[name] for name in ("cx", "cy") if name in free}
     if "f" in known:
         one = known.pop("f")
         return {"fx": one, "fy": one, **known}
-    return {**known, "aspect": aspect_spread}
+    return {**known, "aspect": chosen.best.aspect_spread}
 
 
 def _worse(sigma: Mapping[str, float], spread: Mapping[str, float]) -> dict[str, float]:
