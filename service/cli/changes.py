@@ -52,7 +52,13 @@ def _settings_lost(venue: Venue, stored: Venue) -> list[str]:
     lost = [f"{part}: the file has none" for part in parts if getattr(stored, part) and not getattr(venue, part)]
     fetched = {camera.id for camera in venue.cameras if camera.source}
     blind = [camera.id for camera in stored.cameras if camera.source and camera.id not in fetched]
-    return lost + [f"the source of camera {camera}: the file has none" for camera in blind]
+    told = {camera.id for camera in venue.cameras if camera.intrinsics.sigma}
+    untold = [camera.id for camera in stored.cameras if camera.intrinsics.sigma and camera.id not in told]
+    return [
+        *lost,
+        *(f"the source of camera {camera}: the file has none" for camera in blind),
+        *(f"the sigma of the lens of camera {camera}: the file has none" for camera in untold),
+    ]
 
 
 def standing_like(venue: VenueIn, stored: Venue) -> VenueIn:
@@ -60,7 +66,12 @@ def standing_like(venue: VenueIn, stored: Venue) -> VenueIn:
     # To the last digit: with both places, not with what one of them gives the other.
     known = {camera.id: camera for camera in VenueIn.model_validate(stored.model_dump()).cameras}
     cameras = [
-        camera.model_copy(update={"pose": known[camera.id].pose, "intrinsics": known[camera.id].intrinsics})
+        camera.model_copy(
+            update={
+                "pose": known[camera.id].pose,
+                "intrinsics": known[camera.id].intrinsics.as_known_by(camera.intrinsics),
+            }
+        )
         if camera.id in known
         else camera
         for camera in venue.cameras

@@ -128,7 +128,12 @@ def _with_state(venue: Venue, cameras: list[PosedCamera], ridge: list[list[float
     """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
     then = {camera.id: camera for camera in cameras}
     back = [
-        camera.model_copy(update={"pose": then[camera.id].pose, "intrinsics": then[camera.id].intrinsics})
+        camera.model_copy(
+            update={
+                "pose": then[camera.id].pose,
+                "intrinsics": then[camera.id].intrinsics.as_known_by(camera.intrinsics),
+            }
+        )
         for camera in venue.cameras
     ]
     field = FieldOfPlay.model_validate(venue.field.model_dump() | {"ridge": ridge})
@@ -143,7 +148,9 @@ def _movements(
     if restored is not None:
         since = {camera.id: camera.drift_since for camera in restored.cameras}
     for camera in venue.cameras:
-        if camera.id not in since or (cause == "put" and last.get(camera.id) != camera.posed):
+        previous = last.get(camera.id)
+        replaced = previous is None or previous.standing != camera.posed.standing
+        if camera.id not in since or (cause == "put" and replaced):
             since[camera.id] = number
     firsts = {first: _cameras_at(connection, venue.id, first) for first in set(since.values()) - {number}}
     return {

@@ -15,6 +15,13 @@ from service.wire.base import OPTIONS_PART, Id, Number, Whole, Wire
 
 LensModel = Literal["opencv", "fisheye"]
 DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
+COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
+    "opencv": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"),
+    "fisheye": ("k1", "k2", "k3", "k4"),
+}
+# Of a camera matrix: both focal lengths, the ratio fy/fx, the principal point.
+MATRIX_NUMBERS = ("fx", "fy", "aspect", "cx", "cy")
+LEAST_SIGMA, LARGEST_SIGMA = 1e-9, 1e6
 LARGEST_SIDE = 16384
 # A position and a translation that are less apart say the same: more is not lost by writing them down.
 AGREEING_M = 1e-6
@@ -24,6 +31,7 @@ Position = Annotated[list[Metres], Field(min_length=3, max_length=3)]
 Rotation = Annotated[list[Radians], Field(min_length=3, max_length=3)]
 Row = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Side = Annotated[Whole, Field(ge=32, le=LARGEST_SIDE)]
+Deviation = Annotated[Number, Field(ge=LEAST_SIGMA, le=LARGEST_SIGMA)]
 
 
 class PoseIn(Wire):
@@ -94,6 +102,14 @@ class Intrinsics(Wire):
     distortion: Annotated[list[Annotated[Number, Field(ge=-1000, le=1000)]], Field(max_length=14)] = Field(
         description="0, 4, 5, 8, 12 or 14 numbers; of a fisheye 0 or 4."
     )
+    sigma: dict[str, Deviation] | None = Field(
+        None,
+        description="How well the lens is known: one standard deviation by name, of fx, fy, cx and cy in pixels, of "
+        "aspect (fy/fx) and of the coefficients (k1, k2, p1 ... in OpenCV's order) as they are. Numbers that are not "
+        "named are taken to be as sure as photos of a board leave them that reached every corner of the picture.",
+        examples=[{"fx": 4.0, "fy": 4.0, "cx": 6.0, "cy": 5.0, "k1": 0.002, "k2": 0.004}],
+        json_schema_extra={"propertyNames": {"enum": [*MATRIX_NUMBERS, *COEFFICIENTS["opencv"]]}},
+    )
 
     @model_validator(mode="after")
     def _a_lens(self) -> Self:
@@ -107,6 +123,23 @@ class Intrinsics(Wire):
             expected = f"{', '.join(map(str, most))} or {last_length}"
             raise ValueError(f"distortion must have {expected} numbers with the model {self.model}")
         return self
+
+    @model_validator(mode="after")
+    def _sigma_of_this_lens(self) -> Self:
+        known = (*MATRIX_NUMBERS, *COEFFICIENTS[self.model])
+        unknown = [name for name in self.sigma or {} if name not in known]
+        if unknown:
+            raise ValueError(f"sigma has {', '.join(unknown)}: with the model {self.model} it takes {', '.join(known)}")
+        return self
+
+    @property
+    def numbers(self) -> Intrinsics:
+        """The lens itself, and not how well it is known: lenses that image alike have the same."""
+        return self.model_copy(update={"sigma": None})
+
+    def as_known_by(self, other: Intrinsics) -> Intrinsics:
+        """This lens; where the other one is the same, as well known as that."""
+        return other if other.numbers == self.numbers else self
 
 
 class UnposedCamera(Wire):
@@ -133,6 +166,11 @@ class PosedCamera(UnposedCamera):
     """A camera as it stands: its lens, and where it is and looks."""
 
     pose: Pose
+
+    @property
+    def standing(self) -> PosedCamera:
+        """Where it stands and how it images, and not how well its lens is known."""
+        return self.model_copy(update={"intrinsics": self.intrinsics.numbers})
 
 
 class LensFile(BaseModel):

@@ -156,9 +156,9 @@ class Venue(_Place):
         return {camera.id: camera.pose for camera in self.cameras}
 
     @property
-    def posed(self) -> list[PosedCamera]:
-        """What calibrations say of the cameras, and nothing else."""
-        return [camera.posed for camera in self.cameras]
+    def standing(self) -> list[PosedCamera]:
+        """Where the cameras stand and how they image: the same, however well their lenses are known."""
+        return [camera.posed.standing for camera in self.cameras]
 
     def with_poses(self, poses: dict[str, Pose]) -> Venue:
         """The same venue, cameras moved."""
@@ -172,11 +172,11 @@ class Venue(_Place):
 
     def stands_like(self, other: Venue) -> bool:
         """Whether the cameras of both are the same and stand alike, with the ridge that their poses belong to."""
-        return self.posed == other.posed and self.field.ridge == other.field.ridge
+        return self.standing == other.standing and self.field.ridge == other.field.ridge
 
     def calibrates_like(self, other: Venue) -> bool:
         """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
-        return self.field == other.field and self.posed == other.posed
+        return self.field == other.field and self.standing == other.standing
 
     def films_like(self, other: Venue) -> bool:
         """Whether frames of the one are frames of the other: same pitch and lenses, wherever the cameras stand."""

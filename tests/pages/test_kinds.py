@@ -14,7 +14,8 @@ from tests.e2e.running import venue
 
 CAMERA = VenueIn.model_validate(venue("kinds")).stored().cameras[0]
 POINT = PointResult(world="centre spot", residual_px=1.5, doubted=False, exchanged_with=None, looks_like=None)
-LENS = {"intrinsics": CAMERA.intrinsics, "image_size": CAMERA.image_size, "timings_s": {"fit": 0.3}, "software": "0"}
+KNOWN = CAMERA.intrinsics.model_copy(update={"sigma": {"fx": 2.345, "k1": 0.0123}})
+LENS = {"intrinsics": KNOWN, "image_size": CAMERA.image_size, "timings_s": {"fit": 0.3}, "software": "0"}
 RESULTS = {
     "locate": LocateResult(
         accepted=True,
@@ -72,4 +73,5 @@ def test_a_lens_and_a_first_pose_are_shown_with_what_they_are_worth(stub, kind):
     shown = stub.http.get(f"/ui/jobs/{job}").raise_for_status().text
     assert "1.25 px" in shown
     assert "Click more points on the far side." in shown
+    assert "fx ± 2.3" in shown
     assert kind in stub.http.get(f"/ui/jobs?kind={kind}").raise_for_status().text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
-from math import isfinite
+from math import isfinite, isnan
 from typing import Any, Generic, TypeVar
 
 import cv2
@@ -114,7 +114,7 @@ def pitch_of(field: FieldOfPlay) -> Field:
 def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Intrinsics:
     """The engine's lens."""
     matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
-    return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]))
+    return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]), dict(lens.sigma or {}))
 
 
 def camera_of(camera: geometry.PosedCamera) -> Camera:
@@ -125,7 +125,15 @@ def camera_of(camera: geometry.PosedCamera) -> Camera:
 
 def wire_lens(lens: Intrinsics) -> geometry.Intrinsics:
     """A lens of the engine for the wire."""
-    return geometry.Intrinsics(model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist())
+    # What photos or clicks hardly tell has a deviation beyond any number that says something.
+    sigma = {
+        name: min(max(value, geometry.LEAST_SIGMA), geometry.LARGEST_SIGMA)
+        for name, value in lens.sigma.items()
+        if not isnan(value)
+    }
+    return geometry.Intrinsics(
+        model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist(), sigma=sigma or None
+    )
 
 
 def wire_pose(pose: Pose) -> geometry.Pose:

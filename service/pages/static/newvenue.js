@@ -84,6 +84,7 @@ class Camera {
     this.box = document.getElementById("camera").content.firstElementChild.cloneNode(true);
     this.points = [];
     this.result = null;
+    this.sigma = null;
     this.asking = false;
     this.askAgain = false;
     const way = `way-${cameras.length}-${Date.now()}`;
@@ -115,7 +116,13 @@ class Camera {
       tell();
     });
     const askLater = later(() => this.ask());
-    for (const name of ["model", "fx", "fy", "cx", "cy", "distortion"]) this.field(name).addEventListener("input", askLater);
+    for (const name of ["model", "fx", "fy", "cx", "cy", "distortion"]) {
+      this.field(name).addEventListener("input", () => {
+        // What photos say of their lens does not hold for one that was typed in.
+        this.sigma = null;
+        askLater();
+      });
+    }
     this.sighting = new Sighting(this);
     this.one("[data-point]").addEventListener("change", () => this.choose(this.chosen));
   }
@@ -155,10 +162,11 @@ class Camera {
     const [fx, fy, cx, cy] = ["fx", "fy", "cx", "cy"].map((name) => number(this.field(name).value));
     if ([fx, cx, cy].some((value) => !Number.isFinite(value))) return null;
     const distortion = this.field("distortion").value.split(/[\s,;]+/).filter(Boolean).map(Number);
-    return {model: this.field("model").value, matrix: [[fx, 0, cx], [0, fy ?? fx, cy], [0, 0, 1]], distortion};
+    return {model: this.field("model").value, matrix: [[fx, 0, cx], [0, fy ?? fx, cy], [0, 0, 1]], distortion, sigma: this.sigma};
   }
 
-  set intrinsics({model, matrix, distortion}) {
+  set intrinsics({model, matrix, distortion, sigma}) {
+    this.sigma = sigma;
     const values = {model, fx: matrix[0][0], fy: matrix[1][1], cx: matrix[0][2], cy: matrix[1][2], distortion: distortion.join(", ")};
     for (const [name, value] of Object.entries(values)) this.field(name).value = value;
   }

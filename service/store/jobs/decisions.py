@@ -100,7 +100,9 @@ def _lies_between(now_stored: Venue, began_with: Venue, result: Result) -> bool:
     return (
         now_stored.field in (began_with.field, found.field)
         and now_stored.poses.keys() == began_with.poses.keys()
-        and all(now in ways for now, *ways in zip(now_stored.posed, began_with.posed, found.posed, strict=True))
+        and all(
+            now in ways for now, *ways in zip(now_stored.standing, began_with.standing, found.standing, strict=True)
+        )
     )
 
 

@@ -46,6 +46,8 @@ def test_photos_of_a_board_become_a_lens(service, photos):
     assert result["image_size"] == [1280, 960]
     assert {photo["name"]: photo["fate"] for photo in result["photos"]}["empty.png"] == "no-board"
     assert set(result["sigma"]) == set(result["spread"]) == set(result["terms"])
+    known = result["intrinsics"]["sigma"]
+    assert known["fx"] == known["fy"] == max(result["sigma"]["f"], result["spread"]["f"])
     picture = service.http.get(job["links"]["coverage"])
     assert (picture.status_code, picture.headers["content-type"]) == (200, "image/jpeg")
     assert "venue" not in job["links"]
@@ -177,10 +179,12 @@ def test_esc_goes_from_photos_and_clicks_to_a_venue(tmp_path, photos):
     assert json.loads((tmp_path / "lens.json").read_text())["intrinsics"]["matrix"][0][0] == pytest.approx(
         900, rel=0.02
     )
+    assert json.loads((tmp_path / "lens.json").read_text())["intrinsics"]["sigma"]["fx"] > 0
     assert (tmp_path / "coverage.jpg").read_bytes().startswith(b"\xff\xd8")
     assert esc("intrinsics", *photos, "--board", "9", "--square", "0.03", "-o", "x.json").returncode == 2
 
     whole = venue("v")
+    whole["cameras"][0]["intrinsics"]["sigma"] = {"fx": 2.0}
     (tmp_path / "site.json").write_text(json.dumps({key: whole[key] for key in ("id", "field")}))
     (tmp_path / "left.json").write_text(
         json.dumps({key: whole["cameras"][0][key] for key in ("image_size", "intrinsics")})
@@ -191,6 +195,7 @@ def test_esc_goes_from_photos_and_clicks_to_a_venue(tmp_path, photos):
     assert posed.stderr.count("are exchanged") == 2
     stored = json.loads((tmp_path / "venue.json").read_text())["cameras"][0]
     assert np.linalg.norm(np.array(stored["pose"]["position"]) - CAMERA.pose.position) < 0.3
+    assert stored["intrinsics"]["sigma"] == {"fx": 2.0}
     assert (tmp_path / "pictures" / "points_left.jpg").exists()
 
     (tmp_path / "few.json").write_text(json.dumps({"left": points()[:3]}))

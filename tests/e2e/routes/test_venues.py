@@ -63,6 +63,23 @@ def test_a_patch_changes_what_it_names_and_leaves_the_poses_that_were_calibrated
     assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 2
 
 
+def test_how_well_a_lens_is_known_is_put_read_and_patched_and_moves_nothing(service, name):
+    document = venue(name)
+    document["cameras"][0]["intrinsics"]["sigma"] = {"fx": 0.5, "k1": 0.01}
+
+    def known(answer):
+        return [camera["intrinsics"]["sigma"] for camera in answer.json()["cameras"]]
+
+    put, read = service.http.put(f"/venues/{name}", json=document), service.http.get(f"/venues/{name}")
+    assert known(put) == known(read) == [{"fx": 0.5, "k1": 0.01}, None]
+    better = patched(service, name, {"cameras": {"left": {"intrinsics": {"sigma": {"fx": 0.1, "k1": None}}}}})
+    assert known(better) == [{"fx": 0.1}, None]
+    assert known(patched(service, name, {"cameras": {"left": {"intrinsics": {"sigma": None}}}})) == [None, None]
+    wrong = patched(service, name, {"cameras": {"left": {"intrinsics": {"sigma": {"f": 1.0}}}}})
+    assert (wrong.status_code, "it takes fx, fy, aspect" in wrong.text) == (422, True)
+    assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 1
+
+
 def test_cameras_are_patched_by_their_ids(service, name):
     service.venue(name)
     left, right = patched(service, name, {"cameras": {"left": {"source": "http://127.0.0.1/x"}}}).json()["cameras"]

@@ -45,6 +45,57 @@ def test_a_put_that_moves_nothing_is_no_revision(stock):
     assert told(stock) == [(1, "put", None, None)]
 
 
+KNOWN = {"fx": 0.5, "k1": 0.01}
+
+
+def known_to(venue, sigma):
+    """The venue with all its lenses known so well."""
+    cameras = [
+        camera.model_copy(update={"intrinsics": camera.intrinsics.model_copy(update={"sigma": sigma})})
+        for camera in venue.cameras
+    ]
+    return venue.model_copy(update={"cameras": cameras})
+
+
+def known(stock):
+    return [camera.intrinsics.sigma for camera in stock.venues.get("v").cameras]
+
+
+@in_both_homes
+def test_how_well_a_lens_is_known_is_kept_and_no_revision(stock):
+    stock.venues.put(known_to(stock.venue("v"), KNOWN), anyway)
+    assert (known(stock), told(stock)) == ([KNOWN] * 2, [(1, "put", None, None)])
+    stock.moved_by_hand("v", -3.0)
+    # The other camera was not put elsewhere by being known better.
+    assert [camera.drift_since for camera in stock.venues.history("v", None, 1)[0].cameras] == [2, 1]
+
+
+@in_both_homes
+def test_an_older_revision_with_the_same_lens_is_known_as_well_as_now(stock):
+    stock.venue("v")
+    stock.moved_by_hand("v", -3.0)
+    stock.venues.put(known_to(stock.venue("v"), KNOWN), anyway)
+    stock.venues.restore("v", 1, anyway)
+    assert (standing(stock), known(stock)) == (-1.0, [KNOWN] * 2)
+    stock.moved_by_hand("v", -2.0, intrinsics=Intrinsics(matrix=[[61, 0, 32], [0, 61, 24], [0, 0, 1]], distortion=[]))
+    stock.venues.restore("v", 2, anyway)
+    # Of the lens of that time what was known then.
+    assert known(stock) == [None, KNOWN]
+
+
+@in_both_homes
+def test_a_lens_that_is_known_better_meanwhile_stops_no_result(stock):
+    stock.venue("v")
+    running = stock.attempts.begin(stock.submitted("v"))
+    stock.venues.put(known_to(stock.venue("v"), KNOWN), anyway)
+    stock.attempts.finish(running, result(running.venue, True), [])
+    assert (standing(stock), known(stock)) == (-0.999, [KNOWN] * 2)
+    stock.venues.put(known_to(stock.venue("v"), None), anyway)
+    stock.decisions.reject(running.job_id)
+    stock.decisions.accept(running.job_id)
+    assert standing(stock) == -0.999
+
+
 @in_both_homes
 def test_drift_is_counted_from_where_each_camera_was_put(stock):
     stock.venue("v")

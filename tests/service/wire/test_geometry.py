@@ -45,3 +45,40 @@ def test_a_fisheye_has_no_distortion_or_four_numbers(length, taken):
     else:
         with pytest.raises(ValidationError, match="must have 0 or 4 numbers with the model fisheye"):
             Intrinsics.model_validate(document)
+
+
+MATRIX = VENUE_EXAMPLE["cameras"][0]["intrinsics"]["matrix"]
+KNOWN = {"fx": 4.0, "fy": 4.5, "aspect": 1e-3, "cx": 6.0, "cy": 5.0, "k1": 2e-3, "k4": 0.1}
+
+
+@pytest.mark.parametrize("model", ["opencv", "fisheye"])
+def test_a_lens_says_how_well_each_of_its_numbers_is_known_or_nothing_of_it(model):
+    lens = {"model": model, "matrix": MATRIX, "distortion": []}
+    assert Intrinsics.model_validate(lens | {"sigma": KNOWN}).sigma == KNOWN
+    for nothing in ({}, {"sigma": None}, {"sigma": {}}):
+        assert not Intrinsics.model_validate(lens | nothing).sigma
+
+
+@pytest.mark.parametrize(
+    ("model", "sigma", "why"),
+    [
+        ("opencv", {"f": 4.0}, "sigma has f: with the model opencv it takes fx, fy, aspect, cx, cy, k1"),
+        ("fisheye", {"k1": 0.1, "p1": 0.1, "k5": 0.1}, "sigma has p1, k5: with the model fisheye"),
+        ("opencv", {"fx": 0.0}, "greater than or equal to 0.000000001"),
+        ("opencv", {"fx": -4.0}, "greater than or equal to 0.000000001"),
+        ("opencv", {"fx": 1e300}, "less than or equal to 1000000"),
+        ("opencv", {"fx": float("nan")}, "finite number"),
+        ("opencv", {"fx": "4"}, "valid number"),
+    ],
+)
+def test_a_deviation_of_no_number_of_the_lens_or_of_no_size_is_refused(model, sigma, why):
+    with pytest.raises(ValidationError, match=why):
+        Intrinsics.model_validate({"model": model, "matrix": MATRIX, "distortion": [], "sigma": sigma})
+
+
+def test_the_same_lens_is_as_well_known_as_was_said_last_and_another_one_as_before():
+    lens = Intrinsics(matrix=MATRIX, distortion=[])
+    known = lens.model_copy(update={"sigma": {"fx": 4.0}})
+    longer = lens.model_copy(update={"matrix": [[2200.0, 0, 1634.8], *MATRIX[1:]]})
+    assert (lens.as_known_by(known), known.as_known_by(lens)) == (known, lens)
+    assert (lens.as_known_by(longer), known.as_known_by(longer)) == (lens, known)

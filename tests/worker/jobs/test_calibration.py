@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from service.settings import Settings
 from service.store.jobs.files import picture_file
+from service.wire import geometry
 from service.wire.options import Options
 from service.wire.results import View
 from service.wire.venue import VenueIn
@@ -118,6 +121,23 @@ def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, settings)
     assert [len(asked["frames"][camera]) for camera in ("left", "right")] == [2, 1]
     assert asked["frames"]["left"][0].shape == (180, 320, 3)
     assert asked["options"] == engine.Options(preset="paper", seed=7, parents=8, stitch_weight=0.25)
+
+
+def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_lens(venue, files, asked, settings):
+    left, right = venue.cameras
+    known = left.model_copy(
+        update={"intrinsics": left.intrinsics.model_copy(update={"sigma": {"fx": 2.0, "k1": 0.01}})}
+    )
+    given = venue.model_copy(update={"cameras": [known, right]})
+    result = calibration.solve(given, files, Options(fit_focal_length=True), settings, lambda _: None).result
+    assert [camera.intrinsics.sigma for camera in asked["cameras"]] == [{"fx": 2.0, "k1": 0.01}, {}]
+    assert [camera.intrinsics for camera in result.cameras] == [known.intrinsics, right.intrinsics]
+
+
+def test_what_is_hardly_told_of_a_lens_fits_what_a_venue_takes():
+    lens = wire.lens_of(geometry.Intrinsics(matrix=[[220, 0, 160], [0, 220, 90], [0, 0, 1]], distortion=[]), list(SIZE))
+    said = wire.wire_lens(replace(lens, sigma={"fx": 0.0, "k2": 1e12, "k3": float("inf"), "k1": float("nan")})).sigma
+    assert said == {"fx": geometry.LEAST_SIGMA, "k2": geometry.LARGEST_SIGMA, "k3": geometry.LARGEST_SIGMA}
 
 
 def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files, asked, settings):

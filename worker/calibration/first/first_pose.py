@@ -42,7 +42,7 @@ def first_pose(clicks: Clicks, lens: Intrinsics, landmarks: Mapping[str, Array],
     if gain is None:
         rivals = [other for other in fits[1:] if _elsewhere(other, best) and other.cost < best.cost + AMBIGUOUS]
         return judged(clicks, best, None, rivals, landmarks)
-    return judged(clicks, relabelled(gain.after), gain, [], landmarks)
+    return judged(clicks, relabelled(gain.found), gain, [], landmarks)
 
 
 def _candidates(clicks: Clicks, lens: Intrinsics, name: str) -> list[PointFit]:

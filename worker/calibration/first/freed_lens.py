@@ -7,7 +7,7 @@ what is very strong evidence, and clicks left out of it are foretold better.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ FEWEST_SPARE = 6
 FOLDS = 10
 SQUARE_WITHIN = 0.02
 """Pixels this near to square are square: a board that says otherwise by less was misread."""
+OF_THE_MATRIX = ("fx", "fy", "aspect", "cx", "cy")
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,16 @@ class LensGain:
         focal = float(self.after.camera.intrinsics.matrix[0, 0])
         scale = [focal if name == "focal length" else 1.0 for name in self.after.free]
         return {name: float(s * k) for name, s, k in zip(self.after.free, deviations, scale, strict=True)}
+
+    @property
+    def found(self) -> PointFit:
+        """The fit `after`, whose lens has the `sigma` of what was freed and of what it keeps of the lens before."""
+        lens, told = self.after.camera.intrinsics, dict(self.sigma)
+        names = {"centre x": "cx", "centre y": "cy"}
+        one = told.pop("focal length")
+        both = {"fx": one, "fy": one * float(lens.matrix[1, 1] / lens.matrix[0, 0])}
+        known = {**lens.sigma, **both, **{names.get(name, name): value for name, value in told.items()}}
+        return replace(self.after, camera=self.after.camera.with_lens(replace(lens, sigma=known)))
 
 
 def freed(found: PointFit) -> LensGain | None:
@@ -83,7 +94,10 @@ def left_out_px(found: PointFit) -> float:
 
 
 def two_terms(lens: Intrinsics) -> Intrinsics:
-    """The lens of the same kind with k1 and k2 alone, and square pixels, that comes nearest to `lens`."""
+    """The lens of the same kind with k1 and k2 alone, and square pixels, that comes nearest to `lens`.
+
+    How well the matrix is known stays; k1 and k2 are others, of which nothing is known yet.
+    """
     matrix = lens.matrix.copy()
     matrix[0, 1] = 0.0
     if abs(matrix[1, 1] / matrix[0, 0] - 1) < SQUARE_WITHIN:
@@ -98,7 +112,8 @@ def two_terms(lens: Intrinsics) -> Intrinsics:
     (k1, k2), *_ = np.linalg.lstsq(terms, bent - straight, rcond=None)
     distortion = np.zeros(4 if lens.model == "fisheye" else 5)
     distortion[:2] = k1, k2
-    return type(lens)(matrix, distortion, lens.size)
+    sigma = {name: value for name, value in lens.sigma.items() if name in OF_THE_MATRIX}
+    return type(lens)(matrix, distortion, lens.size, sigma)
 
 
 def _radial_only(lens: Intrinsics) -> Array:

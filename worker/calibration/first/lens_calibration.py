@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import cv2
@@ -98,7 +98,8 @@ class LensCalibration:
     """The lens and what it is worth.
 
     `sigma`: one standard deviation per free number, by OpenCV, corners independent; `spread`: the same by leaving out
-    photos (a jackknife over `FOLDS` groups). `corners` and `off` (N, 2): those used, and projected minus seen, px.
+    photos (a jackknife over `FOLDS` groups); the `lens` has the larger of both. `corners` and `off` (N, 2): those used,
+    and projected minus seen, px.
     """
 
     lens: Intrinsics
@@ -167,16 +168,26 @@ def _require_enough(used: Mapping[str, Sighting], photos: Sequence[Photo]) -> No
 
 @dataclass(frozen=True)
 class _Tried:
-    """A rung: its fit to all photos, and what the fits without some of them say of those, and of the numbers."""
+    """A rung: its fit to all photos, and what the fits without some of them say of those, and of the numbers.
+
+    `aspect_spread`: of fy/fx, which vary together.
+    """
 
     rung: Rung
     fit: LensFit
     left_out_by_photo: Array
     spread: Array
+    aspect_spread: float
 
     @property
     def trial(self) -> LensTrial:
         return LensTrial(self.rung.terms, rms(self.fit.by_photo), rms(self.left_out_by_photo))
+
+    @property
+    def deviations(self) -> tuple[dict[str, float], dict[str, float]]:
+        """One standard deviation per free number: by the fit, and by leaving out photos."""
+        lens = self.fit.lens
+        return _by_name(self.fit.sigma, self.rung, lens), _by_name(self.spread, self.rung, lens)
 
 
 @dataclass(frozen=True)
@@ -218,13 +229,15 @@ def _try(sightings: Sequence[Sighting], size: tuple[int, int], model: LensModel,
         without = fit_lens([s for i, s in enumerate(sightings) if i not in out], size, model, rung)
         left_out[out] = [foretold_px(without.lens, sightings[i]) for i in out]
         numbers.append(numbers_of(without.lens))
-    return _Tried(rung, fit_lens(sightings, size, model, rung), left_out, _jackknife(numbers))
+    parts = np.stack(numbers)
+    fx, fy = (parts[:, NUMBERS[model].index(name)] for name in ("fx", "fy"))
+    spread, (aspect_spread,) = _jackknife(parts), _jackknife((fy / fx)[:, None])
+    return _Tried(rung, fit_lens(sightings, size, model, rung), left_out, spread, float(aspect_spread))
 
 
-def _jackknife(parts: Sequence[Array]) -> Array:
-    """Standard deviations of numbers from what they are without each of some groups."""
-    numbers = np.stack(parts)
-    return np.sqrt((len(parts) - 1) * np.mean((numbers - numbers.mean(axis=0)) ** 2, axis=0))
+def _jackknife(parts: Array) -> Array:
+    """Standard deviations (K,) of numbers from what they are without each of some groups (groups, K)."""
+    return np.sqrt((len(parts) - 1) * np.mean((parts - parts.mean(axis=0)) ** 2, axis=0))
 
 
 # Which photos
@@ -251,10 +264,10 @@ def _result(
         for turn, shift, s in zip(fit.turns, fit.shifts, used.values(), strict=True)
     ]
     corners = np.concatenate([s.pixel for s in used.values()])
-    sigma, spread = _by_name(fit.sigma, best.rung, lens), _by_name(best.spread, best.rung, lens)
+    sigma, spread = best.deviations
     coverage = cover(corners, size)
     return LensCalibration(
-        lens,
+        replace(lens, sigma=_known_to(chosen)),
         best.rung.terms,
         best.trial.rms_px,
         best.trial.left_out_px,
@@ -307,6 +320,25 @@ def _by_name(values: Array, rung: Rung, lens: Intrinsics) -> dict[str, float]:
     return {term: known[term] for term in rung.terms}
 
 
+def _known_to(chosen: _Chosen) -> dict[str, float]:
+    """One standard deviation per number as a lens names it: the worse of two opinions, both focal lengths apart.
+
+    A principal point that was left in the middle is known as well as by the simplest lens that has it free.
+    """
+    known = _worse(*chosen.best.deviations)
+    if "cx" not in known:
+        free = next((_worse(*one.deviations) for one in chosen.tried if "cx" in one.rung.terms), {})
+        known |= {name: free[name] for name in ("cx", "cy") if name in free}
+    if "f" in known:
+        one = known.pop("f")
+        return {"fx": one, "fy": one, **known}
+    return {**known, "aspect": chosen.best.aspect_spread}
+
+
+def _worse(sigma: Mapping[str, float], spread: Mapping[str, float]) -> dict[str, float]:
+    return {name: max(sigma[name], spread[name]) for name in sigma}
+
+
 # What it is worth
 
 
@@ -334,7 +366,7 @@ def _warnings(
             f"the board reached {coverage.share:.0%} of the picture{where}: there the lens is a guess, and with it the "
             "principal point. Add photos with the board in those places"
         )
-    worst = {name: max(sigma[name], spread[name]) for name in sigma}
+    worst = _worse(sigma, spread)
     focal = max(worst.get(name, 0.0) for name in ("f", "fx", "fy"))
     centre = max(worst.get(name, 0.0) for name in ("cx", "cy"))
     if focal > UNSURE * lens.matrix[0, 0]:

@@ -26,6 +26,7 @@ DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 FISHEYE_DISTORTION_LENGTHS = (0, 4)
 WIDEST_FISHEYE_RAD = np.radians(89.0)
 """How far off its axis a fisheye is used: beyond a right angle there are no image coordinates at depth 1."""
+IN_PIXELS = ("fx", "fy", "cx", "cy")
 NEAREST_DEPTH_M = 0.1
 RAY_STEP = 1e-6
 
@@ -120,7 +121,8 @@ class Intrinsics:
     """A lens of OpenCV's calib3d: pinhole with radial, tangential, thin prism and tilt terms.
 
     `matrix` (3, 3) in pixels, `distortion` in OpenCV's order (`DISTORTION_LENGTHS`), `size` (width, height); `sigma`:
-    one standard deviation of its numbers by name (fx, fy, aspect, cx, cy, k1 ...), of those that are known.
+    one standard deviation of its numbers by name (fx, fy, cx, cy in pixels, aspect = fy/fx, k1 ...), of those of which
+    it is known.
     """
 
     matrix: Array
@@ -254,7 +256,8 @@ class Intrinsics:
         for axis, ratio in ((0, width / self.size[0]), (1, height / self.size[1])):
             matrix[axis] *= ratio
             matrix[axis, 2] = (self.matrix[axis, 2] + 0.5) * ratio - 0.5
-        return replace(self, matrix=matrix, size=(width, height))
+        sigma = {name: value * (factor if name in IN_PIXELS else 1.0) for name, value in self.sigma.items()}
+        return replace(self, matrix=matrix, size=(width, height), sigma=sigma)
 
 
 class Fisheye(Intrinsics):

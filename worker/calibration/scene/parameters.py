@@ -88,7 +88,7 @@ def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
         lens, known = camera.intrinsics, camera.intrinsics.sigma
         focal, pixel = float(lens.matrix[0, 0]), lens.relative_size
         found += [
-            LensParameter(number, "focal_length_px", known.get("fx", BOARD_FOCAL * focal), 1e-5 * focal, _longer),
+            LensParameter(number, "focal_length_px", _focal_sigma(lens), 1e-5 * focal, _longer),
             LensParameter(
                 number, "principal_point_x_px", known.get("cx", pixel), 0.01, lambda one, by: _centred(one, by, 0.0)
             ),
@@ -100,6 +100,15 @@ def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
             LensParameter(number, "k2", known.get("k2", BOARD_RADIAL), 1e-5, lambda one, by: _bent(one, 1, by)),
         ]
     return found
+
+
+def _focal_sigma(lens: Intrinsics) -> float:
+    """Of fx, with which fy changes: by what is known of either, the worse of both."""
+    fx, fy = float(lens.matrix[0, 0]), float(lens.matrix[1, 1])
+    known = {"fx": 1.0, "fy": fx / fy}
+    return max(
+        (lens.sigma[name] * scale for name, scale in known.items() if name in lens.sigma), default=BOARD_FOCAL * fx
+    )
 
 
 def field_parameters(pitch: Field) -> list[Parameter]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fields.template import load
-from tests.worker.calibration.synthetic import camera
+from tests.worker.calibration.synthetic import camera, moved
 from worker.calibration.finish.estimate import Estimate, step
 from worker.calibration.finish.residuals import Unknowns
 from worker.calibration.finish.robust import tukey_weights
@@ -20,6 +20,7 @@ from worker.calibration.see.line_measurement import Measurements
 MISFIT_PX = 2.0
 EVEN_M = 1e-4
 TRIALS = 100
+NO_EVIDENCE = Evidence(np.empty(0, int), np.empty(0, int), np.empty(0), np.empty(0, bool), np.empty(0))
 
 
 def measured(lines, one):
@@ -34,7 +35,6 @@ def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
     one, rng = camera("left", (-9.0, -15.0, 7.0), (-6.0, 0.0), focal=500.0), np.random.default_rng(0)
     lines = court.line_points()
     exact, unknowns = measured(lines, one), Unknowns(1, [], Ground.under(lines))
-    nothing = Evidence(np.empty(0, int), np.empty(0, int), np.empty(0), np.empty(0, bool), np.empty(0))
     errors, said = [], []
     for trial in range(TRIALS):
         off = rng.normal(scale=exact.sigma_px)[:, None] * exact.normal
@@ -44,6 +44,31 @@ def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
             here = step(here, [one], found, unknowns, 0.5, tukey_weights)
         errors.append(here.cameras[0].pose.position - one.pose.position)
         if trial % 10 == 0:
-            said.append(judged(here, [one], found, [nothing], unknowns, 0.5).each[0].repeatability.position_m)
+            said.append(judged(here, [one], found, [NO_EVIDENCE], unknowns, 0.5).each[0].repeatability.position_m)
     spread = np.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
     assert np.mean(said) == pytest.approx(spread, rel=0.15)
+
+
+def said_of_a_corner(**sigma):
+    """How sure (m) a long camera is that moved and now sees one corner of a court, its lens known so well."""
+    court = Field(40.0, 20.0, 0.05, template=load("handball"))
+    one = camera("left", (-9.0, -35.0, 9.0), (-20.0, 10.0), focal=3000.0)
+    one = one.with_lens(replace(one.intrinsics, sigma=sigma))
+    lines = court.line_points()
+    unknowns = Unknowns(1, [], Ground.under(lines))
+    here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
+    before = [moved(one, by=(0.0, -2.0, 1.0))]
+    (said,) = judged(here, before, [measured(lines, one)], [NO_EVIDENCE], unknowns, 0.5).each
+    return said.sigma.position_m
+
+
+def test_the_worse_the_focal_length_is_known_the_less_sure_is_where_a_camera_stands_that_sees_little():
+    well, badly, hardly = (said_of_a_corner(fx=fx) for fx in (0.1, 30.0, 150.0))
+    assert well < said_of_a_corner() < badly < hardly
+    assert badly > 3 * well
+    assert said_of_a_corner(fy=150.0) == hardly
+
+
+@pytest.mark.parametrize("sigma", [{"aspect": 0.01}, {"cx": 30.0, "cy": 30.0}, {"k1": 0.1}])
+def test_what_else_of_a_lens_is_known_badly_makes_a_camera_less_sure_too(sigma):
+    assert said_of_a_corner(fx=0.1, **sigma) > 1.1 * said_of_a_corner(fx=0.1)

@@ -1,5 +1,7 @@
 """First poses from clicks on a pitch whose camera is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -297,6 +299,27 @@ def test_a_wrong_lens_is_found_where_the_points_justify_it_and_the_gain_is_told(
     for value, truth, name in ((matrix[0, 2], 970, "centre x"), (matrix[1, 2], 530, "centre y")):
         assert abs(value - truth) < 4 * gain.sigma[name]
     assert "principal point (1080, 440)" in found.warnings[0]
+
+
+def test_a_lens_that_was_freed_is_as_well_known_as_the_points_tell_it():
+    given_ = replace(WRONG, sigma={"fx": 1.0, "aspect": 1e-3, "cy": 1.0, "p1": 1e-3})
+    found = first_pose(clicks(noise_px=1.5), given_, NAMED)
+    lens, told = found.camera.intrinsics, found.lens.sigma
+    assert lens.matrix[0, 0] == lens.matrix[1, 1]
+    assert lens.sigma == {
+        "fx": told["focal length"],
+        "fy": told["focal length"],
+        "aspect": 1e-3,
+        "cx": told["centre x"],
+        "cy": told["centre y"],
+        "k1": told["k1"],
+        "k2": told["k2"],
+    }
+
+
+def test_a_lens_that_is_left_alone_is_as_well_known_as_before():
+    known = replace(LENS, sigma={"fx": 3.0})
+    assert first_pose(clicks(noise_px=1.5), known, NAMED).camera.intrinsics.sigma == {"fx": 3.0}
 
 
 def test_a_wrong_lens_and_exchanged_labels_are_told_apart():

@@ -160,6 +160,32 @@ def test_terms_that_foretell_nothing_are_left_out_and_it_is_said():
     assert any("k3" in warning and "left at 0" in warning for warning in found.warnings)
 
 
+def test_the_lens_says_how_well_it_is_known_by_the_worse_of_two_opinions():
+    found = calibrated()
+    worse = {name: max(found.sigma[name], found.spread[name]) for name in ("f", "cx", "cy", "k1", "k2")}
+    focal = worse.pop("f")
+    assert found.lens.sigma == {"fx": focal, "fy": focal} | worse
+
+
+def test_a_principal_point_that_was_left_in_the_middle_is_known_as_well_as_photos_would_know_it():
+    middle = LENSES["opencv"](
+        np.array([[900.0, 0, 639.5], [0, 900, 479.5], [0, 0, 1]]), np.array([-0.2, 0, 0, 0]), SIZE
+    )
+    rng = np.random.default_rng(2)
+    seen = [corners_seen(middle, *place, 0.5, rng) for place in places(8)]
+    found = calibrate_lens([Photo(str(i), SIZE, s) for i, s in enumerate(seen) if s], "opencv")
+    assert found.terms == ("f", "k1")
+    assert 0.5 < found.lens.sigma["cx"] < 20
+    assert set(found.lens.sigma) == {"fx", "fy", "cx", "cy", "k1"}
+    assert set(found.sigma) == {"f", "k1"}
+
+
+def test_how_well_the_ratio_of_both_focal_lengths_is_known_is_told_where_both_are_free():
+    sigma = calibrated("fisheye").lens.sigma
+    assert 0 < sigma["aspect"] < sigma["fx"] / 520
+    assert "f" not in sigma
+
+
 def test_stretched_pixels_are_noticed():
     stretched = LENSES["opencv"](PINHOLE.matrix * [[1.0], [0.75], [1.0]], PINHOLE.distortion, SIZE)
     seen = [corners_seen(stretched, *place, 0.2, np.random.default_rng(i)) for i, place in enumerate(places(12))]

@@ -1,5 +1,7 @@
 """Cameras: rotations, distortion and projection, against OpenCV and against themselves."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -132,6 +134,11 @@ def test_a_smaller_copy_of_a_picture_keeps_every_point_in_its_place():
     half = full.scaled(0.5)
     rays = np.array([[0.1, -0.2], [0.4, 0.3]])
     np.testing.assert_allclose((full.distort(rays) + 0.5) / 2 - 0.5, half.distort(rays))
+
+
+def test_a_smaller_copy_of_a_picture_has_a_lens_that_is_known_as_well():
+    known = {"fx": 4.0, "cy": 2.0, "aspect": 1e-3, "k1": 0.01}
+    assert replace(lens(), sigma=known).scaled(0.5).sigma == known | {"fx": 2.0, "cy": 1.0}
 
 
 def test_single_precision_is_good_for_a_hundredth_of_a_pixel():

@@ -1,0 +1,42 @@
+"""What the page of a new venue sends on."""
+
+import json
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.pages import newcomer
+
+SIGMA = {"fx": 3.5, "fy": 3.5, "k1": 0.002}
+EVENTS = "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/events"
+POSE = "**/ui/new-venue/pose"
+
+
+@pytest.fixture
+def page(stub, visit):
+    """The page on which a camera has been clicked, where photos give its lens and how well they know it."""
+    page = visit(stub.url, "/ui/new-venue")
+    lens = newcomer.VENUE.cameras[0].intrinsics.model_dump() | {"sigma": SIGMA}
+    end = json.dumps({"status": "succeeded", "result": {"intrinsics": lens, "rms_px": 0.2, "warnings": []}})
+    page.route("**/intrinsics", lambda route: route.fulfill(json={"links": {"events": EVENTS}}))
+    page.route(
+        f"**{EVENTS}",
+        lambda route: route.fulfill(content_type="text/event-stream", body=f"event: end\ndata: {end}\n\n"),
+    )
+    newcomer.describe_the_pitch(page)
+    newcomer.describe_a_camera(page, 0)
+    newcomer.click_points(page, 0, newcomer.VENUE.cameras[0].id)
+    return page
+
+
+def test_how_well_photos_know_a_lens_goes_with_it_until_somebody_changes_its_numbers(page):
+    page.get_by_label("Photos of a board").check()
+    page.locator("[name=photos]").set_input_files(newcomer.DEMO / "left.jpg")
+    with page.expect_request(POSE) as by_photos:
+        page.get_by_role("button", name="Find the lens").click()
+    assert by_photos.value.post_data_json["intrinsics"]["sigma"] == SIGMA
+    expect(page.get_by_text("Found: 0.20 px rms.")).to_be_visible()
+    expect(page.locator("[data-verdict]")).to_contain_text("Good")
+    with page.expect_request(POSE) as by_hand:
+        page.get_by_label("fx, px").fill("2000")
+    assert by_hand.value.post_data_json["intrinsics"]["sigma"] is None
