@@ -20,7 +20,7 @@ Accept = Annotated[
 Lens = Annotated[
     Literal["fixed", "may-drift"],
     Field(
-        description="Of a camera whose zoom or focus has moved: `fixed` rejects its pose, `may-drift` accepts it with the "
+        description="Of cameras whose zoom or focus moved: `fixed` rejects the pose, `may-drift` accepts it with the "
         "focal length that was found."
     ),
 ]

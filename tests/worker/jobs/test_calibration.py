@@ -166,6 +166,12 @@ def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue,
     assert asked["options"] == engine.Options(fit_focal_length=True, fit_ridge=True)
 
 
+def test_a_venue_whose_lens_may_drift_is_calibrated_so(venue, files, asked, settings):
+    for lens, may_drift in (("fixed", False), ("may-drift", True)):
+        calibration.solve(venue.model_copy(update={"lens": lens}), files, Options(), settings, lambda _: None)
+        assert asked["options"].lens_may_drift is may_drift
+
+
 def test_each_camera_has_its_verdict_and_the_job_the_sum_of_them(venue, files, asked, settings):
     asked["against"] = {"right": "it is dark"}
     result = calibration.solve(venue, files, Options(), settings, lambda _: None).result
