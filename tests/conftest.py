@@ -41,8 +41,8 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config):
-    """One more than there are cores: tests of the whole service wait longer than they compute."""
-    return len(os.sched_getaffinity(0)) + 1
+    """Twice as many as there are cores: tests of the whole service wait longer than they compute."""
+    return 2 * len(os.sched_getaffinity(0))
 
 
 @pytest.fixture(scope="session")
