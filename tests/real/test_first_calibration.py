@@ -1,5 +1,6 @@
 """The commands of docs/first-calibration.md as they stand there, on real cameras: from photos and clicks to poses."""
 
+import fcntl
 import json
 import os
 import re
@@ -37,14 +38,27 @@ def typed(step: str, folder: Path) -> subprocess.CompletedProcess:
 
 @pytest.fixture(scope="module")
 def lenses(real_pair, tmp_path_factory) -> Path:
-    """Files of the lenses, from every other photo: to look for boards takes longer than all the rest."""
-    folder = tmp_path_factory.mktemp("lenses")
+    """Files of the lenses, from every other photo: to look for boards takes longer than all the rest.
+
+    The processes that share a run of the tests share them: the first makes them, the others wait for it.
+    """
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "lenses"
+    folder.mkdir(exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / "made").exists():
+            make_lenses(folder)
+            (folder / "made").touch()
+    return folder
+
+
+def make_lenses(folder: Path) -> None:
     for side in ("left", "right"):
         (folder / "checkerboard" / side).mkdir(parents=True)
         for photo in sorted((FOLDER / "checkerboard" / side).glob("*.jpg"))[::2]:
             (folder / "checkerboard" / side / photo.name).symlink_to(photo)
     assert typed(commands()[0], folder).stderr.count("the principal point") >= 2
-    return folder
 
 
 def beginning(folder: Path, lenses: Path, exchanged: bool) -> Path:
