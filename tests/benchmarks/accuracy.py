@@ -10,23 +10,22 @@ Rendered venues (`scenes`), frames through the real U-Net, Start errors as in th
 from __future__ import annotations
 
 import argparse
-import json
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
 
 from tests.benchmarks import plots
 from tests.benchmarks.methods import METHODS, SLOW, THREADS, Seen, engine
+from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, VENUES, Scene, scene, started
 from tests.benchmarks.truth import Errors, apart, errors
 from worker.calibration.calibrate import calibrate
 from worker.calibration.records import Options, Progress
 from worker.calibration.scene.camera import Camera
 
-ROWS = FOLDER / "rows.jsonl"
 CAUGHT_M, CAUGHT_DEG = 0.01, 0.01
 SEEDS, STARTS = 3, 100
 SLOW_VENUES = ("pair-match-1", "apart-match", "pair-real-1", "apart-real")
@@ -299,17 +298,13 @@ SECTIONS: dict[str, Callable[[argparse.Namespace], Iterator[str]]] = {
     "convergence": convergence,
 }
 
-_kept: dict[tuple[str, str | None], Seen] = {}
 _references: dict[str, list[Camera]] = {}
 
 
+@lru_cache(maxsize=12)
 def _seen(venue: str, light: str | None = None) -> Seen:
     """A scene and what the network says of it; the last few are kept."""
-    if (venue, light) not in _kept:
-        if len(_kept) > 12:
-            _kept.pop(next(iter(_kept)))
-        _kept[venue, light] = Seen(scene(venue, light))
-    return _kept[venue, light]
+    return Seen(scene(venue, light))
 
 
 def _reference(venue: str) -> list[Camera]:
@@ -322,23 +317,12 @@ def _reference(venue: str) -> list[Camera]:
 
 def _remembered(key: dict, run: Callable[[], dict]) -> dict:
     """The row of a key, from the file or run now and appended to it."""
-    if not _remembered_rows and ROWS.exists():
-        for line in ROWS.read_text().splitlines():
-            row = json.loads(line)
-            _remembered_rows[json.dumps(row["key"], sort_keys=True)] = row
-    name = json.dumps(key, sort_keys=True)
-    if name not in _remembered_rows:
-        begin = time.perf_counter()
-        row = {"key": key, **{k: v for k, v in key.items() if k in ("venue", "method")}, **run()}
-        ROWS.parent.mkdir(parents=True, exist_ok=True)
-        with ROWS.open("a") as file:
-            file.write(json.dumps(row) + "\n")
-        _remembered_rows[name] = row
-        print(f"  {key} {time.perf_counter() - begin:.0f} s", flush=True)
-    return _remembered_rows[name]
+    return _rows_of_file().remembered(key, lambda: {k: key[k] for k in ("venue", "method") if k in key} | run())
 
 
-_remembered_rows: dict[str, dict] = {}
+@cache
+def _rows_of_file() -> Rows:
+    return Rows(FOLDER / "rows.jsonl")
 
 
 if __name__ == "__main__":

@@ -11,21 +11,21 @@ does. Every run is written to `runs/bench/lenses.jsonl` and not run again; remov
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 
 import numpy as np
 
 from models.training.pitches.conditions import Conditions
 from tests.benchmarks.methods import Seen, engine
+from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER, SIZE, Scene, rendered
 from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 
-ROWS = FOLDER / "lenses.jsonl"
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
 FOCAL_LENGTHS = (2200.0, 4000.0, 6000.0)
 # What point of the ground a view looks at, and how many metres of it are as wide as the picture.
@@ -148,23 +148,17 @@ def _table(cases: Sequence[tuple[str, dict[str, float]]], views: int) -> Iterato
 
 SECTIONS = {"zoom": zoom, "drift": drift, "poor-board": poor_board, "honesty": honesty}
 
-_kept: dict[tuple[float, str, int], Seen] = {}
-
 
 def _row(focal: float, view: str, number: int, wrong: dict[str, float], *, may_drift: bool = False) -> Row:
     """The row of a run, from the file or run now and appended to it."""
-    key = json.dumps([focal, view, number, wrong, may_drift], sort_keys=True)
-    if not _remembered and ROWS.exists():
-        _remembered.update(json.loads(line) for line in ROWS.read_text().splitlines())
-    if key not in _remembered:
-        _remembered[key] = vars(_run(focal, view, number, wrong, may_drift))
-        ROWS.parent.mkdir(parents=True, exist_ok=True)
-        with ROWS.open("a") as file:
-            file.write(json.dumps([key, _remembered[key]]) + "\n")
-    return Row(**_remembered[key])
+    key = {"focal": focal, "view": view, "number": number, "wrong": wrong, "may_drift": may_drift}
+    row = _rows().remembered(key, lambda: vars(_run(focal, view, number, wrong, may_drift)))
+    return Row(**{name: value for name, value in row.items() if name != "key"})
 
 
-_remembered: dict[str, dict] = {}
+@cache
+def _rows() -> Rows:
+    return Rows(FOLDER / "lenses.jsonl")
 
 
 def _run(focal: float, view: str, number: int, wrong: dict[str, float], may_drift: bool) -> Row:
@@ -186,34 +180,30 @@ def _run(focal: float, view: str, number: int, wrong: dict[str, float], may_drif
         np.inf if sigma is None else sigma.position_m,
         np.inf if sigma is None else sigma.rotation_deg,
         said.accepted,
-        float(one.camera.intrinsics.matrix[0, 0]) / focal - 1,
+        one.camera.intrinsics.focal_length_px / focal - 1,
         np.inf if one.zoom is None else one.zoom.sigma / focal,
         said.rejected_because,
     )
 
 
+@lru_cache(maxsize=12)
 def _seen(focal: float, view: str, number: int) -> Seen:
     """The frame of a view and what the network says of it; the last few are kept."""
-    key = (focal, view, number)
-    if key not in _kept:
-        if len(_kept) > 12:
-            _kept.pop(next(iter(_kept)))
-        rng = np.random.default_rng([9, int(focal), list(VIEWS).index(view), number])
-        camera = _camera(focal, view, rng)
-        light = replace(
-            Conditions.named(["sun", "cloud", "long shadows", "floodlight"][number % 4], rng),
-            variety=0.3,
-            fog=0.0,
-            blur=0.2,
-            noise=0.15,
-            sharpening=0.4,
-            jpeg_quality=92,
-            swell=1.0,
-            wobble=1.0,
-        )
-        frame = rendered(f"lens-{focal:.0f}-{view}-{number}", PITCH, camera, light)
-        _kept[key] = Seen(Scene(view, False, PITCH, [camera], [camera], {camera.id: [frame]}))
-    return _kept[key]
+    rng = np.random.default_rng([9, int(focal), list(VIEWS).index(view), number])
+    camera = _camera(focal, view, rng)
+    light = replace(
+        Conditions.named(["sun", "cloud", "long shadows", "floodlight"][number % 4], rng),
+        variety=0.3,
+        fog=0.0,
+        blur=0.2,
+        noise=0.15,
+        sharpening=0.4,
+        jpeg_quality=92,
+        swell=1.0,
+        wobble=1.0,
+    )
+    frame = rendered(f"lens-{focal:.0f}-{view}-{number}", PITCH, camera, light)
+    return Seen(Scene(view, False, PITCH, [camera], [camera], {camera.id: [frame]}))
 
 
 def _camera(focal: float, view: str, rng: np.random.Generator) -> Camera:

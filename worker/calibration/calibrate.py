@@ -158,7 +158,7 @@ def segment_all(
     done = 0
     responses = []
     for camera in cameras:
-        regions = reachable_regions(pitch, camera, CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
+        regions = reachable_regions(pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
         seen = []
         for frame in frames[camera.id]:
             journey.at("segmentation", done / total)

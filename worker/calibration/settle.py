@@ -284,4 +284,4 @@ def judged_alone(
 def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:
     """What streaks say (H, W) of where the markings are, wherever the network would look for them."""
     lines = SeenLines.from_camera(pitch.line_points(), camera)
-    return ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.matrix[0, 0])
+    return ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px)

@@ -46,7 +46,7 @@ def _refitted(here: Situation, number: int, result: CameraResult) -> CameraResul
         zoom, likelier = found.zoom, found.likelier
         if zoom is None or likelier is None:
             return None
-        changed_px = _focal(likelier) - _focal(stored)
+        changed_px = likelier.intrinsics.focal_length_px - stored.intrinsics.focal_length_px
         if abs(zoom.value) >= ARRIVED * zoom.sigma:
             # Until it is found it may be off by all that it has changed.
             found = _with_lens(here, number, likelier, abs(changed_px))
@@ -64,7 +64,3 @@ def _with_lens(here: Situation, number: int, begun: Camera, sigma_px: float) -> 
     alone = here.by_itself(number)
     alone = replace(alone, cameras=[replace(here.cameras[number], intrinsics=lens)])
     return alone.judged(alone.finished([replace(begun, intrinsics=lens)]))[0]
-
-
-def _focal(camera: Camera) -> float:
-    return float(camera.intrinsics.matrix[0, 0])

@@ -22,7 +22,7 @@ from fields.template import NAMES
 from models import MODEL_PATH
 from tests.benchmarks.fields import real, rendered, views
 from tests.benchmarks.fields.engine import THREADS, Engine
-from tests.benchmarks.fields.rows import Rows
+from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER as RUNS
 
 SECTIONS: dict[str, Callable[[argparse.Namespace, Engine], Iterator[str]]] = {

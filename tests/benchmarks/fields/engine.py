@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.benchmarks.fields.rows import Rows
+from tests.benchmarks.rows import Rows
 from worker.calibration.calibrate import NOTHING_USUAL, calibrate
 from worker.calibration.judge.quality import CameraResult
 from worker.calibration.records import Calibration, CalibrationError, Options

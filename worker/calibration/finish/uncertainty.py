@@ -103,7 +103,8 @@ class FinishedCamera:
     @property
     def elsewhere_m(self) -> float:
         """How far from here the camera is if its lens is what the lines say."""
-        return 0.0 if self.likelier is None else _metres_between(self.camera, self.likelier)
+        there = self.camera if self.likelier is None else self.likelier
+        return float(np.linalg.norm(there.pose.position - self.camera.pose.position))
 
     @property
     def sigma(self) -> Sigma | None:
@@ -148,8 +149,8 @@ def judged(
     found = posterior(told.information, told.pull, _blocks(here, stored, unknowns, len(solved.parameters)))
     # How far a camera moved helps to tell a zoom from a move. That it has not is no measurement of where it is: if the
     # lenses are what they are said to be, lines alone have to determine it.
-    certainty = np.maximum(found.certainty, [*np.zeros(solved.dense), *(p.expected**-2 for p in suspects)])
-    certainty[: solved.dense] = np.diag(here.prior(solved))[: solved.dense]
+    of_suspects = np.maximum(found.certainty[solved.dense :], [suspect.expected**-2 for suspect in suspects])
+    certainty = np.concatenate([np.diag(here.prior(solved))[: solved.dense], of_suspects])
     by_lines = np.asarray(np.linalg.inv(told.information + np.diag(certainty)), dtype=float)
     deviations = [
         Deviation(
@@ -288,7 +289,3 @@ def _determined(number: int, unknowns: Unknowns, covariance: Array, value: Array
         float(np.hypot(np.sqrt(covariance[number, number]), value[number])),
         None if most == number - first else (unknowns.parameters[most], float(correlation[most])),
     )
-
-
-def _metres_between(one: Camera, other: Camera) -> float:
-    return float(np.linalg.norm(one.pose.position - other.pose.position))

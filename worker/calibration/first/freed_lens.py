@@ -50,7 +50,7 @@ class LensGain:
         """One standard deviation per free number; of the focal length and of the centre in pixels."""
         deviations = np.sqrt(np.maximum(np.diag(self.after.covariance)[POSE_NUMBERS:], 0.0))
         # Its logarithm is what was fitted.
-        focal = float(self.after.camera.intrinsics.matrix[0, 0])
+        focal = self.after.camera.intrinsics.focal_length_px
         scale = [focal if name == "focal length" else 1.0 for name in self.after.free]
         return {name: float(s * k) for name, s, k in zip(self.after.free, deviations, scale, strict=True)}
 

@@ -187,7 +187,7 @@ def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:
 
 def zoom_in_words(camera: Camera, zoom: Deviation) -> str:
     """By how much the focal length is not what the venue says."""
-    focal = float(camera.intrinsics.matrix[0, 0])
+    focal = camera.intrinsics.focal_length_px
     by = f"{abs(zoom.value) / focal:.2%} ± {zoom.sigma / focal:.2%}"
     return f"the lines fit a focal length {by} {'longer' if zoom.value > 0 else 'shorter'} than the venue says"
 

@@ -132,6 +132,11 @@ class Intrinsics:
     model: ClassVar[LensModel] = "opencv"
 
     @property
+    def focal_length_px(self) -> float:
+        """The horizontal one."""
+        return float(self.matrix[0, 0])
+
+    @property
     def relative_size(self) -> float:
         """The longer side of the picture relative to a 4K frame's: what is given in 4K pixels scales by it."""
         return max(self.size) / 3840

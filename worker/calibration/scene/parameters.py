@@ -86,7 +86,7 @@ def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
     found: list[Parameter] = []
     for number, camera in enumerate(cameras):
         lens, known = camera.intrinsics, camera.intrinsics.sigma
-        focal, pixel = float(lens.matrix[0, 0]), lens.relative_size
+        focal, pixel = lens.focal_length_px, lens.relative_size
         found += [
             LensParameter(number, "focal_length_px", _focal_sigma(lens), 1e-5 * focal, _longer),
             LensParameter(
@@ -129,7 +129,7 @@ def free_focal_lengths(cameras: Sequence[Camera]) -> list[Parameter]:
     """The focal length of each camera, to be found along with its pose."""
     lengths = [p for p in lens_parameters(cameras) if p.name == "focal_length_px"]
     return [
-        replace(p, expected=FREE_FOCAL_LENGTH * float(camera.intrinsics.matrix[0, 0]))
+        replace(p, expected=FREE_FOCAL_LENGTH * camera.intrinsics.focal_length_px)
         for p, camera in zip(lengths, cameras, strict=True)
     ]
 

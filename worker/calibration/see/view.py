@@ -138,7 +138,7 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None 
     lines = _expected_lines(pitch, reduced)
     ground = _Ground.of(pitch, reduced)
     cells = _Cells.of(small, ground.size)
-    sight = look_for_lines(small, lines, REACH_RAD * float(reduced.intrinsics.matrix[0, 0]))
+    sight = look_for_lines(small, lines, REACH_RAD * reduced.intrinsics.focal_length_px)
     lost = ground.field & _lost(sight, ground)
     noise = _noise(frame, ground.field)
     sharpness = _Sharpness.of(frame, grey, ground.field, lost)
