@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check wheel bench bench-real bench-fields bench-segmentation bench-truth bench-service bench-rate train lock clean
+.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-rate train lock clean
 
 setup: $(VENV)/.installed
 
@@ -56,6 +56,10 @@ bench: $(VENV)/.bench
 # One BLAS thread, as the worker sets it.
 bench-truth: $(VENV)/.train
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.lenses
+
+# BEFORE: a clone of an earlier release with its .venv; `git worktree add ../esc-before v0.1.0 && make -C ../esc-before setup`.
+bench-cost: setup
+	$(BIN)/python -m tests.benchmarks.cost $(if $(BEFORE),--before $(BEFORE))
 
 bench-rate: setup
 	$(BIN)/python -m tests.benchmarks.rate

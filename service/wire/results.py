@@ -11,6 +11,10 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Intrinsics, Moved, Pose, Row
 from service.wire.options import Coordinates, Landmark
 
+CPU_S: Any = Field(
+    {}, description="Core-seconds, of all threads, of the stages that `timings_s` times; {} of earlier releases."
+)
+
 
 class Sigma(Wire):
     """One standard deviation of a pose."""
@@ -99,6 +103,7 @@ class Result(Wire):
     loss: float | None
     generations: int
     timings_s: dict[str, float]
+    cpu_s: dict[str, float] = CPU_S
     provenance: Provenance
 
     @property
@@ -248,6 +253,7 @@ class FieldResult(Wire):
     cameras: list[CameraResult]
     stitch_error_px: float | None
     timings_s: dict[str, float]
+    cpu_s: dict[str, float] = CPU_S
     provenance: Provenance
 
 

@@ -244,7 +244,7 @@ def _timed(chosen: Scene, **options: int) -> str:
     for seed in range(3):
         said = engine(**options)(seen, started(chosen.cameras, np.random.default_rng([seed, 1])), seed).said
         assert said is not None
-        runs.append((said.timings_s["evolution"], said.timings_s["refinement"]))
+        runs.append((said.spent.seconds["evolution"], said.spent.seconds["refinement"]))
     evolution, refinement = np.median(runs, axis=0)
     return f"{evolution:.2f} | {refinement:.2f}"
 

@@ -153,7 +153,7 @@ def engine(**options: object) -> Method:
         asked = replace(Options(seed=seed), **options)
         said = calibrate(seen.scene.pitch, cameras, seen.scene.frames, seen.segment, asked)
         poses = [camera.with_pose(result.camera.pose) for camera, result in zip(cameras, said.cameras, strict=True)]
-        return Answer(poses, said.timings_s["evolution"] + said.timings_s["refinement"], said)
+        return Answer(poses, said.spent.seconds["evolution"] + said.spent.seconds["refinement"], said)
 
     return run
 

@@ -110,7 +110,7 @@ def judge(pitch: Field, results: Sequence[CameraResult], sight: Sight, journey: 
         judged.append(replace(result, rejected_because=result.rejected_because or of_pairs or ridge))
     held = {result.camera.id for result in judged if result.accepted}
     stitch = stitch_error_px([pair for pair in pairs if not held or held.issuperset(pair.cameras)], gate)
-    return Answer(pitch, judged, "; ".join(reasons) or None, stitch, journey.seconds)
+    return Answer(pitch, judged, "; ".join(reasons) or None, stitch, journey.spent)
 
 
 def _comparable(results: Sequence[CameraResult]) -> list[int]:

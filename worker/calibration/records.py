@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -62,18 +62,39 @@ class Progress:
     loss: float | None = None
 
 
+class Spent:
+    """What stages took: `seconds` by a clock, and `core_seconds` of all threads of the process."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.core_seconds: dict[str, float] = {}
+
+    @contextmanager
+    def measuring(self, stage: str) -> Iterator[None]:
+        """Measure what that takes which is done inside."""
+        begun, spent = time.perf_counter(), time.process_time()
+        yield
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
+        self.core_seconds[stage] = self.core_seconds.get(stage, 0.0) + time.process_time() - spent
+
+    def add(self, other: Spent) -> None:
+        """What was measured elsewhere, behind what was measured here."""
+        self.seconds |= other.seconds
+        self.core_seconds |= other.core_seconds
+
+
 @dataclass(frozen=True)
 class Answer:
     """What the engine says of cameras around a pitch. `rejected_because`: all reasons in a sentence, None without any.
 
-    `pitch`: the given one but for what of it was to be found; `timings_s`: of each stage.
+    `pitch`: the given one but for what of it was to be found; `spent`: on each stage.
     """
 
     pitch: Field
     cameras: Sequence[CameraResult]
     rejected_because: str | None
     stitch_error_px: float | None
-    timings_s: Mapping[str, float]
+    spent: Spent
 
     @property
     def accepted(self) -> bool:
@@ -112,20 +133,17 @@ class Stopped(Exception):  # noqa: N818  (a request, not an error)
 
 
 class Journey:
-    """Where a job stands: how long each stage took, how far it is, and whether its caller wants it to stop."""
+    """Where a job stands: what each stage took, how far it is, and whether its caller wants it to stop."""
 
     def __init__(self, report: Callable[[Progress], None], stop: Callable[[], bool]) -> None:
+        self.spent = Spent()
         self.report = report
         self.stop = stop
-        self.seconds: dict[str, float] = {}
         self.fraction = 0.0
 
-    @contextmanager
-    def measuring(self, stage: str) -> Iterator[None]:
-        """Measure how long that takes which is done inside."""
-        begin = time.perf_counter()
-        yield
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin
+    def measuring(self, stage: str) -> AbstractContextManager[None]:
+        """Measure what that takes which is done inside."""
+        return self.spent.measuring(stage)
 
     def at(self, stage: Stage, share: float, generation: int | None = None, loss: float | None = None) -> None:
         """Report `share` 0..1 of `stage`; raise `Stopped` when asked to stop."""

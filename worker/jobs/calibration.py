@@ -17,7 +17,7 @@ from worker.calibration.judge.quality import Gate
 from worker.calibration.see.view import UsualView
 from worker.jobs import from_frames
 from worker.jobs.pictures import draw
-from worker.jobs.wire import Solution, number, wire_camera, wire_lens
+from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens
 
 NO_VIEWS: Mapping[str, View] = MappingProxyType({})
 
@@ -43,7 +43,7 @@ def solve(
             given.pitch, given.cameras, given.frames, given.network, asked, step, usual=usual
         ),
         draw,
-        lambda found, timings_s, provenance: _allowed(venue, options, _result(found, options, timings_s, provenance)),
+        lambda found, spent, provenance: _allowed(venue, options, _result(found, options, spent, provenance)),
     )
 
 
@@ -54,9 +54,7 @@ def _engine_options(venue: Venue, options: Options) -> engine.Options:
     )
 
 
-def _result(
-    found: engine.Calibration, options: Options, timings_s: Mapping[str, float], provenance: Provenance
-) -> Result:
+def _result(found: engine.Calibration, options: Options, spent: engine.Spent, provenance: Provenance) -> Result:
     ridge = found.pitch.ridge
     return Result(
         verdict=found.verdict,
@@ -75,7 +73,8 @@ def _result(
         stitch_error_limit_px=Gate().largest_stitch_error_px,
         loss=number(found.loss),
         generations=found.generations,
-        timings_s=dict(timings_s),
+        timings_s=to_the_millisecond(spent.seconds),
+        cpu_s=to_the_millisecond(spent.core_seconds),
         provenance=provenance,
     )
 

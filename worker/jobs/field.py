@@ -14,9 +14,10 @@ from service.wire.results import FieldResult, MeasureResult, Provenance
 from service.wire.venue import Venue
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.measures.field_fit import FieldFit, Measure, fit_field
+from worker.calibration.records import Spent
 from worker.jobs import from_frames
 from worker.jobs.from_frames import Given
-from worker.jobs.wire import Solution, jpeg, number, wire_camera
+from worker.jobs.wire import Solution, jpeg, number, to_the_millisecond, wire_camera
 
 MILLIMETRE = 3
 log = structlog.get_logger()
@@ -39,7 +40,7 @@ def solve(
         report,
         lambda given, step: fit_field(given.pitch, given.cameras, given.frames, given.network, seed, step),
         _draw,
-        lambda found, timings_s, provenance: _result(venue.field, found, timings_s, provenance),
+        lambda found, spent, provenance: _result(venue.field, found, spent, provenance),
     )
 
 
@@ -55,7 +56,7 @@ def _draw(given: Given, found: FieldFit) -> dict[str, bytes]:
     return pictures
 
 
-def _result(given: FieldOfPlay, found: FieldFit, timings_s: Mapping[str, float], provenance: Provenance) -> FieldResult:
+def _result(given: FieldOfPlay, found: FieldFit, spent: Spent, provenance: Provenance) -> FieldResult:
     return FieldResult(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
@@ -63,7 +64,8 @@ def _result(given: FieldOfPlay, found: FieldFit, timings_s: Mapping[str, float],
         measures=[_wire_measure(measure) for measure in found.measures],
         cameras=[wire_camera(camera) for camera in found.cameras],
         stitch_error_px=number(found.stitch_error_px),
-        timings_s=dict(timings_s),
+        timings_s=to_the_millisecond(spent.seconds),
+        cpu_s=to_the_millisecond(spent.core_seconds),
         provenance=provenance,
     )
 

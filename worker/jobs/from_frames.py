@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -17,7 +16,7 @@ from service.wire.options import FieldOptions, Options
 from service.wire.results import Provenance
 from service.wire.venue import Venue
 from worker.calibration import records
-from worker.calibration.records import Answer, CalibrationError, Segment
+from worker.calibration.records import Answer, CalibrationError, Segment, Spent
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Region
@@ -32,7 +31,6 @@ from worker.jobs.wire import (
     pitch_of,
     provenance_of,
     segmenter_of,
-    to_the_millisecond,
     wire_progress,
 )
 
@@ -74,7 +72,7 @@ def solve(
     report: Callable[[Progress], None],
     engine: Callable[[Given, Callable[[records.Progress], None]], A],
     draw: Callable[[Given, A], dict[str, bytes]],
-    tell: Callable[[A, Mapping[str, float], Provenance], R],
+    tell: Callable[[A, Spent, Provenance], R],
 ) -> Solution[R]:
     """Call the `engine` with what a venue and the files of its cameras hold, `draw` its answer and `tell` it.
 
@@ -82,9 +80,9 @@ def solve(
     """
     segmenter = segmenter_of(settings)
     cv2.setNumThreads(settings.threads)
-    begun = time.perf_counter()
-    frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
-    decoded = time.perf_counter()
+    spent = Spent()
+    with spent.measuring("decode"):
+        frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
     cameras = [camera_of(camera) for camera in venue.cameras]
     given = Given(pitch_of(venue.field), cameras, frames, Remembering(segmenter, frames))
     try:
@@ -92,7 +90,7 @@ def solve(
     except CalibrationError as error:
         raise Failure(error.kind, error.detail, error.camera) from error
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
-    drawing = time.perf_counter()
-    pictures = draw(given, answer)
-    timings = {"decode": decoded - begun, **answer.timings_s, "preview": time.perf_counter() - drawing}
-    return Solution(tell(answer, to_the_millisecond(timings), provenance_of(segmenter, options)), pictures)
+    spent.add(answer.spent)
+    with spent.measuring("preview"):
+        pictures = draw(given, answer)
+    return Solution(tell(answer, spent, provenance_of(segmenter, options)), pictures)

@@ -80,9 +80,12 @@ def asked(monkeypatch):
             )
             for camera in cameras
         ]
+        spent = engine.Spent()
+        with spent.measuring("evolution"):
+            sum(range(10_000))
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
-        return engine.Calibration(pitch, results, against, 0.2, {"evolution": 1.0}, None, 0.1, 3, [doubt])
+        return engine.Calibration(pitch, results, against, 0.2, spent, None, 0.1, 3, [doubt])
 
     class Segmenter:
         sha256 = "f" * 64
@@ -147,7 +150,7 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert result.accepted
     assert result.cameras[0].pose.position == [-0.95, -49, 8]
     assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
-    assert set(result.timings_s) == {"decode", "evolution", "preview"}
+    assert set(result.timings_s) == set(result.cpu_s) == {"decode", "evolution", "preview"}
     assert [step.stage for step in steps] == ["evolution", "preview"]
     of_cameras = {f"{kind}_{camera}" for kind in ("overlay", "frame", "stored", "new", "mask") for camera in files}
     assert set(outcome.pictures) == {"preview", "preview_before", "seam", "birdseye"} | of_cameras
