@@ -1,6 +1,6 @@
 """The process that computes one job: what it is given, what it says, and how it ended.
 
-It decodes files that strangers sent. So it gets the task and the way to the files, and no database.
+It decodes files that strangers sent. So it gets the task and the files, and no way to the database or the store.
 """
 
 from __future__ import annotations
@@ -20,15 +20,14 @@ from pydantic import ValidationError
 from service import lifeline
 from service.settings import Settings
 from service.store.jobs.task import Task
-from worker.message import Message
+from worker.message import Files, Given, Means, Message
 
 # Twice as often as a cancellation needs to reach the child.
 LOOK_S = 0.5
 LONGEST_LINE = 16 * 1024 * 1024
+MOST_PICTURES = 1024 * 1024 * 1024
 # For a process that has closed its output.
 ENDING_S = 10.0
-# The way to a bucket, which is in the environment alone.
-TO_THE_BUCKET = ("AWS_", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "NO_PROXY")
 log = structlog.get_logger()
 
 
@@ -37,18 +36,19 @@ class NoMessage(Exception):  # noqa: N818
 
 
 class Child:
-    """The process; killed when the `with` block is left."""
+    """The process; killed when the `with` block is left. `pictures`: the files that came with its result, by name."""
 
-    def __init__(self, settings: Settings, task: Task) -> None:
-        # A file takes the task whole, whether or not the program ever reads it; a pipe could fill up.
+    def __init__(self, settings: Settings, task: Task, files: Files) -> None:
+        self.pictures: dict[str, bytes] = {}
+        # A file takes all of it, whether or not the program ever reads it; a pipe could fill up.
         with tempfile.TemporaryFile() as given:
-            given.write(task.without_addresses().model_dump_json().encode())
+            Given.of(task, Means.of(settings), files).write(given, files)
             given.seek(0)
             self._process = subprocess.Popen(
                 settings.job_program,
                 stdin=given,
                 stdout=subprocess.PIPE,
-                env=lifeline.without_secrets(*TO_THE_BUCKET) | _as_environment(settings) | settings.native_environment,
+                env=lifeline.without_secrets() | settings.native_environment,
             )
         assert self._process.stdout is not None
         self._output: IO[bytes] = self._process.stdout
@@ -63,7 +63,8 @@ class Child:
 
     def messages(self) -> Iterator[Message | None]:
         """What the child says until it ends, and None at least every `LOOK_S`."""
-        descriptor, pending, looked = self._output.fileno(), b"", time.monotonic()
+        descriptor, pending, looked = self._output.fileno(), bytearray(), time.monotonic()
+        last: Message | None = None
         with selectors.DefaultSelector() as selector:
             selector.register(descriptor, selectors.EVENT_READ)
             while True:
@@ -71,10 +72,19 @@ class Child:
                     chunk = os.read(descriptor, 65536)
                     if not chunk:
                         return
-                    *lines, pending = (pending + chunk).split(b"\n")
-                    if len(pending) > LONGEST_LINE:
-                        raise NoMessage(f"its program wrote a line of more than {LONGEST_LINE} bytes")
-                    yield from (message for line in lines if (message := _understood(line)))
+                    pending += chunk
+                    while last is None and (line := _first_line(pending)):
+                        message = _understood(line)
+                        if message is not None and message.last:
+                            last = message
+                            if sum(last.pictures.values()) > MOST_PICTURES:
+                                raise NoMessage(f"its program drew more than {MOST_PICTURES} bytes of pictures")
+                        elif message is not None:
+                            yield message
+                    if last is not None and len(pending) >= sum(last.pictures.values()):
+                        self.pictures = _files(last.pictures, pending)
+                        yield last
+                        return
                 if time.monotonic() - looked >= LOOK_S:
                     looked = time.monotonic()
                     yield None
@@ -100,14 +110,20 @@ def _understood(line: bytes) -> Message | None:
         return None
 
 
-def _as_environment(settings: Settings) -> dict[str, str]:
-    """What the child needs to compute and to find the same files, however this process was configured."""
-    return {
-        "ESC_DATA": str(settings.data.absolute()),
-        "ESC_BLOB_URL": settings.home_blob_url,
-        "ESC_MODEL": str(settings.model.absolute()),
-        "ESC_PROVIDER": settings.provider,
-        "ESC_THREADS": str(settings.threads),
-        "ESC_LOG_FORMAT": settings.log_format,
-        "ESC_LOG_LEVEL": settings.log_level,
-    }
+def _first_line(pending: bytearray) -> bytes | None:
+    """Take the first line of what has come, None if it is not whole."""
+    line, end, rest = pending.partition(b"\n")
+    if not end:
+        if len(pending) > LONGEST_LINE:
+            raise NoMessage(f"its program wrote a line of more than {LONGEST_LINE} bytes")
+        return None
+    pending[:] = rest
+    return bytes(line + end)
+
+
+def _files(sizes: dict[str, int], data: bytearray) -> dict[str, bytes]:
+    """The files that lie one behind the other in the data."""
+    files, begin = {}, 0
+    for name, size in sizes.items():
+        files[name], begin = bytes(data[begin : begin + size]), begin + size
+    return files

@@ -14,6 +14,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, TypeVar
@@ -29,12 +30,13 @@ from service.store.jobs.attempts import Attempts
 from service.store.jobs.task import Task
 from service.wire.job import JobError, Progress
 from service.wire.problems import KINDS, first_line, type_of
-from worker.child import Child
+from worker.child import LOOK_S, Child
 from worker.duties.alarms import Alarms
 from worker.duties.delivering import Delivering
 from worker.duties.retention import Retention
 from worker.duties.scheduled import Scheduled
-from worker.message import Message
+from worker.files import JobFiles, NotStored
+from worker.message import Files, Message
 from worker.spans import Spans
 
 BEAT_S = 2.0
@@ -76,6 +78,7 @@ class Worker:
         self._settings = settings
         home = Home(settings)
         self._attempts, self._workers = home.attempts, home.workers
+        self._files = JobFiles(settings)
         self._queue = WorkerQueue(
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt
         )
@@ -156,24 +159,36 @@ class Worker:
 
     def _compute(self, task: Task, limit_s: float, spans: Spans) -> Message | None:
         """The last word about the job; None if it was taken away."""
-        deadline, shown, hold = time.monotonic() + limit_s, 0.0, Hold(self._attempts, task)
-        with Child(self._settings, task) as child:
+        hold = Hold(self._attempts, task, limit_s)
+        try:
+            files = _looking(lambda: self._files.frames(task), hold.look)
+            last, pictures = self._computed(task, files, hold, spans)
+            _looking(lambda: self._files.keep(task, pictures), hold.look)
+        except TakenAway:
+            return None
+        except TooLate:
+            return Message(error=_error("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
+        except NotStored as missing:
+            return Message(error=_error("job-crashed", str(missing), missing.camera))
+        return last
+
+    def _computed(self, task: Task, files: Files, hold: Hold, spans: Spans) -> tuple[Message, dict[str, bytes]]:
+        """What its program says last, and the pictures that come with it."""
+        shown = 0.0
+        with Child(self._settings, task, files) as child:
             for message in child.messages():
-                if message is None and hold.lost():
-                    return None
-                if time.monotonic() > deadline:
-                    return Message(error=_error("job-timeout", f"It was ended after {limit_s:g} s; see timeout_s."))
                 if message is None:
-                    continue
-                if message.result is not None or message.error is not None:
-                    return message
-                if message.progress is None:
-                    continue
-                spans.at(message.progress.stage)
-                if time.monotonic() - shown >= PROGRESS_S:
-                    self._show(task, message.progress)
-                    shown = time.monotonic()
-            return Message(error=_error("job-crashed", child.how_it_ended()))
+                    hold.look()
+                elif message.last:
+                    return message, child.pictures
+                elif message.warning is not None:
+                    log.warning("said by its program", what=message.warning)
+                elif message.progress is not None:
+                    spans.at(message.progress.stage)
+                    if time.monotonic() - shown >= PROGRESS_S:
+                        self._show(task, message.progress)
+                        shown = time.monotonic()
+            return Message(error=_error("job-crashed", child.how_it_ended())), {}
 
     def _show(self, task: Task, progress: Progress) -> None:
         with suppress(*AWAY):
@@ -183,20 +198,36 @@ class Worker:
         if last is None:
             log.info("job taken away")
         elif last.result is not None:
-            self._attempts.finish(task, last.result, last.pictures)
+            self._attempts.finish(task, last.result, list(last.pictures))
         elif last.error is not None:
             self._attempts.fail(task, last.error)
+
+
+class TakenAway(Exception):  # noqa: N818
+    """The job was cancelled, or is another attempt's."""
+
+
+class TooLate(Exception):  # noqa: N818
+    """The job has had its time."""
 
 
 class Hold:
     """An attempt's hold on its job: looked at often, and now and then renewed, which costs the database a write."""
 
-    def __init__(self, attempts: Attempts, task: Task) -> None:
+    def __init__(self, attempts: Attempts, task: Task, limit_s: float) -> None:
         self._attempts = attempts
         self._task = task
         self._renewed = time.monotonic()
+        self._deadline = self._renewed + limit_s
 
-    def lost(self) -> bool:
+    def look(self) -> None:
+        """Raise `TakenAway` or `TooLate` if the attempt is not to go on."""
+        if self._lost():
+            raise TakenAway
+        if time.monotonic() > self._deadline:
+            raise TooLate
+
+    def _lost(self) -> bool:
         """Whether the job went to a cancellation or to another attempt; while the database is away, nobody can say."""
         try:
             if time.monotonic() - self._renewed < BEAT_S:
@@ -237,8 +268,18 @@ def _again_and_again(look: Callable[[], float], stop: threading.Event) -> None:
             pause_s = PUT_OFF_S
 
 
-def _error(kind: str, detail: str) -> JobError:
-    return JobError(type=type_of(kind), title=KINDS[kind].title, detail=detail)
+def _looking(work: Callable[[], Answer], look: Callable[[], None]) -> Answer:
+    """Do what may have to wait for the store, and `look` meanwhile; if that raises, it is left to itself."""
+    aside = ThreadPoolExecutor(1)
+    done = aside.submit(work)
+    aside.shutdown(wait=False)
+    while not wait([done], LOOK_S).done:
+        look()
+    return done.result()
+
+
+def _error(kind: str, detail: str, camera: str | None = None) -> JobError:
+    return JobError(type=type_of(kind), title=KINDS[kind].title, detail=detail, camera=camera)
 
 
 def _only_one(settings: Settings) -> IO[bytes]:

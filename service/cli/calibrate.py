@@ -98,13 +98,14 @@ def run(
         err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")
     from service.store.jobs.files import picture_file
     from worker.jobs import calibration
+    from worker.message import Means
 
     stored = checked(VenueIn, venue.read_text(), str(venue)).stored()
     if chosen.seed is None:
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
     files = checked_files(stored, frames, settings)
     with failure_told(), bar() as show:
-        solution = calibration.solve(stored, files, chosen, settings, lambda step: show(step, ""))
+        solution = calibration.solve(stored, files, chosen, Means.of(settings), lambda step: show(step, ""))
     output.mkdir(parents=True, exist_ok=True)
     (output / "result.json").write_text(solution.result.model_dump_json(indent=2) + "\n")
     for name, picture in solution.pictures.items():

@@ -185,11 +185,12 @@ def fit_field(
 def _fit_here(file: Path, frames: list[str], options: FieldOptions) -> tuple[Venue, FieldResult, dict[str, bytes]]:
     settings = engine_settings()
     from worker.jobs import field
+    from worker.message import Means
 
     stored = checked(VenueIn, file.read_text(), str(file)).stored()
     files = checked_files(stored, frames, settings)
     with failure_told(), bar() as show:
-        solution = field.solve(stored, files, options, settings, lambda step: show(step, ""))
+        solution = field.solve(stored, files, options, Means.of(settings), lambda step: show(step, ""))
     return stored, solution.result, solution.pictures
 
 

@@ -153,7 +153,7 @@ def result() -> Message:
         timings_s=dict.fromkeys(stages, 1.234),
         provenance=provenance,
     )
-    return Message(result=found, pictures=[])
+    return Message(result=found)
 
 
 def register_venues(database_url: str, count: int) -> None:

@@ -1,4 +1,6 @@
+import io
 import json
+import subprocess
 import sys
 import time
 
@@ -9,6 +11,7 @@ from service.store.jobs.task import Task
 from service.wire.options import Options
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
 from worker import child as children
+from worker.message import Given
 
 VENUE = VenueIn.model_validate(VENUE_EXAMPLE).stored()
 TASK = Task(
@@ -18,13 +21,14 @@ TASK = Task(
     options=Options(seed=7, callback_url="https://example.com/s3cret"),
     frames={},
 )
+FILES = {"left": [b"one\n", b"two"], "right": [b""]}
 
 
 def child(tmp_path, program):
     settings = Settings(
         data=tmp_path, database_url=None, webhook_secret=None, job_program=[sys.executable, "-c", program]
     )
-    return children.Child(settings, TASK)
+    return children.Child(settings, TASK, FILES)
 
 
 def test_a_child_that_never_ends_its_line_is_killed_and_not_waited_for(tmp_path):
@@ -54,17 +58,71 @@ def test_a_child_computes_with_one_blas_thread(tmp_path):
     assert told(tmp_path, "os.environ['OMP_NUM_THREADS']") == "1"
 
 
-def test_a_child_is_given_its_task_but_not_the_address_that_is_told_of_its_end(tmp_path):
-    given = Task.model_validate_json(told(tmp_path, "sys.stdin.read()"))
-    assert given == TASK.without_addresses()
-    assert (given.venue, given.options.seed, given.options.callback_url) == (VENUE, 7, None)
+def test_a_child_is_given_its_task_and_its_files_but_not_the_address_that_is_told_of_its_end(tmp_path):
+    given, files = Given.read(io.BytesIO(told(tmp_path, "sys.stdin.read()").encode()))
+    assert (given.task, files) == (TASK.without_addresses(), FILES)
+    assert (given.task.venue, given.task.options.seed, given.task.options.callback_url) == (VENUE, 7, None)
 
 
-def test_a_child_inherits_the_way_to_the_files_and_no_other_secret(tmp_path, monkeypatch):
+def drawing(tmp_path, sizes, data):
+    """A child that ends its job with pictures of such sizes, and such data behind that."""
+    line = {"error": {"type": "", "title": "", "detail": ""}, "pictures": sizes}
+    said = f"print({json.dumps(line)!r}, flush=True); sys.stdout.buffer.write({data}); sys.stdout.flush()"
+    return child(tmp_path, f"import sys; {said}; sys.stdin.read()")
+
+
+def test_pictures_come_whole_behind_the_last_word(tmp_path):
+    picture = bytes(range(256)) * 1000
+    sizes = {"first": 3, "empty": 0, "large": len(picture)}
+    with drawing(tmp_path, sizes, "b'one' + bytes(range(256)) * 1000") as whole:
+        assert [message.pictures for message in whole.messages() if message] == [sizes]
+        assert whole.pictures == {"first": b"one", "empty": b"", "large": picture}
+
+
+def test_a_child_that_ends_amid_its_pictures_has_said_nothing(tmp_path):
+    with drawing(tmp_path, {"first": 9}, "b'one'") as cut:
+        assert [message for message in cut.messages() if message] == []
+        assert "ended with code 0 and no result" in cut.how_it_ended()
+
+
+def test_more_pictures_than_a_job_can_have_are_not_waited_for(tmp_path):
+    too_much = children.MOST_PICTURES + 1
+    with drawing(tmp_path, {"a": too_much}, "b''") as endless, pytest.raises(children.NoMessage, match="of pictures"):
+        list(endless.messages())
+
+
+def test_what_a_program_warns_of_is_a_message_too(tmp_path):
+    program = "from worker.jobs.job import Parent; import logging; logging.getLogger().addHandler(Parent()); "
+    with child(tmp_path, program + "print('native'); logging.warning('cannot %s', 'draw')") as warning:
+        assert [message.warning for message in warning.messages() if message] == ["cannot draw"]
+
+
+def test_a_child_inherits_no_secret_and_no_way_to_the_files(tmp_path, monkeypatch):
+    ways = ("AWS_ACCESS_KEY_ID", "https_proxy", "ESC_DATA")
     secrets = ("ESC_DATABASE_URL", "ESC_WEBHOOK_SECRET", "ESC_API_KEY", "PGPASSWORD", "GITHUB_TOKEN")
-    for name in ("AWS_ACCESS_KEY_ID", "https_proxy", "CUDA_VISIBLE_DEVICES", *secrets):
+    for name in ("CUDA_VISIBLE_DEVICES", *ways, *secrets):
         monkeypatch.setenv(name, "x")
     inherited = json.loads(told(tmp_path, "json.dumps(dict(os.environ))"))
-    assert {"PATH", "AWS_ACCESS_KEY_ID", "https_proxy", "CUDA_VISIBLE_DEVICES"} <= inherited.keys()
-    assert inherited["ESC_BLOB_URL"] == (tmp_path / "blobs").as_uri()
-    assert not inherited.keys() & set(secrets)
+    assert {"PATH", "CUDA_VISIBLE_DEVICES"} <= inherited.keys()
+    assert not inherited.keys() & {*ways, *secrets}
+
+
+LOADED = """
+import sys
+import worker.jobs.job, worker.jobs.calibration, worker.jobs.field, worker.jobs.intrinsics, worker.jobs.locate
+print(*{name.partition(".")[0] for name in sys.modules} - sys.stdlib_module_names)
+"""
+# Of what the project depends on; the last reads the task.
+COMPUTES_WITH = {"numpy", "cv2", "onnxruntime", "pydantic"}
+NOTHING_OF = {
+    *("fastapi", "starlette", "uvicorn", "httpx", "jinja2"),
+    *("sqlalchemy", "alembic", "dbos", "psycopg", "obstore"),
+    *("pydantic_settings", "structlog", "rich", "typer", "opentelemetry", "prometheus_client"),
+}
+
+
+def test_what_computes_a_job_loads_nothing_of_the_web_the_database_or_the_store():
+    run = subprocess.run([sys.executable, "-P", "-c", LOADED], capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.split())
+    assert loaded >= COMPUTES_WITH
+    assert not loaded & NOTHING_OF

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
 
-from service.settings import Settings
 from service.wire.job import Progress
 from service.wire.options import Options
 from service.wire.results import Provenance, Result, Suspicion, View
@@ -18,6 +17,7 @@ from worker.calibration.see.view import UsualView
 from worker.jobs import from_frames
 from worker.jobs.pictures import draw
 from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens
+from worker.message import Means
 
 NO_VIEWS: Mapping[str, View] = MappingProxyType({})
 
@@ -26,7 +26,7 @@ def solve(
     venue: Venue,
     files: Mapping[str, Sequence[bytes]],
     options: Options,
-    settings: Settings,
+    means: Means,
     report: Callable[[Progress], None],
     last_views: Mapping[str, View] = NO_VIEWS,
 ) -> Solution[Result]:
@@ -37,7 +37,7 @@ def solve(
         venue,
         files,
         options,
-        settings,
+        means,
         report,
         lambda given, step: calibrate(
             given.pitch, given.cameras, given.frames, given.network, asked, step, usual=usual

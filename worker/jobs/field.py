@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 
-import structlog
-
-from service.settings import Settings
 from service.wire.field import FieldOfPlay
 from service.wire.job import Progress
 from service.wire.options import FieldOptions
@@ -18,16 +16,17 @@ from worker.calibration.records import Spent
 from worker.jobs import from_frames
 from worker.jobs.from_frames import Given
 from worker.jobs.wire import Solution, jpeg, number, to_the_millisecond, wire_camera
+from worker.message import Means
 
 MILLIMETRE = 3
-log = structlog.get_logger()
+log = logging.getLogger(__name__)
 
 
 def solve(
     venue: Venue,
     files: Mapping[str, Sequence[bytes]],
     options: FieldOptions,
-    settings: Settings,
+    means: Means,
     report: Callable[[Progress], None],
 ) -> Solution[FieldResult]:
     """The measures of a venue's pitch from the files of its cameras."""
@@ -36,7 +35,7 @@ def solve(
         venue,
         files,
         options,
-        settings,
+        means,
         report,
         lambda given, step: fit_field(given.pitch, given.cameras, given.frames, given.network, seed, step),
         _draw,
@@ -50,7 +49,7 @@ def _draw(given: Given, found: FieldFit) -> dict[str, bytes]:
         try:
             drawn = overlay((given.pitch, old), (found.pitch, new.camera), given.frames[old.id][0], "field")
         except Exception:  # what was rejected may look anywhere; a picture is not worth losing the reason
-            log.warning("cannot draw", camera=old.id, exc_info=True)
+            log.warning("cannot draw camera %s", old.id, exc_info=True)
             continue
         pictures[f"overlay_{old.id}"] = jpeg(drawn)
     return pictures

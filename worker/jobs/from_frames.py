@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from service.settings import Settings
 from service.wire.job import Progress
 from service.wire.options import FieldOptions, Options
 from service.wire.results import Provenance
@@ -33,6 +32,7 @@ from worker.jobs.wire import (
     segmenter_of,
     wire_progress,
 )
+from worker.message import Means
 
 A = TypeVar("A", bound=Answer)
 Frames = Mapping[str, Sequence[Picture]]
@@ -68,7 +68,7 @@ def solve(
     venue: Venue,
     files: Mapping[str, Sequence[bytes]],
     options: Options | FieldOptions,
-    settings: Settings,
+    means: Means,
     report: Callable[[Progress], None],
     engine: Callable[[Given, Callable[[records.Progress], None]], A],
     draw: Callable[[Given, A], dict[str, bytes]],
@@ -78,8 +78,8 @@ def solve(
 
     With or without a server around it.
     """
-    segmenter = segmenter_of(settings)
-    cv2.setNumThreads(settings.threads)
+    segmenter = segmenter_of(means)
+    cv2.setNumThreads(means.threads)
     spent = Spent()
     with spent.measuring("decode"):
         frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}

@@ -1,32 +1,26 @@
-"""One job, in a process of its own: load, compute what its kind asks for, draw, hand back.
+"""One job, in a process of its own: read it, compute what its kind asks for, draw, hand back.
 
-`python -m worker.jobs.job` reads a `Task` on its standard input and prints a line of JSON for each step of progress and
-one for the end, a `worker.message.Message` each. It decodes what strangers sent, so it sees no database: its parent
-writes the rows.
+`python -m worker.jobs.job` reads a `worker.message.Given` with its files on its standard input and prints a line of
+JSON for each step of progress and one for the end, a `Message` each; pictures follow the last line. It decodes what
+strangers sent, so it sees no database, no store and no settings: its parent reads and writes them.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 
 import cv2
-import structlog
 
 from service import lifeline
-from service.observe import logs
-from service.settings import Settings
-from service.store.blobs import AWAY, Blobs
-from service.store.jobs.files import picture_file, picture_folder
 from service.store.jobs.task import Task
 from service.wire.job import Progress
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions
-from service.wire.problems import first_line
 from service.wire.results import AnyResult
-from worker.jobs import calibration, field, intrinsics, locate
 from worker.jobs.wire import Failure, Solution
-from worker.message import Message
+from worker.message import Given, Means, Message
 
 BEHIND_THE_OTHERS = 10
 """Niceness: answers of the API and heartbeats of the worker on the same machine go before the computation."""
@@ -36,74 +30,66 @@ def main() -> None:
     """Compute the job that the parent has begun."""
     lifeline.end_with_parent()
     os.nice(BEHIND_THE_OTHERS)
-    say = _line_to_parent()
-    # The parent says all there is to know: a file of settings may hold the password of the database.
-    settings = Settings(_env_file=None)
-    logs.configure(settings)
-    task = Task.model_validate_json(sys.stdin.buffer.read())
-    structlog.contextvars.bind_contextvars(job=task.job_id, **task.origin.names())
-    blobs = Blobs(settings.home_blob_url)
+    parent = Parent()
+    logging.basicConfig(handlers=[parent], format="%(message)s")
+    given, files = Given.read(sys.stdin.buffer)
     try:
-        solution = _compute(task, _load(task, blobs), settings, lambda progress: say(Message(progress=progress)))
-        _store(task, blobs, solution.pictures)
+        solution = _compute(given.task, files, given.means, lambda progress: parent.told(Message(progress=progress)))
     except Failure as failure:
-        say(Message(error=failure.error))
+        parent.told(Message(error=failure.error))
         return
-    say(Message(result=solution.result, pictures=list(solution.pictures)))
+    sizes = {name: len(picture) for name, picture in solution.pictures.items()}
+    parent.told(Message(result=solution.result, pictures=sizes), *solution.pictures.values())
 
 
 def _compute(
-    task: Task, files: Mapping[str, Sequence[bytes]], settings: Settings, report: Callable[[Progress], None]
+    task: Task, files: Mapping[str, Sequence[bytes]], means: Means, report: Callable[[Progress], None]
 ) -> Solution[AnyResult]:
-    """What the kind of the job asks for."""
-    cv2.setNumThreads(settings.threads)
+    """What the kind of the job asks for; what other kinds need is not loaded."""
+    cv2.setNumThreads(means.threads)
     match task.options:
         case IntrinsicsOptions() as options:
+            from worker.jobs import intrinsics
+
             return intrinsics.solve({name: photo for name, (photo,) in files.items()}, options, report)
         case LocateOptions() as options:
+            from worker.jobs import locate
+
             assert task.venue is not None
             ((camera, frames),) = files.items()
             return locate.solve(task.venue, camera, options, next(iter(frames), None), report)
         case FieldOptions() as options:
+            from worker.jobs import field
+
             assert task.venue is not None
-            return field.solve(task.venue, files, options, settings, report)
+            return field.solve(task.venue, files, options, means, report)
         case options:
+            from worker.jobs import calibration
+
             assert task.venue is not None
-            return calibration.solve(task.venue, files, options, settings, report, task.last_views)
+            return calibration.solve(task.venue, files, options, means, report, task.last_views)
 
 
-def _line_to_parent() -> Callable[[Message], None]:
-    """Keep standard output for messages; whatever native code prints goes to the log."""
-    messages = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
+class Parent(logging.Handler):
+    """The process that started this one, at the other end of the standard output; warnings go there too.
 
-    def say(message: Message) -> None:
-        print(message.line(), file=messages, flush=True)
+    The standard output is kept for messages: whatever native code prints goes to the log.
+    """
 
-    return say
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self._messages = os.fdopen(os.dup(1), "wb")
+        os.dup2(2, 1)
 
+    def told(self, message: Message, *files: bytes) -> None:
+        """Say it, and hand over the files behind it."""
+        self._messages.write(message.line().encode() + b"\n")
+        self._messages.writelines(files)
+        self._messages.flush()
 
-def _load(task: Task, blobs: Blobs) -> dict[str, list[bytes]]:
-    files: dict[str, list[bytes]] = {}
-    for camera, paths in task.frames.items():
-        files[camera] = []
-        for path in paths:
-            try:
-                data = blobs.get(path)
-            except AWAY as error:
-                raise Failure("job-crashed", f"A stored frame cannot be read: {first_line(error)}", camera) from error
-            if data is None:
-                raise Failure("job-crashed", f"The stored frame {path} is gone.", camera)
-            files[camera].append(data)
-    return files
-
-
-def _store(task: Task, blobs: Blobs, pictures: Mapping[str, bytes]) -> None:
-    for name, picture in pictures.items():
-        try:
-            blobs.put(f"{picture_folder(task.job_id, task.run_token)}/{picture_file(name)}", picture)
-        except AWAY as error:
-            raise Failure("job-crashed", f"Its pictures cannot be stored: {first_line(error)}") from error
+    def emit(self, record: logging.LogRecord) -> None:
+        """Say a line of the log, which the parent knows the job of."""
+        self.told(Message(warning=self.format(record)))
 
 
 if __name__ == "__main__":

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from functools import cache, partial
 
 import cv2
 import numpy as np
-import structlog
 from numpy.typing import NDArray
 
 from worker.calibration.draw import layers, mosaic
@@ -24,7 +24,7 @@ FRAME_WIDTH, PREVIEW_WIDTH = 1920, 1920
 FRAME_QUALITY = 75
 # A camera, and the pitch as its pose has it.
 Standing = tuple[Field, Camera]
-log = structlog.get_logger()
+log = logging.getLogger(__name__)
 
 
 def draw(given: Given, found: Calibration) -> dict[str, bytes]:

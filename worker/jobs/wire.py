@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from service.settings import Settings
 from service.wire import geometry
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Moved
@@ -27,6 +26,7 @@ from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
 from worker.calibration.see.view import ViewCondition
+from worker.message import Means
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
@@ -148,12 +148,12 @@ def number(value: Any) -> float | None:
     return float(value) if value is not None and isfinite(value) else None
 
 
-def segmenter_of(settings: Settings) -> Segmenter:
+def segmenter_of(means: Means) -> Segmenter:
     """The network that the settings name."""
-    if not settings.model.is_file():
-        raise Failure("model-missing", f"{settings.model} is not there; set ESC_MODEL or train one.")
+    if not means.model.is_file():
+        raise Failure("model-missing", f"{means.model} is not there; set ESC_MODEL or train one.")
     try:
-        return Segmenter(settings.model, settings.threads, PROVIDERS[settings.provider])
+        return Segmenter(means.model, means.threads, PROVIDERS[means.provider])
     except ProviderMissing as missing:
         raise Failure("provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for.") from missing
 

@@ -17,6 +17,7 @@ from worker.calibration.scene.camera import Camera, Intrinsics
 from worker.calibration.scene.field import Field
 from worker.duties.alarms import Alarms
 from worker.jobs import calibration
+from worker.message import Means
 
 SIZE, FOCAL, LENS = (640, 360), 400.0, (-0.12, 0.02, 0.0, 0.0, 0.0)
 OTHER_PITCH = Field(92.0, 50.0)
@@ -101,7 +102,7 @@ class Year:
         files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
         task = self.home.attempts.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
         before = self.home.venues.get("v").cameras
-        found = calibration.solve(task.venue, files, task.options, self.home.settings, lambda _: None)
+        found = calibration.solve(task.venue, files, task.options, Means.of(self.home.settings), lambda _: None)
         self.home.attempts.finish(task, found.result, [])
         if not found.result.accepted:
             self.rejected[called] = found.result.rejected_because

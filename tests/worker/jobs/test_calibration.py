@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from service.settings import Settings
+from service.settings import MODEL_BESIDE_THE_CODE
 from service.store.jobs.files import picture_file
 from service.wire import geometry
 from service.wire.options import Options
@@ -18,7 +18,7 @@ from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
 from worker.jobs import calibration, pictures, wire
-from worker.message import Message
+from worker.message import Means, Message
 
 SIZE = (320, 180)
 FIGURES = ViewFigures(120.0, 1.5, 60.0, 0.8, 0.7, 0.0, 0.0, 0.0, 0.0, 0.1)
@@ -102,22 +102,22 @@ def asked(monkeypatch):
 
 
 @pytest.fixture
-def settings(tmp_path):
+def means(tmp_path):
     model = tmp_path / "unet.onnx"
     model.touch()
-    return Settings(model=model, threads=1)
+    return Means(model=model, threads=1)
 
 
-def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, settings):
+def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, means):
     last = {"left": View(usable=True, detail="", lines_found=0.9, blur_px=None)}
-    outcome = calibration.solve(venue, files, Options(seed=7), settings, lambda _: None, last)
+    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, last)
     assert asked["usual"] == {"left": UsualView(0.9, None)}
     assert outcome.result.cameras[0].view.lines_found == 0.8
 
 
-def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, settings):
+def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, means):
     options = Options(seed=7, preset="paper", stitch_weight=0.25, parents=8)
-    calibration.solve(venue, files, options, settings, lambda _: None)
+    calibration.solve(venue, files, options, means, lambda _: None)
     assert asked["pitch"].ridge.tolist() == [[-18, 0, 0.2], [18, 0, 0.2]]
     left = asked["cameras"][0]
     assert (left.id, left.intrinsics.size, left.pose.rotation.tolist()) == ("left", SIZE, UP_LEFT)
@@ -126,13 +126,13 @@ def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, settings)
     assert asked["options"] == engine.Options(preset="paper", seed=7, parents=8, stitch_weight=0.25)
 
 
-def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_lens(venue, files, asked, settings):
+def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_lens(venue, files, asked, means):
     left, right = venue.cameras
     known = left.model_copy(
         update={"intrinsics": left.intrinsics.model_copy(update={"sigma": {"fx": 2.0, "k1": 0.01}})}
     )
     given = venue.model_copy(update={"cameras": [known, right]})
-    result = calibration.solve(given, files, Options(fit_focal_length=True), settings, lambda _: None).result
+    result = calibration.solve(given, files, Options(fit_focal_length=True), means, lambda _: None).result
     assert [camera.intrinsics.sigma for camera in asked["cameras"]] == [{"fx": 2.0, "k1": 0.01}, {}]
     assert [camera.intrinsics for camera in result.cameras] == [known.intrinsics, right.intrinsics]
 
@@ -143,9 +143,9 @@ def test_what_is_hardly_told_of_a_lens_fits_what_a_venue_takes():
     assert said == {"fx": geometry.LEAST_SIGMA, "k2": geometry.LARGEST_SIGMA, "k3": geometry.LARGEST_SIGMA}
 
 
-def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files, asked, settings):
+def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files, asked, means):
     steps = []
-    outcome = calibration.solve(venue, files, Options(seed=7), settings, steps.append)
+    outcome = calibration.solve(venue, files, Options(seed=7), means, steps.append)
     result = outcome.result
     assert result.accepted
     assert result.cameras[0].pose.position == [-0.95, -49, 8]
@@ -158,9 +158,9 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())
 
 
-def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, settings):
+def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, means):
     plain, fitted = (
-        calibration.solve(venue, files, Options(fit_focal_length=fit, fit_ridge=fit), settings, lambda _: None).result
+        calibration.solve(venue, files, Options(fit_focal_length=fit, fit_ridge=fit), means, lambda _: None).result
         for fit in (False, True)
     )
     assert (plain.cameras[0].intrinsics, plain.ridge) == (None, None)
@@ -169,107 +169,109 @@ def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue,
     assert asked["options"] == engine.Options(fit_focal_length=True, fit_ridge=True)
 
 
-def test_a_venue_whose_lens_may_drift_is_calibrated_so(venue, files, asked, settings):
+def test_a_venue_whose_lens_may_drift_is_calibrated_so(venue, files, asked, means):
     for lens, may_drift in (("fixed", False), ("may-drift", True)):
-        calibration.solve(venue.model_copy(update={"lens": lens}), files, Options(), settings, lambda _: None)
+        calibration.solve(venue.model_copy(update={"lens": lens}), files, Options(), means, lambda _: None)
         assert asked["options"].lens_may_drift is may_drift
 
 
-def test_each_camera_has_its_verdict_and_the_job_the_sum_of_them(venue, files, asked, settings):
+def test_each_camera_has_its_verdict_and_the_job_the_sum_of_them(venue, files, asked, means):
     asked["against"] = {"right": "it is dark"}
-    result = calibration.solve(venue, files, Options(), settings, lambda _: None).result
+    result = calibration.solve(venue, files, Options(), means, lambda _: None).result
     assert (result.verdict, result.accepted, result.rejected_because) == ("partly", False, "camera right: it is dark")
     assert [(c.accepted, c.rejected_because) for c in result.cameras] == [(True, None), (False, "it is dark")]
     asked["against"] = {"left": "it is dark", "right": "it is dark"}
-    assert calibration.solve(venue, files, Options(), settings, lambda _: None).result.verdict == "rejected"
+    assert calibration.solve(venue, files, Options(), means, lambda _: None).result.verdict == "rejected"
     asked["against"] = {}
-    assert calibration.solve(venue, files, Options(), settings, lambda _: None).result.verdict == "accepted"
+    assert calibration.solve(venue, files, Options(), means, lambda _: None).result.verdict == "accepted"
 
 
-def test_a_venue_that_takes_all_or_nothing_refuses_what_is_accepted_in_part(venue, files, asked, settings):
+def test_a_venue_that_takes_all_or_nothing_refuses_what_is_accepted_in_part(venue, files, asked, means):
     asked["against"] = {"right": "it is dark"}
     every = venue.model_copy(update={"accept": "all"})
-    result = calibration.solve(every, files, Options(), settings, lambda _: None).result
+    result = calibration.solve(every, files, Options(), means, lambda _: None).result
     assert (result.verdict, result.accepted_cameras) == ("rejected", [])
     assert result.rejected_because == "camera right: it is dark; the venue accepts the poses of all cameras or none"
     assert result.cameras[0].rejected_because == "the venue accepts the poses of all cameras or none"
     assert result.cameras[1].rejected_because == "it is dark"
 
 
-def test_a_ridge_that_was_found_is_accepted_with_all_poses_or_not_at_all(venue, files, asked, settings):
+def test_a_ridge_that_was_found_is_accepted_with_all_poses_or_not_at_all(venue, files, asked, means):
     asked["against"] = {"right": "it is dark"}
-    result = calibration.solve(venue, files, Options(fit_ridge=True), settings, lambda _: None).result
+    result = calibration.solve(venue, files, Options(fit_ridge=True), means, lambda _: None).result
     assert (result.verdict, result.cameras[0].accepted) == ("rejected", False)
 
 
-def test_what_the_lines_contradict_is_told(venue, files, asked, settings):
-    (doubt,) = calibration.solve(venue, files, Options(), settings, lambda _: None).result.diagnosis
+def test_what_the_lines_contradict_is_told(venue, files, asked, means):
+    (doubt,) = calibration.solve(venue, files, Options(), means, lambda _: None).result.diagnosis
     assert (doubt.camera, doubt.quantity, doubt.deviation, doubt.sigma) == ("left", "k1", 0.01, 0.001)
 
 
-def test_what_json_cannot_say_is_null(venue, files, asked, settings):
+def test_what_json_cannot_say_is_null(venue, files, asked, means):
     steps = []
-    camera = calibration.solve(venue, files, Options(seed=7), settings, steps.append).result.cameras[0]
+    camera = calibration.solve(venue, files, Options(seed=7), means, steps.append).result.cameras[0]
     assert (camera.sigma, camera.moved.pixels, camera.residual_px) == (None, None, None)
     assert camera.repeatability.position_m == 0.02
     assert (steps[0].loss, steps[0].fraction) == (None, wire.PREVIEW_FRACTION)
 
 
-def test_what_a_program_says_is_what_its_worker_understands(venue, files, asked, settings):
+def test_what_a_program_says_is_what_its_worker_understands(venue, files, asked, means):
     steps = []
-    outcome = calibration.solve(venue, files, Options(), settings, steps.append)
+    outcome = calibration.solve(venue, files, Options(), means, steps.append)
     for message in (Message(progress=steps[0]), Message(result=outcome.result)):
         assert Message.model_validate_json(message.line()) == message
 
 
-def test_the_orientation_a_camera_writes_into_its_files_is_not_obeyed(venue, files, asked, settings):
+def test_the_orientation_a_camera_writes_into_its_files_is_not_obeyed(venue, files, asked, means):
     turned = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
     files["right"] = [files["right"][0][:2] + turned + files["right"][0][2:]]
-    calibration.solve(venue, files, Options(), settings, lambda _: None)
+    calibration.solve(venue, files, Options(), means, lambda _: None)
     assert asked["frames"]["right"][0].shape == (180, 320, 3)
 
 
-def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, files, asked, settings):
+def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, files, asked, means):
     files["right"] = [b"\xff\xd8\xff\xda\0\x02\xff\xd9"]
     with pytest.raises(wire.Failure) as failure:
-        calibration.solve(venue, files, Options(), settings, lambda _: None)
+        calibration.solve(venue, files, Options(), means, lambda _: None)
     assert (failure.value.error.type, failure.value.error.camera) == ("/problems/broken-image", "right")
 
 
-def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, settings):
+def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, means):
     files["right"] = [cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()]
     with pytest.raises(wire.Failure, match=r"right decodes to 64x48 pixels; .* 320x180"):
-        calibration.solve(venue, files, Options(), settings, lambda _: None)
+        calibration.solve(venue, files, Options(), means, lambda _: None)
 
 
-def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, asked, settings, monkeypatch):
+def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, asked, means, monkeypatch):
     def calibrate(*_, **__):
         raise engine.CalibrationError("left", "no-markings-in-view", "store another pose")
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
     with pytest.raises(wire.Failure) as failure:
-        calibration.solve(venue, files, Options(), settings, lambda _: None)
+        calibration.solve(venue, files, Options(), means, lambda _: None)
     error = failure.value.error
     assert (error.type, error.camera, error.detail) == ("/problems/no-markings-in-view", "left", "store another pose")
 
 
-def test_a_missing_network_fails_and_says_where_it_should_be(venue, files, settings):
-    gone = settings.model_copy(update={"model": settings.model / "nowhere"})
+def test_a_missing_network_fails_and_says_where_it_should_be(venue, files, means):
+    gone = means.model_copy(update={"model": means.model / "nowhere"})
     with pytest.raises(wire.Failure, match="nowhere"):
         calibration.solve(venue, files, Options(), gone, lambda _: None)
 
 
 def test_a_provider_that_is_not_installed_fails_and_says_what_to_set(venue, files):
     with pytest.raises(wire.Failure, match=r"no CUDAExecutionProvider, only .* ESC_PROVIDER=cpu") as failure:
-        calibration.solve(venue, files, Options(), Settings(threads=1, provider="cuda"), lambda _: None)
+        calibration.solve(
+            venue, files, Options(), Means(model=MODEL_BESIDE_THE_CODE, threads=1, provider="cuda"), lambda _: None
+        )
     assert failure.value.error.type == "/problems/provider-missing"
 
 
-def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, settings, monkeypatch):
+def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, means, monkeypatch):
     def stitched(*_):
         raise ValueError
 
     monkeypatch.setattr(pictures.mosaic, "stitched", stitched)
-    outcome = calibration.solve(venue, files, Options(seed=1), settings, lambda _: None)
+    outcome = calibration.solve(venue, files, Options(seed=1), means, lambda _: None)
     assert {"birdseye", "overlay_left", "overlay_right"} <= set(outcome.pictures)
     assert not {"preview", "preview_before"} & set(outcome.pictures)

@@ -2,11 +2,11 @@
 
 import pytest
 
-from service.settings import Settings
 from service.wire.options import FieldOptions
 from service.wire.venue import VenueIn
 from worker.jobs.field import solve
 from worker.jobs.wire import Failure
+from worker.message import Means
 
 
 def refusal(tmp_path, template, length_m, width_m):
@@ -20,7 +20,7 @@ def refusal(tmp_path, template, length_m, width_m):
     field = {"template": template, "length_m": length_m, "width_m": width_m}
     venue = VenueIn.model_validate({"id": "v", "field": field, "cameras": [camera]}).stored()
     with pytest.raises(Failure) as refused:
-        solve(venue, {"left": []}, FieldOptions(), Settings(model=tmp_path / "none.onnx"), lambda _: None)
+        solve(venue, {"left": []}, FieldOptions(), Means(model=tmp_path / "none.onnx", threads=1), lambda _: None)
     return refused.value.error
 
 
