@@ -99,6 +99,12 @@ class Settings(BaseSettings):
         description="What finds a first pose while its points are being clicked.",
     )
 
+    picture_program: list[str] = Field(
+        [sys.executable, "-P", "-m", "worker.programs.draw"],
+        description="What draws pictures that somebody looks at.",
+    )
+    pictures_at_once: int = Field(2, ge=1, description="That one API process has drawn at the same time.")
+
     # The worker.
     worker_name: str = Field(
         default_factory=socket.gethostname, max_length=200, description="Unique per worker and stable."

@@ -70,6 +70,8 @@ class Message(BaseModel):
     error: JobError | None = None
     # Beside a result: the pictures that follow, and their bytes.
     pictures: dict[str, int] = {}
+    # The names of those that can be drawn when somebody looks.
+    later: list[str] = []
 
     @property
     def last(self) -> bool:

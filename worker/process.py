@@ -198,7 +198,7 @@ class Worker:
         if last is None:
             log.info("job taken away")
         elif last.result is not None:
-            self._attempts.finish(task, last.result, list(last.pictures))
+            self._attempts.finish(task, last.result, [*last.pictures, *last.later])
         elif last.error is not None:
             self._attempts.fail(task, last.error)
 

@@ -8,6 +8,7 @@ from fastapi import Depends, Path, Request
 
 from service.api.auth import Gate
 from service.api.clicked_pose import ClickedPoses
+from service.api.drawings import Drawings
 from service.api.shared_reads import SharedReads
 from service.api.uploads import Uploads
 from service.api.watch import Watch
@@ -32,6 +33,7 @@ class Context(Home):
         self.gate = Gate(self.keys, self.sessions, settings)
         self.uploads = Uploads(settings)
         self.clicked_poses = ClickedPoses(settings)
+        self.drawings = Drawings(settings, self.jobs, self.blobs)
 
 
 async def _context(request: Request) -> Context:

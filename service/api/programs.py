@@ -23,34 +23,40 @@ class OneAtATime:
         self._turn = threading.Lock()
 
     def run(self, command: Sequence[str], environment: Mapping[str, str], given: bytes) -> bytes:
-        """What the program writes to its standard output for what it is `given` on its input.
-
-        One that lacks a package says so on its standard error and ends with `os.EX_UNAVAILABLE`.
-        """
+        """As `answer`, in this turn."""
         if not self._turn.acquire(blocking=False):
             raise self.busy()
         try:
-            done = subprocess.run(
-                command,
-                input=given,
-                env={**lifeline.without_secrets(), **environment},
-                capture_output=True,
-                timeout=self._longest_s,
-                check=True,
-            )
-        except subprocess.TimeoutExpired as error:
-            raise Problem("unavailable", f"The {self._what} was not done after {self._longest_s:g} s.") from error
-        except subprocess.CalledProcessError as error:
-            said = error.stderr.decode(errors="replace")
-            if error.returncode == os.EX_UNAVAILABLE:
-                raise Problem("extra-missing", f"{said.strip()}.") from None
-            log.error("a program failed", program=self._what, stderr=said[-2000:])
-            raise
+            return answer(self._what, command, environment, given, self._longest_s)
         finally:
             self._turn.release()
-        return done.stdout
 
     def busy(self) -> Problem:
         """What those are told that come meanwhile."""
         headers = {"Retry-After": str(self._again_s)}
         return Problem("unavailable", f"Another {self._what} is being made.", headers=headers)
+
+
+def answer(what: str, command: Sequence[str], environment: Mapping[str, str], given: bytes, longest_s: float) -> bytes:
+    """What a program writes to its standard output for what it is `given` on its input.
+
+    One that lacks a package says so on its standard error and ends with `os.EX_UNAVAILABLE`.
+    """
+    try:
+        done = subprocess.run(
+            command,
+            input=given,
+            env={**lifeline.without_secrets(), **environment},
+            capture_output=True,
+            timeout=longest_s,
+            check=True,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise Problem("unavailable", f"The {what} was not done after {longest_s:g} s.") from error
+    except subprocess.CalledProcessError as error:
+        said = error.stderr.decode(errors="replace")
+        if error.returncode == os.EX_UNAVAILABLE:
+            raise Problem("extra-missing", f"{said.strip()}.") from None
+        log.error("a program failed", program=what, stderr=said[-2000:])
+        raise
+    return done.stdout

@@ -103,6 +103,7 @@ def run(
     stored = checked(VenueIn, venue.read_text(), str(venue)).stored()
     if chosen.seed is None:
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
+    chosen = chosen.model_copy(update={"pictures": True})
     files = checked_files(stored, frames, settings)
     with failure_told(), bar() as show:
         solution = calibration.solve(stored, files, chosen, Means.of(settings), lambda step: show(step, ""))

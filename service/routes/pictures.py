@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
+from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context, InContext
 from service.routes.contract.documented import BINARY, needs, problems
@@ -48,11 +49,11 @@ PICTURES = (
 def _show(route: str, address: str, shows: str) -> None:
     name, _, suffix = address.replace("/", "_").partition(".")
 
-    def of_job(job: Existing, context: InContext) -> Response:
-        return _picture(context, job, name)
+    async def of_job(job: Existing, context: InContext) -> Response:
+        return await _picture(context, job, name)
 
-    def of_camera(job: Existing, camera: CameraPath, context: InContext) -> Response:
-        return _picture(context, job, name.format(camera=camera))
+    async def of_camera(job: Existing, camera: CameraPath, context: InContext) -> Response:
+        return await _picture(context, job, name.format(camera=camera))
 
     content = {PNG if suffix == "png" else JPEG: BINARY}
     router.add_api_route(
@@ -66,23 +67,22 @@ def _show(route: str, address: str, shows: str) -> None:
     )
 
 
-def _picture(context: Context, job: Job, name: str) -> Response:
-    pictures = context.jobs.pictures(job.id)
+async def _picture(context: Context, job: Job, name: str) -> Response:
+    pictures = await run_in_threadpool(context.jobs.pictures, job.id)
     if pictures is None or name not in pictures.names:
         detail = "The job has not come to its pictures yet." if job.open else "The job made no such picture."
         raise Problem("picture-not-found", detail, job=job.id)
-    file = picture_file(name)
-    data = None if pictures.deleted else context.blobs.get(f"{pictures.folder}/{file}")
+    data = None if pictures.deleted else await context.drawings.picture(job.id, pictures, name)
     if data is None:
         raise Problem("picture-deleted", _why_deleted(pictures, context.settings.keep_pictures_days), job=job.id)
-    media_type = PNG if file.endswith(".png") else JPEG
+    media_type = PNG if picture_file(name).endswith(".png") else JPEG
     return Response(data, media_type=media_type, headers={"Cache-Control": "private, max-age=3600"})
 
 
 def _why_deleted(pictures: Pictures, keep_days: float) -> str:
     if pictures.deleted:
         return f"Pictures are deleted {keep_days:g} days after the end of their job; the job and its numbers stay."
-    return "The job made it, but its file is gone from the store, and not by the service."
+    return "Its file, or the frames to draw it of, are gone from the store, and not by the service."
 
 
 for each in PICTURES:

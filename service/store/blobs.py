@@ -77,6 +77,22 @@ class Blobs:
         self._make_sure_of(to)
         return True
 
+    @_told()
+    def move(self, path: str, to: str) -> bool:
+        """Let an object be found elsewhere; in a folder that takes no room. False if there is none.
+
+        In a bucket the object stays where it was as well.
+        """
+        if self._folder is None:
+            return self.copy(path, to)
+        try:
+            (self._folder / to).parent.mkdir(parents=True, exist_ok=True)
+            (self._folder / path).rename(self._folder / to)
+        except FileNotFoundError:
+            return False
+        self._make_sure_of(to)
+        return True
+
     def _make_sure_of(self, path: str) -> None:
         if self._folder:
             # A bucket promises durability; a file has it only after its pages have reached the disk, and the entry of
@@ -93,6 +109,15 @@ class Blobs:
             return obstore.get(self._store, path).bytes().to_bytes()
         except FileNotFoundError:
             return None
+
+    @_told()
+    def has(self, path: str) -> bool:
+        """Whether there is such an object."""
+        try:
+            obstore.head(self._store, path)
+        except FileNotFoundError:
+            return False
+        return True
 
     @_told()
     def delete_under(self, prefix: str) -> None:

@@ -10,13 +10,14 @@ The last accepted job of each venue, the one that brought its poses, is past no 
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
 from service.store import tables
 from service.store.engine import Repository, clock, reading, serialise, writing
-from service.store.jobs.files import frame_folder, pictures_folder
+from service.store.jobs.files import frame_folder, picture_folder, pictures_folder
 from service.store.revisions import TAKEN
 
 j = tables.jobs.c
@@ -37,17 +38,48 @@ NEWEST_TAKEN = NEWEST.where(others.c.cause.in_(TAKEN))
 NOT_THE_LAST_ACCEPTED = j.id != sa.func.coalesce(LAST_ACCEPTED, "")
 
 
+@dataclass(frozen=True)
+class OldFrames:
+    """The frames of a job: the path of one of each camera, and the names of pictures that may be drawn of them yet.
+
+    `folder`: where its pictures lie.
+    """
+
+    job_id: str
+    folder: str
+    pictures: list[str]
+    frames: dict[str, str]
+
+
 class Expiry(Repository):
     """What the database knows to be past its time."""
 
-    def expire_frames(self, ended_before: datetime, now: datetime, limit: int) -> int:
-        """Let up to `limit` jobs that ended before a moment, the oldest first, have no frames; says how many."""
+    def old_frames(self, ended_before: datetime, limit: int) -> list[OldFrames]:
+        """The frames of up to `limit` jobs that ended before a moment, the oldest first."""
+        query = (
+            sa.select(j.id, j.kind, j.run_token, j.pictures, j.pictures_deleted_at, j.frames)
+            .where(j.finished_at < ended_before, j.frames_deleted_at.is_(None))
+            .order_by(j.finished_at)
+            .limit(limit)
+        )
+        with reading(self._engine) as connection:
+            rows = connection.execute(query).all()
+        return [
+            OldFrames(
+                row.id,
+                picture_folder(row.id, row.run_token or ""),
+                (row.pictures or []) if row.kind == "calibration" and row.pictures_deleted_at is None else [],
+                {camera: paths[0] for camera, paths in row.frames.items() if paths},
+            )
+            for row in rows
+        ]
+
+    def expire_frames(self, job_ids: Collection[str], now: datetime) -> None:
+        """Let ended jobs have no frames."""
         with writing(self._engine) as connection:
             serialise(connection, "expiry")
-            ids = self._ended(connection, ended_before, limit, j.frames_deleted_at.is_(None))
-            self._mark(connection, ids, frames_deleted_at=now)
-            self._leave(connection, [frame_folder(job_id) for job_id in ids], now)
-            return len(ids)
+            self._mark(connection, job_ids, frames_deleted_at=now)
+            self._leave(connection, [frame_folder(job_id) for job_id in job_ids], now)
 
     def expire_pictures(self, ended_before: datetime, now: datetime, limit: int) -> int:
         """The same for pictures, but for those of the last accepted job of each venue."""

@@ -36,6 +36,11 @@ class Options(Handling):
     fit_focal_length: Flag = Field(False, description="Find each camera's focal length too: heat changes it.")
     fit_ridge: Flag = Field(False, description="Find the height of the field's ridge too.")
     dry_run: Flag = Field(False, description="Never move the stored poses.")
+    pictures: Flag = Field(
+        False,
+        description="Draw all pictures with the job. Absent: where all poses are accepted, each is drawn when it is "
+        "first looked at.",
+    )
 
     @model_validator(mode="after")
     def _fits_with_the_finish(self) -> Self:

@@ -147,7 +147,7 @@ def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(stock, mo
         stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", timedelta(hours=1))
         assert stock.expiry.leftovers(stock.expiry.now(), 10) == []
         assert stock.deliveries.attempt(stock.deliveries.now(), stock.deliveries.now(), 10)
-        assert stock.expiry.expire_frames(stock.expiry.now() - timedelta(days=2), stock.expiry.now(), 10) == 0
+        assert stock.expiry.old_frames(stock.expiry.now() - timedelta(days=2), 10) == []
     now, ended = datetime.now(UTC), stock.jobs.get(job.id)
     for moment in (job.created_at, ended.finished_at, stock.expiry.now(), stock.deliveries.now()):
         assert abs(now - moment) < timedelta(minutes=10)

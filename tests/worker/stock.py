@@ -46,14 +46,18 @@ class Stock(Stores):
         self.submissions.submit(submission, 100, lambda _, job_id, *__: self.enqueued.append(job_id))
         return job_id
 
-    def ended(self, venue_id: str, at: datetime, *, accepted: bool | None = True, **options) -> str:
-        """A job that ended at a moment, with a picture; `accepted` None: it failed and has none."""
+    def ended(self, venue_id: str, at: datetime, *, accepted: bool | None = True, drawn: bool = True, **options) -> str:
+        """A job that ended at a moment, with a picture; `accepted` None: it failed and has none.
+
+        `drawn`: whether the picture is there, or can be drawn when somebody looks.
+        """
         job_id = self.submitted(venue_id, **options)
         task = self.attempts.begin(job_id)
         if accepted is None:
             self.attempts.fail(task, JobError(type="/problems/job-crashed", title="", detail=""))
         else:
-            self.blobs.put(f"{picture_folder(job_id, task.run_token)}/preview.jpg", b"picture")
+            if drawn:
+                self.blobs.put(f"{picture_folder(job_id, task.run_token)}/preview.jpg", b"picture")
             self.attempts.finish(task, result(task.venue, accepted), ["preview"])
         with self.engine.begin() as connection:
             connection.execute(sa.update(tables.jobs).where(tables.jobs.c.id == job_id).values(finished_at=at))

@@ -14,8 +14,9 @@ import structlog
 
 from service.observe.disk import Disk
 from service.settings import Settings
-from service.store.blobs import Blobs
-from service.store.expiry import Expiry
+from service.store.blobs import AWAY, Blobs
+from service.store.expiry import Expiry, OldFrames
+from service.store.jobs.files import drawn_together, picture_file, source_file
 from service.store.workers import Workers
 
 # Of each kind per round: some seconds on a bucket, a fraction of one in a folder.
@@ -69,7 +70,7 @@ class Retention:
         keep = self._settings
         keep_frames_days = 0 if short_of_room else keep.keep_frames_days
         counts = {
-            "frames": self._expiry.expire_frames(now - timedelta(days=keep_frames_days), now, BATCH),
+            "frames": self._expire_frames(now - timedelta(days=keep_frames_days), now),
             "pictures": self._expiry.expire_pictures(now - timedelta(days=keep.keep_pictures_days), now, BATCH),
             "jobs": self._delete_jobs(now - timedelta(days=keep.keep_jobs_days), now),
             "revisions": self._expiry.expire_revisions(now - keep.keep_revisions_years * YEAR, BATCH),
@@ -83,6 +84,27 @@ class Retention:
         """Whether this worker, of those alive, is the one to do it: the first by name."""
         alive = self._workers.alive(self._settings.takeover_after_s)
         return min((worker.name for worker in alive), default="") == self._settings.worker_name
+
+    def _expire_frames(self, ended_before: datetime, now: datetime) -> int:
+        """What nobody has looked at can be drawn for as long as pictures are kept: its frames stay beside them."""
+        job_ids: list[str] = []
+        for old in self._expiry.old_frames(ended_before, BATCH):
+            try:
+                self._keep_for_pictures(old)
+            except AWAY:
+                # Neither do those behind it fare better; the next round tries again.
+                log.warning("cannot keep what pictures are drawn of", job=old.job_id, exc_info=True)
+                break
+            job_ids.append(old.job_id)
+        self._expiry.expire_frames(job_ids, now)
+        return len(job_ids)
+
+    def _keep_for_pictures(self, old: OldFrames) -> None:
+        together = {drawn_together(name) for name in old.pictures} - {()}
+        if all(self._blobs.has(f"{old.folder}/{picture_file(first)}") for first, *_ in together):
+            return
+        for camera, path in old.frames.items():
+            self._blobs.move(path, source_file(old.folder, camera))
 
     def _delete_jobs(self, ended_before: datetime, now: datetime) -> int:
         job_ids = self._expiry.old_jobs(ended_before, BATCH)

@@ -15,7 +15,8 @@ from worker.calibration.calibrate import calibrate
 from worker.calibration.judge.quality import Gate
 from worker.calibration.see.view import UsualView
 from worker.jobs import from_frames
-from worker.jobs.pictures import draw
+from worker.jobs.from_frames import Drawn, Given
+from worker.jobs.pictures import Scene, draw, masks
 from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens
 from worker.message import Means
 
@@ -42,9 +43,22 @@ def solve(
         lambda given, step: calibrate(
             given.pitch, given.cameras, given.frames, given.network, asked, step, usual=usual
         ),
-        draw,
+        lambda given, found: _drawn(given, found, options),
         lambda found, spent, provenance: _allowed(venue, options, _result(found, options, spent, provenance)),
     )
+
+
+def _drawn(given: Given, found: engine.Calibration, options: Options) -> Drawn:
+    """What only this job can draw; and all the rest at once where somebody asks for it, or will want to see why."""
+    scene = Scene(
+        (given.pitch, given.cameras),
+        (found.pitch, [result.camera for result in found.cameras]),
+        {camera: several[0] for camera, several in given.frames.items()},
+    )
+    seen = masks(given.cameras, given.network.responses)
+    if found.accepted and not options.pictures:
+        return Drawn(seen, scene.names)
+    return Drawn(draw(scene, scene.names) | seen)
 
 
 def _engine_options(venue: Venue, options: Options) -> engine.Options:

@@ -14,7 +14,7 @@ from worker.calibration.draw.overlays import overlay
 from worker.calibration.measures.field_fit import FieldFit, Measure, fit_field
 from worker.calibration.records import Spent
 from worker.jobs import from_frames
-from worker.jobs.from_frames import Given
+from worker.jobs.from_frames import Drawn, Given
 from worker.jobs.wire import Solution, jpeg, number, to_the_millisecond, wire_camera
 from worker.message import Means
 
@@ -43,7 +43,7 @@ def solve(
     )
 
 
-def _draw(given: Given, found: FieldFit) -> dict[str, bytes]:
+def _draw(given: Given, found: FieldFit) -> Drawn:
     pictures = {}
     for old, new in zip(given.cameras, found.cameras, strict=True):
         try:
@@ -52,7 +52,7 @@ def _draw(given: Given, found: FieldFit) -> dict[str, bytes]:
             log.warning("cannot draw camera %s", old.id, exc_info=True)
             continue
         pictures[f"overlay_{old.id}"] = jpeg(drawn)
-    return pictures
+    return Drawn(pictures)
 
 
 def _result(given: FieldOfPlay, found: FieldFit, spent: Spent, provenance: Provenance) -> FieldResult:

@@ -64,6 +64,14 @@ class Given:
     network: Remembering
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """Pictures by name, and the names of those that can be drawn later."""
+
+    pictures: dict[str, bytes]
+    later: Sequence[str] = ()
+
+
 def solve(
     venue: Venue,
     files: Mapping[str, Sequence[bytes]],
@@ -71,7 +79,7 @@ def solve(
     means: Means,
     report: Callable[[Progress], None],
     engine: Callable[[Given, Callable[[records.Progress], None]], A],
-    draw: Callable[[Given, A], dict[str, bytes]],
+    draw: Callable[[Given, A], Drawn],
     tell: Callable[[A, Spent, Provenance], R],
 ) -> Solution[R]:
     """Call the `engine` with what a venue and the files of its cameras hold, `draw` its answer and `tell` it.
@@ -92,5 +100,5 @@ def solve(
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
     spent.add(answer.spent)
     with spent.measuring("preview"):
-        pictures = draw(given, answer)
-    return Solution(tell(answer, spent, provenance_of(segmenter, options)), pictures)
+        drawn = draw(given, answer)
+    return Solution(tell(answer, spent, provenance_of(segmenter, options)), drawn.pictures, drawn.later)

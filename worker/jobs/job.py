@@ -39,7 +39,9 @@ def main() -> None:
         parent.told(Message(error=failure.error))
         return
     sizes = {name: len(picture) for name, picture in solution.pictures.items()}
-    parent.told(Message(result=solution.result, pictures=sizes), *solution.pictures.values())
+    parent.told(
+        Message(result=solution.result, pictures=sizes, later=list(solution.later)), *solution.pictures.values()
+    )
 
 
 def _compute(

@@ -3,48 +3,52 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
-from functools import cache, partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED
 from worker.calibration.draw import layers, mosaic
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.draw.viewpoint import viewpoint
-from worker.calibration.records import Calibration
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
-from worker.jobs.from_frames import Given
 from worker.jobs.wire import Picture, jpeg, png
 
 # Of the frames that layers are laid over: a wide screen. The overlays have the size of the frames.
 FRAME_WIDTH, PREVIEW_WIDTH = 1920, 1920
 FRAME_QUALITY = 75
-# A camera, and the pitch as its pose has it.
-Standing = tuple[Field, Camera]
 log = logging.getLogger(__name__)
 
 
-def draw(given: Given, found: Calibration) -> dict[str, bytes]:
-    """Files by name."""
-    pitch, before, frames = given.pitch, given.cameras, given.frames
-    after = [result.camera for result in found.cameras]
-    first = {camera: several[0] for camera, several in frames.items()}
-    view = cache(lambda: viewpoint(found.pitch, after, PREVIEW_WIDTH))
-    parts: list[Callable[[], dict[str, bytes]]] = [
-        lambda: _preview(mosaic.stitched(found.pitch, view(), after, first)),
-        # The same view by the stored poses.
-        lambda: {"preview_before": jpeg(mosaic.stitched(pitch, view(), before, first).picture)},
-        lambda: {"birdseye": jpeg(mosaic.birdseye(found.pitch, after, first))},
-    ]
-    for old, new in zip(before, after, strict=True):
-        frame, response = first[old.id], given.network.responses.get(old.id)
-        parts += [
-            partial(_overlay, (pitch, old), (found.pitch, new), frame),
-            partial(_layers, (pitch, old), (found.pitch, new), frame, response),
-        ]
+@dataclass(frozen=True)
+class Scene:
+    """What is drawn: a pitch and cameras as they were `stored` and as they were `found`, and a frame of each camera."""
+
+    stored: tuple[Field, Sequence[Camera]]
+    found: tuple[Field, Sequence[Camera]]
+    frames: Mapping[str, Picture]
+
+    @property
+    def names(self) -> list[str]:
+        """All pictures that can be drawn."""
+        return [*STITCHED, *BIRDSEYE, *(f"{kind}_{camera.id}" for camera in self.stored[1] for kind in OF_CAMERA)]
+
+
+def draw(scene: Scene, names: Sequence[str]) -> dict[str, bytes]:
+    """Files by name, those that are drawn together with the ones that are asked for too."""
+    parts: list[Callable[[], dict[str, bytes]]] = []
+    if {*names} & {*STITCHED}:
+        parts.append(partial(_stitched, scene))
+    if {*names} & {*BIRDSEYE}:
+        parts.append(partial(_birdseye, scene))
+    for number, camera in enumerate(scene.stored[1]):
+        if {*names} & {f"{kind}_{camera.id}" for kind in OF_CAMERA}:
+            parts.append(partial(_of_camera, scene, number))
     pictures: dict[str, bytes] = {}
     for part in parts:
         try:
@@ -54,25 +58,46 @@ def draw(given: Given, found: Calibration) -> dict[str, bytes]:
     return pictures
 
 
-def _preview(stitched: mosaic.Stitched) -> dict[str, bytes]:
-    """One view by the new poses, and where one camera hands over to another in it."""
-    return {"preview": jpeg(stitched.picture), "seam": png(layers.seam_layer(stitched.owner))}
+def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.uint8]]) -> dict[str, bytes]:
+    """What the network saw (H, W), in 0..255, to be laid over the frames; nothing else can tell it later."""
+    return {
+        f"mask_{camera.id}": png(layers.mask_layer(responses[camera.id], _smaller(camera)))
+        for camera in cameras
+        if camera.id in responses
+    }
 
 
-def _overlay(stored: Standing, new: Standing, frame: Picture) -> dict[str, bytes]:
-    """The frame with both fields on it."""
-    return {f"overlay_{stored[1].id}": jpeg(overlay(stored, new, frame))}
+def _stitched(scene: Scene) -> dict[str, bytes]:
+    """One view by the new poses, where one camera hands over to another in it, and the view by the stored poses."""
+    view = viewpoint(*scene.found, PREVIEW_WIDTH)
+    after = mosaic.stitched(scene.found[0], view, scene.found[1], scene.frames)
+    before = mosaic.stitched(scene.stored[0], view, scene.stored[1], scene.frames)
+    return {
+        "preview": jpeg(after.picture),
+        "seam": png(layers.seam_layer(after.owner)),
+        "preview_before": jpeg(before.picture),
+    }
 
 
-def _layers(stored: Standing, new: Standing, frame: Picture, response: NDArray[np.uint8] | None) -> dict[str, bytes]:
-    """The frame, smaller, and what can be laid over it."""
-    camera = stored[1].id
-    width, height = stored[1].intrinsics.size
-    size = (min(width, FRAME_WIDTH), round(height * min(1.0, FRAME_WIDTH / width)))
+def _birdseye(scene: Scene) -> dict[str, bytes]:
+    return {"birdseye": jpeg(mosaic.birdseye(*scene.found, scene.frames))}
+
+
+def _of_camera(scene: Scene, number: int) -> dict[str, bytes]:
+    """The frame with both fields on it; and smaller, with each field to be laid over it."""
+    stored, new = ((pitch, cameras[number]) for pitch, cameras in (scene.stored, scene.found))
+    camera, size = stored[1].id, _smaller(stored[1])
+    frame = scene.frames[camera]
     small = np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), np.uint8)
-    drawn = {
+    return {
+        f"overlay_{camera}": jpeg(overlay(stored, new, frame)),
         f"frame_{camera}": jpeg(small, FRAME_QUALITY),
         f"stored_{camera}": png(layers.stored_layer(*stored, size)),
         f"new_{camera}": png(layers.new_layer(*new, size)),
     }
-    return drawn if response is None else drawn | {f"mask_{camera}": png(layers.mask_layer(response, size))}
+
+
+def _smaller(camera: Camera) -> tuple[int, int]:
+    """Width and height of a frame as it is shown."""
+    width, height = camera.intrinsics.size
+    return min(width, FRAME_WIDTH), round(height * min(1.0, FRAME_WIDTH / width))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from math import isfinite, isnan
@@ -38,10 +38,14 @@ R = TypeVar("R", bound=AnyResult, covariant=True)
 
 @dataclass(frozen=True)
 class Solution(Generic[R]):
-    """A result and the files of its pictures, by the names that `service.store.jobs.files.picture_file` knows."""
+    """A result and the files of its pictures, by the names that `service.store.jobs.files.picture_file` knows.
+
+    `later`: the names of those that can be drawn when somebody looks.
+    """
 
     result: R
     pictures: dict[str, bytes]
+    later: Sequence[str] = ()
 
 
 def provenance_of(segmenter: Segmenter, options: Options | FieldOptions) -> Provenance:

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 # Pictures to be laid over others.
 LAYERS = ("seam", "stored", "new", "mask")
+# Pictures of a calibration that can be drawn when somebody looks, of all cameras and of each; those that share most of
+# their work are drawn together. What the network saw cannot be drawn again without it.
+STITCHED = ("preview", "preview_before", "seam")
+BIRDSEYE = ("birdseye",)
+OF_CAMERA = ("overlay", "frame", "stored", "new")
 
 
 def frame_folder(job_id: str) -> str:
@@ -19,6 +24,21 @@ def pictures_folder(job_id: str) -> str:
 def picture_folder(job_id: str, run_token: str) -> str:
     """Each attempt has pictures of its own, so that one given up late cannot overwrite those of the next."""
     return f"{pictures_folder(job_id)}/{run_token}"
+
+
+def drawn_together(name: str) -> tuple[str, ...]:
+    """A picture that can be drawn when somebody looks, and those that are drawn along with it; () for all others."""
+    kind, _, camera = name.partition("_")
+    if name in STITCHED:
+        return STITCHED
+    if kind in OF_CAMERA and camera:
+        return tuple(f"{each}_{camera}" for each in OF_CAMERA)
+    return BIRDSEYE if name in BIRDSEYE else ()
+
+
+def source_file(folder: str, camera: str) -> str:
+    """What pictures can be drawn of after the frames have gone from their own folder, in the folder of the pictures."""
+    return f"{folder}/source/{camera}"
 
 
 def picture_file(name: str) -> str:

@@ -37,6 +37,15 @@ class Pictures:
 
 
 @dataclass(frozen=True)
+class Drawable:
+    """What a calibration began with and found, and the path of a frame of each camera."""
+
+    venue: Venue
+    result: Result
+    frames: dict[str, str]
+
+
+@dataclass(frozen=True)
 class State:
     """What waiters watch: `revision` grows with every change."""
 
@@ -84,6 +93,15 @@ class Jobs(Repository):
         if row is None:
             return None
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
+
+    def drawable(self, job_id: str) -> Drawable | None:
+        """What pictures of a calibration can be drawn of; None: it has no result, or is no calibration."""
+        with reading(self._engine) as connection:
+            found = found_poses(connection, job_id)
+            if found is None:
+                return None
+            frames = connection.execute(sa.select(j.frames).where(j.id == job_id)).scalar_one()
+        return Drawable(*found, {camera: paths[0] for camera, paths in frames.items()})
 
     def posed(self, job_id: str) -> Venue | None:
         """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""

@@ -6,6 +6,9 @@ from threading import Barrier
 import pytest
 import sqlalchemy as sa
 
+from service.store import tables
+from service.store.blobs import FolderAway
+from service.store.jobs.files import source_file
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock
 from worker.duties.retention import FAILURES, TRY_AGAIN_AFTER, Retention
@@ -36,6 +39,34 @@ def test_frames_go_after_two_days_and_pictures_after_two_weeks(stock, retention)
     retention.round(NOW)
     assert stock.files() == {f"pictures/{old}", f"pictures/{young}", f"frames/{young}"}
     assert {job.id for job in stock.jobs.page("a", None, None, 10)} == {failed, old, older, young}
+
+
+def test_frames_of_pictures_that_nobody_has_looked_at_stay_as_long_as_pictures(stock, retention):
+    unseen, old = (stock.ended("a", ago(days=days), accepted=False, drawn=False) for days in (3, 15))
+    retention.round(NOW)
+    assert stock.files() == {f"pictures/{unseen}"}
+    folder = stock.jobs.pictures(unseen).folder
+    assert stock.blobs.get(source_file(folder, "left")) == b"frame"
+    # As after a death between the files and the rows.
+    with stock.engine.begin() as connection:
+        connection.execute(sa.update(tables.jobs).values(frames_deleted_at=None))
+    retention.round(NOW)
+    assert stock.blobs.get(source_file(folder, "left")) == b"frame"
+    assert stock.jobs.get(old).links.keys() & {"preview"} == set()
+
+
+def test_frames_that_cannot_be_kept_for_pictures_do_not_go(stock, retention, monkeypatch):
+    unseen, later = (stock.ended("a", ago(days=days), accepted=False, drawn=False) for days in (4, 3))
+
+    def away(*_):
+        raise FolderAway("away")
+
+    with monkeypatch.context() as outage:
+        outage.setattr(stock.blobs, "move", away)
+        retention.round(NOW)
+    assert stock.files() == {f"frames/{unseen}", f"frames/{later}"}
+    retention.round(NOW)
+    assert stock.files() == {f"pictures/{unseen}", f"pictures/{later}"}
 
 
 def test_a_job_with_deleted_pictures_links_to_none(stock, retention):

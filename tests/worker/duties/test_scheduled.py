@@ -137,7 +137,7 @@ def test_a_camera_that_gives_no_frame_is_a_job_that_failed(home_of_schedules, du
     assert look_at_figures(home.engine, 1).tallies[ENDED, ("failed", "", "source-failed")] == 2
     # There is nothing to compute again, and nothing in the way of the next time.
     assert home.submissions.of(last.id) is None
-    assert home.expiry.expire_frames(home.schedules.now() + timedelta(days=1), home.schedules.now(), 10) == 0
+    assert home.expiry.old_frames(home.schedules.now() + timedelta(days=1), 10) == []
     monkeypatch.setattr(home.snapshots, "take", lambda cameras, _: {camera.id: png() for camera in cameras})
     all_due(home)
     look(duty)

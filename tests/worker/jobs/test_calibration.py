@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from dataclasses import replace
 
 import cv2
@@ -5,8 +7,9 @@ import numpy as np
 import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
-from service.store.jobs.files import picture_file
+from service.store.jobs.files import drawn_together, picture_file
 from service.wire import geometry
+from service.wire.drawing import Drawing, Drawn, packed, unpacked
 from service.wire.options import Options
 from service.wire.results import View
 from service.wire.venue import VenueIn
@@ -85,7 +88,8 @@ def asked(monkeypatch):
             sum(range(10_000))
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
-        return engine.Calibration(pitch, results, against, 0.2, spent, None, 0.1, 3, [doubt])
+        found = pitch.flat() if options.flat else pitch.raised(asked.get("raised", 0.0))
+        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, [doubt])
 
     class Segmenter:
         sha256 = "f" * 64
@@ -143,19 +147,60 @@ def test_what_is_hardly_told_of_a_lens_fits_what_a_venue_takes():
     assert said == {"fx": geometry.LEAST_SIGMA, "k2": geometry.LARGEST_SIGMA, "k3": geometry.LARGEST_SIGMA}
 
 
+ALL_PICTURES = {"preview", "preview_before", "seam", "birdseye"} | {
+    f"{kind}_{camera}" for kind in ("overlay", "frame", "stored", "new") for camera in ("left", "right")
+}
+MASKS = {"mask_left", "mask_right"}
+
+
 def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files, asked, means):
     steps = []
-    outcome = calibration.solve(venue, files, Options(seed=7), means, steps.append)
+    outcome = calibration.solve(venue, files, Options(seed=7, pictures=True), means, steps.append)
     result = outcome.result
     assert result.accepted
     assert result.cameras[0].pose.position == [-0.95, -49, 8]
     assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
     assert set(result.timings_s) == set(result.cpu_s) == {"decode", "evolution", "preview"}
     assert [step.stage for step in steps] == ["evolution", "preview"]
-    of_cameras = {f"{kind}_{camera}" for kind in ("overlay", "frame", "stored", "new", "mask") for camera in files}
-    assert set(outcome.pictures) == {"preview", "preview_before", "seam", "birdseye"} | of_cameras
+    assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
     begins = {".jpg": b"\xff\xd8", ".png": b"\x89PNG"}
     assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())
+
+
+def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the_network_saw(
+    venue, files, asked, means
+):
+    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None)
+    assert (set(outcome.pictures), set(outcome.later)) == (MASKS, ALL_PICTURES)
+    asked["against"] = {"right": "it is dark"}
+    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None)
+    assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
+
+
+@pytest.mark.parametrize("options", [Options(), Options(fit_ridge=True, fit_focal_length=True), Options(flat=True)])
+def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked, means, options):
+    asked["raised"] = 0.1 if options.fit_ridge else 0.0
+    at_once = options.model_copy(update={"pictures": True})
+    outcome = calibration.solve(venue, files, at_once, means, lambda _: None)
+    first = {camera: several[0] for camera, several in files.items()}
+    for name in ("preview", "birdseye", "frame_right"):
+        needed = {"right": first["right"]} if name == "frame_right" else first
+        given = Drawing(
+            venue=venue,
+            result=outcome.result,
+            names=[name],
+            threads=1,
+            sizes={camera: len(file) for camera, file in needed.items()},
+        )
+        run = subprocess.run(
+            [sys.executable, "-m", "worker.programs.draw"],
+            input=packed(given, needed),
+            stdout=subprocess.PIPE,
+            check=True,
+        )
+        drawn = unpacked(Drawn.model_validate_json(run.stdout.splitlines()[0]).sizes, run.stdout)
+        assert set(drawn) == set(drawn_together(name))
+        assert all(picture == outcome.pictures[each] for each, picture in drawn.items())
 
 
 def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, means):
@@ -272,6 +317,6 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, mea
         raise ValueError
 
     monkeypatch.setattr(pictures.mosaic, "stitched", stitched)
-    outcome = calibration.solve(venue, files, Options(seed=1), means, lambda _: None)
+    outcome = calibration.solve(venue, files, Options(seed=1, pictures=True), means, lambda _: None)
     assert {"birdseye", "overlay_left", "overlay_right"} <= set(outcome.pictures)
     assert not {"preview", "preview_before"} & set(outcome.pictures)

@@ -1,0 +1,108 @@
+"""Pictures of calibrations, drawn when somebody first looks at them, and kept.
+
+A program draws them, beside this process: frames are what strangers sent, and decoding and blending them here would
+hold up every other request. A few at a time; who waits for a turn holds no thread. Several API processes may draw the
+same picture at once: it is the same, and stored under the same name.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from weakref import WeakValueDictionary
+
+from starlette.concurrency import run_in_threadpool
+
+from service.api.programs import answer
+from service.settings import Settings
+from service.store.blobs import Blobs
+from service.store.jobs.files import drawn_together, picture_file, pictures_folder, source_file
+from service.store.jobs.reading import Drawable, Jobs, Pictures
+from service.wire.drawing import Drawing, Drawn, packed, unpacked
+from service.wire.problems import Problem
+
+LONGEST_S = 60.0
+# The first picture takes about a second, and a page asks for several at once.
+PATIENCE_S = 20.0
+AGAIN_S = 2
+
+
+class Drawings:
+    """Asks the program that draws them, for so many at once."""
+
+    def __init__(self, settings: Settings, jobs: Jobs, blobs: Blobs) -> None:
+        self._settings, self._jobs, self._blobs = settings, jobs, blobs
+        self._turns = asyncio.Semaphore(settings.pictures_at_once)
+        # Of pictures that are drawn together: whoever asks for one while they are drawn waits for them.
+        self._drawing: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
+
+    async def picture(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
+        """The file of a picture of a job, drawn if it is not there; None if it cannot be drawn any more."""
+        stored = await run_in_threadpool(self._stored, pictures, name)
+        together = drawn_together(name)
+        if stored is not None or not together:
+            return stored
+        lock = self._drawing.setdefault(f"{job_id}/{together[0]}", asyncio.Lock())
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                await lock.acquire()
+        except TimeoutError:
+            raise _busy() from None
+        try:
+            return await run_in_threadpool(self._stored, pictures, name) or await self._drawn(job_id, pictures, name)
+        finally:
+            lock.release()
+
+    async def _drawn(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                await self._turns.acquire()
+        except TimeoutError:
+            raise _busy() from None
+        try:
+            return await run_in_threadpool(self._draw, job_id, pictures, name)
+        finally:
+            self._turns.release()
+
+    def _draw(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
+        job = self._jobs.drawable(job_id)
+        frames = {} if job is None else self._frames(job, pictures, name)
+        if job is None or None in frames.values():
+            return None
+        files = {camera: frame for camera, frame in frames.items() if frame is not None}
+        asked = Drawing(
+            venue=job.venue,
+            result=job.result,
+            names=[name],
+            threads=self._settings.threads,
+            sizes={camera: len(frame) for camera, frame in files.items()},
+        )
+        program, environment = self._settings.picture_program, self._settings.native_environment
+        said = answer("picture", program, environment, packed(asked, files), LONGEST_S)
+        drawn = unpacked(Drawn.model_validate_json(said[: said.index(b"\n")]).sizes, said)
+        for each, picture in drawn.items():
+            self._blobs.put(f"{pictures.folder}/{picture_file(each)}", picture)
+        self._forget_if_gone(job_id)
+        return drawn.get(name)
+
+    def _frames(self, job: Drawable, pictures: Pictures, name: str) -> dict[str, bytes | None]:
+        """Of the cameras that a picture shows; from their own folder, or what was kept of it."""
+        of_one = name.partition("_")[2]
+        needed = [of_one] if of_one in job.frames and f"frame_{of_one}" in drawn_together(name) else job.frames
+        return {
+            camera: self._blobs.get(job.frames[camera]) or self._blobs.get(source_file(pictures.folder, camera))
+            for camera in needed
+        }
+
+    def _forget_if_gone(self, job_id: str) -> None:
+        """Who tidied up while they were drawn does not come again."""
+        left = self._jobs.pictures(job_id)
+        if left is None or left.deleted:
+            self._blobs.delete_under(pictures_folder(job_id))
+
+    def _stored(self, pictures: Pictures, name: str) -> bytes | None:
+        return self._blobs.get(f"{pictures.folder}/{picture_file(name)}")
+
+
+def _busy() -> Problem:
+    headers = {"Retry-After": str(AGAIN_S)}
+    return Problem("unavailable", "Other pictures are being drawn.", headers=headers)
