@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from worker.calibration.draw.viewpoint import Viewpoint, world_behind
 from worker.calibration.scene.camera import Array, Camera, Frame
 from worker.calibration.scene.field import Field
-from worker.calibration.scene.look import Look, ground_grid, look_through
+from worker.calibration.scene.look import Look, box, ground_grid, look_through
 
 # Least length of the pitch in the bird's-eye view, in pixels: courts are small.
 BIRDSEYE_LENGTH = 800
@@ -97,12 +97,30 @@ def seam_weights(qualities: NDArray[np.float32], sharpness: int) -> NDArray[np.f
 
 
 def _blend(looks: Sequence[Look]) -> Frame:
+    gains = exposure_gains(looks)
+    picture = np.full(looks[0].values.shape, BACKDROP, np.uint8)
+    for look, gain in zip(looks, gains, strict=True):
+        evened = cv2.transform(look.values, np.diag(gain))
+        cv2.copyTo(evened, look.valid.astype(np.uint8), picture)
+    overlap = np.sum([look.valid for look in looks], axis=0) > 1
+    if overlap.any():
+        around = box(overlap)
+        shared = overlap[around]
+        picture[around][shared] = _feathered([_part(look, around) for look in looks], gains)[shared]
+    return picture
+
+
+def _part(look: Look, around: tuple[slice, slice]) -> Look:
+    return Look(look.values[around], look.valid[around], look.quality[around])
+
+
+def _feathered(looks: Sequence[Look], gains: NDArray[np.float32]) -> Frame:
+    """Where several cameras see: each one's part, feathered along the seam."""
     qualities = np.stack([look.quality for look in looks])
     detail, smooth = seam_weights(qualities, DETAIL_SHARPNESS), seam_weights(qualities, SMOOTH_SHARPNESS)
     picture = np.zeros(looks[0].values.shape, np.float32)
-    for look, short, long, gain in zip(looks, detail, smooth, exposure_gains(looks), strict=True):
+    for look, short, long, gain in zip(looks, detail, smooth, gains, strict=True):
         picture += gain * (short[..., None] * look.values + (long - short)[..., None] * _smooth_part(look))
-    picture[~np.any([look.valid for look in looks], axis=0)] = BACKDROP
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 

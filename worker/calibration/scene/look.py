@@ -42,15 +42,23 @@ def look_through(camera: Camera, image: NDArray[Any], pixels: Array) -> Look:
     for number in np.unique(level[valid]):
         small = _shrink(image, 1 << int(number))
         scale = small.shape[1] / image.shape[1], small.shape[0] / image.shape[0]
-        place = (x + 0.5) * scale[0] - 0.5, (y + 0.5) * scale[1] - 0.5
-        sampled = cv2.remap(small, *place, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         chosen = valid & (level == number)
-        values[chosen] = sampled[chosen]
+        # Far and near lie in bands of the picture.
+        around = box(chosen)
+        place = (x[around] + 0.5) * scale[0] - 0.5, (y[around] + 0.5) * scale[1] - 0.5
+        sampled = cv2.remap(small, *place, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        values[around][chosen[around]] = sampled[chosen[around]]
     # 1 in the middle of the camera's picture, next to 0 at its border; the better, the finer it resolves the point.
     width, height = camera.intrinsics.size
     middle = (1 - np.abs(2 * x / (width - 1) - 1)) * (1 - np.abs(2 * y / (height - 1) - 1))
     quality = np.where(valid, np.maximum(middle, 1e-6) * np.sqrt(np.maximum(area, 1e-6)), 0)
     return Look(values, valid, quality)
+
+
+def box(mask: Mask) -> tuple[slice, slice]:
+    """The rows and columns that hold all of a mask (H, W) that is not empty."""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
 
 def ground_view(pitch: Field, camera: Camera, image: NDArray[Any], grid_xy: Array) -> tuple[NDArray[Any], Mask]:
