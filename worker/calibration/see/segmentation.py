@@ -64,6 +64,10 @@ class Segmenter:
         # Regions differ in size: memory planned for one does not fit the next.
         options.enable_mem_pattern = False
         self.session = ort.InferenceSession(model, options, providers=[provider])
+        # What a run took is given back at its end: search, finish and pictures come after, and need as much.
+        self.run = ort.RunOptions()
+        if provider == "CPUExecutionProvider":
+            self.run.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
         self.sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
         self.input_name = self.session.get_inputs()[0].name
 
@@ -93,7 +97,7 @@ class Segmenter:
 
     def _probabilities(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
         rgb = picture[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
-        (answer,) = self.session.run(None, {self.input_name: rgb})
+        (answer,) = self.session.run(None, {self.input_name: rgb}, self.run)
         return np.asarray(answer, dtype=np.float32)[0, 0]
 
 

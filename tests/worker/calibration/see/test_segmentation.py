@@ -36,6 +36,31 @@ def picture():
     return np.clip(frame + noise, 0, 255).astype(np.uint8)
 
 
+AFTERWARDS = """
+import sys
+from pathlib import Path
+import numpy as np
+from worker.calibration.see.segmentation import Segmenter, whole_frame
+
+def memory(kind):
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) for line in file if line.startswith(kind))
+
+segmenter = Segmenter(Path(sys.argv[1]), 1)
+before = memory("VmRSS")
+segmenter(np.zeros((544, 960, 3), np.uint8), whole_frame((960, 544)))
+print(before, memory("VmHWM"), memory("VmRSS"))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_what_the_network_took_is_given_back():
+    command = [sys.executable, "-c", AFTERWARDS, str(MODEL_BESIDE_THE_CODE)]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    before, most, after = map(int, run.stdout.split())
+    assert after - before < 0.3 * (most - before)
+
+
 def everywhere(frame):
     height, width = (-(-side // 32) * 32 for side in frame.shape[:2])
     return [Region(left, 0, min(left + 416, width), height) for left in range(0, width, 416)]
