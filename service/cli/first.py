@@ -120,7 +120,7 @@ def pose(
     for camera in given.keys() - clicks.keys():
         fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
     from worker.jobs import locate
-    from worker.jobs.wire import lens_of
+    from worker.jobs.reading import lens_of
 
     found = {camera.id: camera for camera in place.cameras}
     results = []

@@ -35,7 +35,7 @@ def checked_files(stored: Venue, frames: Sequence[str], settings: Settings) -> d
 @contextmanager
 def failure_told() -> Iterator[None]:
     """What is refused, and what a job without a server fails of, is a line."""
-    from worker.jobs.wire import Failure
+    from worker.jobs.reading import Failure
 
     try:
         yield

@@ -10,7 +10,7 @@ from service.wire.geometry import Pose
 from service.wire.venue import VenueIn
 from tests import demo
 from worker.calibration.scene.camera import Camera
-from worker.jobs.wire import camera_of, pitch_of
+from worker.jobs.reading import camera_of, pitch_of
 
 DEMO = Path(demo.__file__).parent
 VENUE = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).stored()

@@ -11,7 +11,7 @@ from service.wire.venue import Camera
 from tests.real.pair import FOLDER
 from tests.worker.calibration.see import spoiling
 from worker.calibration.see.view import look_at
-from worker.jobs.wire import camera_of, pitch_of
+from worker.jobs.reading import camera_of, pitch_of
 
 pytestmark = pytest.mark.real
 FIELDS = FOLDER.parent / "fields"

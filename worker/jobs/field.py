@@ -15,7 +15,8 @@ from worker.calibration.measures.field_fit import FieldFit, Measure, fit_field
 from worker.calibration.records import Spent
 from worker.jobs import from_frames
 from worker.jobs.from_frames import Drawn, Given
-from worker.jobs.wire import Solution, jpeg, number, to_the_millisecond, wire_camera
+from worker.jobs.reading import jpeg
+from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera
 from worker.message import Means
 
 MILLIMETRE = 3

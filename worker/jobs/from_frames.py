@@ -19,19 +19,8 @@ from worker.calibration.records import Answer, CalibrationError, Segment, Spent
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Region
-from worker.jobs.wire import (
-    PREVIEW_FRACTION,
-    Failure,
-    Picture,
-    R,
-    Solution,
-    camera_of,
-    decoded_frame,
-    pitch_of,
-    provenance_of,
-    segmenter_of,
-    wire_progress,
-)
+from worker.jobs.reading import Failure, Picture, camera_of, decoded_frame, pitch_of
+from worker.jobs.wire import PREVIEW_FRACTION, R, Solution, provenance_of, segmenter_of, wire_progress
 from worker.message import Means
 
 A = TypeVar("A", bound=Answer)

@@ -15,7 +15,8 @@ from service.wire.results import CoverageResult, IntrinsicsResult, LensTrial, Ph
 from worker.calibration.draw.inspection import coverage_picture
 from worker.calibration.first.boards import Board, Charuco, find_board, other_size
 from worker.calibration.first.lens_calibration import LensCalibration, NoLens, Photo, calibrate_lens
-from worker.jobs.wire import Failure, Picture, Solution, decoded, jpeg, number, to_the_millisecond, wire_lens
+from worker.jobs.reading import Failure, Picture, decoded, jpeg
+from worker.jobs.wire import Solution, number, to_the_millisecond, wire_lens
 
 DETECTION_FRACTION = 0.8
 

@@ -19,7 +19,8 @@ from service.store.jobs.task import Task
 from service.wire.job import Progress
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions
 from service.wire.results import AnyResult
-from worker.jobs.wire import Failure, Solution
+from worker.jobs.reading import Failure
+from worker.jobs.wire import Solution
 from worker.message import Given, Means, Message
 
 BEHIND_THE_OTHERS = 10

@@ -22,18 +22,8 @@ from worker.calibration.first.freed_lens import LensGain
 from worker.calibration.first.verdict import FirstPose
 from worker.calibration.scene.camera import Array, Intrinsics
 from worker.calibration.scene.field import Field
-from worker.jobs.wire import (
-    Failure,
-    Solution,
-    decoded_frame,
-    jpeg,
-    lens_of,
-    number,
-    pitch_of,
-    to_the_millisecond,
-    wire_lens,
-    wire_pose,
-)
+from worker.jobs.reading import Failure, decoded_frame, jpeg, lens_of, pitch_of
+from worker.jobs.wire import Solution, number, to_the_millisecond, wire_lens, wire_pose
 
 
 def solve(

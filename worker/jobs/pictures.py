@@ -17,7 +17,7 @@ from worker.calibration.draw.overlays import overlay
 from worker.calibration.draw.viewpoint import viewpoint
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
-from worker.jobs.wire import Picture, jpeg, png
+from worker.jobs.reading import Picture, jpeg, png
 
 # Of the frames that layers are laid over: a wide screen. The overlays have the size of the frames.
 FRAME_WIDTH, PREVIEW_WIDTH = 1920, 1920

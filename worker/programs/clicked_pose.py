@@ -16,7 +16,7 @@ from worker.calibration.draw.overlays import outline
 from worker.calibration.scene.camera import Camera, inside
 from worker.calibration.scene.field import Field
 from worker.jobs.locate import clicks_of, pose_of, result_of
-from worker.jobs.wire import Failure, lens_of, pitch_of
+from worker.jobs.reading import Failure, lens_of, pitch_of
 
 # A line is drawn as far as this beside the picture, in widths of it: what is further out is not worth drawing.
 BESIDE = 0.25

@@ -16,9 +16,11 @@ from service import lifeline
 from service.wire.drawing import Drawing, Drawn, packed, unpacked
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.settle import METHODS
 from worker.jobs.pictures import Scene, draw
-from worker.jobs.wire import camera_of, decoded_frame, pitch_of
+from worker.jobs.reading import camera_of, decoded_frame, pitch_of
+
+# The presets whose method is: `settle.METHODS` says so too, and loads the whole engine with it.
+FLAT = ("scpr",)
 
 
 def main() -> None:
@@ -56,7 +58,7 @@ def _found_cameras(asked: Drawing) -> list[Camera]:
 def _found_pitch(asked: Drawing, pitch: Field) -> Field:
     """As it was finished on: flat, or with the ridge that was found."""
     options, ridge = asked.result.provenance.options, asked.result.ridge
-    if options.get("flat") or METHODS[options.get("preset", "esc")].flat:
+    if options["flat"] or options["preset"] in FLAT:
         return pitch.flat()
     return pitch if ridge is None else pitch_of(asked.venue.field.model_copy(update={"ridge": ridge}))
 

@@ -19,7 +19,7 @@ from service import lifeline
 from service.formats.archive import archive
 from service.wire.venue import Camera
 from worker.calibration.draw.st_maps import StMap, distorting, undistorting
-from worker.jobs.wire import lens_of
+from worker.jobs.reading import lens_of
 
 
 def main(origin: str) -> None:

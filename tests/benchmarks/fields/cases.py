@@ -14,7 +14,7 @@ import numpy as np
 from service.wire.field import FieldOfPlay
 from worker.calibration.scene.camera import LENSES, Camera, Frame, Pose, rotation_matrices, rotation_vectors
 from worker.calibration.scene.field import Field
-from worker.jobs.wire import pitch_of
+from worker.jobs.reading import pitch_of
 
 FOLDER = Path(__file__).parents[4] / "shared" / "real" / "fields"
 

@@ -7,7 +7,7 @@ from service.store import movement
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Intrinsics, Pose, PosedCamera
 from worker.calibration.judge.quality import Movement
-from worker.jobs.wire import camera_of, pitch_of
+from worker.jobs.reading import camera_of, pitch_of
 
 FIELD = FieldOfPlay(length_m=105, width_m=68)
 LENSES = {

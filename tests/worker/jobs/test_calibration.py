@@ -20,8 +20,10 @@ from worker.calibration.judge.quality import CameraResult, Movement
 from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
-from worker.jobs import calibration, pictures, wire
+from worker.calibration.settle import METHODS
+from worker.jobs import calibration, pictures, reading, wire
 from worker.message import Means, Message
+from worker.programs import draw
 
 SIZE = (320, 180)
 FIGURES = ViewFigures(120.0, 1.5, 60.0, 0.8, 0.7, 0.0, 0.0, 0.0, 0.0, 0.1)
@@ -142,7 +144,9 @@ def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_len
 
 
 def test_what_is_hardly_told_of_a_lens_fits_what_a_venue_takes():
-    lens = wire.lens_of(geometry.Intrinsics(matrix=[[220, 0, 160], [0, 220, 90], [0, 0, 1]], distortion=[]), list(SIZE))
+    lens = reading.lens_of(
+        geometry.Intrinsics(matrix=[[220, 0, 160], [0, 220, 90], [0, 0, 1]], distortion=[]), list(SIZE)
+    )
     said = wire.wire_lens(replace(lens, sigma={"fx": 0.0, "k2": 1e12, "k3": float("inf"), "k1": float("nan")})).sigma
     assert said == {"fx": geometry.LEAST_SIGMA, "k2": geometry.LARGEST_SIGMA, "k3": geometry.LARGEST_SIGMA}
 
@@ -201,6 +205,10 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
         drawn = unpacked(Drawn.model_validate_json(run.stdout.splitlines()[0]).sizes, run.stdout)
         assert set(drawn) == set(drawn_together(name))
         assert all(picture == outcome.pictures[each] for each, picture in drawn.items())
+
+
+def test_a_flat_method_is_drawn_flat():
+    assert tuple(name for name, method in METHODS.items() if method.flat) == draw.FLAT
 
 
 def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, means):
@@ -276,14 +284,14 @@ def test_the_orientation_a_camera_writes_into_its_files_is_not_obeyed(venue, fil
 
 def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, files, asked, means):
     files["right"] = [b"\xff\xd8\xff\xda\0\x02\xff\xd9"]
-    with pytest.raises(wire.Failure) as failure:
+    with pytest.raises(reading.Failure) as failure:
         calibration.solve(venue, files, Options(), means, lambda _: None)
     assert (failure.value.error.type, failure.value.error.camera) == ("/problems/broken-image", "right")
 
 
 def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, means):
     files["right"] = [cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()]
-    with pytest.raises(wire.Failure, match=r"right decodes to 64x48 pixels; .* 320x180"):
+    with pytest.raises(reading.Failure, match=r"right decodes to 64x48 pixels; .* 320x180"):
         calibration.solve(venue, files, Options(), means, lambda _: None)
 
 
@@ -292,7 +300,7 @@ def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, ask
         raise engine.CalibrationError("left", "no-markings-in-view", "store another pose")
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
-    with pytest.raises(wire.Failure) as failure:
+    with pytest.raises(reading.Failure) as failure:
         calibration.solve(venue, files, Options(), means, lambda _: None)
     error = failure.value.error
     assert (error.type, error.camera, error.detail) == ("/problems/no-markings-in-view", "left", "store another pose")
@@ -300,12 +308,12 @@ def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, ask
 
 def test_a_missing_network_fails_and_says_where_it_should_be(venue, files, means):
     gone = means.model_copy(update={"model": means.model / "nowhere"})
-    with pytest.raises(wire.Failure, match="nowhere"):
+    with pytest.raises(reading.Failure, match="nowhere"):
         calibration.solve(venue, files, Options(), gone, lambda _: None)
 
 
 def test_a_provider_that_is_not_installed_fails_and_says_what_to_set(venue, files):
-    with pytest.raises(wire.Failure, match=r"no CUDAExecutionProvider, only .* ESC_PROVIDER=cpu") as failure:
+    with pytest.raises(reading.Failure, match=r"no CUDAExecutionProvider, only .* ESC_PROVIDER=cpu") as failure:
         calibration.solve(
             venue, files, Options(), Means(model=MODEL_BESIDE_THE_CODE, threads=1, provider="cuda"), lambda _: None
         )

@@ -5,7 +5,7 @@ import pytest
 from service.wire.options import FieldOptions
 from service.wire.venue import VenueIn
 from worker.jobs.field import solve
-from worker.jobs.wire import Failure
+from worker.jobs.reading import Failure
 from worker.message import Means
 
 

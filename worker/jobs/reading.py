@@ -1,0 +1,80 @@
+"""What a job or a drawing is given, as the engine takes it: files become pictures, the wire the engine's types."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from service.wire import geometry
+from service.wire.field import FieldOfPlay
+from service.wire.job import JobError
+from service.wire.problems import KINDS, type_of
+from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
+from worker.calibration.scene.field import Field
+
+Picture = NDArray[np.uint8]
+JPEG_QUALITY = 90
+
+
+class Failure(Exception):  # noqa: N818
+    """The job has no result; `error` says why."""
+
+    def __init__(self, kind: str, detail: str, camera: str | None = None) -> None:
+        super().__init__(detail)
+        self.error = JobError(type=type_of(kind), title=KINDS[kind].title, detail=detail, camera=camera)
+
+
+def decoded(file: bytes, flags: int) -> Picture | None:
+    """A picture from a file's bytes, None where it has none; a camera's EXIF orientation is not obeyed."""
+    try:
+        picture = cv2.imdecode(np.frombuffer(file, dtype=np.uint8), flags | cv2.IMREAD_IGNORE_ORIENTATION)
+    except cv2.error:
+        return None
+    return None if picture is None else np.asarray(picture, dtype=np.uint8)
+
+
+def decoded_frame(camera: str, image_size: list[int], file: bytes) -> Picture:
+    """A BGR frame (height, width, 3) of the size of the intrinsics."""
+    frame = decoded(file, cv2.IMREAD_COLOR_BGR)
+    if frame is None:
+        raise Failure("broken-image", f"A frame of camera {camera} cannot be decoded; grab it again.", camera)
+    height, width = frame.shape[:2]
+    if [width, height] != image_size:
+        raise Failure(
+            "frame-size",
+            f"A frame of camera {camera} decodes to {width}x{height} pixels; its intrinsics are for "
+            f"{image_size[0]}x{image_size[1]}.",
+            camera,
+        )
+    return frame
+
+
+def jpeg(picture: Picture, quality: int = JPEG_QUALITY) -> bytes:
+    """The file of a picture."""
+    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return data.tobytes()
+
+
+def png(picture: Picture) -> bytes:
+    """The file of a picture with an opacity, BGRA."""
+    _, data = cv2.imencode(".png", picture)
+    return data.tobytes()
+
+
+def pitch_of(field: FieldOfPlay) -> Field:
+    """The engine's pitch."""
+    ridge = None if field.ridge is None else np.array(field.ridge)
+    return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
+
+
+def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Intrinsics:
+    """The engine's lens."""
+    matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
+    return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]), dict(lens.sigma or {}))
+
+
+def camera_of(camera: geometry.PosedCamera) -> Camera:
+    """The engine's camera at its stored pose."""
+    pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
+    return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
