@@ -69,13 +69,7 @@ class Drawings:
         if job is None or None in frames.values():
             return None
         files = {camera: frame for camera, frame in frames.items() if frame is not None}
-        asked = Drawing(
-            venue=job.venue,
-            result=job.result,
-            names=[name],
-            threads=self._settings.threads,
-            sizes={camera: len(frame) for camera, frame in files.items()},
-        )
+        asked = Drawing.of(job.venue, job.result, [name], self._settings.threads, files)
         program, environment = self._settings.picture_program, self._settings.native_environment
         said = answer("picture", program, environment, packed(asked, files), LONGEST_S)
         drawn = unpacked(Drawn.model_validate_json(said[: said.index(b"\n")]).sizes, said)

@@ -2,23 +2,63 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
 from pydantic import BaseModel
 
-from service.wire.results import Result
-from service.wire.venue import Venue
+from service.wire.field import FieldOfPlay
+from service.wire.geometry import PosedCamera
+
+# Somebody waits for the program, and all that a venue and a result can be takes as long to load as NumPy.
+if TYPE_CHECKING:
+    from service.wire.results import Result
+    from service.wire.venue import Venue
+
+FLAT = ("scpr",)
+"""The presets that calibrate on a plane, whatever the venue has."""
+
+
+class Standing(BaseModel):
+    """A field and the cameras around it."""
+
+    field: FieldOfPlay
+    cameras: list[PosedCamera]
 
 
 class Drawing(BaseModel):
-    """Pictures of a calibration, from the `venue` as the job found it and its `result`.
+    """Pictures of a calibration: how all stood when the job began (`stored`) and as it was `found`.
 
     `names`: of the pictures; `sizes`: bytes of the frames that follow, one of each camera that is needed.
     """
 
-    venue: Venue
-    result: Result
+    stored: Standing
+    found: Standing
     names: list[str]
     threads: int
     sizes: dict[str, int]
+
+    @classmethod
+    def of(
+        cls, venue: Venue, result: Result, names: Sequence[str], threads: int, files: Mapping[str, bytes]
+    ) -> Drawing:
+        """What a job had before it when it was done."""
+        stored = Standing(field=venue.field, cameras=[camera.posed for camera in venue.cameras])
+        cameras = [
+            camera.model_copy(update={"pose": new.pose, "intrinsics": new.intrinsics or camera.intrinsics})
+            for camera, new in zip(stored.cameras, result.cameras, strict=True)
+        ]
+        found = Standing(field=_field_found(venue, result), cameras=cameras)
+        sizes = {camera: len(file) for camera, file in files.items()}
+        return cls(stored=stored, found=found, names=list(names), threads=threads, sizes=sizes)
+
+
+def _field_found(venue: Venue, result: Result) -> FieldOfPlay:
+    """As it was finished on: flat, or with the ridge that was found."""
+    options = result.provenance.options
+    if options["flat"] or options["preset"] in FLAT:
+        return venue.field.model_copy(update={"ridge": None})
+    return venue.field.model_copy(update={"ridge": result.ridge or venue.field.ridge})
 
 
 class Drawn(BaseModel):
@@ -27,7 +67,7 @@ class Drawn(BaseModel):
     sizes: dict[str, int]
 
 
-def packed(told: Drawing | Drawn, files: dict[str, bytes]) -> bytes:
+def packed(told: Drawing | Drawn, files: Mapping[str, bytes]) -> bytes:
     """The line and the files."""
     return b"".join((told.model_dump_json().encode(), b"\n", *files.values()))
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from service.wire import geometry
 from service.wire.field import FieldOfPlay
-from service.wire.job import JobError
 from service.wire.problems import KINDS, type_of
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
+
+if TYPE_CHECKING:
+    from service.wire.job import JobError
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
@@ -22,7 +26,16 @@ class Failure(Exception):  # noqa: N818
 
     def __init__(self, kind: str, detail: str, camera: str | None = None) -> None:
         super().__init__(detail)
-        self.error = JobError(type=type_of(kind), title=KINDS[kind].title, detail=detail, camera=camera)
+        self._kind, self._detail, self._camera = kind, detail, camera
+
+    @property
+    def error(self) -> JobError:
+        """For the row of the job."""
+        # What a drawing needs would take twice as long to load with all that a job can be.
+        from service.wire.job import JobError
+
+        told = {"type": type_of(self._kind), "title": KINDS[self._kind].title}
+        return JobError(**told, detail=self._detail, camera=self._camera)
 
 
 def decoded(file: bytes, flags: int) -> Picture | None:

@@ -9,18 +9,16 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 
 import cv2
 
 from service import lifeline
-from service.wire.drawing import Drawing, Drawn, packed, unpacked
+from service.wire.drawing import Drawing, Drawn, Standing, packed, unpacked
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.jobs.pictures import Scene, draw
 from worker.jobs.reading import camera_of, decoded_frame, pitch_of
-
-# The presets whose method is: `settle.METHODS` says so too, and loads the whole engine with it.
-FLAT = ("scpr",)
 
 
 def main() -> None:
@@ -36,31 +34,16 @@ def main() -> None:
 
 
 def scene_of(asked: Drawing, files: Mapping[str, bytes]) -> Scene:
-    """What the job had before it when it was done; frames only of the cameras whose files came."""
-    cameras = {camera.id: camera for camera in asked.venue.cameras}
-    pitch = pitch_of(asked.venue.field)
-    return Scene(
-        (pitch, [camera_of(camera) for camera in asked.venue.cameras]),
-        (_found_pitch(asked, pitch), _found_cameras(asked)),
-        {camera: decoded_frame(camera, cameras[camera].image_size, file) for camera, file in files.items()},
-    )
+    """Frames only of the cameras whose files came."""
+    sizes = {camera.id: camera.image_size for camera in asked.stored.cameras}
+    with ThreadPoolExecutor(asked.threads) as each:
+        frames = each.map(lambda camera: decoded_frame(camera, sizes[camera], files[camera]), files)
+        decoded = dict(zip(files, frames, strict=True))
+    return Scene(_standing(asked.stored), _standing(asked.found), decoded)
 
 
-def _found_cameras(asked: Drawing) -> list[Camera]:
-    """With the lens that was found, where one was."""
-    found = zip(asked.venue.cameras, asked.result.cameras, strict=True)
-    return [
-        camera_of(camera.model_copy(update={"pose": new.pose, "intrinsics": new.intrinsics or camera.intrinsics}))
-        for camera, new in found
-    ]
-
-
-def _found_pitch(asked: Drawing, pitch: Field) -> Field:
-    """As it was finished on: flat, or with the ridge that was found."""
-    options, ridge = asked.result.provenance.options, asked.result.ridge
-    if options["flat"] or options["preset"] in FLAT:
-        return pitch.flat()
-    return pitch if ridge is None else pitch_of(asked.venue.field.model_copy(update={"ridge": ridge}))
+def _standing(asked: Standing) -> tuple[Field, list[Camera]]:
+    return pitch_of(asked.field), [camera_of(camera) for camera in asked.cameras]
 
 
 if __name__ == "__main__":

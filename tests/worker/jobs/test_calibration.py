@@ -9,7 +9,7 @@ import pytest
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store.jobs.files import drawn_together, picture_file
 from service.wire import geometry
-from service.wire.drawing import Drawing, Drawn, packed, unpacked
+from service.wire.drawing import FLAT, Drawing, Drawn, packed, unpacked
 from service.wire.options import Options
 from service.wire.results import View
 from service.wire.venue import VenueIn
@@ -23,7 +23,6 @@ from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
 from worker.calibration.settle import METHODS
 from worker.jobs import calibration, pictures, reading, wire
 from worker.message import Means, Message
-from worker.programs import draw
 
 SIZE = (320, 180)
 FIGURES = ViewFigures(120.0, 1.5, 60.0, 0.8, 0.7, 0.0, 0.0, 0.0, 0.0, 0.1)
@@ -189,13 +188,7 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     first = {camera: several[0] for camera, several in files.items()}
     for name in ("preview", "birdseye", "frame_right"):
         needed = {"right": first["right"]} if name == "frame_right" else first
-        given = Drawing(
-            venue=venue,
-            result=outcome.result,
-            names=[name],
-            threads=1,
-            sizes={camera: len(file) for camera, file in needed.items()},
-        )
+        given = Drawing.of(venue, outcome.result, [name], 1, needed)
         run = subprocess.run(
             [sys.executable, "-m", "worker.programs.draw"],
             input=packed(given, needed),
@@ -208,7 +201,7 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
 
 
 def test_a_flat_method_is_drawn_flat():
-    assert tuple(name for name, method in METHODS.items() if method.flat) == draw.FLAT
+    assert tuple(name for name, method in METHODS.items() if method.flat) == FLAT
 
 
 def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, means):
