@@ -56,7 +56,7 @@ class Drawing(BaseModel):
 def _field_found(venue: Venue, result: Result) -> FieldOfPlay:
     """As it was finished on: flat, or with the ridge that was found."""
     options = result.provenance.options
-    if options["flat"] or options["preset"] in FLAT:
+    if options.get("flat") or options.get("preset") in FLAT:
         return venue.field.model_copy(update={"ridge": None})
     return venue.field.model_copy(update={"ridge": result.ridge or venue.field.ridge})
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
@@ -70,8 +71,11 @@ def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.uint8]])
 def _stitched(scene: Scene) -> dict[str, bytes]:
     """One view by the new poses, where one camera hands over to another in it, and the view by the stored poses."""
     view = viewpoint(*scene.found, PREVIEW_WIDTH)
-    after = mosaic.stitched(scene.found[0], view, scene.found[1], scene.frames)
-    before = mosaic.stitched(scene.stored[0], view, scene.stored[1], scene.frames)
+    # Somebody may wait, and each of them keeps a core busy.
+    with ThreadPoolExecutor(2) as both:
+        after, before = both.map(
+            lambda standing: mosaic.stitched(standing[0], view, standing[1], scene.frames), (scene.found, scene.stored)
+        )
     return {
         "preview": jpeg(after.picture),
         "seam": png(layers.seam_layer(after.owner)),
