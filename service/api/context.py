@@ -7,8 +7,8 @@ from typing import Annotated, cast
 from fastapi import Depends, Path, Request
 
 from service.api.auth import Gate
-from service.api.clicked_pose import ClickedPoses
-from service.api.drawings import Drawings
+from service.api.programs.clicked_pose import ClickedPoses
+from service.api.programs.drawings import Drawings
 from service.api.shared_reads import SharedReads
 from service.api.uploads import Uploads
 from service.api.watch import Watch

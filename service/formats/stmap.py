@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from service.api.programs import OneAtATime
+from service.api.programs.running import OneAtATime
 from service.formats.lens import Shot
 
 # A 4K lens takes 10 s of one core, and its maps 100 MB.

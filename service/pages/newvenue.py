@@ -13,9 +13,9 @@ from service.api.context import InContext
 from service.pages.shown import Page, page
 from service.routes.contract.documented import needs
 from service.routes.contract.guarded import Guarded
-from service.wire.clicked_pose import ClickedCamera, ClickedPose
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import LensModel
+from service.wire.programs.clicked_pose import ClickedCamera, ClickedPose
 
 ARC_STEP_RAD = math.radians(4)
 router = APIRouter(route_class=Page, include_in_schema=False)

@@ -1,7 +1,7 @@
 """The first pose of a camera while its points are being clicked, in a process of its own: JSON in, JSON out.
 
-`python -m worker.programs.clicked_pose`. What comes is a `service.wire.clicked_pose.ClickedCamera`, what leaves a
-`ClickedPose`.
+`python -m worker.programs.clicked_pose`. What comes is a `service.wire.programs.clicked_pose.ClickedCamera`, what
+leaves a `ClickedPose`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import time
 from math import isfinite
 
 from service import lifeline
-from service.wire.clicked_pose import ClickedCamera, ClickedPose, Polyline
+from service.wire.programs.clicked_pose import ClickedCamera, ClickedPose, Polyline
 from worker.calibration.draw.overlays import outline
 from worker.calibration.scene.camera import Camera, inside
 from worker.calibration.scene.field import Field

@@ -1,7 +1,7 @@
 """Pictures of a calibration when somebody looks at them, in a process of its own.
 
-`python -m worker.programs.draw`. What comes is a `service.wire.drawing.Drawing` and frames, what leaves a `Drawn` and
-the pictures.
+`python -m worker.programs.draw`. What comes is a `service.wire.programs.drawing.Drawing` and frames, what leaves a
+`Drawn` and the pictures.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 import cv2
 
 from service import lifeline
-from service.wire.drawing import Drawing, Drawn, Standing, packed, unpacked
+from service.wire.programs.drawing import Drawing, Drawn, Standing, packed, unpacked
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.jobs.pictures import Scene, draw

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from service.api import drawings
-from service.api.drawings import Drawings
+from service.api.programs import drawings
+from service.api.programs.drawings import Drawings
 from service.settings import Settings
 from service.store.jobs.files import source_file
 from service.wire.problems import Problem

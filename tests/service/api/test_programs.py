@@ -8,12 +8,12 @@ import threading
 import pytest
 from anyio.to_thread import current_default_thread_limiter
 
-from service.api import clicked_pose
-from service.api.clicked_pose import ClickedPoses
-from service.api.programs import OneAtATime
+from service.api.programs import clicked_pose
+from service.api.programs.clicked_pose import ClickedPoses
+from service.api.programs.running import OneAtATime
 from service.settings import Settings
-from service.wire.clicked_pose import ClickedCamera
 from service.wire.problems import Problem
+from service.wire.programs.clicked_pose import ClickedCamera
 from tests.e2e.running import venue
 
 SLOW = [sys.executable, "-c", "import sys, time; time.sleep(0.5); sys.stdout.write(sys.stdin.read())"]

@@ -9,8 +9,8 @@ import pytest
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store.jobs.files import drawn_together, picture_file
 from service.wire import geometry
-from service.wire.drawing import FLAT, Drawing, Drawn, packed, unpacked
 from service.wire.options import Options
+from service.wire.programs.drawing import FLAT, Drawing, Drawn, packed, unpacked
 from service.wire.results import View
 from service.wire.venue import VenueIn
 from worker.calibration import records as engine

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from service.wire.clicked_pose import ClickedCamera
 from service.wire.options import ClickedPoint
+from service.wire.programs.clicked_pose import ClickedCamera
 from tests.pages.newcomer import VENUE, points_to_click, true_camera
 from worker.programs.clicked_pose import answer
 

@@ -12,13 +12,13 @@ from weakref import WeakValueDictionary
 
 from starlette.concurrency import run_in_threadpool
 
-from service.api.programs import answer
+from service.api.programs.running import answer
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.jobs.files import drawn_together, picture_file, pictures_folder, source_file
 from service.store.jobs.reading import Drawable, Jobs, Pictures
-from service.wire.drawing import Drawing, Drawn, packed, unpacked
 from service.wire.problems import Problem
+from service.wire.programs.drawing import Drawing, Drawn, packed, unpacked
 
 LONGEST_S = 60.0
 # The first picture takes about a second, and a page asks for several at once.

@@ -6,9 +6,9 @@ import asyncio
 
 from starlette.concurrency import run_in_threadpool
 
-from service.api.programs import OneAtATime
+from service.api.programs.running import OneAtATime
 from service.settings import Settings
-from service.wire.clicked_pose import ClickedCamera, ClickedPose
+from service.wire.programs.clicked_pose import ClickedCamera, ClickedPose
 
 # Clicks come a second apart; a pose takes less.
 PATIENCE_S = 10.0

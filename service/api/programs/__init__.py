@@ -1,0 +1,1 @@
+"""Programs beside the API that are asked for something at once, without a job: what needs NumPy."""

@@ -1,0 +1,1 @@
+"""What programs beside the API are asked, and what they answer."""
