@@ -36,9 +36,12 @@ class Measured:
     core_s: float = 12.3
     elapsed_s: float = 7.0
     frame_mb: float = 5.76
-    picture_mb: float = 8.62
     frames: int = 2
-    pictures: int = 14
+    # Of the masks; the other pictures are drawn when somebody looks, and are then so many and so large.
+    picture_mb: float = 0.20
+    pictures: int = 2
+    looked_at_mb: float = 8.62
+    looked_at: int = 14
     # `make bench-rate`.
     transactions: float = 45
     wal_kb: float = 23
@@ -100,23 +103,28 @@ class Fleet:
         return self.jobs_per_day * self.chosen.keep_jobs_fewer_days * self.job.database_kb / 1e6
 
     @property
+    def files_kept_days(self) -> float:
+        """Frames stay as long as pictures that nobody has looked at could be drawn of them."""
+        return max(self.chosen.keep_frames_days, self.chosen.keep_pictures_days)
+
+    @property
     def bucket_gb(self) -> float:
-        frames = self.chosen.keep_frames_days * self.job.frame_mb
-        return self.jobs_per_day * (frames + self.chosen.keep_pictures_days * self.job.picture_mb) / 1e3
+        return self.jobs_per_day * self.files_kept_days * (self.job.frame_mb + self.job.picture_mb) / 1e3
 
     @property
     def objects(self) -> float:
-        frames = self.chosen.keep_frames_days * self.job.frames
-        return self.jobs_per_day * (frames + self.chosen.keep_pictures_days * self.job.pictures)
+        return self.jobs_per_day * self.files_kept_days * (self.job.frames + self.job.pictures)
 
     @property
     def puts_per_month(self) -> float:
-        return 30 * self.jobs_per_day * (self.job.frames + self.job.pictures)
+        # Frames are copied once more, to stay beside the pictures.
+        return 30 * self.jobs_per_day * (2 * self.job.frames + self.job.pictures)
 
     @property
     def gets_and_lists_per_month(self) -> float:
-        # A worker gets each frame; frames and pictures are listed once more to be deleted, which costs nothing itself.
-        return 30 * self.jobs_per_day * (self.job.frames + 2)
+        # A worker gets each frame, and looks for four pictures, one of each that are drawn together, before those go;
+        # frames and pictures are listed once more to be deleted, which costs nothing itself.
+        return 30 * self.jobs_per_day * (self.job.frames + 4 + 2)
 
     @property
     def mbit_per_s_in(self) -> float:
@@ -163,7 +171,8 @@ def tables() -> str:
     costs = {
         "processor": f"{job.core_s:.1f} core seconds, {job.elapsed_s:.1f} s on two cores",
         "frames": f"{job.frames}, {job.frame_mb:.1f} MB in all",
-        "pictures": f"{job.pictures}, {job.picture_mb:.1f} MB in all",
+        "pictures": f"{job.pictures}, {job.picture_mb:.1f} MB in all; once somebody has looked at all of them, "
+        f"{job.looked_at}, {job.looked_at_mb:.1f} MB",
         "database": f"{job.transactions:.0f} transactions, {job.wal_kb:.0f} kB of write-ahead log, "
         f"{job.database_kb:.0f} kB that stay",
         "around it": f"{1000 * job.api_core_s:.0f} ms of a core in the API, {1000 * job.worker_core_s:.0f} ms in the "

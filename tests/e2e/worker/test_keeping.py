@@ -75,7 +75,12 @@ def test_what_is_past_its_time_goes_and_says_so(start):
 @in_both_homes
 def test_a_picture_that_somebody_else_deleted_is_told_from_one_that_never_was(service, name):
     job = service.calibrated(service.venue(name))["id"]
-    Blobs(service.blob_url).delete_under(f"pictures/{job}")
+    blobs = Blobs(service.blob_url)
+    blobs.delete_under(f"pictures/{job}")
+    # It is drawn again, as if nobody had ever looked at it.
+    assert service.http.get(f"/jobs/{job}/birdseye.jpg").status_code == 200
+    for kind in ("frames", "pictures"):
+        blobs.delete_under(f"{kind}/{job}")
     gone = service.http.get(f"/jobs/{job}/birdseye.jpg")
     assert (gone.status_code, gone.json()["type"]) == (410, "/problems/picture-deleted")
     never = service.http.get(f"/jobs/{job}/overlay/middle.jpg")
