@@ -37,6 +37,29 @@ class View(Wire):
     )
 
 
+Side = Literal["outside", "inside", "right", "left", "far", "near"]
+
+
+class MarkingResult(Wire):
+    """A marking as one camera sees it; dashes of a line, and marks in rows, are one.
+
+    Lines that bound the field, and circles and arcs, have an outside and an inside; else the sides are those of the
+    pitch: right (x) and left, far (y) and near.
+    """
+
+    name: str
+    expected_m: float = Field(description="Length of it that should be in view.")
+    found: float = Field(description="Share 0..1 of that length that is seen where the pose puts it.")
+    offset_cm: float | None = Field(
+        None,
+        description="How far its paint lies from where the venue has it, across it on the ground, if all other "
+        "markings are in place; positive outside, right or far, else negative. Null where that cannot be told.",
+    )
+    sigma_cm: float | None = Field(None, description="One standard deviation of that, ten metres of line taken as one.")
+    side: Side | None = Field(None, description="On which side of its place the paint is: the sign in a word.")
+    elsewhere: bool = Field(False, description="Beyond three sigma and 3 cm: the paint is off, or a measure.")
+
+
 class CameraResult(Wire):
     """One camera's answer."""
 
@@ -57,6 +80,7 @@ class CameraResult(Wire):
     by_chance: float | None = Field(None, description="Share 0..1 of that length that would be seen anywhere.")
     residual_px: float | None
     view: View | None = None
+    markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
 
 
 class Provenance(Wire):

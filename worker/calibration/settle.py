@@ -15,6 +15,7 @@ import numpy as np
 
 from worker.calibration.finish.refinement import Sight, assess, refine
 from worker.calibration.finish.uncertainty import Deviation, Finished
+from worker.calibration.judge.markings import markings_seen
 from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection, markings_iou
 from worker.calibration.judge.registration import Response
 from worker.calibration.records import Journey, Options, Preset
@@ -273,6 +274,7 @@ def judged_alone(
             iou=markings_iou(finished.pitch, after.camera, response),
             evidence_before=evidence_of(lines, before, channels, response),
             moved=Movement.between(pitch, before, after.camera),
+            markings=markings_seen(finished.pitch, after),
         )
         for before, after, view, channels, response in zip(
             stored, finished.each, seen.views, seen.sight.channels, seen.sight.responses, strict=True

@@ -19,10 +19,11 @@ from service.wire.geometry import Moved
 from service.wire.job import JobError, Progress
 from service.wire.options import FieldOptions, Options
 from service.wire.problems import KINDS, type_of
-from service.wire.results import AnyResult, CameraResult, Provenance, Sigma, View
+from service.wire.results import AnyResult, CameraResult, MarkingResult, Provenance, Sigma, View
 from worker.calibration import records
 from worker.calibration.finish import uncertainty
 from worker.calibration.judge import quality
+from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
@@ -188,7 +189,25 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
         by_chance=number(found.evidence.by_chance),
         view=_view(found.view),
         residual_px=number(found.residual_px),
+        markings=[_marking(one) for one in found.markings],
     )
+
+
+def _marking(seen: MarkingSeen) -> MarkingResult:
+    return MarkingResult(
+        name=seen.name,
+        expected_m=round(seen.expected_m, 1),
+        found=round(seen.found, 3),
+        offset_cm=_rounded_cm(seen.offset_m),
+        sigma_cm=_rounded_cm(seen.sigma_m),
+        side=seen.side,
+        elsewhere=seen.is_elsewhere,
+    )
+
+
+def _rounded_cm(metres: float | None) -> float | None:
+    """To the millimetre."""
+    return None if metres is None or not isfinite(metres) else round(100 * metres, 1)
 
 
 def _view(found: ViewCondition) -> View:

@@ -160,7 +160,9 @@ def _assessed(
     measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
-    return judged(ordinary, stored, measured, evidence, unknowns, stitch_weight)
+    finished = judged(ordinary, stored, measured, evidence, unknowns, stitch_weight)
+    each = [replace(one, measured=its) for one, its in zip(finished.each, measured, strict=True)]
+    return replace(finished, each=each)
 
 
 def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:

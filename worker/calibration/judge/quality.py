@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from worker.calibration.finish.diagnosis import BEYOND_DOUBT, is_sure
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS
 from worker.calibration.finish.uncertainty import Deviation, FinishedCamera
+from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
@@ -76,7 +77,7 @@ class CameraResult(FinishedCamera):
 
     `view`: whether its frame could be used, and what is wrong with it if not; `iou`: see `markings_iou`;
     `rejected_because`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
-    camera's lens is not the stored one but what the lines say.
+    camera's lens is not the stored one but what the lines say; `markings`: what is seen of each.
     """
 
     view: ViewCondition
@@ -85,6 +86,7 @@ class CameraResult(FinishedCamera):
     moved: Movement
     rejected_because: str | None = None
     lens_found: bool = False
+    markings: Sequence[MarkingSeen] = field(default=(), kw_only=True)
 
     @property
     def accepted(self) -> bool:

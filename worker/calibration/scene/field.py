@@ -175,6 +175,10 @@ class Field:
     def _size(self) -> dict[str, float]:
         return {"length": self.length, "width": self.width, "line": self.line_width, **self.measures}
 
+    def whole_names(self) -> list[str]:
+        """Of each of the markings the name of what is painted: the same for all dashes of a broken line."""
+        return [self.template.whole(marking.name) for marking in self.markings()]
+
     def places(self) -> dict[str, Array]:
         """Where the named points of the template are, (3,) each, on the surface."""
         return {name: self.lift(np.array(point)) for name, point in self.template.places(self._size).items()}
