@@ -266,13 +266,10 @@ def _by_patch(patch: NDArray[np.intp], values: Array) -> Array:
 
 
 def in_words(seen: MarkingSeen) -> str:
-    """`far touchline: 62 % of 74 m found, 10 ± 1 cm outside`."""
-    found = f"{seen.name}: {seen.found:.0%} of {seen.expected_m:.0f} m found"
+    """`far touchline: 62 % found, 10 +- 1 cm outside`, in the letters that OpenCV can draw."""
+    words = f"{seen.name}: {seen.found:.0%} found"
     if seen.offset_m is None or seen.sigma_m is None:
-        return found
-    return f"{found}, {100 * abs(seen.offset_m):.1f} ± {100 * seen.sigma_m:.1f} cm {seen.side}"
-
-
-def elsewhere(seen: Sequence[MarkingSeen]) -> list[MarkingSeen]:
-    """Those markings whose paint surely is not where the venue has it."""
-    return [one for one in seen if one.is_elsewhere]
+        return words
+    places = 0 if seen.sigma_m >= 0.01 else 1
+    offset, sigma = 100 * abs(seen.offset_m), 100 * seen.sigma_m
+    return f"{words}, {offset:.{places}f} +- {sigma:.{places}f} cm {seen.side}"

@@ -8,7 +8,7 @@ import pytest
 
 from tests.worker.calibration.synthetic import PITCH, camera, paint_markings
 from worker.calibration.finish.refinement import Sight, refine
-from worker.calibration.judge.markings import direction_of, elsewhere, in_words, markings_seen
+from worker.calibration.judge.markings import MarkingSeen, direction_of, in_words, markings_seen
 from worker.calibration.scene.field import FOOTBALL, Field
 from worker.calibration.see.contrast import Channels
 
@@ -51,7 +51,7 @@ def test_paint_in_its_place_is_off_by_no_more_than_its_sigma_says():
     told = [one for one in as_the_venue_has_it().values() if one.offset_m is not None]
     assert len(told) >= 6
     assert all(abs(one.offset_m) < 3 * one.sigma_m and abs(one.offset_m) < 0.02 for one in told)
-    assert elsewhere(told) == []
+    assert not any(one.is_elsewhere for one in told)
 
 
 def test_a_line_painted_outside_of_its_place_is_told_with_its_offset():
@@ -59,8 +59,17 @@ def test_a_line_painted_outside_of_its_place_is_told_with_its_offset():
     assert near.side == "outside"
     assert near.offset_m == pytest.approx(0.12, abs=3 * near.sigma_m)
     assert near.sigma_m < 0.04
-    assert near in elsewhere(list(with_a_touchline_outside().values()))
-    assert "cm outside" in in_words(near)
+    assert near.is_elsewhere
+    assert not with_a_touchline_outside()["left penalty arc"].is_elsewhere
+
+
+def test_what_is_said_of_a_marking_can_be_read_and_drawn():
+    touchline = MarkingSeen("far touchline", 74.0, 0.62, 0.102, 0.011, "outside")
+    assert in_words(touchline) == "far touchline: 62% found, 10 +- 1 cm outside"
+    assert (
+        in_words(replace(touchline, offset_m=-0.051, sigma_m=0.004)) == "far touchline: 62% found, 5.1 +- 0.4 cm inside"
+    )
+    assert in_words(replace(touchline, offset_m=None)) == "far touchline: 62% found"
 
 
 def test_what_is_hidden_of_a_line_is_not_found():
