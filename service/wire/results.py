@@ -73,7 +73,15 @@ class CameraResult(Wire):
         None, description="The part of sigma that the lens and the field, the same the next time, have no part in."
     )
     moved: Moved
-    iou: float | None
+    iou: float | None = Field(description="Of the expected markings and the network's mask of the pitch, as lengths.")
+    expected_found: float | None = Field(
+        None, description="One side of the IoU: share 0..1 of the expected markings that the network's mask covers."
+    )
+    unexpected: float | None = Field(
+        None,
+        description="The other side: share 0..1 of the mask on the pitch that lies beside all expected markings; much "
+        "where another sport's lines are painted, which a field may list as `other_markings`.",
+    )
     found: float | None = Field(
         None, description="Share 0..1 of the visible markings' length that is seen where the pose puts it."
     )

@@ -16,7 +16,8 @@ import numpy as np
 from worker.calibration.finish.refinement import Sight, assess, refine
 from worker.calibration.finish.uncertainty import Deviation, Finished
 from worker.calibration.judge.markings import markings_seen
-from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection, markings_iou
+from worker.calibration.judge.overlap import overlap_of
+from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection
 from worker.calibration.judge.registration import Response
 from worker.calibration.records import Journey, Options, Preset
 from worker.calibration.scene.camera import Camera
@@ -271,7 +272,7 @@ def judged_alone(
         CameraResult(
             **vars(after),
             view=view,
-            iou=markings_iou(finished.pitch, after.camera, response),
+            overlap=overlap_of(finished.pitch, after.camera, response),
             evidence_before=evidence_of(lines, before, channels, response),
             moved=Movement.between(pitch, before, after.camera),
             markings=markings_seen(finished.pitch, after),

@@ -13,6 +13,7 @@ from service.wire.venue import VenueIn
 from worker.calibration import records as engine
 from worker.calibration.finish.diagnosis import Suspicion
 from worker.calibration.finish.uncertainty import Sigma
+from worker.calibration.judge.overlap import Overlap
 from worker.calibration.judge.quality import CameraResult, Movement
 from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
@@ -73,7 +74,7 @@ def asked(monkeypatch):
                 zoom=None,
                 likelier=None,
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
-                iou=0.9,
+                overlap=Overlap(0.9, 0.95, 0.05),
                 evidence_before=seen,
                 moved=Movement(0.0, 0.05, float("nan")),
                 rejected_because=asked["against"].get(camera.id),
