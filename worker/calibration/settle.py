@@ -35,6 +35,7 @@ from worker.calibration.search.search import (
 )
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
+from worker.calibration.see.left_out import left_out
 from worker.calibration.see.ridge_response import ridge_response
 from worker.calibration.see.view import ViewCondition
 
@@ -273,7 +274,7 @@ def judged_alone(
             **vars(after),
             view=view,
             overlap=overlap_of(finished.pitch, after.camera, response),
-            evidence_before=evidence_of(lines, before, channels, response),
+            evidence_before=evidence_of(lines, before, channels, response, left_out(pitch, before)),
             moved=Movement.between(pitch, before, after.camera),
             markings=markings_seen(finished.pitch, after),
         )

@@ -109,7 +109,8 @@ def png(picture: Picture) -> bytes:
 def pitch_of(field: FieldOfPlay) -> Field:
     """The engine's pitch."""
     ridge = None if field.ridge is None else np.array(field.ridge)
-    return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
+    size = field.length_m, field.width_m, field.line_width_m
+    return Field(*size, ridge, field.plan, field.measures_m, others=field.others)
 
 
 def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Intrinsics:

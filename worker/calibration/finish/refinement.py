@@ -21,6 +21,7 @@ from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
 from worker.calibration.scene.parameters import Parameter
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
+from worker.calibration.see.left_out import left_out
 from worker.calibration.see.line_measurement import Measurements, measure_lines
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
@@ -154,7 +155,7 @@ def _assessed(
 ) -> Finished:
     lines = here.on_ground(unknowns)
     evidence = [
-        evidence_of(lines, camera, channels, response)
+        evidence_of(lines, camera, channels, response, left_out(here.pitch, camera))
         for camera, channels, response in zip(here.cameras, sight.channels, sight.responses, strict=True)
     ]
     measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))

@@ -12,6 +12,7 @@ from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.evidence import MARKING, TOLERANCE_PX
+from worker.calibration.see.left_out import left_out, line_band
 
 AROUND_PITCH_M = 1.0
 
@@ -46,9 +47,11 @@ def overlap_of(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> O
     tolerance = max(TOLERANCE_PX * camera.intrinsics.relative_size, 1.0)
     found = float(weight[_strongest(response, tolerance)[_rounded(seen.pixel)] > MARKING * coverage].sum())
     marked = (response > MARKING).astype(np.uint8)
-    explained = _band(seen, camera.intrinsics.size, tolerance)
+    explained = line_band(seen, camera.intrinsics.size, tolerance)
     area_explained = np.count_nonzero(marked & explained)
-    area_beside = np.count_nonzero(marked & _pitch_area(pitch, camera) & ~explained)
+    beside_all = marked & _pitch_area(pitch, camera) & ~explained
+    not_counted = left_out(pitch, camera)
+    area_beside = np.count_nonzero(beside_all if not_counted is None else beside_all & ~not_counted)
     beside = area_beside * found / area_explained if area_explained else float(area_beside)
     unexpected = area_beside / (area_beside + area_explained) if area_beside else 0.0
     return Overlap(found / (expected + beside), found / expected, unexpected)
@@ -64,17 +67,6 @@ def _strongest(response: NDArray[np.float32], distance: float) -> NDArray[np.flo
 def _rounded(pixels: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     x, y = np.rint(pixels).astype(np.intp).T
     return y, x
-
-
-def _band(seen: SeenLines, size: tuple[int, int], tolerance: float) -> NDArray[np.uint8]:
-    """1 where a pixel is on an expected line or within `tolerance` of one."""
-    band = np.zeros((size[1], size[0]), dtype=np.uint8)
-    along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1) * seen.length_px[:, None] * 0.6
-    thickness = np.rint(seen.width_px + 2 * tolerance).astype(int)
-    starts, ends = (np.rint(16 * (seen.pixel + sign * along)).astype(int) for sign in (-1, 1))
-    for start, end, thick in zip(starts.tolist(), ends.tolist(), thickness.tolist(), strict=True):
-        cv2.line(band, start, end, 1, min(max(thick, 1), 255), shift=4)
-    return band
 
 
 def _pitch_area(pitch: Field, camera: Camera) -> NDArray[np.uint8]:

@@ -1,0 +1,34 @@
+"""What of a frame does not count: lines that are painted on the ground and are not the venue's."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.visibility import SeenLines
+
+BESIDE_PX = 6.0
+"""How far from where the pose puts them other lines do not count, in pixels of a 4K frame; 2 px at least."""
+
+
+def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
+    """Where (H, W) the frame of a camera does not count, by its pose; None where all of it does."""
+    others = pitch.other_points()
+    if others is None:
+        return None
+    seen = SeenLines.from_camera(others, camera)
+    return line_band(seen, camera.intrinsics.size, max(BESIDE_PX * camera.intrinsics.relative_size, 2.0)) > 0
+
+
+def line_band(seen: SeenLines, size: tuple[int, int], tolerance: float) -> NDArray[np.uint8]:
+    """1 where a pixel (H, W) is on a line or within `tolerance` of one."""
+    band = np.zeros((size[1], size[0]), dtype=np.uint8)
+    along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1) * seen.length_px[:, None] * 0.6
+    thickness = np.rint(seen.width_px + 2 * tolerance).astype(int)
+    starts, ends = (np.rint(16 * (seen.pixel + sign * along)).astype(int) for sign in (-1, 1))
+    for start, end, thick in zip(starts.tolist(), ends.tolist(), thickness.tolist(), strict=True):
+        cv2.line(band, start, end, 1, min(max(thick, 1), 255), shift=4)
+    return band
