@@ -18,6 +18,7 @@ from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import Channels
+from worker.calibration.see.left_out import of_use
 from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
@@ -164,7 +165,7 @@ def segment_all(
             journey.at("segmentation", done / total)
             seen.append(segment(frame, regions))
             done += 1
-        responses.append(median(seen) / np.float32(255))
+        responses.append(of_use(camera, median(seen) / np.float32(255)))
     return responses
 
 

@@ -35,7 +35,7 @@ from worker.calibration.search.search import (
 )
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
-from worker.calibration.see.left_out import left_out
+from worker.calibration.see.left_out import left_out, of_use
 from worker.calibration.see.ridge_response import ridge_response
 from worker.calibration.see.view import ViewCondition
 
@@ -288,4 +288,4 @@ def judged_alone(
 def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:
     """What streaks say (H, W) of where the markings are, wherever the network would look for them."""
     lines = SeenLines.from_camera(pitch.line_points(), camera)
-    return ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px)
+    return of_use(camera, ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px))

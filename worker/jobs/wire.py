@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from math import isfinite, isnan
 from typing import Any, Generic, TypeVar
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.settings import Settings
-from service.wire import geometry
+from service.wire import geometry, venue
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Moved
 from service.wire.job import JobError, Progress
@@ -26,6 +26,7 @@ from worker.calibration.judge import quality
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.ignored import Ignored
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
 from worker.calibration.see.view import ViewCondition
 
@@ -123,6 +124,13 @@ def camera_of(camera: geometry.PosedCamera) -> Camera:
     """The engine's camera at its stored pose."""
     pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
     return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
+
+
+def watching(camera: venue.Camera) -> Camera:
+    """The engine's camera of a venue, with what of its frames is to be ignored."""
+    width, height = camera.image_size
+    polygons = [np.array(polygon, dtype=float) for polygon in camera.ignore]
+    return replace(camera_of(camera), ignored=Ignored(polygons, (width, height)) if polygons else None)
 
 
 def wire_lens(lens: Intrinsics) -> geometry.Intrinsics:

@@ -127,7 +127,7 @@ def test_a_field_that_is_none_is_refused_and_the_place_named(field, where, messa
 def test_the_documented_fields_are_fields():
     document = (Path(__file__).parents[3] / "docs" / "fields.md").read_text()
     examples = re.findall(r"```json\n(.*?)```", document, re.DOTALL)
-    assert len(examples) == 2
+    assert len(examples) == 3
     for example in examples:
         field = FieldOfPlay.model_validate(json.loads(example)["field"])
         assert field.plan.markings(field.size)

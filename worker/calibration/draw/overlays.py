@@ -28,7 +28,8 @@ def overlay(
     """The frame with the markings on it: orange by the stored pose, blue by the new one, BGR like `frame`.
 
     Each is drawn with the pitch it is for; `legend_for` says what is stored and new. `seen`: what is said of the
-    markings; those that are elsewhere, or hardly found, have colours of their own, and numbers of a list.
+    markings; those that are elsewhere, or hardly found, have colours of their own, and numbers of a list. What is
+    ignored is dark.
 
     The stored pose draws the centre of each line; the new one frames it: the painted line stays visible between two
     blue ones if the pose is right.
@@ -36,6 +37,8 @@ def overlay(
     picture = frame.copy()
     width = frame.shape[1]
     pitch, camera = stored
+    if camera.ignored is not None:
+        picture[camera.ignored.area] //= 2
     for marking in pitch.markings():
         draw_line(picture, camera.project(pitch.lift(outline(marking)[0])), STORED_COLOUR, max(1, round(width / 1600)))
     thickness = max(1, round(width / 3000))

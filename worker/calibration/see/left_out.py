@@ -1,4 +1,4 @@
-"""What of a frame does not count: lines that are painted on the ground and are not the venue's."""
+"""What of a frame does not count: areas that are ignored, and lines that are painted and not the venue's."""
 
 from __future__ import annotations
 
@@ -16,11 +16,18 @@ BESIDE_PX = 6.0
 
 def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
     """Where (H, W) the frame of a camera does not count, by its pose; None where all of it does."""
+    ignored = None if camera.ignored is None else camera.ignored.area
     others = pitch.other_points()
     if others is None:
-        return None
+        return ignored
     seen = SeenLines.from_camera(others, camera)
-    return line_band(seen, camera.intrinsics.size, max(BESIDE_PX * camera.intrinsics.relative_size, 2.0)) > 0
+    band = line_band(seen, camera.intrinsics.size, max(BESIDE_PX * camera.intrinsics.relative_size, 2.0)) > 0
+    return band if ignored is None else band | ignored
+
+
+def of_use(camera: Camera, response: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A response (H, W) to the frame of a camera, 0 where it is ignored."""
+    return response if camera.ignored is None else np.where(camera.ignored.area, np.float32(0), response)
 
 
 def line_band(seen: SeenLines, size: tuple[int, int], tolerance: float) -> NDArray[np.uint8]:
