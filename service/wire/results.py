@@ -91,6 +91,32 @@ class CameraResult(Wire):
     markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
 
 
+class SeamPlace(Wire):
+    """A piece of line that two cameras see, around a point `at` [x, y] of the pitch, m.
+
+    The second camera puts its paint `error_cm` ± `sigma_cm` beside where the first does, in the direction `across` the
+    line, a unit vector [x, y]. Along the line nothing is measured.
+    """
+
+    at: list[float]
+    across: list[float]
+    error_cm: float
+    sigma_cm: float
+
+
+class PairResult(Wire):
+    """Two cameras that were compared."""
+
+    cameras: list[Id]
+    stitch_error_px: float | None = Field(
+        description="At the centre of the pitch, or of what both see; null where the views cannot be brought together."
+    )
+    seam: list[SeamPlace] = Field(
+        description="All along what both see, by the lines that both have measured, from end to end; at most 24 places."
+    )
+    worst: SeamPlace | None = Field(description="The place of the seam whose error is surely the largest.")
+
+
 class Provenance(Wire):
     """What it takes to compute the same numbers again."""
 
@@ -128,6 +154,7 @@ class Result(Wire):
     stitch_error_px: float | None
     stitch_error_before_px: float | None
     stitch_error_limit_px: float | None = Field(None, description="What the gate lets pass at most.")
+    pairs: list[PairResult] = Field([], description="The cameras that were compared, two by two.")
     loss: float | None
     generations: int
     timings_s: dict[str, float]

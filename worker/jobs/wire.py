@@ -19,11 +19,21 @@ from service.wire.geometry import Moved
 from service.wire.job import JobError, Progress
 from service.wire.options import FieldOptions, Options
 from service.wire.problems import KINDS, type_of
-from service.wire.results import AnyResult, CameraResult, MarkingResult, Provenance, Sigma, View
+from service.wire.results import (
+    AnyResult,
+    CameraResult,
+    MarkingResult,
+    PairResult,
+    Provenance,
+    SeamPlace,
+    Sigma,
+    View,
+)
 from worker.calibration import records
 from worker.calibration.finish import uncertainty
-from worker.calibration.judge import quality
+from worker.calibration.judge import quality, seam
 from worker.calibration.judge.markings import MarkingSeen
+from worker.calibration.judge.pairs import Pair
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ignored import Ignored
@@ -213,6 +223,25 @@ def _marking(seen: MarkingSeen) -> MarkingResult:
         sigma_cm=_rounded_cm(seen.sigma_m),
         side=seen.side,
         elsewhere=seen.is_elsewhere,
+    )
+
+
+def wire_pair(pair: Pair, found: seam.Seam) -> PairResult:
+    """What two cameras say of each other."""
+    return PairResult(
+        cameras=list(pair.cameras),
+        stitch_error_px=number(pair.error_px),
+        seam=[_place(place) for place in found.places],
+        worst=None if found.worst is None else _place(found.worst),
+    )
+
+
+def _place(place: seam.SeamPlace) -> SeamPlace:
+    return SeamPlace(
+        at=place.at.round(1).tolist(),
+        across=(place.across.round(2) + 0.0).tolist(),
+        error_cm=round(100 * place.error_m, 1),
+        sigma_cm=round(100 * place.sigma_m, 1),
     )
 
 

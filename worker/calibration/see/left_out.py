@@ -15,13 +15,20 @@ BESIDE_PX = 6.0
 
 
 def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
-    """Where (H, W) the frame of a camera does not count, by its pose; None where all of it does."""
+    """Where (H, W) the frame of a camera does not count, by its pose; None where all of it does.
+
+    Where a line of the venue and another one meet, or are the same, the frame counts.
+    """
     ignored = None if camera.ignored is None else camera.ignored.area
     others = pitch.other_points()
     if others is None:
         return ignored
-    seen = SeenLines.from_camera(others, camera)
-    band = line_band(seen, camera.intrinsics.size, max(BESIDE_PX * camera.intrinsics.relative_size, 2.0)) > 0
+    tolerance = max(BESIDE_PX * camera.intrinsics.relative_size, 2.0)
+    other, own = (
+        line_band(SeenLines.from_camera(lines, camera), camera.intrinsics.size, tolerance) > 0
+        for lines in (others, pitch.line_points())
+    )
+    band = other & ~own
     return band if ignored is None else band | ignored
 
 
