@@ -13,11 +13,13 @@ from worker.calibration.finish.refinement import Sight
 from worker.calibration.judge.pairs import Pair, Seeing, compared, contradictions, stitch_error_px
 from worker.calibration.judge.quality import CameraResult, Gate, believable, ridge_rejection
 from worker.calibration.judge.registration import Response
+from worker.calibration.judge.seam import seam_between
 from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import Channels
+from worker.calibration.see.left_out import of_use
 from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.steady import Sway, median, sways
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
@@ -56,11 +58,12 @@ def calibrate(
         evidence_before = [one.evidence_before for one in answer.cameras]
         stored = [Seeing(*each) for each in zip(cameras, seen.sight.responses, evidence_before, strict=True)]
         before = compared(pitch, [stored[n] for n in _comparable(answer.cameras)])
+        loss = here.loss_of(answer.pitch, [one.camera for one in answer.cameras])
         journey.at("refinement", 1.0)
     return Calibration(
         **vars(answer),
         stitch_error_before_px=stitch_error_px(before, Gate()),
-        loss=settled.loss,
+        loss=loss,
         generations=settled.generations,
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
     )
@@ -111,7 +114,9 @@ def judge(pitch: Field, results: Sequence[CameraResult], sight: Sight, journey: 
         judged.append(replace(result, rejected_because=result.rejected_because or of_pairs or ridge))
     held = {result.camera.id for result in judged if result.accepted}
     stitch = stitch_error_px([pair for pair in pairs if not held or held.issuperset(pair.cameras)], gate)
-    return Answer(pitch, judged, "; ".join(reasons) or None, stitch, journey.seconds)
+    by_id = {result.camera.id: result for result in judged}
+    seams = [(pair, seam_between(pitch, by_id[pair.first], by_id[pair.second])) for pair in pairs]
+    return Answer(pitch, judged, "; ".join(reasons) or None, stitch, journey.seconds, pairs=seams)
 
 
 def _comparable(results: Sequence[CameraResult]) -> list[int]:
@@ -166,7 +171,7 @@ def segment_all(
             journey.at("segmentation", done / total)
             seen.append(segment(frame, regions))
             done += 1
-        responses.append(median(seen, swayed[camera.id]) / np.float32(255))
+        responses.append(of_use(camera, median(seen, swayed[camera.id]) / np.float32(255)))
     return responses
 
 

@@ -21,6 +21,7 @@ from worker.calibration.scene.ground import EVEN, MOST_UNEVEN_M, ORDINARY, UNEVE
 from worker.calibration.scene.parameters import Parameter
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
+from worker.calibration.see.left_out import left_out
 from worker.calibration.see.line_measurement import Measurements, measure_lines
 
 SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
@@ -155,13 +156,15 @@ def _assessed(
 ) -> Finished:
     lines = here.on_ground(unknowns)
     evidence = [
-        evidence_of(lines, camera, channels, response)
+        evidence_of(lines, camera, channels, response, left_out(here.pitch, camera))
         for camera, channels, response in zip(here.cameras, sight.channels, sight.responses, strict=True)
     ]
     measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
-    return judged(ordinary, stored, measured, evidence, unknowns, stitch_weight)
+    finished = judged(ordinary, stored, measured, evidence, unknowns, stitch_weight)
+    each = [replace(one, measured=its) for one, its in zip(finished.each, measured, strict=True)]
+    return replace(finished, each=each)
 
 
 def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
