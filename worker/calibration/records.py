@@ -5,14 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.finish.diagnosis import Suspicion
+from worker.calibration.judge.pairs import Pair
 from worker.calibration.judge.quality import CameraResult
+from worker.calibration.judge.seam import Seam
 from worker.calibration.scene.camera import Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Region
@@ -87,7 +89,8 @@ class Spent:
 class Answer:
     """What the engine says of cameras around a pitch. `rejected_because`: all reasons in a sentence, None without any.
 
-    `pitch`: the given one but for what of it was to be found; `spent`: on each stage.
+    `pitch`: the given one but for what of it was to be found; `spent`: on each stage; `pairs`: of cameras that were
+    compared, each with its seam.
     """
 
     pitch: Field
@@ -95,6 +98,7 @@ class Answer:
     rejected_because: str | None
     stitch_error_px: float | None
     spent: Spent
+    pairs: Sequence[tuple[Pair, Seam]] = field(default=(), kw_only=True)
 
     @property
     def accepted(self) -> bool:

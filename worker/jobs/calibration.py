@@ -17,7 +17,7 @@ from worker.calibration.see.view import UsualView
 from worker.jobs import from_frames
 from worker.jobs.from_frames import Drawn, Given
 from worker.jobs.pictures import Scene, draw, masks
-from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens
+from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens, wire_pair
 from worker.message import Means
 
 NO_VIEWS: Mapping[str, View] = MappingProxyType({})
@@ -54,6 +54,7 @@ def _drawn(given: Given, found: engine.Calibration, options: Options) -> Drawn:
         (given.pitch, given.cameras),
         (found.pitch, [result.camera for result in found.cameras]),
         {camera: several[0] for camera, several in given.frames.items()},
+        {result.camera.id: result.markings for result in found.cameras},
     )
     seen = masks(given.cameras, given.network.responses)
     if found.accepted and not options.pictures:
@@ -85,6 +86,7 @@ def _result(found: engine.Calibration, options: Options, spent: engine.Spent, pr
         stitch_error_px=number(found.stitch_error_px),
         stitch_error_before_px=number(found.stitch_error_before_px),
         stitch_error_limit_px=Gate().largest_stitch_error_px,
+        pairs=[wire_pair(*pair) for pair in found.pairs],
         loss=number(found.loss),
         generations=found.generations,
         timings_s=to_the_millisecond(spent.seconds),

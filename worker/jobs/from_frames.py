@@ -19,7 +19,7 @@ from worker.calibration.records import Answer, CalibrationError, Segment, Spent
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Region
-from worker.jobs.reading import Failure, Picture, camera_of, decoded_frame, pitch_of
+from worker.jobs.reading import Failure, Picture, decoded_frame, pitch_of, watching
 from worker.jobs.wire import PREVIEW_FRACTION, R, Solution, provenance_of, segmenter_of, wire_progress
 from worker.message import Means
 
@@ -80,7 +80,7 @@ def solve(
     spent = Spent()
     with spent.measuring("decode"):
         frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
-    cameras = [camera_of(camera) for camera in venue.cameras]
+    cameras = [watching(camera, camera.ignore) for camera in venue.cameras]
     given = Given(pitch_of(venue.field), cameras, frames, Remembering(segmenter, frames))
     try:
         answer = engine(given, lambda step: report(wire_progress(step)))

@@ -16,6 +16,7 @@ from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED
 from worker.calibration.draw import layers, mosaic
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.draw.viewpoint import viewpoint
+from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.jobs.reading import Picture, jpeg, png
@@ -28,11 +29,15 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Scene:
-    """What is drawn: a pitch and cameras as they were `stored` and as they were `found`, and a frame of each camera."""
+    """What is drawn: a pitch and cameras as they were `stored` and as they were `found`, and a frame of each camera.
+
+    `markings`: what is said of them, by the camera that sees them.
+    """
 
     stored: tuple[Field, Sequence[Camera]]
     found: tuple[Field, Sequence[Camera]]
     frames: Mapping[str, Picture]
+    markings: Mapping[str, Sequence[MarkingSeen]]
 
     @property
     def names(self) -> list[str]:
@@ -88,13 +93,13 @@ def _birdseye(scene: Scene) -> dict[str, bytes]:
 
 
 def _of_camera(scene: Scene, number: int) -> dict[str, bytes]:
-    """The frame with both fields on it; and smaller, with each field to be laid over it."""
+    """The frame with both fields on it and what is wrong with markings; and smaller, with what is laid over it."""
     stored, new = ((pitch, cameras[number]) for pitch, cameras in (scene.stored, scene.found))
     camera, size = stored[1].id, _smaller(stored[1])
     frame = scene.frames[camera]
     small = np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), np.uint8)
     return {
-        f"overlay_{camera}": jpeg(overlay(stored, new, frame)),
+        f"overlay_{camera}": jpeg(overlay(stored, new, frame, seen=scene.markings[camera])),
         f"frame_{camera}": jpeg(small, FRAME_QUALITY),
         f"stored_{camera}": png(layers.stored_layer(*stored, size)),
         f"new_{camera}": png(layers.new_layer(*new, size)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -13,6 +15,7 @@ from service.wire.field import FieldOfPlay
 from service.wire.problems import KINDS, type_of
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.ignored import Ignored
 
 if TYPE_CHECKING:
     from service.wire.job import JobError
@@ -78,7 +81,8 @@ def png(picture: Picture) -> bytes:
 def pitch_of(field: FieldOfPlay) -> Field:
     """The engine's pitch."""
     ridge = None if field.ridge is None else np.array(field.ridge)
-    return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
+    size = field.length_m, field.width_m, field.line_width_m
+    return Field(*size, ridge, field.plan, field.measures_m, others=field.others)
 
 
 def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Intrinsics:
@@ -91,3 +95,10 @@ def camera_of(camera: geometry.PosedCamera) -> Camera:
     """The engine's camera at its stored pose."""
     pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
     return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
+
+
+def watching(camera: geometry.PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:
+    """The engine's camera, with the polygons of its frames that are to be ignored."""
+    width, height = camera.image_size
+    polygons = [np.array(polygon, dtype=float) for polygon in ignore]
+    return replace(camera_of(camera), ignored=Ignored(polygons, (width, height)) if polygons else None)

@@ -12,10 +12,21 @@ from service.wire import geometry
 from service.wire.geometry import Moved
 from service.wire.job import Progress
 from service.wire.options import FieldOptions, Options
-from service.wire.results import AnyResult, CameraResult, Provenance, Sigma, View
+from service.wire.results import (
+    AnyResult,
+    CameraResult,
+    MarkingResult,
+    PairResult,
+    Provenance,
+    SeamPlace,
+    Sigma,
+    View,
+)
 from worker.calibration import records
 from worker.calibration.finish import uncertainty
-from worker.calibration.judge import quality
+from worker.calibration.judge import quality, seam
+from worker.calibration.judge.markings import MarkingSeen
+from worker.calibration.judge.pairs import Pair
 from worker.calibration.scene.camera import Intrinsics, Pose
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
 from worker.calibration.see.view import ViewCondition
@@ -116,12 +127,51 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
             position_m=found.moved.position_m,
             pixels=number(found.moved.pixels),
         ),
-        iou=number(found.iou),
+        iou=number(found.overlap.iou),
+        expected_found=number(found.overlap.found),
+        unexpected=number(found.overlap.unexpected),
         found=number(found.evidence.share),
         by_chance=number(found.evidence.by_chance),
         view=_view(found.view),
         residual_px=number(found.residual_px),
+        markings=[_marking(one) for one in found.markings],
     )
+
+
+def _marking(seen: MarkingSeen) -> MarkingResult:
+    return MarkingResult(
+        name=seen.name,
+        expected_m=round(seen.expected_m, 1),
+        found=round(seen.found, 3),
+        offset_cm=_rounded_cm(seen.offset_m),
+        sigma_cm=_rounded_cm(seen.sigma_m),
+        side=seen.side,
+        elsewhere=seen.is_elsewhere,
+    )
+
+
+def wire_pair(pair: Pair, found: seam.Seam) -> PairResult:
+    """What two cameras say of each other."""
+    return PairResult(
+        cameras=list(pair.cameras),
+        stitch_error_px=number(pair.error_px),
+        seam=[_place(place) for place in found.places],
+        worst=None if found.worst is None else _place(found.worst),
+    )
+
+
+def _place(place: seam.SeamPlace) -> SeamPlace:
+    return SeamPlace(
+        at=place.at.round(1).tolist(),
+        across=(place.across.round(2) + 0.0).tolist(),
+        error_cm=round(100 * place.error_m, 1),
+        sigma_cm=round(100 * place.sigma_m, 1),
+    )
+
+
+def _rounded_cm(metres: float | None) -> float | None:
+    """To the millimetre."""
+    return None if metres is None or not isfinite(metres) else round(100 * metres, 1)
 
 
 def _view(found: ViewCondition) -> View:

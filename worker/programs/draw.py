@@ -10,15 +10,17 @@ import logging
 import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from typing import cast
 
 import cv2
 
 from service import lifeline
-from service.wire.programs.drawing import Drawing, Drawn, Standing, packed, unpacked
+from service.wire.programs.drawing import Drawing, Drawn, SeenMarking, Standing, packed, unpacked
+from worker.calibration.judge.markings import OPPOSITE, Direction, MarkingSeen
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.jobs.pictures import Scene, draw
-from worker.jobs.reading import camera_of, decoded_frame, pitch_of
+from worker.jobs.reading import decoded_frame, pitch_of, watching
 
 
 def main() -> None:
@@ -39,11 +41,20 @@ def scene_of(asked: Drawing, files: Mapping[str, bytes]) -> Scene:
     with ThreadPoolExecutor(asked.threads) as each:
         frames = each.map(lambda camera: decoded_frame(camera, sizes[camera], files[camera]), files)
         decoded = dict(zip(files, frames, strict=True))
-    return Scene(_standing(asked.stored), _standing(asked.found), decoded)
+    markings = {camera: [_seen(one) for one in seen] for camera, seen in asked.markings.items()}
+    return Scene(_standing(asked.stored, asked), _standing(asked.found, asked), decoded, markings)
 
 
-def _standing(asked: Standing) -> tuple[Field, list[Camera]]:
-    return pitch_of(asked.field), [camera_of(camera) for camera in asked.cameras]
+def _standing(standing: Standing, asked: Drawing) -> tuple[Field, list[Camera]]:
+    return pitch_of(standing.field), [watching(camera, asked.ignore[camera.id]) for camera in standing.cameras]
+
+
+def _seen(told: SeenMarking) -> MarkingSeen:
+    """The engine's: its offset is positive on one of the two sides, and that is the direction."""
+    direction = cast(Direction | None, told.side)
+    if told.offset_m is not None and told.offset_m < 0:
+        direction = next(one for one, opposite in OPPOSITE.items() if opposite == told.side)
+    return MarkingSeen(told.name, told.expected_m, told.found, told.offset_m, told.sigma_m, direction)
 
 
 if __name__ == "__main__":

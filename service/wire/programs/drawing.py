@@ -12,7 +12,7 @@ from service.wire.geometry import PosedCamera
 
 # Somebody waits for the program, and all that a venue and a result can be takes as long to load as NumPy.
 if TYPE_CHECKING:
-    from service.wire.results import Result
+    from service.wire.results import MarkingResult, Result
     from service.wire.venue import Venue
 
 FLAT = ("scpr",)
@@ -26,14 +26,28 @@ class Standing(BaseModel):
     cameras: list[PosedCamera]
 
 
+class SeenMarking(BaseModel):
+    """What is said of a marking; `offset_m` ± `sigma_m` on its `side`."""
+
+    name: str
+    expected_m: float
+    found: float
+    offset_m: float | None
+    sigma_m: float | None
+    side: str | None
+
+
 class Drawing(BaseModel):
     """Pictures of a calibration: how all stood when the job began (`stored`) and as it was `found`.
 
-    `names`: of the pictures; `sizes`: bytes of the frames that follow, one of each camera that is needed.
+    `markings` and `ignore`, polygons of what is not looked at: by camera. `names`: of the pictures; `sizes`: bytes of
+    the frames that follow, one of each camera that is needed.
     """
 
     stored: Standing
     found: Standing
+    markings: dict[str, list[SeenMarking]]
+    ignore: dict[str, list[list[list[float]]]]
     names: list[str]
     threads: int
     sizes: dict[str, int]
@@ -50,7 +64,26 @@ class Drawing(BaseModel):
         ]
         found = Standing(field=_field_found(venue, result), cameras=cameras)
         sizes = {camera: len(file) for camera, file in files.items()}
-        return cls(stored=stored, found=found, names=list(names), threads=threads, sizes=sizes)
+        return cls(
+            stored=stored,
+            found=found,
+            markings={camera.id: [_marking(one) for one in camera.markings] for camera in result.cameras},
+            ignore={camera.id: camera.ignore for camera in venue.cameras},
+            names=list(names),
+            threads=threads,
+            sizes=sizes,
+        )
+
+
+def _marking(seen: MarkingResult) -> SeenMarking:
+    return SeenMarking(
+        name=seen.name,
+        expected_m=seen.expected_m,
+        found=seen.found,
+        offset_m=None if seen.offset_cm is None else seen.offset_cm / 100,
+        sigma_m=None if seen.sigma_cm is None else seen.sigma_cm / 100,
+        side=seen.side,
+    )
 
 
 def _field_found(venue: Venue, result: Result) -> FieldOfPlay:

@@ -9,6 +9,7 @@ import pytest
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store.jobs.files import drawn_together, picture_file
 from service.wire import geometry
+from service.wire.field import OtherField
 from service.wire.options import Options
 from service.wire.programs.drawing import FLAT, Drawing, Drawn, packed, unpacked
 from service.wire.results import View
@@ -16,6 +17,8 @@ from service.wire.venue import VenueIn
 from worker.calibration import records as engine
 from worker.calibration.finish.diagnosis import Suspicion
 from worker.calibration.finish.uncertainty import Sigma
+from worker.calibration.judge.markings import MarkingSeen
+from worker.calibration.judge.overlap import Overlap
 from worker.calibration.judge.quality import CameraResult, Movement
 from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
@@ -77,10 +80,11 @@ def asked(monkeypatch):
                 zoom=None,
                 likelier=None,
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
-                iou=0.9,
+                overlap=Overlap(0.9, 0.95, 0.05),
                 evidence_before=seen,
                 moved=Movement(0.0, 0.05, float("nan")),
                 rejected_because=asked["against"].get(camera.id),
+                markings=asked.get("markings", ()),
             )
             for camera in cameras
         ]
@@ -129,6 +133,18 @@ def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, means):
     assert [len(asked["frames"][camera]) for camera in ("left", "right")] == [2, 1]
     assert asked["frames"]["left"][0].shape == (180, 320, 3)
     assert asked["options"] == engine.Options(preset="paper", seed=7, parents=8, stitch_weight=0.25)
+
+
+def test_what_else_is_painted_and_what_is_to_be_ignored_reach_the_engine(venue, files, asked, means):
+    left, right = venue.cameras
+    field = venue.field.model_copy(update={"other_markings": [OtherField(template="handball")]})
+    partly = left.model_copy(update={"ignore": [[[0, 100], [319, 100], [319, 179], [0, 179]]]})
+    given = venue.model_copy(update={"field": field, "cameras": [partly, right]})
+    calibration.solve(given, files, Options(), means, lambda _: None)
+    assert "left goal line" in [shape.name for shape in asked["pitch"].others]
+    assert asked["cameras"][0].ignored.area[150].all()
+    assert not asked["cameras"][0].ignored.area[90].any()
+    assert asked["cameras"][1].ignored is None
 
 
 def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_lens(venue, files, asked, means):
@@ -182,12 +198,19 @@ def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the
 
 @pytest.mark.parametrize("options", [Options(), Options(fit_ridge=True, fit_focal_length=True), Options(flat=True)])
 def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked, means, options):
+    left, right = venue.cameras
+    partly = left.model_copy(update={"ignore": [[[0, 100], [319, 100], [319, 179], [0, 179]]]})
+    venue = venue.model_copy(update={"cameras": [partly, right]})
+    asked["markings"] = [
+        MarkingSeen("halfway line", 31.5, 0.21),
+        MarkingSeen("left goal line", 40.2, 0.9, -0.08, 0.01, "outside"),
+    ]
     asked["raised"] = 0.1 if options.fit_ridge else 0.0
     at_once = options.model_copy(update={"pictures": True})
     outcome = calibration.solve(venue, files, at_once, means, lambda _: None)
     first = {camera: several[0] for camera, several in files.items()}
-    for name in ("preview", "birdseye", "frame_right"):
-        needed = {"right": first["right"]} if name == "frame_right" else first
+    for name in ("preview", "birdseye", "frame_left", "frame_right"):
+        needed = {camera: file for camera, file in first.items() if not name.startswith("frame") or camera in name}
         given = Drawing.of(venue, outcome.result, [name], 1, needed)
         run = subprocess.run(
             [sys.executable, "-m", "worker.programs.draw"],
