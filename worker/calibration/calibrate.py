@@ -14,6 +14,7 @@ from worker.calibration.judge.pairs import Pair, Seeing, compared, contradiction
 from worker.calibration.judge.quality import CameraResult, Gate, believable, ridge_rejection
 from worker.calibration.judge.registration import Response
 from worker.calibration.judge.seam import seam_between
+from worker.calibration.nearby import settle_nearby
 from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
@@ -53,19 +54,22 @@ def calibrate(
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey, usual)
     here = Situation(method, pitch, cameras, seen, options, journey)
-    settled, answer = agree(here, refit_zoomed(here, settle(here)))
+    near = look_nearby(here) if options.search == "auto" else None
+    settled, answer = near or agree(here, refit_zoomed(here, settle(here)))
     with journey.measuring("quality"):
         evidence_before = [one.evidence_before for one in answer.cameras]
         stored = [Seeing(*each) for each in zip(cameras, seen.sight.responses, evidence_before, strict=True)]
         before = compared(pitch, [stored[n] for n in _comparable(answer.cameras)])
         loss = here.loss_of(answer.pitch, [one.camera for one in answer.cameras])
         journey.at("refinement", 1.0)
+    journey.spent.name("evolution")
     return Calibration(
         **vars(answer),
         stitch_error_before_px=stitch_error_px(before, Gate()),
         loss=loss,
         generations=settled.generations,
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
+        path="wide" if near is None else "near",
     )
 
 
@@ -85,6 +89,15 @@ def look(
     with journey.measuring("segmentation"):
         responses = segment_all(pitch, cameras, frames, swayed, segment, journey)
     return Seen(views, Sight([Channels(frames[camera.id], swayed[camera.id]) for camera in cameras], responses))
+
+
+def look_nearby(here: Situation) -> tuple[Settled, Answer] | None:
+    """The answer where all cameras are found near their stored poses and agree; None where a search is needed."""
+    settled = settle_nearby(replace(here, journey=here.journey.unreported()))
+    if settled is None:
+        return None
+    answer = judge(settled.pitch, settled.results, here.seen.sight, here.journey)
+    return (settled, answer) if answer.accepted else None
 
 
 def agree(here: Situation, settled: Settled) -> tuple[Settled, Answer]:

@@ -89,6 +89,7 @@ def _result(found: engine.Calibration, options: Options, spent: engine.Spent, pr
         pairs=[wire_pair(*pair) for pair in found.pairs],
         loss=number(found.loss),
         generations=found.generations,
+        path=found.path,
         timings_s=to_the_millisecond(spent.seconds),
         cpu_s=to_the_millisecond(spent.core_seconds),
         provenance=provenance,

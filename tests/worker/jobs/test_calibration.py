@@ -94,7 +94,7 @@ def asked(monkeypatch):
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
         found = pitch.flat() if options.flat else pitch.raised(asked.get("raised", 0.0))
-        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, [doubt])
+        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, [doubt], "near")
 
     class Segmenter:
         sha256 = "f" * 64
