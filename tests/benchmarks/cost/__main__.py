@@ -148,7 +148,7 @@ def running(name: str, folder: Path) -> Iterator[Release]:
 def table(cameras: str, start: str, measured: dict[str, list[dict]]) -> Iterator[str]:
     """Markdown: a line per stage, its medians of core-seconds and of seconds, a pair of columns per release."""
     runs = max(len(rows) for rows in measured.values())
-    what = "the demo" if cameras == "demo" else f"{cameras} cameras"
+    what = "the demo" if cameras == "demo" else f"{cameras} camera{'s' * (cameras != '1')}"
     yield f"\n{what}, {start}; medians of {runs}, core-seconds and seconds"
     yield f"\n| | {' | '.join(f'{name}: core s | s' for name in measured)} |"
     yield "|---|" + "---|---|" * len(measured)
