@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -10,6 +11,7 @@ from service.api.programs.drawings import Drawings
 from service.settings import Settings
 from service.store.jobs.files import source_file
 from service.wire.problems import Problem
+from tests.e2e.running import wait_for
 from tests.homes import in_both_homes
 from tests.worker.stock import result
 
@@ -18,8 +20,9 @@ DRAWING = """
 import json, sys, time
 line, frames = sys.stdin.buffer.read().split(b"\\n", 1)
 asked = json.loads(line)
+with open({log!r}, "a") as log:
+    log.write(" ".join(asked["names"]) + "\\n")
 time.sleep({pause})
-open({log!r}, "a").write(" ".join(asked["names"]) + "\\n")
 files = {{name: name.encode() + b":" + frames for name in asked["names"] if name != "seam"}}
 print(json.dumps({{"sizes": {{name: len(file) for name, file in files.items()}}}}), flush=True)
 sys.stdout.buffer.write(b"".join(files.values()))
@@ -88,13 +91,12 @@ def test_pictures_are_drawn_of_what_was_kept_when_the_frames_went(stock, drawing
     assert look(drawing(), stock, job, "birdseye") == [None]
 
 
-def test_nothing_is_left_of_a_picture_whose_time_ended_while_it_was_drawn(stock, drawing, job):
-    pictures = stock.jobs.pictures(job)
-    stock.expiry.delete_jobs([job], stock.expiry.now())
-    drawn_by = drawing()
-    drawn_by._jobs = type("Remembering", (), {"drawable": lambda *_: remembered, "pictures": stock.jobs.pictures})()
-    remembered = type("Job", (), {"venue": stock.venue("v"), "result": result(stock.venue("v"), True), "frames": {}})
-    assert asyncio.run(drawn_by.picture(job, pictures, "birdseye")) == b"birdseye:"
+def test_nothing_is_left_of_a_picture_whose_time_ended_while_it_was_drawn(stock, drawing, job, tmp_path):
+    with ThreadPoolExecutor(1) as aside:
+        seen = aside.submit(look, drawing(pause=1), stock, job, "birdseye")
+        wait_for((tmp_path / "drawn").exists)
+        stock.expiry.delete_jobs([job], stock.expiry.now())
+        assert seen.result() == [b"birdseye:frame"]
     assert stock.files() == {f"frames/{job}"}
 
 
