@@ -15,10 +15,10 @@ from service.wire.options import FieldOptions, Options
 from service.wire.results import Provenance
 from service.wire.venue import Venue
 from worker.calibration import records
-from worker.calibration.records import Answer, CalibrationError, Segment, Spent
+from worker.calibration.records import Answer, CalibrationError, Spent
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.see.segmentation import Region
+from worker.calibration.see.segmentation import Region, Segmenter
 from worker.jobs.reading import Failure, Picture, decoded_frame, pitch_of, watching
 from worker.jobs.wire import PREVIEW_FRACTION, R, Solution, provenance_of, segmenter_of, wire_progress
 from worker.message import Means
@@ -28,16 +28,23 @@ Frames = Mapping[str, Sequence[Picture]]
 
 
 class Remembering:
-    """A network that remembers what it said of the first frame of each camera."""
+    """A network that remembers what it said of the first frame of each camera.
 
-    def __init__(self, segment: Segment, frames: Frames) -> None:
-        self._segment = segment
+    When it has seen all frames it is released: search, judgement and pictures come after, and need as much memory.
+    """
+
+    def __init__(self, segmenter: Segmenter, frames: Frames) -> None:
+        self._segmenter = segmenter
+        self._unseen = sum(len(several) for several in frames.values())
         self._cameras = {id(several[0]): camera for camera, several in frames.items()}
         self.responses: dict[str, NDArray[np.uint8]] = {}
 
     def __call__(self, frame: Picture, regions: Sequence[Region]) -> NDArray[np.uint8]:
         """As the network that is asked."""
-        response = self._segment(frame, regions)
+        response = self._segmenter(frame, regions)
+        self._unseen -= 1
+        if self._unseen == 0:
+            self._segmenter.release()
         if id(frame) in self._cameras:
             self.responses[self._cameras[id(frame)]] = response
         return response

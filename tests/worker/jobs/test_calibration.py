@@ -101,9 +101,14 @@ def asked(monkeypatch):
 
         def __init__(self, model, threads, provider):
             assert provider == "CPUExecutionProvider"
+            asked.pop("released", None)
 
         def __call__(self, frame, regions):
+            assert "released" not in asked
             return np.full(frame.shape[:2], 255, np.uint8)
+
+        def release(self):
+            asked["released"] = True
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
     monkeypatch.setattr(wire, "Segmenter", Segmenter)
@@ -181,6 +186,7 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
     assert set(result.timings_s) == set(result.cpu_s) == {"decode", "evolution", "preview"}
     assert [step.stage for step in steps] == ["evolution", "preview"]
+    assert asked["released"]
     assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
     begins = {".jpg": b"\xff\xd8", ".png": b"\x89PNG"}
     assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())

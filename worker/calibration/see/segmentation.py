@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -63,13 +64,14 @@ class Segmenter:
         options.inter_op_num_threads = 1
         # Regions differ in size: memory planned for one does not fit the next.
         options.enable_mem_pattern = False
-        self.session = ort.InferenceSession(model, options, providers=[provider])
-        # What a run took is given back at its end: search, finish and pictures come after, and need as much.
-        self.run = ort.RunOptions()
-        if provider == "CPUExecutionProvider":
-            self.run.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
+        self._begin = partial(ort.InferenceSession, model, options, providers=[provider])
+        self.session: ort.InferenceSession | None = self._begin()
         self.sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
         self.input_name = self.session.get_inputs()[0].name
+
+    def release(self) -> None:
+        """Give back what runs have taken, hundreds of megabytes; who asks again waits until the network is loaded."""
+        self.session = None
 
     def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
         """Probabilities of a BGR frame (H, W, 3) as (H, W) in 0..255; 0 outside the regions.
@@ -97,7 +99,8 @@ class Segmenter:
 
     def _probabilities(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
         rgb = picture[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
-        (answer,) = self.session.run(None, {self.input_name: rgb}, self.run)
+        self.session = self.session or self._begin()
+        (answer,) = self.session.run(None, {self.input_name: rgb})
         return np.asarray(answer, dtype=np.float32)[0, 0]
 
 
