@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from service.store.counts.past_calibrations import PastCalibrations
-from service.store.deliveries import Deliveries
 from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
 from service.store.jobs.attempts import Attempts
@@ -13,6 +12,8 @@ from service.store.jobs.submission import Submissions
 from service.store.keys import Keys
 from service.store.schedules import Schedules
 from service.store.sessions import Sessions
+from service.store.told.deliveries import Deliveries
+from service.store.told.following import Following
 from service.store.venues import Venues
 from service.store.workers import Workers
 
@@ -31,6 +32,7 @@ class Stores:
         self.decisions = Decisions(engine)
         self.past_calibrations = PastCalibrations(engine)
         self.deliveries = Deliveries(engine)
+        self.following = Following(engine)
         self.expiry = Expiry(engine)
         self.workers = Workers(engine)
         self.keys = Keys(engine)

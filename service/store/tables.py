@@ -139,11 +139,28 @@ leftovers = sa.Table(
     sa.Index("leftovers_by_due", "due_at"),
 )
 
+# What happened to venues, in the order of each one's transactions; for as long as somebody may come back and ask.
+events = sa.Table(
+    "events",
+    metadata,
+    # Never given twice, also after the last one was deleted: clients go on from it.
+    sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True),
+    sa.Column("venue", sa.String(64), nullable=False),
+    # Of wire.told.events.Event.
+    sa.Column("type", sa.String(32), nullable=False),
+    sa.Column("at", Instant, nullable=False),
+    # Its data; of a job, which is read when it is told, null.
+    sa.Column("data", sa.JSON(none_as_null=True)),
+    sa.Column("job", sa.String(26)),
+    sa.Index("events_by_venue", "venue", "id"),
+    sqlite_autoincrement=True,
+)
+
 # Who is to be told of what: written with what happened, attempted until it succeeds or is given up.
 deliveries = sa.Table(
     "deliveries",
     metadata,
-    # Of the job that has ended, or of an alarm's event.
+    # Of the job that has ended, or one of its own.
     sa.Column("id", sa.String(26), primary_key=True),
     sa.Column("url", sa.String(2048), nullable=False),
     # The host of the URL.
@@ -155,8 +172,8 @@ deliveries = sa.Table(
     sa.Column("due_at", Instant, nullable=False),
     # Why the last attempt that failed did.
     sa.Column("last_error", sa.String(500)),
-    # wire.health.AlarmEvent; null: that the job has ended.
-    sa.Column("event", sa.JSON(none_as_null=True)),
+    # Which of `events`; null: that the job has ended.
+    sa.Column("event", sa.BigInteger),
     sa.Index("deliveries_by_due", "status", "due_at"),
 )
 

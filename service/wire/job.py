@@ -97,11 +97,14 @@ class Job(Wire):
 
 
 class JobEvent(Wire):
-    """What a `callback_url` gets, at least once: a job has ended. Its id is the `webhook-id` of every attempt."""
+    """A job has ended: what a `callback_url` gets, at least once; its id is the `webhook-id` of every attempt.
 
-    type: Literal["job.succeeded", "job.failed", "job.cancelled"]
-    timestamp: datetime = Field(description="When the job ended.")
-    data: Job
+    Who follows the venue is also told when a job was submitted (`job.queued`).
+    """
+
+    type: Literal["job.queued", "job.succeeded", "job.failed", "job.cancelled"]
+    timestamp: datetime = Field(description="When it happened.")
+    data: Job = Field(description="As it is when it is told.")
 
     @classmethod
     def of(cls, job: Job) -> JobEvent:

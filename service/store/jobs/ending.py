@@ -1,4 +1,7 @@
-"""The end of a job, whoever brings it: row, callback and tallies in one transaction."""
+"""The end of a job, whoever brings it: row, event, callback and tallies in one transaction.
+
+Whoever ends a job of a venue is serialised about the venue from the beginning.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,10 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.counts import tallies
 from service.store.counts.endings import Ending
-from service.store.deliveries import add_delivery
 from service.store.engine import clock
 from service.store.jobs.task import OPTIONS
+from service.store.told.deliveries import add_delivery
+from service.store.told.events import add_job_event
 from service.wire.job import OPEN, JobError, Status
 from service.wire.results import AnyResult
 
@@ -39,9 +43,11 @@ def end(
     ended = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **changed(now))
     if connection.execute(ended).rowcount == 0:
         return False
-    query = sa.select(j.kind, j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
+    query = sa.select(j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
     row = connection.execute(query).one()
     options = OPTIONS[row.kind].model_validate(row.options)
+    if row.venue is not None:
+        add_job_event(connection, row.venue, f"job.{status}", job_id, now)
     if options.callback_url is not None:
         add_delivery(connection, job_id, options.callback_url, now)
     ending = Ending(row.kind, status, result, error, row.created_at, row.started_at, now, row.attempt)

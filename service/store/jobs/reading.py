@@ -9,11 +9,11 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.deliveries import deliveries_of
 from service.store.engine import Repository, reading
 from service.store.jobs.files import picture_file, picture_folder
 from service.store.jobs.task import Origin
 from service.store.revisions import revisions_of_jobs
+from service.store.told.deliveries import deliveries_of
 from service.store.venues import with_result
 from service.wire.job import CallbackState, Job, Status
 from service.wire.results import Result
@@ -100,6 +100,12 @@ class Jobs(Repository):
 def read_job(connection: sa.Connection, job_id: str) -> Job:
     """One job as clients see it, which is there."""
     return _jobs(connection, [connection.execute(ONE, {"job_id": job_id}).one()])[0]
+
+
+def jobs_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, Job]:
+    """Those of several jobs that are there, as clients see them."""
+    rows = connection.execute(sa.select(tables.jobs).where(j.id.in_(job_ids))).all() if job_ids else []
+    return {job.id: job for job in _jobs(connection, rows)}
 
 
 def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] | None:

@@ -79,5 +79,8 @@ class Task(Asked):
     last_views: dict[str, View] = {}
 
     def without_addresses(self) -> Task:
-        """The same but for who is told of its end: to compute it nobody need know, and the address may be a secret."""
-        return self.model_copy(update={"options": self.options.model_copy(update={"callback_url": None})})
+        """The same but for who is told of it: to compute it nobody need know, and the addresses may be secrets."""
+        untold = self.venue and self.venue.model_copy(update={"webhooks": [], "alarms": None})
+        return self.model_copy(
+            update={"venue": untold, "options": self.options.model_copy(update={"callback_url": None})}
+        )

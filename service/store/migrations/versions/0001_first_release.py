@@ -141,6 +141,17 @@ def _beside_jobs() -> None:
     )
     op.create_index("leftovers_by_due", "leftovers", ["due_at"])
     op.create_table(
+        "events",
+        sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True),
+        sa.Column("venue", sa.String(64), nullable=False),
+        sa.Column("type", sa.String(32), nullable=False),
+        sa.Column("at", moment, nullable=False),
+        sa.Column("data", sa.JSON),
+        sa.Column("job", sa.String(26)),
+        sqlite_autoincrement=True,
+    )
+    op.create_index("events_by_venue", "events", ["venue", "id"])
+    op.create_table(
         "deliveries",
         sa.Column("id", sa.String(26), primary_key=True),
         sa.Column("url", sa.String(2048), nullable=False),
@@ -149,7 +160,7 @@ def _beside_jobs() -> None:
         sa.Column("attempts", sa.Integer, nullable=False),
         sa.Column("due_at", moment, nullable=False),
         sa.Column("last_error", sa.String(500)),
-        sa.Column("event", sa.JSON),
+        sa.Column("event", sa.BigInteger),
     )
     op.create_index("deliveries_by_due", "deliveries", ["status", "due_at"])
     op.create_table(
