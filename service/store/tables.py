@@ -229,9 +229,11 @@ schedules = sa.Table(
     sa.Column("venue", sa.String(64), primary_key=True),
     sa.Column("cron", sa.String(100), nullable=False),
     sa.Column("time_zone", sa.String(64), nullable=False),
+    sa.Column("exact", sa.Boolean, nullable=False),
     # The time it is fired for, and when somebody is to look at it: later while a worker is at it.
     sa.Column("due_at", Instant, nullable=False),
     sa.Column("look_at", Instant, nullable=False),
+    sa.Column("last_at", Instant),
     sa.Column("last_job", sa.String(26)),
     sa.Column("last_error", sa.String(500)),
     sa.Index("schedules_by_look", "look_at"),

@@ -119,8 +119,10 @@ def _beside_venues() -> None:
         sa.Column("venue", sa.String(64), primary_key=True),
         sa.Column("cron", sa.String(100), nullable=False),
         sa.Column("time_zone", sa.String(64), nullable=False),
+        sa.Column("exact", sa.Boolean, nullable=False),
         sa.Column("due_at", moment, nullable=False),
         sa.Column("look_at", moment, nullable=False),
+        sa.Column("last_at", moment),
         sa.Column("last_job", sa.String(26)),
         sa.Column("last_error", sa.String(500)),
     )
