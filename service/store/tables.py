@@ -94,6 +94,8 @@ jobs = sa.Table(
     # From then on the row answers for none of its files, whether or not the store is rid of them.
     sa.Column("frames_deleted_at", Instant),
     sa.Column("pictures_deleted_at", Instant),
+    # wire.job.Job's.
+    sa.Column("asked_by", sa.String(80)),
     # The request that it came with, as its log and its trace call it.
     sa.Column("request_id", sa.String(64)),
     sa.Column("traceparent", sa.String(55)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -64,6 +64,9 @@ class Job(Wire):
                     "result": None,
                     "callback": None,
                     "venue_revision": None,
+                    "asked_by": "key truck-7",
+                    "options": {"preset": "esc", "seed": 7},
+                    "frames": {"left": ["/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/frames/0"]},
                     "links": {"self": "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"},
                 }
             ]
@@ -87,6 +90,15 @@ class Job(Wire):
     )
     venue_revision: int | None = Field(
         None, description="The revision of the venue that its poses became, by themselves or by hand; null: none."
+    )
+    asked_by: str | None = Field(
+        None, description="`key NAME`: with this API key; `schedule`: that of the venue; null: no key was asked for."
+    )
+    options: dict[str, Any] = Field(
+        {}, description="As they were asked, what was left out filled in, the seed too; without `callback_url`."
+    )
+    frames: dict[str, list[str]] = Field(
+        {}, description="Addresses of the frames as they came, by camera or the name of a photo; empty: none are kept."
     )
     links: dict[str, str]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import sqlalchemy as sa
@@ -85,6 +86,14 @@ class Jobs(Repository):
             return None
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
+    def frame(self, job_id: str, number: int) -> str | None:
+        """Where a frame of a job lies in the blob store, counted through all of them; None: there is none."""
+        query = sa.select(j.frames).where(j.id == job_id, j.frames_deleted_at.is_(None))
+        with reading(self._engine) as connection:
+            frames = connection.execute(query).scalar_one_or_none() or {}
+        paths = [path for several in frames.values() for path in several]
+        return paths[number] if number < len(paths) else None
+
     def posed(self, job_id: str) -> Venue | None:
         """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
         with reading(self._engine) as connection:
@@ -123,7 +132,7 @@ def asked(row: Any) -> dict[str, Any]:
         "venue": row.venue_document,
         "options": row.options,
         "frames": row.frames,
-        "origin": Origin(row.request_id, row.traceparent),
+        "origin": Origin(row.request_id, row.traceparent, row.asked_by),
     }
 
 
@@ -150,9 +159,21 @@ def _job(row: Any, position: int | None, callback: CallbackState | None, revisio
         error=row.error,
         result=row.result,
         callback=callback,
+        asked_by=row.asked_by,
+        # An address may be a secret, and how far its telling has come is said by `callback`.
+        options={name: value for name, value in row.options.items() if name != "callback_url"},
+        frames=_frames(row),
         venue_revision=revision,
         links=_links(row),
     )
+
+
+def _frames(row: Any) -> dict[str, list[str]]:
+    """By camera, or by the names of photos, addresses that count through all of them."""
+    if row.frames_deleted_at is not None:
+        return {}
+    number = count()
+    return {name: [f"/jobs/{row.id}/frames/{next(number)}" for _ in paths] for name, paths in row.frames.items()}
 
 
 def _positions(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:

@@ -163,6 +163,7 @@ def _insert(
         "idempotency_key": submission.idempotency_key,
         "venue_document": venue.model_dump(mode="json") if venue else None,
         "frames": submission.frames,
+        "asked_by": submission.origin.asked_by,
         "request_id": submission.origin.request_id,
         "traceparent": submission.origin.traceparent,
         "created_at": now,

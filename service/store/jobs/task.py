@@ -36,10 +36,12 @@ def seeded(options: AnyOptions) -> AnyOptions:
 
 @dataclass(frozen=True)
 class Origin:
-    """The request that a job came with: how the log calls it, and its place in a trace (W3C Trace Context)."""
+    """The request that a job came with: how the log calls it, its place in a trace (W3C Trace Context), and who asked:
+    `key NAME`, or `schedule`."""
 
     request_id: str | None = None
     traceparent: str | None = None
+    asked_by: str | None = None
 
     def names(self) -> dict[str, str]:
         """For every line of the log that comes of it."""

@@ -202,6 +202,7 @@ def test_a_schedule_that_finds_no_frames_says_why_and_goes_on(service, camera, n
     assert "camera right" in error
     assert "404" in error
     failed = service.job(health(service, name)["schedule"]["last_job"])
+    assert (failed["asked_by"], failed["frames"]) == ("schedule", {})
     assert (failed["status"], failed["error"]["camera"], failed["error"]["detail"]) == ("failed", "right", error)
     page = service.http.get(f"/ui/venues/{name}").text
     assert "0 3 * * * <span>Asia/Tokyo</span>" in page

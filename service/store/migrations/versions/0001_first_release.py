@@ -70,6 +70,7 @@ def _jobs() -> None:
         sa.Column("updated_at", moment, nullable=False),
         sa.Column("frames_deleted_at", moment),
         sa.Column("pictures_deleted_at", moment),
+        sa.Column("asked_by", sa.String(80)),
         sa.Column("request_id", sa.String(64)),
         sa.Column("traceparent", sa.String(55)),
     )
