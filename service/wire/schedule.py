@@ -11,7 +11,6 @@ from datetime import UTC, datetime, timedelta
 from typing import Annotated, Self
 from zoneinfo import ZoneInfo
 
-from croniter import CroniterError, croniter
 from pydantic import ConfigDict, Field, StringConstraints, model_validator
 
 from service.wire.base import Flag, Wire
@@ -82,6 +81,9 @@ def next_time(cron: str, time_zone: str, after: datetime, place: float = 0.0) ->
 
 
 def _next(cron: str, time_zone: str, after: datetime) -> datetime:
+    # The commands of the client, which start anew each time, seldom look at a schedule.
+    from croniter import CroniterError, croniter
+
     if len(cron.split()) != FIELDS:
         raise NoSchedule(f"{cron!r} is not cron's five fields: minute, hour, day, month, day of the week")
     try:
