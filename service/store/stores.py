@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from service.store.counts.glances import Glances
 from service.store.counts.past_calibrations import PastCalibrations
 from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
@@ -30,6 +31,7 @@ class Stores:
         self.jobs = Jobs(engine)
         self.attempts = Attempts(engine)
         self.decisions = Decisions(engine)
+        self.glances = Glances(engine)
         self.past_calibrations = PastCalibrations(engine)
         self.deliveries = Deliveries(engine)
         self.following = Following(engine)

@@ -204,6 +204,8 @@ venue_quality = sa.Table(
     sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
     # counts.courses.Course by camera.
     sa.Column("cameras", sa.JSON(none_as_null=True)),
+    # counts.glances.Glance; null: it was never calibrated.
+    sa.Column("glance", sa.JSON(none_as_null=True)),
     # When an alarm rings if nothing happens before.
     sa.Column("alarm_due_at", Instant),
     sa.Index("venues_by_stitch_error", "stitch_error_px"),

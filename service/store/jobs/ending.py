@@ -13,11 +13,13 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.counts import tallies
 from service.store.counts.endings import Ending
+from service.store.counts.glances import note_end
 from service.store.engine import clock
 from service.store.jobs.task import OPTIONS
 from service.store.told.deliveries import add_delivery
 from service.store.told.events import add_job_event
 from service.wire.job import OPEN, JobError, Status
+from service.wire.options import Options
 from service.wire.results import AnyResult
 
 # What must still hold of a row when it is written.
@@ -46,6 +48,8 @@ def end(
     query = sa.select(j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt).where(j.id == job_id)
     row = connection.execute(query).one()
     options = OPTIONS[row.kind].model_validate(row.options)
+    if isinstance(options, Options):
+        note_end(connection, row.venue, status, result, now, dry_run=options.dry_run)
     if row.venue is not None:
         add_job_event(connection, row.venue, f"job.{status}", job_id, now)
     if options.callback_url is not None:

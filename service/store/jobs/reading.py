@@ -56,6 +56,11 @@ class Jobs(Repository):
             except sa.exc.NoResultFound:
                 return None
 
+    def several(self, job_ids: Collection[str]) -> dict[str, Job]:
+        """Those of several jobs that are there, by their ids."""
+        with reading(self._engine) as connection:
+            return jobs_of(connection, job_ids)
+
     def page(
         self, venue: str | None, status: str | None, before: str | None, limit: int, kind: str | None = None
     ) -> list[Job]:

@@ -102,6 +102,7 @@ def _beside_venues() -> None:
         sa.Column("drift_px", sa.Double),
         sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
         sa.Column("cameras", sa.JSON(none_as_null=True)),
+        sa.Column("glance", sa.JSON(none_as_null=True)),
         sa.Column("alarm_due_at", moment),
     )
     op.create_index("venues_by_stitch_error", "venue_quality", ["stitch_error_px"])
