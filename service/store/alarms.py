@@ -165,7 +165,8 @@ def _begin(connection: sa.Connection, venue: Venue, alarm: Alarm) -> None:
 
 
 def _tell(connection: sa.Connection, venue: Venue, what: str, alarm: Alarm, at: datetime) -> None:
-    event = add_event(connection, venue.id, what, VenueAlarm(venue=venue.id, **alarm.model_dump()), at)
+    data = VenueAlarm(venue=venue.id, **alarm.model_dump())
+    event = add_event(connection, venue.id, venue.webhooks, what, data, at)
     if venue.alarms is not None and venue.alarms.callback_url is not None:
         add_event_delivery(connection, event, venue.alarms.callback_url, at)
 

@@ -71,7 +71,7 @@ def add_revision(
         cameras=[camera.posed for camera in venue.cameras],
         changed=_changed(venue, _cameras(before)),
     )
-    add_event(connection, venue.id, "poses.changed", poses, at)
+    add_event(connection, venue.id, venue.webhooks, "poses.changed", poses, at)
     drifts = [movement.drift.pixels for movement in movements.values() if movement.drift]
     note(connection, venue.id, drift_px=max((drift for drift in drifts if drift is not None), default=None))
 

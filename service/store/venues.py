@@ -71,9 +71,9 @@ class Venues(Repository):
             _keep(connection, venue_id, credentials)
             save_venue(connection, venue)
             if before is None:
-                add_venue_event(connection, venue_id, "venue.created", [])
+                add_venue_event(connection, venue, "venue.created", [])
             elif changed := venue.differs_in(before):
-                add_venue_event(connection, venue_id, "venue.changed", changed)
+                add_venue_event(connection, venue, "venue.changed", changed)
             if before is None or not venue.stands_like(before):
                 add_revision(connection, venue, "put")
             settle_alarms(connection, venue)
@@ -120,8 +120,10 @@ class Venues(Repository):
             serialise(connection, venue_lock(venue_id))
             j = tables.jobs.c
             active = connection.scalar(sa.select(j.id).where(j.venue == venue_id, j.status.in_(OPEN)))
-            allow(find_venue(connection, venue_id), active)
-            add_venue_event(connection, venue_id, "venue.deleted", [])
+            venue = find_venue(connection, venue_id)
+            allow(venue, active)
+            if venue is not None:
+                add_venue_event(connection, venue, "venue.deleted", [])
             for table in OF_VENUES:
                 connection.execute(sa.delete(table).where(table.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))

@@ -72,7 +72,7 @@ class Delivering:
     def _attempt(self, delivery: Delivery) -> None:
         body = self._body(delivery)
         if body is None:
-            self._deliveries.give_up(delivery, "the job was deleted")
+            self._deliveries.give_up(delivery, "what was to be told is no longer kept")
             return
         named = {"job": delivery.id} if delivery.event is None else {"event": delivery.event}
         with structlog.contextvars.bound_contextvars(**named, receiver=delivery.receiver, attempt=delivery.attempt):

@@ -104,7 +104,7 @@ class Submissions(Repository):
             now = clock(connection)
             _insert(connection, submission, venue, "queued", now)
             if venue is not None:
-                add_job_event(connection, venue.id, "job.queued", submission.job_id, now)
+                add_job_event(connection, venue.id, venue.webhooks, "job.queued", submission.job_id, now)
             priority = PRIORITIES[submission.options.priority]
             enqueue(connection, submission.job_id, priority, submission.kind)
             # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
