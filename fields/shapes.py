@@ -37,6 +37,10 @@ class Line:
         """The same so far away."""
         return replace(self, points=tuple(_shifted(point, by) for point in self.points))
 
+    def turned(self, by: float) -> Line:
+        """The same turned about the centre of the field, counter-clockwise by so many rad."""
+        return replace(self, points=tuple(_turned(point, by) for point in self.points))
+
     @property
     def length(self) -> float:
         """Along it."""
@@ -84,6 +88,10 @@ class Arc:
         """The same so far away."""
         return replace(self, centre=_shifted(self.centre, by))
 
+    def turned(self, by: float) -> Arc:
+        """The same turned about the centre of the field, counter-clockwise by so many rad."""
+        return replace(self, centre=_turned(self.centre, by), start=self.start + by, end=self.end + by)
+
     @property
     def length(self) -> float:
         """Along it."""
@@ -120,6 +128,10 @@ class Spot:
         """The same so far away."""
         return replace(self, centre=_shifted(self.centre, by))
 
+    def turned(self, by: float) -> Spot:
+        """The same turned about the centre of the field, counter-clockwise by so many rad."""
+        return replace(self, centre=_turned(self.centre, by))
+
 
 Shape = Line | Arc | Spot
 
@@ -142,3 +154,8 @@ def _other_end(point: Point) -> Point:
 
 def _shifted(point: Point, by: Point) -> Point:
     return point[0] + by[0], point[1] + by[1]
+
+
+def _turned(point: Point, by: float) -> Point:
+    (x, y), along, across = point, math.cos(by), math.sin(by)
+    return along * x - across * y, across * x + along * y

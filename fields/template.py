@@ -75,6 +75,12 @@ class Template:
         )
         return [*once, *(_at(end, shape) for end in ("left", "right") for shape in left)]
 
+    def whole(self, name: str) -> str:
+        """What a marking of `markings` is a part of: the broken line of a dash, the row of a mark, or itself."""
+        entries = [entry["name"] for entry in self.marking]
+        entries += [entry["name"].replace(END, end) for entry in self.end for end in ("left", "right")]
+        return max((one for one in entries if f"{name}, ".startswith(f"{one}, ")), key=len, default=name)
+
     def places(self, size: Mapping[str, float]) -> dict[str, Point]:
         """Where each named point is, but for those with `{distance}`."""
         return dict(self._places(self.known(size), measured=False))

@@ -18,6 +18,7 @@ from starlette.responses import HTMLResponse, RedirectResponse
 from service.api.auth import COOKIE, SCOPES, page_token
 from service.pages import words
 from service.pages.assets import address
+from service.pages.seam import seam_curve
 from service.routes.contract.guarded import Guarded
 from service.store.engine import AWAY
 from service.store.keys import Key
@@ -41,7 +42,7 @@ templates = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-templates.globals |= {"static": address, "version": version("esc-calibration")}
+templates.globals |= {"static": address, "version": version("esc-calibration"), "seam_curve": seam_curve}
 templates.filters |= {
     "figure": words.figure,
     "cm": words.centimetres,

@@ -19,7 +19,7 @@ from pydantic import (
     model_validator,
 )
 
-from fields.shapes import COLOUR_PATTERN, WHITE
+from fields.shapes import COLOUR_PATTERN, WHITE, Shape
 from fields.template import NAMES, Extent, Template, load
 from service.wire.base import Name, Number, Wire
 from service.wire.geometry import Row
@@ -114,6 +114,50 @@ TemplateName = Annotated[str, AfterValidator(_is_a_template), WithJsonSchema({"t
 USUAL = {"length_m": "length", "width_m": "width", "line_width_m": "line"}
 
 
+class OtherField(Wire):
+    """The field of another sport on the same ground; it has its template's measures unless given."""
+
+    template: TemplateName
+    length_m: Length | None = None
+    width_m: Length | None = None
+    line_width_m: PaintWidth | None = None
+    measures_m: dict[str, Number] = Field({})
+    centre: Place = Field([0.0, 0.0], description="Where its centre is on the venue's field.")
+    turned_deg: Annotated[Number, Field(ge=-360, le=360)] = Field(
+        0.0, description="From the venue's x to its own, counter-clockwise seen from above."
+    )
+
+    @model_validator(mode="after")
+    def _of_this_template(self) -> Self:
+        extents = load(self.template).size
+        for name, measure in self.size.items():
+            if name not in extents:
+                raise ValueError(f"{name} is not among what {self.template} leaves open: {', '.join(extents)}")
+            _must_lie(measure, extents[name], f"{self.template}, {name}")
+        return self
+
+    @property
+    def size(self) -> dict[str, float]:
+        """What its plan is drawn by, where that is not as usual."""
+        given = {measure: getattr(self, name) for name, measure in USUAL.items()}
+        return {name: measure for name, measure in given.items() if measure is not None} | self.measures_m
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """What is painted of it, on the venue's field."""
+        x, y = self.centre
+        turn = math.radians(self.turned_deg)
+        return [shape.turned(turn).shifted((x, y)) for shape in load(self.template).markings(self.size)]
+
+
+OtherMarking = Annotated[
+    Annotated[OtherField, Tag("field")] | Annotated[MarkingIn, Tag("marking")],
+    Discriminator(
+        lambda given: "field" if "template" in (given if isinstance(given, dict) else vars(given)) else "marking"
+    ),
+]
+
+
 def _usual_need_not_be_given(schema: dict[str, Any]) -> None:
     schema["required"] = [name for name in schema["required"] if name not in USUAL]
 
@@ -132,6 +176,12 @@ class FieldOfPlay(Wire):
     line_width_m: PaintWidth = Field(description="Absent: the template's.")
     measures_m: dict[str, Number] = Field({}, description="What else a template leaves open, by name.")
     ridge: Annotated[list[Row], Field(min_length=2, max_length=2)] | None = None
+    other_markings: Annotated[list[OtherMarking], Field(max_length=500)] = Field(
+        [],
+        description="What else is painted on the ground: fields of other sports by their templates, or markings one by "
+        "one. Nothing is calibrated by them, and they do not count against a frame.",
+        examples=[[{"template": "american-football", "length_m": 109.728, "width_m": 48.768}]],
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -192,6 +242,13 @@ class FieldOfPlay(Wire):
             return load(self.template)
         entries = [marking.entry for marking in self.template.markings]
         return Template(marking=entries, points=self.template.points)
+
+    @property
+    def others(self) -> list[Shape]:
+        """What else is painted on the ground."""
+        own = [marking.entry for marking in self.other_markings if isinstance(marking, MarkingIn)]
+        fields = [field for field in self.other_markings if isinstance(field, OtherField)]
+        return [*Template(marking=own).markings(self.size), *(shape for field in fields for shape in field.shapes)]
 
     @property
     def size(self) -> dict[str, float]:

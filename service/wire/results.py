@@ -37,6 +37,29 @@ class View(Wire):
     )
 
 
+Side = Literal["outside", "inside", "right", "left", "far", "near"]
+
+
+class MarkingResult(Wire):
+    """A marking as one camera sees it; dashes of a line, and marks in rows, are one.
+
+    Lines that bound the field, and circles and arcs, have an outside and an inside; else the sides are those of the
+    pitch: right (x) and left, far (y) and near.
+    """
+
+    name: str
+    expected_m: float = Field(description="Length of it that should be in view.")
+    found: float = Field(description="Share 0..1 of that length that is seen where the pose puts it.")
+    offset_cm: float | None = Field(
+        None,
+        description="How far its paint lies from where the venue has it, across it on the ground, if all other "
+        "markings are in place; positive outside, right or far, else negative. Null where that cannot be told.",
+    )
+    sigma_cm: float | None = Field(None, description="One standard deviation of that, ten metres of line taken as one.")
+    side: Side | None = Field(None, description="On which side of its place the paint is: the sign in a word.")
+    elsewhere: bool = Field(False, description="Beyond three sigma and 3 cm: the paint is off, or a measure.")
+
+
 class CameraResult(Wire):
     """One camera's answer."""
 
@@ -50,13 +73,48 @@ class CameraResult(Wire):
         None, description="The part of sigma that the lens and the field, the same the next time, have no part in."
     )
     moved: Moved
-    iou: float | None
+    iou: float | None = Field(description="Of the expected markings and the network's mask of the pitch, as lengths.")
+    expected_found: float | None = Field(
+        None, description="One side of the IoU: share 0..1 of the expected markings that the network's mask covers."
+    )
+    unexpected: float | None = Field(
+        None,
+        description="The other side: share 0..1 of the mask on the pitch that lies beside all expected markings; much "
+        "where another sport's lines are painted, which a field may list as `other_markings`.",
+    )
     found: float | None = Field(
         None, description="Share 0..1 of the visible markings' length that is seen where the pose puts it."
     )
     by_chance: float | None = Field(None, description="Share 0..1 of that length that would be seen anywhere.")
     residual_px: float | None
     view: View | None = None
+    markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
+
+
+class SeamPlace(Wire):
+    """A piece of line that two cameras see, around a point `at` [x, y] of the pitch, m.
+
+    The second camera puts its paint `error_cm` ± `sigma_cm` beside where the first does, in the direction `across` the
+    line, a unit vector [x, y]. Along the line nothing is measured.
+    """
+
+    at: list[float]
+    across: list[float]
+    error_cm: float
+    sigma_cm: float
+
+
+class PairResult(Wire):
+    """Two cameras that were compared."""
+
+    cameras: list[Id]
+    stitch_error_px: float | None = Field(
+        description="At the centre of the pitch, or of what both see; null where the views cannot be brought together."
+    )
+    seam: list[SeamPlace] = Field(
+        description="All along what both see, by the lines that both have measured, from end to end; at most 24 places."
+    )
+    worst: SeamPlace | None = Field(description="The place of the seam whose error is surely the largest.")
 
 
 class Provenance(Wire):
@@ -96,8 +154,12 @@ class Result(Wire):
     stitch_error_px: float | None
     stitch_error_before_px: float | None
     stitch_error_limit_px: float | None = Field(None, description="What the gate lets pass at most.")
+    pairs: list[PairResult] = Field([], description="The cameras that were compared, two by two.")
     loss: float | None
     generations: int
+    path: Literal["near", "wide"] = Field(
+        "wide", description="Whether the poses were found near the stored ones, or by a search."
+    )
     timings_s: dict[str, float]
     provenance: Provenance
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 
 from service.wire.addresses import HIDDEN, SourceUrl, without_credentials
-from service.wire.base import Id, Name, Wire
+from service.wire.base import Id, Name, Number, Wire
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Pose, PosedCamera, PoseIn, UnposedCamera
 from service.wire.health import Alarms
@@ -31,16 +31,40 @@ Webhooks = Annotated[
 ]
 
 
+Pixel = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Polygon = Annotated[list[Pixel], Field(min_length=3, max_length=200)]
+Ignore = Annotated[
+    list[Polygon],
+    Field(
+        max_length=50,
+        description="Areas of the frame that are of no use, polygons of [x, y] in pixels: nothing in them counts as a "
+        "marking, is measured or is missed.",
+        examples=[[[[0, 1900], [900, 1900], [900, 2159], [0, 2159]]]],
+    ),
+]
+
+
 class CameraIn(UnposedCamera):
     """A camera of a venue as it is sent."""
 
     pose: PoseIn
+    ignore: Ignore = Field([])
     source: SourceUrl | None = Field(
         None,
         description="Where its frames can be fetched: the address of a JPEG or PNG, or an RTSP stream. User and "
         f"password are not shown again: `{HIDDEN}@` stands for them, and sent back keeps them.",
         examples=["http://user:password@10.1.0.7/snapshot.jpg"],
     )
+
+    @model_validator(mode="after")
+    def _ignores_what_is_in_its_picture(self) -> Self:
+        width, height = self.image_size
+        for x, y in (corner for polygon in self.ignore for corner in polygon):
+            if not (-0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5):
+                raise ValueError(
+                    f"ignore: the corner ({x:g}, {y:g}) lies outside the {width}x{height} pixels of camera {self.id}"
+                )
+        return self
 
     @model_validator(mode="after")
     def _above_the_pitch(self) -> Self:
@@ -55,6 +79,7 @@ class CameraIn(UnposedCamera):
 class Camera(PosedCamera):
     """A camera of a venue with its stored pose."""
 
+    ignore: Ignore = Field([])
     source: str | None = Field(None, description="Where its frames can be fetched.")
 
     @property

@@ -13,13 +13,16 @@ from worker.calibration.finish.refinement import Sight
 from worker.calibration.judge.pairs import Pair, Seeing, compared, contradictions, stitch_error_px
 from worker.calibration.judge.quality import CameraResult, Gate, believable, ridge_rejection
 from worker.calibration.judge.registration import Response
+from worker.calibration.judge.seam import seam_between
+from worker.calibration.nearby import settle_nearby
 from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import Channels
-from worker.calibration.see.sampling import median
+from worker.calibration.see.left_out import of_use
 from worker.calibration.see.segmentation import reachable_regions
+from worker.calibration.see.steady import Sway, median, sways
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
 from worker.calibration.settle import CAPTURE_RAD, METHODS, Seen, Settled, Situation, ridges_of, settle, settle_without
 from worker.calibration.zoom import refit_zoomed
@@ -51,18 +54,21 @@ def calibrate(
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey, usual)
     here = Situation(method, pitch, cameras, seen, options, journey)
-    settled, answer = agree(here, refit_zoomed(here, settle(here)))
+    near = look_nearby(here) if options.search == "auto" else None
+    settled, answer = near or agree(here, refit_zoomed(here, settle(here)))
     with journey.measuring("quality"):
         evidence_before = [one.evidence_before for one in answer.cameras]
         stored = [Seeing(*each) for each in zip(cameras, seen.sight.responses, evidence_before, strict=True)]
         before = compared(pitch, [stored[n] for n in _comparable(answer.cameras)])
+        loss = here.loss_of(answer.pitch, [one.camera for one in answer.cameras])
         journey.at("refinement", 1.0)
     return Calibration(
-        **vars(answer),
+        **vars(answer) | {"timings_s": {**answer.timings_s, "evolution": answer.timings_s.get("evolution", 0.0)}},
         stitch_error_before_px=stitch_error_px(before, Gate()),
-        loss=settled.loss,
+        loss=loss,
         generations=settled.generations,
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
+        path="wide" if near is None else "near",
     )
 
 
@@ -78,9 +84,19 @@ def look(
     require_markings_in_view(pitch, cameras)
     with journey.measuring("view"):
         views = [view_of(frames[camera.id], pitch, camera, usual.get(camera.id)) for camera in cameras]
+        swayed = {camera.id: sways(frames[camera.id], camera.intrinsics) for camera in cameras}
     with journey.measuring("segmentation"):
-        responses = segment_all(pitch, cameras, frames, segment, journey)
-    return Seen(views, Sight([Channels(frames[camera.id]) for camera in cameras], responses))
+        responses = segment_all(pitch, cameras, frames, swayed, segment, journey)
+    return Seen(views, Sight([Channels(frames[camera.id], swayed[camera.id]) for camera in cameras], responses))
+
+
+def look_nearby(here: Situation) -> tuple[Settled, Answer] | None:
+    """The answer where all cameras are found near their stored poses and agree; None where a search is needed."""
+    settled = settle_nearby(replace(here, journey=here.journey.unreported()))
+    if settled is None:
+        return None
+    answer = judge(settled.pitch, settled.results, here.seen.sight, here.journey)
+    return (settled, answer) if answer.accepted else None
 
 
 def agree(here: Situation, settled: Settled) -> tuple[Settled, Answer]:
@@ -110,7 +126,9 @@ def judge(pitch: Field, results: Sequence[CameraResult], sight: Sight, journey: 
         judged.append(replace(result, rejected_because=result.rejected_because or of_pairs or ridge))
     held = {result.camera.id for result in judged if result.accepted}
     stitch = stitch_error_px([pair for pair in pairs if not held or held.issuperset(pair.cameras)], gate)
-    return Answer(pitch, judged, "; ".join(reasons) or None, stitch, journey.seconds)
+    by_id = {result.camera.id: result for result in judged}
+    seams = [(pair, seam_between(pitch, by_id[pair.first], by_id[pair.second])) for pair in pairs]
+    return Answer(pitch, judged, "; ".join(reasons) or None, stitch, journey.seconds, pairs=seams)
 
 
 def _comparable(results: Sequence[CameraResult]) -> list[int]:
@@ -150,10 +168,11 @@ def segment_all(
     pitch: Field,
     cameras: Sequence[Camera],
     frames: Mapping[str, Sequence[Frame]],
+    swayed: Mapping[str, Sequence[Sway]],
     segment: Segment,
     journey: Journey,
 ) -> list[Response]:
-    """The fused segmentation (H, W) of each camera, where its markings can be."""
+    """The fused segmentation (H, W) of each camera, where its markings can be; `swayed`: how its frames lie."""
     total = sum(len(frames[camera.id]) for camera in cameras)
     done = 0
     responses = []
@@ -164,7 +183,7 @@ def segment_all(
             journey.at("segmentation", done / total)
             seen.append(segment(frame, regions))
             done += 1
-        responses.append(median(seen) / np.float32(255))
+        responses.append(of_use(camera, median(seen, swayed[camera.id]) / np.float32(255)))
     return responses
 
 

@@ -15,7 +15,9 @@ import numpy as np
 
 from worker.calibration.finish.refinement import Sight, assess, refine
 from worker.calibration.finish.uncertainty import Deviation, Finished
-from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection, markings_iou
+from worker.calibration.judge.markings import markings_seen
+from worker.calibration.judge.overlap import overlap_of
+from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection
 from worker.calibration.judge.registration import Response
 from worker.calibration.records import Journey, Options, Preset
 from worker.calibration.scene.camera import Camera
@@ -29,10 +31,12 @@ from worker.calibration.search.search import (
     Found,
     Level,
     Strategy,
+    genome_of,
     search,
 )
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
+from worker.calibration.see.left_out import left_out, of_use
 from worker.calibration.see.ridge_response import ridge_response
 from worker.calibration.see.view import ViewCondition
 
@@ -129,6 +133,23 @@ class Situation:
                 self.pitch, begun, self.seen.sight, asked.stitch_weight, self._free(), stored=self.cameras
             )
 
+    def loss_of(self, pitch: Field, answered: Sequence[Camera]) -> float:
+        """The loss of the last level of the search where the cameras are answered to stand, inf without any of use."""
+        group = self.usable
+        if not group:
+            return float("inf")
+        cameras = [answered[n] for n in group]
+        seen = [
+            response if (out := left_out(pitch, camera)) is None else np.where(out, np.float32(0), response)
+            for camera, response in zip(cameras, self.of(group).by_network(), strict=True)
+        ]
+        level = self.method.levels[-1]
+        if level.alone:
+            alone = [level.objective(pitch, [one], [its], 0.0) for one, its in zip(cameras, seen, strict=True)]
+            return float(np.mean([o.losses(genome_of([c])[None])[0] for o, c in zip(alone, cameras, strict=True)]))
+        together = level.objective(pitch, cameras, seen, self.options.stitch_weight)
+        return float(together.losses(genome_of(cameras)[None])[0])
+
     def left(self) -> Finished:
         """The stored poses as they are."""
         with self.journey.measuring("refinement"):
@@ -150,7 +171,7 @@ class Settled:
     """Where the cameras ended on their pitch, each judged by itself.
 
     `begun`: where the search left each; `together`: the numbers of those that were finished together, the others stand
-    by themselves; `deviations`: what the lines say of lenses and field; `loss`, `generations`: of the search of all.
+    by themselves; `deviations`: what the lines say of lenses and field; `generations`: of the search of all.
     """
 
     pitch: Field
@@ -158,7 +179,6 @@ class Settled:
     results: list[CameraResult]
     together: list[int]
     deviations: list[Deviation]
-    loss: float
     generations: int
 
 
@@ -191,12 +211,14 @@ def settle(here: Situation) -> Settled:
                 results[n] = alone[n].result
     deviations = _deviations(finished, [alone[n].finished for n in everyone if n not in together])
     in_order = [results[n] for n in everyone]
-    return Settled(finished.pitch, begun, in_order, together, deviations, found.loss, found.generations)
+    return Settled(finished.pitch, begun, in_order, together, deviations, found.generations)
 
 
 def settle_without(out: Collection[int], here: Situation, settled: Settled) -> Settled:
     """The same, but some of those that were finished together stay as they are, and the others finish without them."""
     together = [n for n in settled.together if n not in out]
+    if len(together) in (0, len(settled.together)):
+        return replace(settled, together=together)
     group = here.of(together)
     finished = group.finished([settled.begun[n] for n in together])
     results = dict(enumerate(settled.results)) | dict(zip(together, group.judged(finished), strict=True))
@@ -270,9 +292,10 @@ def judged_alone(
         CameraResult(
             **vars(after),
             view=view,
-            iou=markings_iou(finished.pitch, after.camera, response),
-            evidence_before=evidence_of(lines, before, channels, response),
+            overlap=overlap_of(finished.pitch, after.camera, response),
+            evidence_before=evidence_of(lines, before, channels, response, left_out(pitch, before)),
             moved=Movement.between(pitch, before, after.camera),
+            markings=markings_seen(finished.pitch, after),
         )
         for before, after, view, channels, response in zip(
             stored, finished.each, seen.views, seen.sight.channels, seen.sight.responses, strict=True
@@ -284,4 +307,4 @@ def judged_alone(
 def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:
     """What streaks say (H, W) of where the markings are, wherever the network would look for them."""
     lines = SeenLines.from_camera(pitch.line_points(), camera)
-    return ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px)
+    return of_use(camera, ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px))

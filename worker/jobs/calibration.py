@@ -17,7 +17,7 @@ from worker.calibration.judge.quality import Gate
 from worker.calibration.see.view import UsualView
 from worker.jobs import from_frames
 from worker.jobs.pictures import draw
-from worker.jobs.wire import Solution, number, wire_camera, wire_lens
+from worker.jobs.wire import Solution, number, wire_camera, wire_lens, wire_pair
 
 NO_VIEWS: Mapping[str, View] = MappingProxyType({})
 
@@ -73,8 +73,10 @@ def _result(
         stitch_error_px=number(found.stitch_error_px),
         stitch_error_before_px=number(found.stitch_error_before_px),
         stitch_error_limit_px=Gate().largest_stitch_error_px,
+        pairs=[wire_pair(*pair) for pair in found.pairs],
         loss=number(found.loss),
         generations=found.generations,
+        path=found.path,
         timings_s=dict(timings_s),
         provenance=provenance,
     )

@@ -79,6 +79,7 @@ def _wire_field(given: FieldOfPlay, found: FieldFit) -> FieldOfPlay:
         line_width_m=given.line_width_m,
         measures_m=given.measures_m,
         ridge=ridge,
+        other_markings=given.other_markings,
     )
 
 

@@ -27,12 +27,12 @@ from worker.jobs.wire import (
     Picture,
     R,
     Solution,
-    camera_of,
     decoded_frame,
     pitch_of,
     provenance_of,
     segmenter_of,
     to_the_millisecond,
+    watching,
     wire_progress,
 )
 
@@ -85,7 +85,7 @@ def solve(
     begun = time.perf_counter()
     frames = {c.id: [decoded_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
     decoded = time.perf_counter()
-    cameras = [camera_of(camera) for camera in venue.cameras]
+    cameras = [watching(camera) for camera in venue.cameras]
     given = Given(pitch_of(venue.field), cameras, frames, Remembering(segmenter, frames))
     try:
         answer = engine(given, lambda step: report(wire_progress(step)))

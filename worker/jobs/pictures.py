@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 
 import cv2
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from worker.calibration.draw import layers, mosaic
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.draw.viewpoint import viewpoint
+from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.records import Calibration
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
@@ -39,10 +40,11 @@ def draw(given: Given, found: Calibration) -> dict[str, bytes]:
         lambda: {"preview_before": jpeg(mosaic.stitched(pitch, view(), before, first).picture)},
         lambda: {"birdseye": jpeg(mosaic.birdseye(found.pitch, after, first))},
     ]
-    for old, new in zip(before, after, strict=True):
+    for old, result in zip(before, found.cameras, strict=True):
+        new = result.camera
         frame, response = first[old.id], given.network.responses.get(old.id)
         parts += [
-            partial(_overlay, (pitch, old), (found.pitch, new), frame),
+            partial(_overlay, (pitch, old), (found.pitch, new), frame, result.markings),
             partial(_layers, (pitch, old), (found.pitch, new), frame, response),
         ]
     pictures: dict[str, bytes] = {}
@@ -59,9 +61,9 @@ def _preview(stitched: mosaic.Stitched) -> dict[str, bytes]:
     return {"preview": jpeg(stitched.picture), "seam": png(layers.seam_layer(stitched.owner))}
 
 
-def _overlay(stored: Standing, new: Standing, frame: Picture) -> dict[str, bytes]:
-    """The frame with both fields on it."""
-    return {f"overlay_{stored[1].id}": jpeg(overlay(stored, new, frame))}
+def _overlay(stored: Standing, new: Standing, frame: Picture, seen: Sequence[MarkingSeen]) -> dict[str, bytes]:
+    """The frame with both fields on it, and what is wrong with markings."""
+    return {f"overlay_{stored[1].id}": jpeg(overlay(stored, new, frame, seen=seen))}
 
 
 def _layers(stored: Standing, new: Standing, frame: Picture, response: NDArray[np.uint8] | None) -> dict[str, bytes]:

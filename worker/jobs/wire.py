@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from math import isfinite, isnan
 from typing import Any, Generic, TypeVar
@@ -13,18 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.settings import Settings
-from service.wire import geometry
+from service.wire import geometry, venue
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Moved
 from service.wire.job import JobError, Progress
 from service.wire.options import FieldOptions, Options
 from service.wire.problems import KINDS, type_of
-from service.wire.results import AnyResult, CameraResult, Provenance, Sigma, View
+from service.wire.results import (
+    AnyResult,
+    CameraResult,
+    MarkingResult,
+    PairResult,
+    Provenance,
+    SeamPlace,
+    Sigma,
+    View,
+)
 from worker.calibration import records
 from worker.calibration.finish import uncertainty
-from worker.calibration.judge import quality
+from worker.calibration.judge import quality, seam
+from worker.calibration.judge.markings import MarkingSeen
+from worker.calibration.judge.pairs import Pair
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.ignored import Ignored
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
 from worker.calibration.see.view import ViewCondition
 
@@ -108,7 +120,8 @@ def png(picture: Picture) -> bytes:
 def pitch_of(field: FieldOfPlay) -> Field:
     """The engine's pitch."""
     ridge = None if field.ridge is None else np.array(field.ridge)
-    return Field(field.length_m, field.width_m, field.line_width_m, ridge, field.plan, field.measures_m)
+    size = field.length_m, field.width_m, field.line_width_m
+    return Field(*size, ridge, field.plan, field.measures_m, others=field.others)
 
 
 def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Intrinsics:
@@ -121,6 +134,13 @@ def camera_of(camera: geometry.PosedCamera) -> Camera:
     """The engine's camera at its stored pose."""
     pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
     return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
+
+
+def watching(camera: venue.Camera) -> Camera:
+    """The engine's camera of a venue, with what of its frames is to be ignored."""
+    width, height = camera.image_size
+    polygons = [np.array(polygon, dtype=float) for polygon in camera.ignore]
+    return replace(camera_of(camera), ignored=Ignored(polygons, (width, height)) if polygons else None)
 
 
 def wire_lens(lens: Intrinsics) -> geometry.Intrinsics:
@@ -183,12 +203,51 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
             position_m=found.moved.position_m,
             pixels=number(found.moved.pixels),
         ),
-        iou=number(found.iou),
+        iou=number(found.overlap.iou),
+        expected_found=number(found.overlap.found),
+        unexpected=number(found.overlap.unexpected),
         found=number(found.evidence.share),
         by_chance=number(found.evidence.by_chance),
         view=_view(found.view),
         residual_px=number(found.residual_px),
+        markings=[_marking(one) for one in found.markings],
     )
+
+
+def _marking(seen: MarkingSeen) -> MarkingResult:
+    return MarkingResult(
+        name=seen.name,
+        expected_m=round(seen.expected_m, 1),
+        found=round(seen.found, 3),
+        offset_cm=_rounded_cm(seen.offset_m),
+        sigma_cm=_rounded_cm(seen.sigma_m),
+        side=seen.side,
+        elsewhere=seen.is_elsewhere,
+    )
+
+
+def wire_pair(pair: Pair, found: seam.Seam) -> PairResult:
+    """What two cameras say of each other."""
+    return PairResult(
+        cameras=list(pair.cameras),
+        stitch_error_px=number(pair.error_px),
+        seam=[_place(place) for place in found.places],
+        worst=None if found.worst is None else _place(found.worst),
+    )
+
+
+def _place(place: seam.SeamPlace) -> SeamPlace:
+    return SeamPlace(
+        at=place.at.round(1).tolist(),
+        across=(place.across.round(2) + 0.0).tolist(),
+        error_cm=round(100 * place.error_m, 1),
+        sigma_cm=round(100 * place.sigma_m, 1),
+    )
+
+
+def _rounded_cm(metres: float | None) -> float | None:
+    """To the millimetre."""
+    return None if metres is None or not isfinite(metres) else round(100 * metres, 1)
 
 
 def _view(found: ViewCondition) -> View:

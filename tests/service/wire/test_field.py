@@ -127,7 +127,7 @@ def test_a_field_that_is_none_is_refused_and_the_place_named(field, where, messa
 def test_the_documented_fields_are_fields():
     document = (Path(__file__).parents[3] / "docs" / "fields.md").read_text()
     examples = re.findall(r"```json\n(.*?)```", document, re.DOTALL)
-    assert len(examples) == 2
+    assert len(examples) == 3
     for example in examples:
         field = FieldOfPlay.model_validate(json.loads(example)["field"])
         assert field.plan.markings(field.size)
@@ -147,3 +147,34 @@ def test_the_corner_is_not_the_origin():
     from_the_corner = own({"name": "halfway", "line": [[10, 0], [10, 10]]})
     with pytest.raises(ValidationError, match="whose centre is the origin"):
         FieldOfPlay.model_validate(from_the_corner)
+
+
+def test_other_markings_are_fields_of_other_sports_and_markings_one_by_one():
+    field = FieldOfPlay.model_validate(
+        {
+            "other_markings": [
+                {"template": "handball", "centre": [10, 5], "turned_deg": 90},
+                {"name": "run-up", "line": [[0, -30], [40, -30]], "width_m": 0.05},
+            ]
+        }
+    )
+    names = [shape.name for shape in field.others]
+    assert names[0] == "run-up"
+    (side,) = [shape for shape in field.others if shape.name == "left goal line"]
+    # Turned by a right angle, its left end is the near one.
+    assert {round(y, 1) for _, y in side.points} == {round(5 - 20 + 0.025, 1)}
+    assert FieldOfPlay.model_validate(field.model_dump(mode="json")) == field
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"template": "quidditch"}, "none of the templates"),
+        ({"template": "handball", "length_m": 500}, "400"),
+        ({"template": "handball", "measures_m": {"hash": 5}}, "hash is not among"),
+        ({"name": "neither"}, "exactly one of line"),
+    ],
+)
+def test_other_markings_that_cannot_be_are_refused(wrong, told):
+    with pytest.raises(ValidationError, match=told):
+        FieldOfPlay.model_validate({"other_markings": [wrong]})

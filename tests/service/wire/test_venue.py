@@ -37,3 +37,22 @@ def test_cameras_have_names_of_their_own():
     document = VENUE_EXAMPLE | {"cameras": VENUE_EXAMPLE["cameras"] * 2}
     with pytest.raises(ValidationError, match="same id"):
         VenueIn.model_validate(document)
+
+
+def ignoring(*polygons):
+    return VENUE_EXAMPLE | {"cameras": [VENUE_EXAMPLE["cameras"][0] | {"ignore": list(polygons)}]}
+
+
+def test_areas_of_a_frame_to_be_ignored_are_kept_with_the_camera():
+    area = [[0, 1500], [3071, 1500], [3071, 1727]]
+    stored = VenueIn.model_validate(ignoring(area)).stored()
+    assert stored.cameras[0].ignore == [area]
+    assert stored.sent().cameras[0].ignore == [area]
+    assert VenueIn.model_validate(VENUE_EXAMPLE).stored().cameras[0].ignore == []
+
+
+def test_areas_that_are_not_in_the_frame_are_refused():
+    with pytest.raises(ValidationError, match=r"corner \(4000, 10\) lies outside the 3072x1728 pixels of camera left"):
+        VenueIn.model_validate(ignoring([[0, 0], [4000, 10], [10, 10]]))
+    with pytest.raises(ValidationError, match="at least 3"):
+        VenueIn.model_validate(ignoring([[0, 0], [10, 10]]))

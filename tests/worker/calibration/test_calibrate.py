@@ -166,3 +166,17 @@ def test_a_camera_that_sees_something_else_is_rejected_and_says_nothing_of_its_l
     found = run(pictures=elsewhere)
     assert "camera left" in found.rejected_because
     assert {s.camera for s in found.suspicions} <= {"right"}
+
+
+def test_the_loss_is_that_of_the_poses_that_are_answered():
+    steps = []
+    found = calibrate(CROWNED, outdated(), frames(), white_on_green, Options(seed=3, generations=10), steps.append)
+    of_search = [step.loss for step in steps if step.stage == "evolution"][-1]
+    assert found.loss < 0.8 * of_search
+
+
+def test_what_is_seen_of_markings_and_of_the_seam_is_in_the_answer():
+    assert {"halfway line", "centre circle"} <= {one.name for one in result().cameras[0].markings}
+    ((pair, seam),) = result().pairs
+    assert pair.cameras == ("left", "right")
+    assert seam.worst.error_m < 0.05

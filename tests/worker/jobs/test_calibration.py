@@ -7,12 +7,14 @@ import pytest
 from service.settings import Settings
 from service.store.jobs.files import picture_file
 from service.wire import geometry
+from service.wire.field import OtherField
 from service.wire.options import Options
 from service.wire.results import View
 from service.wire.venue import VenueIn
 from worker.calibration import records as engine
 from worker.calibration.finish.diagnosis import Suspicion
 from worker.calibration.finish.uncertainty import Sigma
+from worker.calibration.judge.overlap import Overlap
 from worker.calibration.judge.quality import CameraResult, Movement
 from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
@@ -73,7 +75,7 @@ def asked(monkeypatch):
                 zoom=None,
                 likelier=None,
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
-                iou=0.9,
+                overlap=Overlap(0.9, 0.95, 0.05),
                 evidence_before=seen,
                 moved=Movement(0.0, 0.05, float("nan")),
                 rejected_because=asked["against"].get(camera.id),
@@ -82,7 +84,7 @@ def asked(monkeypatch):
         ]
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
-        return engine.Calibration(pitch, results, against, 0.2, {"evolution": 1.0}, None, 0.1, 3, [doubt])
+        return engine.Calibration(pitch, results, against, 0.2, {"evolution": 1.0}, None, 0.1, 3, [doubt], "near")
 
     class Segmenter:
         sha256 = "f" * 64
@@ -121,6 +123,18 @@ def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, settings)
     assert [len(asked["frames"][camera]) for camera in ("left", "right")] == [2, 1]
     assert asked["frames"]["left"][0].shape == (180, 320, 3)
     assert asked["options"] == engine.Options(preset="paper", seed=7, parents=8, stitch_weight=0.25)
+
+
+def test_what_else_is_painted_and_what_is_to_be_ignored_reach_the_engine(venue, files, asked, settings):
+    left, right = venue.cameras
+    field = venue.field.model_copy(update={"other_markings": [OtherField(template="handball")]})
+    partly = left.model_copy(update={"ignore": [[[0, 100], [319, 100], [319, 179], [0, 179]]]})
+    given = venue.model_copy(update={"field": field, "cameras": [partly, right]})
+    calibration.solve(given, files, Options(), settings, lambda _: None)
+    assert "left goal line" in [shape.name for shape in asked["pitch"].others]
+    assert asked["cameras"][0].ignored.area[150].all()
+    assert not asked["cameras"][0].ignored.area[90].any()
+    assert asked["cameras"][1].ignored is None
 
 
 def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_lens(venue, files, asked, settings):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from worker.calibration.draw.overlays import NEW_COLOUR, draw_line, legend, outline
+from worker.calibration.draw.marked import NEW_COLOUR
+from worker.calibration.draw.overlays import draw_line, legend, outline
 from worker.calibration.first.clicks import Clicks
 from worker.calibration.first.lens_calibration import LensCalibration
 from worker.calibration.first.verdict import FirstPose

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.draw.overlays import EDGE_GAP, NEW_COLOUR, STORED_COLOUR, draw_line, frame_of, outline
+from worker.calibration.draw.marked import NEW_COLOUR
+from worker.calibration.draw.overlays import EDGE_GAP, STORED_COLOUR, draw_line, frame_of, outline
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 

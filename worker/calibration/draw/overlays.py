@@ -7,20 +7,29 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from worker.calibration.draw.marked import NEW_COLOUR, WRONG, colour_of, colours_of, list_wrong
+from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.scene.camera import Array, Camera, Frame, inside
 from worker.calibration.scene.field import Field, Marking, resample
 
-# Orange and blue stay apart for all common kinds of colour blindness, and both from white on grass. BGR.
+# Orange and the blue of the new pose stay apart for all common kinds of colour blindness, and both from white. BGR.
 STORED_COLOUR = (0, 140, 255)
-NEW_COLOUR = (255, 60, 0)
 # From the edge of the paint to the middle of the stroke that frames it, in strokes.
 EDGE_GAP = 1.0
 
 
-def overlay(stored: tuple[Field, Camera], new: tuple[Field, Camera], frame: Frame, legend_for: str = "pose") -> Frame:
+def overlay(
+    stored: tuple[Field, Camera],
+    new: tuple[Field, Camera],
+    frame: Frame,
+    legend_for: str = "pose",
+    seen: Sequence[MarkingSeen] = (),
+) -> Frame:
     """The frame with the markings on it: orange by the stored pose, blue by the new one, BGR like `frame`.
 
-    Each is drawn with the pitch it is for; `legend_for` says what is stored and new.
+    Each is drawn with the pitch it is for; `legend_for` says what is stored and new. `seen`: what is said of the
+    markings; those that are elsewhere, or hardly found, have colours of their own, and numbers of a list. What is
+    ignored is dark.
 
     The stored pose draws the centre of each line; the new one frames it: the painted line stays visible between two
     blue ones if the pose is right.
@@ -28,14 +37,20 @@ def overlay(stored: tuple[Field, Camera], new: tuple[Field, Camera], frame: Fram
     picture = frame.copy()
     width = frame.shape[1]
     pitch, camera = stored
+    if camera.ignored is not None:
+        picture[camera.ignored.area] //= 2
     for marking in pitch.markings():
         draw_line(picture, camera.project(pitch.lift(outline(marking)[0])), STORED_COLOUR, max(1, round(width / 1600)))
     thickness = max(1, round(width / 3000))
     pitch, camera = new
-    for marking in pitch.markings():
+    colours = colours_of(pitch, seen)
+    for marking, colour in zip(pitch.markings(), colours, strict=True):
         for line in frame_of(pitch, camera, marking, EDGE_GAP * thickness):
-            draw_line(picture, line, NEW_COLOUR, thickness)
-    legend(picture, ((f"stored {legend_for}", STORED_COLOUR), (f"new {legend_for}", NEW_COLOUR)))
+            draw_line(picture, line, colour, thickness)
+    list_wrong(picture, pitch, camera, seen)
+    entries = [(f"stored {legend_for}", STORED_COLOUR), (f"new {legend_for}", NEW_COLOUR)]
+    used = {colour_of(one) for one in seen}
+    legend(picture, [*entries, *(entry for entry in WRONG if entry[1] in used)])
     return picture
 
 

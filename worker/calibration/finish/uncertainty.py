@@ -9,7 +9,7 @@ from the poses that are answered belongs to their error.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -89,7 +89,7 @@ class FinishedCamera:
     None where it had too few measurements: `residual_px`, the rms of its lines, `covariance` (6, 6) of (rotation in the
     camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens, field and ground,
     which do not change. `zoom`: what the lines say of the focal length, None where it was found with the pose;
-    `likelier`: the camera with that focal length, where it then is.
+    `likelier`: the camera with that focal length, where it then is. `measured`: the lines it was judged by.
     """
 
     camera: Camera
@@ -99,6 +99,7 @@ class FinishedCamera:
     repeatability: Sigma | None
     zoom: Deviation | None
     likelier: Camera | None
+    measured: Measurements | None = field(default=None, kw_only=True)
 
     @property
     def elsewhere_m(self) -> float:

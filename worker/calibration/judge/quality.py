@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from worker.calibration.finish.diagnosis import BEYOND_DOUBT, is_sure
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS
 from worker.calibration.finish.uncertainty import Deviation, FinishedCamera
-from worker.calibration.scene.camera import Array, Camera, inside, rotation_angles_deg
+from worker.calibration.judge.markings import MarkingSeen
+from worker.calibration.judge.overlap import Overlap
+from worker.calibration.scene.camera import Camera, inside, rotation_angles_deg
 from worker.calibration.scene.field import Field
-from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.evidence import LEAST_ROOM, MARKING, TOLERANCE_PX, Evidence
+from worker.calibration.see.evidence import LEAST_ROOM, Evidence
 from worker.calibration.see.view import ViewCondition
 
-AROUND_PITCH_M = 1.0
+MUCH_UNEXPECTED = 0.4
+"""Of the segmentation on the pitch: so much of it beside all lines of the venue are lines of something else."""
 
 
 @dataclass(frozen=True)
@@ -74,46 +74,24 @@ class Movement:
 class CameraResult(FinishedCamera):
     """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
 
-    `view`: whether its frame could be used, and what is wrong with it if not; `iou`: see `markings_iou`;
+    `view`: whether its frame could be used, and what is wrong with it if not; `overlap`: of expected lines and the
+    segmentation;
     `rejected_because`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
-    camera's lens is not the stored one but what the lines say.
+    camera's lens is not the stored one but what the lines say; `markings`: what is seen of each.
     """
 
     view: ViewCondition
-    iou: float
+    overlap: Overlap
     evidence_before: Evidence
     moved: Movement
     rejected_because: str | None = None
     lens_found: bool = False
+    markings: Sequence[MarkingSeen] = field(default=(), kw_only=True)
 
     @property
     def accepted(self) -> bool:
         """Whether the gate lets its pose replace the stored one."""
         return self.rejected_because is None
-
-
-def markings_iou(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> float:
-    """IoU in 0..1 of the markings expected by the pose and those in the segmentation (H, W), as lengths of line.
-
-    A line is thinner than any honest tolerance, so a plain IoU of pixels would measure paint and blur. Here a piece of
-    expected line is found when the segmentation has a marking within `TOLERANCE_PX` of it; segmentation on the pitch
-    that lies beside every expected line counts as as much line as it could have been. A line thinner than a pixel
-    covers only a part of it, and has that part of the weight and of the response that is asked for.
-    """
-    seen = SeenLines.from_camera(pitch.line_points(), camera)
-    coverage = np.minimum(seen.width_px, 1.0)
-    weight = seen.length_px * coverage
-    expected = float(weight.sum())
-    if expected == 0:
-        return 0.0
-    tolerance = max(TOLERANCE_PX * camera.intrinsics.relative_size, 1.0)
-    found = float(weight[_strongest(response, tolerance)[_rounded(seen.pixel)] > MARKING * coverage].sum())
-    marked = (response > MARKING).astype(np.uint8)
-    explained = _band(seen, camera.intrinsics.size, tolerance)
-    area_explained = np.count_nonzero(marked & explained)
-    area_beside = np.count_nonzero(marked & _pitch_area(pitch, camera) & ~explained)
-    beside = area_beside * found / area_explained if area_explained else float(area_beside)
-    return found / (expected + beside)
 
 
 def believable(deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate) -> list[Deviation]:
@@ -144,6 +122,7 @@ def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
             f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it ought "
             f"to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen anywhere); "
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
+            f"{_other_lines(result)}"
         )
     if result.residual_px is None or result.sigma is None:
         return f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?"
@@ -151,7 +130,7 @@ def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
     if result.residual_px > limit:
         return (
             f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
-            "check intrinsics and the field's measures"
+            f"check intrinsics and the field's measures{_other_lines(result)}"
         )
     if result.zoom is not None and zoomed_beyond_doubt(result, gate):
         return (
@@ -179,6 +158,18 @@ def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
     return None
 
 
+def _other_lines(result: CameraResult) -> str:
+    """What to do about lines that are not the venue's, where there are many."""
+    overlap = result.overlap
+    if overlap.unexpected < MUCH_UNEXPECTED:
+        return ""
+    return (
+        f"; the network finds {overlap.found:.0%} of the lines, and {overlap.unexpected:.0%} of what it takes for "
+        "lines on the pitch lies beside all of them: if another sport is painted there, list it in the field's "
+        "other_markings"
+    )
+
+
 def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:
     """Whether the lines contradict the focal length, and the pose with it."""
     sure = result.zoom is not None and is_sure(result.zoom, BEYOND_DOUBT)
@@ -190,44 +181,3 @@ def zoom_in_words(camera: Camera, zoom: Deviation) -> str:
     focal = camera.intrinsics.focal_length_px
     by = f"{abs(zoom.value) / focal:.2%} ± {zoom.sigma / focal:.2%}"
     return f"the lines fit a focal length {by} {'longer' if zoom.value > 0 else 'shorter'} than the venue says"
-
-
-def _strongest(response: NDArray[np.float32], distance: float) -> NDArray[np.float32]:
-    """The largest response (H, W) within `distance` of each pixel."""
-    size = 2 * round(distance) + 1
-    around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    return np.asarray(cv2.dilate(response, around), dtype=np.float32)
-
-
-def _rounded(pixels: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    x, y = np.rint(pixels).astype(np.intp).T
-    return y, x
-
-
-def _band(seen: SeenLines, size: tuple[int, int], tolerance: float) -> NDArray[np.uint8]:
-    """1 where a pixel is on an expected line or within `tolerance` of one."""
-    band = np.zeros((size[1], size[0]), dtype=np.uint8)
-    along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1) * seen.length_px[:, None] * 0.6
-    thickness = np.rint(seen.width_px + 2 * tolerance).astype(int)
-    starts, ends = (np.rint(16 * (seen.pixel + sign * along)).astype(int) for sign in (-1, 1))
-    for start, end, thick in zip(starts.tolist(), ends.tolist(), thickness.tolist(), strict=True):
-        cv2.line(band, start, end, 1, min(max(thick, 1), 255), shift=4)
-    return band
-
-
-def _pitch_area(pitch: Field, camera: Camera) -> NDArray[np.uint8]:
-    """1 inside the pitch and `AROUND_PITCH_M` around it, at an eighth of the picture's detail."""
-    coarse = camera.intrinsics.scaled(0.125)
-    width, height = coarse.size
-    x, y = np.meshgrid(np.arange(width), np.arange(height))
-    rays = Camera(camera.id, coarse, camera.pose).rays(np.stack([x, y], axis=-1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = -camera.pose.position[2] / rays[..., 2]
-        ground = camera.pose.position[:2] + distance[..., None] * rays[..., :2]
-        on_pitch = (
-            (distance > 0)
-            & (np.abs(ground[..., 0]) < pitch.length / 2 + AROUND_PITCH_M)
-            & (np.abs(ground[..., 1]) < pitch.width / 2 + AROUND_PITCH_M)
-        )
-    full = cv2.resize(on_pitch.astype(np.uint8), camera.intrinsics.size, interpolation=cv2.INTER_NEAREST)
-    return np.asarray(full, dtype=np.uint8)

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, inside
+from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.look import Mask, ground_grid, ground_view
 from worker.calibration.scene.motion import ground_slopes
@@ -130,7 +130,7 @@ def register_pair(
 def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
     """The pitch centre (2,) if both cameras see it, else the middle of the common markings around the nearest one."""
     points = np.concatenate([pitch.lift(np.zeros((1, 2))), pitch.line_points(0.5).position])
-    seen = np.all([inside(camera.project(points), camera.intrinsics.size) for camera in (first, second)], axis=0)
+    seen = np.all([camera.sees(camera.project(points)) for camera in (first, second)], axis=0)
     if not seen.any():
         return None
     if seen[0]:
@@ -148,9 +148,7 @@ def _directions_in_common(pitch: Field, first: Camera, second: Camera, centre: A
     nothing but a side line 10 m away.
     """
     lines = pitch.line_points(0.5)
-    seen = np.all(
-        [inside(camera.project(lines.position), camera.intrinsics.size) for camera in (first, second)], axis=0
-    )
+    seen = np.all([camera.sees(camera.project(lines.position)) for camera in (first, second)], axis=0)
     near = np.abs(lines.position[:, :2] - centre).max(axis=1) < FINE_HALF_M
     common = lines[seen & near]
     across = common.normal[:, :2]

@@ -15,6 +15,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from worker.calibration.scene.ignored import Ignored
+
 Array = NDArray[np.float64]
 Plane = NDArray[np.floating[Any]]
 """One coordinate of many points, in the precision of whoever asks."""
@@ -334,11 +336,12 @@ LENSES: Mapping[LensModel, type[Intrinsics]] = {"opencv": Intrinsics, "fisheye":
 
 @dataclass(frozen=True)
 class Camera:
-    """One camera of an installation: its lens and its pose."""
+    """One camera of an installation: its lens and its pose, and what of its picture is `ignored`."""
 
     id: str
     intrinsics: Intrinsics
     pose: Pose
+    ignored: Ignored | None = None
 
     def project(self, points: Array) -> Array:
         """World points (..., 3) to pixels (..., 2); NaN behind the camera and outside what the lens model covers."""
@@ -353,11 +356,16 @@ class Camera:
 
     def with_pose(self, pose: Pose) -> Camera:
         """The same lens elsewhere."""
-        return Camera(self.id, self.intrinsics, pose)
+        return Camera(self.id, self.intrinsics, pose, self.ignored)
 
     def with_lens(self, intrinsics: Intrinsics) -> Camera:
         """Another lens in the same place."""
-        return Camera(self.id, intrinsics, self.pose)
+        return Camera(self.id, intrinsics, self.pose, self.ignored)
+
+    def sees(self, pixels: Array) -> NDArray[np.bool_]:
+        """Which pixels (..., 2) lie in the picture where it is of use."""
+        within = inside(pixels, self.intrinsics.size)
+        return within if self.ignored is None else within & ~self.ignored.at(pixels, self.intrinsics.size)
 
 
 def project(points: Array, rotations: Array, positions: Array, intrinsics: Intrinsics) -> Array:

@@ -84,7 +84,7 @@ class Field:
     """A field of a sport, a football pitch unless said; `measures`: what else its template leaves open, in metres.
 
     `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. `dashed`: the size whose dashes its broken
-    lines have, as many and stretched with them; None = its own.
+    lines have, as many and stretched with them; None = its own. `others`: what else is painted there, of no use.
     """
 
     length: float
@@ -94,6 +94,7 @@ class Field:
     template: Template = FOOTBALL
     measures: Mapping[str, float] = field(default_factory=dict)
     dashed: Mapping[str, float] | None = None
+    others: Sequence[Shape] = ()
 
     def resized(self, *, length: float | None = None, width: float | None = None) -> Field:
         """The same pitch with another length or width, point by point: with as many dashes."""
@@ -175,6 +176,10 @@ class Field:
     def _size(self) -> dict[str, float]:
         return {"length": self.length, "width": self.width, "line": self.line_width, **self.measures}
 
+    def whole_names(self) -> list[str]:
+        """Of each of the markings the name of what is painted: the same for all dashes of a broken line."""
+        return [self.template.whole(marking.name) for marking in self.markings()]
+
     def places(self) -> dict[str, Array]:
         """Where the named points of the template are, (3,) each, on the surface."""
         return {name: self.lift(np.array(point)) for name, point in self.template.places(self._size).items()}
@@ -185,16 +190,32 @@ class Field:
 
     def line_points(self, spacing: float = 0.25) -> LinePoints:
         """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
-        return self._line_points([fitting(marking.centre, spacing) for marking in self.markings()], spacing)
+        if spacing not in self._drawn:
+            markings = self.markings()
+            counts = [fitting(marking.centre, spacing) for marking in markings]
+            self._drawn[spacing] = self._line_points(markings, counts, spacing)
+        return self._drawn[spacing]
+
+    @cached_property
+    def _drawn(self) -> dict[float, LinePoints]:
+        """The line points that have been asked for, by their spacing: dozens of times in a calibration."""
+        return {}
+
+    def other_points(self, spacing: float = 0.25) -> LinePoints | None:
+        """The same of what else is painted there, None where nothing is."""
+        others = [_marking(shape) for shape in self.others]
+        if not others:
+            return None
+        return self._line_points(others, [fitting(marking.centre, spacing) for marking in others], spacing)
 
     def same_line_points(self, others: LinePoints) -> LinePoints:
         """The points that are those of the pitch before it was `resized`: as many on each marking, as far along it."""
         counts: list[int] = np.bincount(others.marking).tolist()
-        return self._line_points(counts, others.spacing)
+        return self._line_points(self.markings(), counts, others.spacing)
 
-    def _line_points(self, counts: Sequence[int], spacing: float) -> LinePoints:
+    def _line_points(self, markings: Sequence[Marking], counts: Sequence[int], spacing: float) -> LinePoints:
         positions, tangents, widths, index = [], [], [], []
-        for number, (marking, count) in enumerate(zip(self.markings(), counts, strict=True)):
+        for number, (marking, count) in enumerate(zip(markings, counts, strict=True)):
             xy, along = equal_pieces(marking.centre, count)
             positions.append(xy)
             tangents.append(along)
@@ -208,7 +229,7 @@ class Field:
             self._in_surface(xy, across),
             np.concatenate(widths),
             which,
-            np.array([marking.colour for marking in self.markings()])[which],
+            np.array([marking.colour for marking in markings])[which],
             spacing,
         )
 

@@ -59,8 +59,9 @@ def ground_view(pitch: Field, camera: Camera, image: NDArray[Any], grid_xy: Arra
     `image`: uint8 or float32 (height, width[, C]) of the size of the camera's intrinsics. Values are means over about
     the area between the points of the grid where that is coarser than the image.
     """
-    seen = look_through(camera, image, camera.project(pitch.lift(grid_xy)))
-    return seen.values, seen.valid
+    pixels = camera.project(pitch.lift(grid_xy))
+    seen = look_through(camera, image, pixels)
+    return seen.values, seen.valid & camera.sees(pixels)
 
 
 def _footprint(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:

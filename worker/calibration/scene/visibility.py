@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, inside
+from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import LinePoints
 
 STEP_M = 0.05
@@ -37,7 +37,7 @@ class SeenLines:
     def from_camera(cls, lines: LinePoints, camera: Camera) -> SeenLines:
         """The points that fall into the picture."""
         pixel = camera.project(lines.position)
-        index = np.flatnonzero(inside(pixel, camera.intrinsics.size))
+        index = np.flatnonzero(camera.sees(pixel))
         lines, pixel = lines[index], pixel[index]
         along = (camera.project(lines.position + STEP_M * lines.tangent) - pixel) / STEP_M
         across = (camera.project(lines.position + STEP_M * lines.normal) - pixel) / STEP_M

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, inside, rotation_matrices
+from worker.calibration.scene.camera import Array, Camera, rotation_matrices
 from worker.calibration.scene.field import Field
 from worker.calibration.see.sampling import bilinear
 
@@ -138,7 +138,7 @@ class _Grid:
     def visible(self, camera: Camera) -> Binary:
         """255 where `camera` sees the ground."""
         pixels = camera.project(self.surface.reshape(-1, 3))
-        seen = inside(pixels, camera.intrinsics.size)
+        seen = camera.sees(pixels)
         return (255 * seen).astype(np.uint8).reshape(self.size[::-1])
 
     def template(self, pitch: Field) -> Binary:

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, Intrinsics, Plane, inside, project_planes
+from worker.calibration.scene.camera import Array, Camera, Intrinsics, Plane, project_planes
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.line_profile import blurred_line
@@ -102,8 +102,11 @@ class BlurredResponse:
 
     def minus(self, coarser: BlurredResponse) -> BlurredResponse:
         """The difference to a coarser blur of the same picture."""
-        size = (self.values.shape[1], self.values.shape[0])
-        difference = cv2.resize(coarser.values, size)
+        finer = coarser.shrink // self.shrink
+        height, width = self.values.shape
+        # Both were padded to whole pixels of their own size: only their upper left corners coincide.
+        size = (finer * coarser.values.shape[1], finer * coarser.values.shape[0])
+        difference = cv2.resize(coarser.values, size)[:height, :width]
         np.subtract(self.values, difference, out=difference)
         return BlurredResponse(np.asarray(difference, dtype=np.float32), self.shrink)
 
@@ -175,8 +178,8 @@ class StitchTerm:
     def build(cls, lines: LinePoints, first: BlurredView, second: BlurredView, i: int, j: int) -> StitchTerm | None:
         """The term for the cameras of index i and j; None where they share no markings."""
         both = lines[
-            inside(first.camera.project(lines.position), first.camera.intrinsics.size)
-            & inside(second.camera.project(lines.position), second.camera.intrinsics.size)
+            first.camera.sees(first.camera.project(lines.position))
+            & second.camera.sees(second.camera.project(lines.position))
         ]
         seen = SeenLines.from_camera(both, first.camera).thinned(max(first.sigma, 2.0))
         other = SeenLines.from_camera(seen.points, second.camera)

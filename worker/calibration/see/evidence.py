@@ -84,10 +84,16 @@ def _mean(values: Array | NDArray[np.bool_], weight: Array) -> float:
     return float(np.sum(values * weight)) / total if total else 0.0
 
 
-def evidence_of(lines: LinePoints, camera: Camera, channels: Channels, response: NDArray[np.float32]) -> Evidence:
+def evidence_of(
+    lines: LinePoints,
+    camera: Camera,
+    channels: Channels,
+    response: NDArray[np.float32],
+    left_out: NDArray[np.bool_] | None = None,
+) -> Evidence:
     """How much of `lines` the frame shows where the pose of `camera` puts them.
 
-    `channels` of the frame; `response` (H, W) the segmentation in 0..1.
+    `channels` of the frame; `response` (H, W) the segmentation in 0..1; `left_out` (H, W): where chance has no try.
     """
     scale = camera.intrinsics.relative_size
     tolerance, beside = max(TOLERANCE_PX * scale, 2.0), max(CHANCE_REACH_PX * scale, 24.0)
@@ -101,14 +107,17 @@ def evidence_of(lines: LinePoints, camera: Camera, channels: Channels, response:
         near = np.abs(looked.shifts) <= tolerance
         away = np.abs(looked.shifts) > min(2 * tolerance + pieces.width_px.max(initial=0) / 2, beside)
         # As many shifts at a time as there are around the expected place, and all that there are beside a wide line.
-        hits = _any_of(strength[:, away] >= 1, min(int(near.sum()), int(away.sum())))
+        tries = min(int(near.sum()), int(away.sum()))
+        hits = _any_of(strength[:, away] >= 1, tries)
         parts.append(
             Evidence(
                 pieces.index,
                 pieces.points.marking,
                 pieces.length_px * np.minimum(pieces.width_px, 1.0),
                 np.asarray((strength[:, near] >= 1).any(axis=1)),
-                hits.mean(axis=1),
+                hits.mean(axis=1)
+                if left_out is None
+                else _mean_of_tries(hits, _any_of(_inside(left_out, where[:, away]), tries)),
             )
         )
     return Evidence(*(np.concatenate(column) for column in zip(*(vars(part).values() for part in parts), strict=True)))
@@ -118,3 +127,17 @@ def _any_of(hit: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
     """Whether any of `count` neighbours is hit, for groups (M, G) of columns (M, S)."""
     groups = hit.shape[1] // count
     return np.asarray(hit[:, : groups * count].reshape(len(hit), groups, count).any(axis=2))
+
+
+def _inside(area: NDArray[np.bool_], pixels: Array) -> NDArray[np.bool_]:
+    """Which pixels (..., 2) lie in an area (H, W)."""
+    height, width = area.shape
+    column, row = (np.clip(np.rint(pixels[..., n]), 0, last - 1).astype(int) for n, last in ((0, width), (1, height)))
+    return area[row, column]
+
+
+def _mean_of_tries(hits: NDArray[np.bool_], not_tried: NDArray[np.bool_]) -> Array:
+    """How often (M,) the tries (M, G) of a piece that count hit; as often as those of the others where none does."""
+    tried = (~not_tried).sum(axis=1)
+    usual = float((hits & ~not_tried).sum()) / max(int(tried.sum()), 1)
+    return np.where(tried > 0, (hits & ~not_tried).sum(axis=1) / np.maximum(tried, 1), usual)

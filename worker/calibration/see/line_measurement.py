@@ -101,7 +101,8 @@ def measure_lines(
         for matches in match_lines(seen, channels, search_px, camera.intrinsics.relative_size)
     ]
     index, pixel, normal, px_per_metre, px_per_metre_up, length_px = map(np.concatenate, zip(*found, strict=True))
-    return Measurements(index, lines[index], pixel, normal, px_per_metre, px_per_metre_up, length_px)
+    measured = Measurements(index, lines[index], pixel, normal, px_per_metre, px_per_metre_up, length_px)
+    return measured if camera.ignored is None else measured[camera.sees(measured.pixel)]
 
 
 def _measured(

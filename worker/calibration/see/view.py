@@ -349,6 +349,7 @@ class _Ground:
             place = camera.pose.position[:2] + reach[..., None] * rays[..., :2]
             marked = pitch.line_points().position[:, :2]
             field = ((place > marked.min(axis=0)) & (place < marked.max(axis=0))).all(axis=-1)
+        field &= camera.sees(np.stack([column, row], axis=-1))
         inner = cv2.erode(field.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         distance = np.nan_to_num(reach * np.linalg.norm(rays, axis=-1))
         return cls(np.asarray(inner if inner.sum() >= FEWEST_CELLS else field), distance, cell)

@@ -16,7 +16,9 @@ from tests.worker.calibration.synthetic import (
     pair,
     pair_frames,
 )
-from worker.calibration.draw.overlays import EDGE_GAP, NEW_COLOUR, STORED_COLOUR, overlay
+from worker.calibration.draw.marked import ELSEWHERE_COLOUR, MISSING_COLOUR, NEW_COLOUR, worst
+from worker.calibration.draw.overlays import EDGE_GAP, STORED_COLOUR, overlay
+from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.scene.camera import Pose
 
 LEFT = pair()[0]
@@ -54,3 +56,15 @@ def test_an_overlay_of_a_pose_that_sees_no_pitch_is_the_frame_with_a_legend() ->
     assert (drawn[:400] == frame[:400]).all()
     assert (drawn[-80:] != frame[-80:]).any()
     assert cv2.absdiff(drawn, frame)[:, 300:].max() == 0
+
+
+def test_a_marking_that_is_elsewhere_or_missing_has_a_colour_and_words_of_its_own() -> None:
+    frame = pair_frames()[0]
+    circle = MarkingSeen("centre circle", 57.0, 1.0, 0.2, 0.01, "outside")
+    half_found = MarkingSeen("left goal line", 46.0, 0.3)
+    drawn = overlay((CROWNED, LEFT), (CROWNED, LEFT), frame, seen=[half_found, circle])
+    bare = overlay((CROWNED, LEFT), (CROWNED, LEFT), frame)
+    for colour, least in ((ELSEWHERE_COLOUR, 100), (MISSING_COLOUR, 60)):
+        near = [(np.abs(picture[:450] - np.array(colour)).max(axis=-1) < 40).sum() for picture in (drawn, bare)]
+        assert near[0] > near[1] + least
+    assert worst([half_found, MarkingSeen("near touchline", 20.0, 0.9), circle]) == [circle, half_found]

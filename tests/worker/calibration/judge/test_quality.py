@@ -5,17 +5,14 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, pair, pair_markings
+from tests.worker.calibration.synthetic import PITCH, moved, pair
 from worker.calibration.finish.uncertainty import Deviation, Sigma
-from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection, markings_iou
+from worker.calibration.judge.overlap import Overlap
+from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition, ViewFigures
 
 LEFT = pair(())[0]
-
-
-def scene():
-    return LEFT, pair_markings(())[0]
 
 
 def seen(share: float, by_chance: float = 0.2) -> Evidence:
@@ -41,44 +38,10 @@ def good():
         zoom=None,
         likelier=None,
         view=IN_VIEW,
-        iou=0.9,
+        overlap=Overlap(0.9, 0.95, 0.05),
         evidence_before=seen(0.3),
         moved=Movement(0.5, 0.1, 12.0),
     )
-
-
-def test_the_true_pose_explains_the_markings():
-    one, response = scene()
-    assert markings_iou(CROWNED, one, response) > 0.7
-
-
-def test_a_moved_pose_explains_fewer():
-    one, response = scene()
-    assert markings_iou(CROWNED, moved(one, (0.02, 0, 0)), response) < 0.4
-
-
-def test_markings_beside_the_expected_ones_count_against_a_pose():
-    one, response = scene()
-    cluttered = response.copy()
-    cluttered[300:330:4, 200:700] = 1
-    assert markings_iou(CROWNED, one, cluttered) < markings_iou(CROWNED, one, response)
-
-
-def test_what_is_off_the_pitch_does_not_count():
-    one, response = scene()
-    lettering = response.copy()
-    lettering[:60] = 1  # sky
-    assert markings_iou(CROWNED, one, lettering) == pytest.approx(markings_iou(CROWNED, one, response))
-
-
-def test_a_black_segmentation_explains_nothing():
-    one, response = scene()
-    assert markings_iou(CROWNED, one, np.zeros_like(response)) == 0
-
-
-def test_a_pose_that_sees_no_pitch_explains_nothing():
-    one, response = scene()
-    assert markings_iou(CROWNED, moved(one, (2.0, 0, 0)), response) == 0
 
 
 def test_a_good_result_passes_the_gate():
@@ -111,14 +74,20 @@ def test_the_gate_names_the_cause(change, cause):
     assert cause in alone_rejection(replace(good(), **change), Gate())
 
 
+def test_a_rejection_amid_lines_of_something_else_offers_to_list_them():
+    spoiled = replace(good(), evidence=seen(0.4), overlap=Overlap(0.4, 0.9, 0.56))
+    assert "56% of what it takes for lines on the pitch lies beside" in alone_rejection(spoiled, Gate())
+    assert "other_markings" in alone_rejection(spoiled, Gate())
+    assert "other_markings" not in alone_rejection(replace(spoiled, overlap=Overlap(0.4, 0.4, 0.1)), Gate())
+
+
 def test_a_doubt_of_the_focal_length_that_moves_no_camera_rejects_none():
     assert alone_rejection(replace(good(), zoom=ZOOMED, likelier=moved(LEFT, by=(0.05, 0.0, 0.0))), Gate()) is None
 
 
 def test_movement_is_told_in_degrees_metres_and_pixels():
-    one, _ = scene()
-    turned = Movement.between(PITCH, one, moved(one, by=(0.3, 0, 0.4)))
+    turned = Movement.between(PITCH, LEFT, moved(LEFT, by=(0.3, 0, 0.4)))
     assert turned.rotation_deg == pytest.approx(0)
     assert turned.position_m == pytest.approx(0.5)
     assert turned.pixels > 1
-    assert Movement.between(PITCH, one, one) == Movement(0.0, 0.0, 0.0)
+    assert Movement.between(PITCH, LEFT, LEFT) == Movement(0.0, 0.0, 0.0)

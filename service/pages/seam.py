@@ -1,0 +1,60 @@
+"""The curve of a seam as an SVG: how far apart two cameras put the same paint, from one end of it to the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from service.wire.results import PairResult
+
+WIDTH, HEIGHT, LEFT, BELOW, ABOVE = 480.0, 120.0, 34.0, 18.0, 8.0
+LEAST_TOP_CM = 5.0
+"""Errors that are harmless look harmless."""
+
+
+@dataclass(frozen=True)
+class Dot:
+    """A place of the seam in the box: its error, what is one sigma around it, and what to say of it."""
+
+    x: float
+    y: float
+    low: float
+    high: float
+    words: str
+    worst: bool
+
+
+@dataclass(frozen=True)
+class SeamCurve:
+    """Dots in a box of `WIDTH` x `HEIGHT`; `top_cm` is the error at its top, `base` the height of none."""
+
+    dots: list[Dot]
+    path: str
+    top_cm: float
+    base: float
+    top: float
+
+
+def seam_curve(pair: PairResult) -> SeamCurve | None:
+    """Of a pair of cameras, None where its seam has fewer than two places."""
+    places = pair.seam
+    if len(places) < 2:
+        return None
+    top_cm = max(LEAST_TOP_CM, *(place.error_cm + place.sigma_cm for place in places))
+    across, up = WIDTH - LEFT - 6, HEIGHT - BELOW - ABOVE
+
+    def height(error_cm: float) -> float:
+        return round(HEIGHT - BELOW - up * min(max(error_cm, 0.0) / top_cm, 1.0), 1)
+
+    dots = [
+        Dot(
+            round(LEFT + 4 + (across - 8) * number / (len(places) - 1), 1),
+            height(place.error_cm),
+            height(place.error_cm - place.sigma_cm),
+            height(place.error_cm + place.sigma_cm),
+            f"{place.error_cm:.1f} ± {place.sigma_cm:.1f} cm at ({place.at[0]:.0f}, {place.at[1]:.0f}) m",
+            place == pair.worst,
+        )
+        for number, place in enumerate(places)
+    ]
+    path = "M" + "L".join(f"{dot.x} {dot.y}" for dot in dots)
+    return SeamCurve(dots, path, round(top_cm, 1), height(0.0), height(top_cm))
