@@ -91,6 +91,12 @@ class Jobs(Repository):
             return None
         return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
 
+    def posed(self, job_id: str) -> Venue | None:
+        """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
+        with reading(self._engine) as connection:
+            found = found_poses(connection, job_id)
+        return None if found is None else with_result(*found)
+
     def frame(self, job_id: str, number: int) -> str | None:
         """Where a frame of a job lies in the blob store, counted through all of them; None: there is none."""
         query = sa.select(j.frames).where(j.id == job_id, j.frames_deleted_at.is_(None))
@@ -98,12 +104,6 @@ class Jobs(Repository):
             frames = connection.execute(query).scalar_one_or_none() or {}
         paths = [path for several in frames.values() for path in several]
         return paths[number] if number < len(paths) else None
-
-    def posed(self, job_id: str) -> Venue | None:
-        """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
-        with reading(self._engine) as connection:
-            found = found_poses(connection, job_id)
-        return None if found is None else with_result(*found)
 
     def check(self) -> None:
         """Raise unless the database answers, and has them."""
