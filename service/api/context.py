@@ -11,7 +11,7 @@ from service.api.programs.clicked_pose import ClickedPoses
 from service.api.programs.drawings import Drawings
 from service.api.shared_reads import SharedReads
 from service.api.uploads import Uploads
-from service.api.watch import Watch
+from service.api.watch import Places, Watch
 from service.home import Home
 from service.observe.metrics import Metrics
 from service.observe.readiness import Readiness
@@ -28,12 +28,19 @@ class Context(Home):
         silence_s = settings.takeover_after_s
         self.reads = SharedReads(self.jobs.get)
         self.watch = Watch(self.jobs.states)
+        self.watch_venues = Watch(self.following.newest)
+        self.followers = Places(settings.followers)
         self.metrics = Metrics(lambda: look(self.engine, settings.metrics_venues), self.disk, silence_s)
         self.readiness = Readiness(self.jobs, self.blobs, self.disk, self.workers, silence_s)
         self.gate = Gate(self.keys, self.sessions, settings)
         self.uploads = Uploads(settings)
         self.clicked_poses = ClickedPoses(settings)
         self.drawings = Drawings(settings, self.jobs, self.blobs)
+
+    def let_go(self) -> None:
+        """Let everybody go who waits for a job or follows a venue."""
+        self.watch.close()
+        self.watch_venues.close()
 
 
 async def _context(request: Request) -> Context:
