@@ -87,8 +87,8 @@ def scene(name: str, light: str | None = None) -> Scene:
     number = list(VENUES).index(name)
     rng = np.random.default_rng([7, number])
     pitch = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, crown], [18.5, 0.0, crown]]))
-    believed = [_camera(f"camera-{i}", *places, rng) for i, places in enumerate(_places(LAYOUTS[layout]))]
-    real = believed if matches else [_as_built(camera, rng) for camera in believed]
+    believed = placed_cameras(LAYOUTS[layout], rng)
+    real = believed if matches else [as_built(camera, rng) for camera in believed]
     drawn = Conditions.named(light or usual, np.random.default_rng([8, number]))
     conditions = replace(
         drawn,
@@ -114,8 +114,10 @@ def started(cameras: Sequence[Camera], rng: np.random.Generator, size: float = 1
     return [camera.with_pose(outdated(camera.pose, size * START_M, size * START_DEG, rng)) for camera in cameras]
 
 
-def _places(layout: Layout) -> list[tuple[np.ndarray, np.ndarray]]:
-    return [(np.array(p), np.array([*t, 0.0])) for p, t in zip(layout.positions, layout.targets, strict=True)]
+def placed_cameras(layout: Layout, rng: np.random.Generator) -> list[Camera]:
+    """The cameras of a layout, each with a lens of its own."""
+    places = zip(layout.positions, layout.targets, strict=True)
+    return [_camera(f"camera-{i}", np.array(p), np.array([*t, 0.0]), rng) for i, (p, t) in enumerate(places)]
 
 
 def _camera(name: str, position: np.ndarray, target: np.ndarray, rng: np.random.Generator) -> Camera:
@@ -127,7 +129,7 @@ def _camera(name: str, position: np.ndarray, target: np.ndarray, rng: np.random.
     return Camera(name, Intrinsics(matrix, np.array([k1, 0.92 * k1 * k1, 0, 0, 0]), SIZE), pose)
 
 
-def _as_built(camera: Camera, rng: np.random.Generator) -> Camera:
+def as_built(camera: Camera, rng: np.random.Generator) -> Camera:
     """The same camera with the lens it really has."""
     lens = camera.intrinsics
     matrix = lens.matrix.copy()

@@ -20,8 +20,8 @@ from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.left_out import of_use
-from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import reachable_regions
+from worker.calibration.see.steady import Sway, median, sways
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
 from worker.calibration.settle import CAPTURE_RAD, METHODS, Seen, Settled, Situation, ridges_of, settle, settle_without
 from worker.calibration.zoom import refit_zoomed
@@ -81,9 +81,10 @@ def look(
     require_markings_in_view(pitch, cameras)
     with journey.measuring("view"):
         views = [view_of(frames[camera.id], pitch, camera, usual.get(camera.id)) for camera in cameras]
+        swayed = {camera.id: sways(frames[camera.id], camera.intrinsics) for camera in cameras}
     with journey.measuring("segmentation"):
-        responses = segment_all(pitch, cameras, frames, segment, journey)
-    return Seen(views, Sight([Channels(frames[camera.id]) for camera in cameras], responses))
+        responses = segment_all(pitch, cameras, frames, swayed, segment, journey)
+    return Seen(views, Sight([Channels(frames[camera.id], swayed[camera.id]) for camera in cameras], responses))
 
 
 def agree(here: Situation, settled: Settled) -> tuple[Settled, Answer]:
@@ -155,10 +156,11 @@ def segment_all(
     pitch: Field,
     cameras: Sequence[Camera],
     frames: Mapping[str, Sequence[Frame]],
+    swayed: Mapping[str, Sequence[Sway]],
     segment: Segment,
     journey: Journey,
 ) -> list[Response]:
-    """The fused segmentation (H, W) of each camera, where its markings can be."""
+    """The fused segmentation (H, W) of each camera, where its markings can be; `swayed`: how its frames lie."""
     total = sum(len(frames[camera.id]) for camera in cameras)
     done = 0
     responses = []
@@ -169,7 +171,7 @@ def segment_all(
             journey.at("segmentation", done / total)
             seen.append(segment(frame, regions))
             done += 1
-        responses.append(of_use(camera, median(seen) / np.float32(255)))
+        responses.append(of_use(camera, median(seen, swayed[camera.id]) / np.float32(255)))
     return responses
 
 

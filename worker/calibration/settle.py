@@ -217,6 +217,8 @@ def settle(here: Situation) -> Settled:
 def settle_without(out: Collection[int], here: Situation, settled: Settled) -> Settled:
     """The same, but some of those that were finished together stay as they are, and the others finish without them."""
     together = [n for n in settled.together if n not in out]
+    if len(together) in (0, len(settled.together)):
+        return replace(settled, together=together)
     group = here.of(together)
     finished = group.finished([settled.begun[n] for n in together])
     results = dict(enumerate(settled.results)) | dict(zip(together, group.judged(finished), strict=True))

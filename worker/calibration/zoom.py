@@ -12,7 +12,7 @@ from dataclasses import replace
 from worker.calibration.finish.diagnosis import is_sure
 from worker.calibration.judge.quality import CameraResult, zoom_in_words, zoomed_beyond_doubt
 from worker.calibration.scene.camera import Camera
-from worker.calibration.settle import Settled, Situation
+from worker.calibration.settle import Settled, Situation, settle_without
 
 MOST_ROUNDS = 5
 ARRIVED = 0.25
@@ -24,12 +24,15 @@ WHAT_TO_DO = (
 
 
 def refit_zoomed(here: Situation, settled: Settled) -> Settled:
-    """The same, but those cameras that zoomed are where their lines put them with another focal length."""
-    results = [
-        (_refitted(here, number, result) or result) if _asks_for_it(here, result) else result
-        for number, result in enumerate(settled.results)
-    ]
-    return replace(settled, results=results)
+    """The same, but those cameras that zoomed are where their lines put them with another focal length.
+
+    What they say of their neighbours with the old one is wrong: the others are finished without them.
+    """
+    asking = [number for number, result in enumerate(settled.results) if _asks_for_it(here, result)]
+    found = {number: _refitted(here, number, settled.results[number]) for number in asking}
+    refitted = {number: result for number, result in found.items() if result is not None}
+    settled = settle_without(refitted, here, settled)
+    return replace(settled, results=[refitted.get(n, result) for n, result in enumerate(settled.results)])
 
 
 def _asks_for_it(here: Situation, result: CameraResult) -> bool:

@@ -104,7 +104,7 @@ def frames_form(options: type[BaseModel], *, required: bool = True) -> dict[str,
     return form(
         options,
         "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part to send several frames of a "
-        "camera, they are fused.",
+        "camera: they are laid onto each other, so that its shaking blurs no line, and what walks by vanishes.",
         required=required,
     )
 

@@ -12,6 +12,7 @@ from worker.calibration.calibrate import calibrate
 from worker.calibration.records import Calibration, Options
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.parameters import with_focal_length
+from worker.calibration.settle import Situation
 
 ZOOM = 0.015
 WIND = ((2e-4, -1e-4, 1e-4), (0.01, 0.0, -0.01))
@@ -68,6 +69,24 @@ def test_a_lens_that_may_drift_is_accepted_with_the_focal_length_it_has():
     assert found.accepted
     assert one.camera.intrinsics.matrix[0, 0] == pytest.approx(2000.0, abs=3 * one.zoom.sigma)
     assert off_m(found) < 3 * one.sigma.position_m
+
+
+def test_the_neighbours_of_a_camera_that_zoomed_are_finished_without_it(monkeypatch):
+    finished, finish = [], Situation.finished
+
+    def finishing(here, begun):
+        finished.append([one.id for one in begun])
+        return finish(here, begun)
+
+    monkeypatch.setattr(Situation, "finished", finishing)
+    beside = camera("beside", (-8.0, -62.0, 18.0), (4.0, 2.0), focal=1600.0, size=(1280, 720))
+    frames = {"tele": [picture()], "beside": [paint_frame(CROWNED, beside)]}
+    options = Options(seed=1, generations=60, lens_may_drift=True)
+    found = calibrate(CROWNED, [believed(0.003), moved(beside, *WIND)], frames, white_on_green, options)
+    assert found.accepted
+    assert [one.lens_found for one in found.cameras] == [True, False]
+    assert finished[0] == ["tele", "beside"]
+    assert finished[-1] == ["beside"]
 
 
 def test_a_camera_that_moved_has_not_zoomed():

@@ -13,10 +13,10 @@ import numpy as np
 
 from worker.calibration.finish.normal_equations import normal_equations
 from worker.calibration.finish.residuals import Unknowns, residuals
-from worker.calibration.finish.robust import Weigh
+from worker.calibration.finish.robust import Weigh, tukey_weights
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.ground import UNEVEN_M
+from worker.calibration.scene.ground import UNEVEN_M, Belief
 from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved
 from worker.calibration.see.line_measurement import Measurements
 
@@ -105,10 +105,10 @@ def step(
 
 
 def unevenness(
-    here: Estimate, measured: Sequence[Measurements], unknowns: Unknowns, stitch_weight: float, weigh: Weigh
+    here: Estimate, measured: Sequence[Measurements], unknowns: Unknowns, stitch_weight: float, before: Belief
 ) -> float:
-    """How uneven a ground the heights speak for, a standard deviation in metres."""
-    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, weigh)
+    """How uneven a ground the heights speak for, a standard deviation in metres; `before`: what was thought of it."""
+    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
     information = normal_equations(rows, unknowns).information + here.prior(unknowns)
     covariance = np.asarray(np.linalg.inv(information)[unknowns.dense :, unknowns.dense :], dtype=float)
-    return unknowns.ground.unevenness(here.heights, covariance, here.uneven_m)
+    return unknowns.ground.unevenness(here.heights, covariance, here.uneven_m, before)

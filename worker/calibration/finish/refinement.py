@@ -17,7 +17,7 @@ from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.finish.uncertainty import Finished, judged
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
+from worker.calibration.scene.ground import EVEN, MOST_UNEVEN_M, ORDINARY, UNEVEN_M, Ground
 from worker.calibration.scene.parameters import Parameter
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
@@ -77,12 +77,13 @@ def refine(
         here = _down_huber(here, cameras, measured, unknowns, stitch_weight)
         measured = doubted(here, measured)
         here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
-        uneven = unevenness(here, measured, unknowns, stitch_weight, tukey_weights)
+        uneven = unevenness(here, measured, unknowns, stitch_weight, EVEN)
         # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
         uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
         here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
         if here.farthest_from(before) < SETTLED_M:
             break
+    here = replace(here, uneven_m=unevenness(here, measured, unknowns, stitch_weight, ORDINARY))
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
     return _assessed(here, stored or cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
 

@@ -22,9 +22,21 @@ UNEVEN_M = 0.015
 """Standard deviation of the heights of an ordinary pitch."""
 MOST_UNEVEN_M = 0.02
 """More than that is not taken for a swell: a ground that may do anything explains any pose."""
-EVEN_M, EVEN_NODES = 0.004, 2.0
-"""How even a pitch is thought to be before it is seen, and how many nodes of evidence that is worth."""
 NUGGET = 1e-6
+
+
+@dataclass(frozen=True)
+class Belief:
+    """How uneven a pitch is thought to be before it is seen, and how many nodes of evidence that is worth."""
+
+    uneven_m: float
+    nodes: float
+
+
+EVEN = Belief(0.004, 2.0)
+"""Finds poses: what a flat ground explains is not owed to swells."""
+ORDINARY = Belief(UNEVEN_M, 8.0)
+"""Says how sure they are: a few lines that fit a flat ground do not show that the whole of it has not sunk."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +87,13 @@ class Ground:
         sums = np.bincount(pair.ravel(), both.ravel(), len(self) ** 2)
         return np.asarray(sums.reshape(len(self), len(self)), dtype=float)
 
-    def unevenness(self, heights: Array, covariance: Array, believed: float) -> float:
+    def unevenness(self, heights: Array, covariance: Array, believed: float, before: Belief) -> float:
         """The standard deviation that heights (K,) speak for, known to a covariance (K, K) under a `believed` one.
 
+        `before`: what was thought of it before.
         MacKay's evidence update (Bayesian Interpolation, 1992): what the data determined counts, the rest does not.
         """
         determined = len(self) - np.sum(self.precision * covariance) / believed**2
         power = heights @ self.precision @ heights
-        uneven = np.sqrt((power + EVEN_NODES * EVEN_M**2) / (max(determined, 0.0) + EVEN_NODES))
+        uneven = np.sqrt((power + before.nodes * before.uneven_m**2) / (max(determined, 0.0) + before.nodes))
         return float(uneven)

@@ -102,8 +102,11 @@ class BlurredResponse:
 
     def minus(self, coarser: BlurredResponse) -> BlurredResponse:
         """The difference to a coarser blur of the same picture."""
-        size = (self.values.shape[1], self.values.shape[0])
-        difference = cv2.resize(coarser.values, size)
+        finer = coarser.shrink // self.shrink
+        height, width = self.values.shape
+        # Both were padded to whole pixels of their own size: only their upper left corners coincide.
+        size = (finer * coarser.values.shape[1], finer * coarser.values.shape[0])
+        difference = cv2.resize(coarser.values, size)[:height, :width]
         np.subtract(self.values, difference, out=difference)
         return BlurredResponse(np.asarray(difference, dtype=np.float32), self.shrink)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fields.shapes import WHITE
 from worker.calibration.scene.camera import Frame
-from worker.calibration.see.sampling import median
+from worker.calibration.see.steady import Sway, median
 
 BLUE, GREEN, RED = range(3)
 CONTRASTS = tuple((channel, sign) for channel in (GREEN, RED, BLUE) for sign in (1, -1))
@@ -37,16 +37,20 @@ OPPOSES = 0.33
 
 
 class Channels:
-    """The colour channels of the frames of one camera: of several frames their median, without what walks by."""
+    """The colour channels of the frames of one camera: of several frames their median, without what walks by.
 
-    def __init__(self, frames: Sequence[Frame]) -> None:
+    `swayed`: how each of several lies beside that still view.
+    """
+
+    def __init__(self, frames: Sequence[Frame], swayed: Sequence[Sway] = ()) -> None:
         self._frames = frames
+        self._swayed = swayed
         self._read: dict[int, NDArray[np.float32]] = {}
 
     def __getitem__(self, channel: int) -> NDArray[np.float32]:
         """Brightness (H, W) 0..255 in one channel, read when it is first asked for."""
         if channel not in self._read:
-            self._read[channel] = median([frame[..., channel] for frame in self._frames])
+            self._read[channel] = median([frame[..., channel] for frame in self._frames], self._swayed)
         return self._read[channel]
 
 

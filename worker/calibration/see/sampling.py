@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +11,6 @@ from worker.calibration.scene.camera import Array, Plane
 ROW = 1024
 """cv2.remap takes maps of at most 32767 rows and columns: any number of points is laid out in rows of this length."""
 FAR_OUTSIDE = -1e6
-BAND_ROWS = 128
-
-
-def median(pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.float32]:
-    """The median (H, W) of pictures of one camera, in which what walks by vanishes; in bands, to bound the memory."""
-    if len(pictures) == 1:
-        return pictures[0].astype(np.float32)
-    still = np.empty(pictures[0].shape, dtype=np.float32)
-    for top in range(0, len(still), BAND_ROWS):
-        band = slice(top, top + BAND_ROWS)
-        still[band] = np.median([picture[band] for picture in pictures], axis=0)
-    return still
 
 
 def bilinear(image: NDArray[np.float32], pixels: Array, outside: float = 0.0) -> NDArray[np.float32]:

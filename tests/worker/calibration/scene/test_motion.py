@@ -27,9 +27,13 @@ def camera(name, x, height, target, roll_deg):
 
 
 def in_view(one):
-    """Points of the ground and above it that the camera sees."""
+    """Points of the ground and above it that the camera sees, and still does from a little beside.
+
+    Where a fisheye's field of view ends inside the picture, a point may be in view and no longer after a step.
+    """
     points = np.random.default_rng(0).uniform([-50, -34, 0], [50, 34, 2.5], size=(3000, 3))
-    return points[inside(one.project(points), SIZE, margin=5)]
+    points = points[inside(one.project(points), SIZE, margin=5)]
+    return points[np.isfinite(differences(lambda change: moved(one, change).project(points))).all(axis=(1, 2))]
 
 
 def differences(of):

@@ -110,3 +110,18 @@ def test_the_papers_objective_sees_a_crown_through_its_planes():
     with_roof = GroundObjective(CROWNED, cameras, responses, 0.5)
     without = GroundObjective(CROWNED.flat(), cameras, responses, 0.5)
     assert loss(with_roof, cameras) < loss(without, cameras)
+
+
+def test_the_size_of_a_picture_does_not_move_its_surround():
+    rng = np.random.default_rng(8)
+    whole = np.zeros((128, 192), dtype=np.float32)
+    whole[:117, :173] = rng.random((117, 173))
+    odd = whole[:117, :173]
+    bands = [
+        BlurredResponse.from_response(one, 4.0).minus(BlurredResponse.from_response(one, 16.0)) for one in (whole, odd)
+    ]
+    column, row = np.meshgrid(np.arange(0.0, 160.0, 7.0), np.arange(0.0, 110.0, 7.0))
+
+    of_whole, of_odd = (band.at(column, row) for band in bands)
+
+    assert of_odd == pytest.approx(of_whole, abs=1e-6)

@@ -10,6 +10,7 @@ from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
 from worker.calibration.see.contrast import BLUE, GREEN, RED, Channels, possible_signs
 from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.line_measurement import measure_lines
+from worker.calibration.see.steady import Sway
 
 WOOD, TURF, ICE = (60, 110, 170), (40, 120, 70), (235, 230, 225)
 PAINTS = {
@@ -89,6 +90,6 @@ def test_white_says_nothing_and_every_other_colour_something():
 
 def test_of_several_frames_each_channel_is_the_median():
     frames = [np.full((4, 5, 3), (value, 2 * value, 0), dtype=np.uint8) for value in (10, 12, 90)]
-    channels = Channels(frames)
+    channels = Channels(frames, [Sway(None)] * 3)
     assert (channels[BLUE] == 12).all()
     assert (channels[GREEN] == 24).all()

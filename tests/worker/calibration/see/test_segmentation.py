@@ -10,7 +10,6 @@ import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.worker.calibration.synthetic import CROWNED, camera, pair_frames
-from worker.calibration.see.sampling import median
 from worker.calibration.see.segmentation import (
     REGION_PX,
     Region,
@@ -133,12 +132,6 @@ def test_regions_do_not_overlap():
 def test_the_sky_is_not_looked_at():
     up = camera("left", (-1.0, -48.0, 12.0), (-20.0, 60.0), focal=1200, size=(1920, 1800))
     assert min(region.top for region in reachable_regions(CROWNED, up, 50)) > 500
-
-
-def test_what_walks_by_vanishes_from_several_frames():
-    responses = [np.full((10, 10), 200, dtype=np.uint8) for _ in range(3)]
-    responses[1][:, 5] = 0
-    np.testing.assert_array_equal(median(responses), 200)
 
 
 def test_painted_lines_are_found_and_grass_is_not(segmenter, picture):
