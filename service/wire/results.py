@@ -10,6 +10,7 @@ from service.wire.base import Id, Wire
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Intrinsics, Moved, Pose, Row
 from service.wire.options import Coordinates, Landmark
+from service.wire.refusals import address_of
 
 
 class Sigma(Wire):
@@ -66,6 +67,11 @@ class CameraResult(Wire):
     id: Id
     accepted: bool = Field(description="Whether the gate lets its pose replace the stored one.")
     rejected_because: str | None
+    refusal: str | None = Field(
+        None,
+        description="Where the service explains that reason: what it looks like and what to do.",
+        examples=["/refusals/residual"],
+    )
     pose: Pose
     intrinsics: Intrinsics | None = Field(None, description="With fit_focal_length: those the pose belongs to.")
     sigma: Sigma | None
@@ -165,10 +171,16 @@ class Result(Wire):
         """Those whose poses may replace the stored ones."""
         return [camera.id for camera in self.cameras if camera.accepted]
 
-    def refused(self, because: str) -> Result:
-        """The same result of which no pose is to hold, for a reason beside those of the gate."""
+    def refused(self, because: str, reason: str = "all-or-none") -> Result:
+        """The same result of which no pose is to hold, for a `reason` of `refusals` beside those of the gate."""
         cameras = [
-            camera.model_copy(update={"accepted": False, "rejected_because": camera.rejected_because or because})
+            camera.model_copy(
+                update={
+                    "accepted": False,
+                    "rejected_because": camera.rejected_because or because,
+                    "refusal": camera.refusal if camera.rejected_because else address_of(reason),
+                }
+            )
             for camera in self.cameras
         ]
         reasons = [because] if self.rejected_because is None else [self.rejected_because, because]

@@ -301,7 +301,7 @@ def judged_alone(
             stored, finished.each, seen.views, seen.sight.channels, seen.sight.responses, strict=True
         )
     ]
-    return [replace(result, rejected_because=alone_rejection(result, gate)) for result in results]
+    return [replace(result, refusal=alone_rejection(result, gate)) for result in results]
 
 
 def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:

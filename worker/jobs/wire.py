@@ -19,6 +19,7 @@ from service.wire.geometry import Moved
 from service.wire.job import JobError, Progress
 from service.wire.options import FieldOptions, Options
 from service.wire.problems import KINDS, type_of
+from service.wire.refusals import address_of
 from service.wire.results import (
     AnyResult,
     CameraResult,
@@ -194,6 +195,7 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
         id=found.camera.id,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
+        refusal=None if found.refusal is None else address_of(found.refusal.reason),
         pose=wire_pose(found.camera.pose),
         intrinsics=lens,
         sigma=_sigma(found.sigma),

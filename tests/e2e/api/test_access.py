@@ -20,7 +20,15 @@ from tests.e2e.running import Service, keys_in, png, upload, venue, wait_for
 
 SCOPES = ("read", "calibrate", "admin")
 # What the service can do is no secret.
-OPEN = {"/livez", "/readyz", "/problems/{kind}", "/docs", "/docs/rapidoc-min.js", "/docs/LICENSE.txt"}
+OPEN = {
+    "/livez",
+    "/readyz",
+    "/problems/{kind}",
+    "/refusals/{reason}",
+    "/docs",
+    "/docs/rapidoc-min.js",
+    "/docs/LICENSE.txt",
+}
 # The way to sign in, and what it is drawn with.
 OPEN |= {"/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
 NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "PATCH": "admin", "DELETE": "admin"}
