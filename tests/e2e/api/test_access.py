@@ -33,7 +33,12 @@ OPEN = {
 OPEN |= {"/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
 NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "PATCH": "admin", "DELETE": "admin"}
 # Pages that show nothing but how to change something, and a question that takes a body.
-OTHERWISE = {"/ui/venues/{venue_id}/calibrate": "calibrate", "/ui/new-venue": "admin", "/ui/new-venue/plan": "read"}
+OTHERWISE = {
+    "/ui/venues/{venue_id}/calibrate": "calibrate",
+    "/ui/venues/{venue_id}/ignore": "admin",
+    "/ui/new-venue": "admin",
+    "/ui/new-venue/plan": "read",
+}
 JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"
 
 
@@ -83,7 +88,13 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
         (method,) = route.methods
         needed = None if route.path in OPEN else OTHERWISE.get(route.path, NEEDED[method])
         path = route.path.replace(":path", "").format(
-            job_id=JOB, venue_id="nowhere", camera="left", kind="not-found", of_edition="0", path="page.css"
+            job_id=JOB,
+            venue_id="nowhere",
+            camera="left",
+            kind="not-found",
+            reason="lines",
+            of_edition="0",
+            path="page.css",
         )
         for caller in (None, *SCOPES):
             answer = guarded.http.request(method, path, headers=bearer(key[caller]) if caller else {})
