@@ -7,11 +7,16 @@ import os
 # busy with tests. What the tests start inherits it.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
+import hypothesis
 import pytest
 
 from service.store.engine import connect, migrate
 from tests.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
 from tests.worker.stock import Stock
+
+# How long an example takes says how busy the machine is, not whether the property holds.
+hypothesis.settings.register_profile("esc", deadline=None)
+hypothesis.settings.load_profile("esc")
 
 # What tests can do without, and how to enable those that cannot.
 PARTS = {

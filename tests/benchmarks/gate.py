@@ -37,7 +37,7 @@ PITCH = Field(105.0, 68.0, 0.12, RIDGE)
 ROW = Layout([(-0.5, -50.0, 14.0), (0.0, -50.0, 14.0), (0.5, -50.0, 14.0)], [(-42, -5), (0, -5), (42, -5)])
 RIGS = {"one": LAYOUTS["one"], "pair": LAYOUTS["pair"], "row of three": ROW, "four": LAYOUTS["four"]}
 STARTS = {"wind": (0.02, 0.05), "paper": (0.162, 2.1)}
-HANDBALL = Field(90.0, 50.0, 0.12, template=load("handball"))
+HANDBALL = Field(90.0, 50.0, 0.12, RIDGE, load("handball"))
 SIGMAS, FARTHEST_M = 3.0, 0.3
 LONGER = 0.08
 TARPAULIN = (90.0, 60.0, 40.0)

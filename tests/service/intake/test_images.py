@@ -3,7 +3,7 @@ from contextlib import suppress
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from service.intake import images
@@ -65,7 +65,6 @@ def test_the_orientation_in_the_exif_data_turns_nothing(orientation):
     check(whole[:2] + exif + whole[2:])
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=300), st.sampled_from(sorted(ENCODINGS)), st.integers(0, 400))
 def test_whatever_comes_a_problem_is_the_worst(garbage, kind, position):
     whole = encoded(kind)

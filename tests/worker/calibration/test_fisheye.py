@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame
@@ -59,7 +59,6 @@ def test_the_ray_of_a_rays_pixel_is_that_ray(distortion, angle, turn):
     np.testing.assert_allclose(ours.undistort(ours.distort(ray)), ray, atol=1e-7 * (1 + ray @ ray))
 
 
-@settings(deadline=None)
 @given(terms, st.floats(5, 30), st.floats(-40, 40))
 def test_the_ray_through_a_projected_point_meets_the_point_again(distortion, height, aside):
     dome = Camera("dome", lens(distortion), Pose.looking_at([aside, -45, height], [0, 0, 0]))

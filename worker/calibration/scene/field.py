@@ -190,8 +190,16 @@ class Field:
 
     def line_points(self, spacing: float = 0.25) -> LinePoints:
         """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
-        markings = self.markings()
-        return self._line_points(markings, [fitting(marking.centre, spacing) for marking in markings], spacing)
+        if spacing not in self._drawn:
+            markings = self.markings()
+            counts = [fitting(marking.centre, spacing) for marking in markings]
+            self._drawn[spacing] = self._line_points(markings, counts, spacing)
+        return self._drawn[spacing]
+
+    @cached_property
+    def _drawn(self) -> dict[float, LinePoints]:
+        """The line points that have been asked for, by their spacing: dozens of times in a calibration."""
+        return {}
 
     def other_points(self, spacing: float = 0.25) -> LinePoints | None:
         """The same of what else is painted there, None where nothing is."""

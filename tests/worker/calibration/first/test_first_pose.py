@@ -65,7 +65,7 @@ def far(found, camera=CAMERA):
     )
 
 
-@settings(deadline=None, max_examples=5)
+@settings(max_examples=5)
 @given(st.floats(-30, 30), st.floats(4, 25), st.floats(-25, 25), st.floats(-3, 3))
 def test_the_pose_of_a_camera_anywhere_beside_the_pitch_is_found(aside, height, target, roll):
     camera = CAMERA.with_pose(Pose.looking_at([aside, -46.0, height], [target, 0.0, 0.0], roll))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from worker.calibration.scene.camera import (
@@ -75,7 +75,6 @@ def test_projection_is_opencvs_for_every_length_of_the_distortion(length):
     np.testing.assert_allclose(ours, theirs[:, 0], atol=1e-8)
 
 
-@settings(deadline=None)
 @given(
     st.tuples(st.floats(-0.4, 0.1), st.floats(0, 0.15), st.floats(-2e-3, 2e-3), st.floats(-2e-3, 2e-3)),
     st.floats(5, 40),

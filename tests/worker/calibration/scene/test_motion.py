@@ -31,7 +31,7 @@ def in_view(one):
 
     Where a fisheye's field of view ends inside the picture, a point may be in view and no longer after a step.
     """
-    points = np.random.default_rng(0).uniform([-50, -34, 0], [50, 34, 2.5], size=(3000, 3))
+    points = np.random.default_rng(0).uniform([-50, -34, 0], [50, 34, 2.5], size=(600, 3))
     points = points[inside(one.project(points), SIZE, margin=5)]
     return points[np.isfinite(differences(lambda change: moved(one, change).project(points))).all(axis=(1, 2))]
 
