@@ -120,7 +120,9 @@ class PairResult(Wire):
     seam: list[SeamPlace] = Field(
         description="All along what both see, by the lines that both have measured, from end to end; at most 24 places."
     )
-    worst: SeamPlace | None = Field(description="The place of the seam whose error is surely the largest.")
+    worst: SeamPlace | None = Field(
+        description="The place of the seam with the largest error, but for those that are hardly measured."
+    )
 
 
 class Provenance(Wire):

@@ -313,7 +313,7 @@ def _given_way(
     """
     by_sigma = np.concatenate([slopes, rises], axis=1) / measured.sigma_px[:, None]
     weighted = by_sigma * weight[:, None]
-    information = np.einsum("mi,mj->ij", weighted, by_sigma)
+    information = weighted.T @ by_sigma
     information[:POSE_NUMBERS, :POSE_NUMBERS] += np.diag([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3)
     information[POSE_NUMBERS:, POSE_NUMBERS:] += ground.precision / uneven_m**2
     return np.asarray(np.linalg.solve(information, weighted.T)[:POSE_NUMBERS])
