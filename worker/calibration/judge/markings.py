@@ -1,8 +1,9 @@
 """What is seen of each marking: how much of it is found, and how far its paint lies from where the venue has it.
 
 The pose follows all lines, so one that is elsewhere pulls it along and looks nearer than it is. How far the pose gives
-way is known, and put back. Sigma has what makes the pieces of a line differ, and how far the ground under all of it may
-swell; what moves all of a line by more (paint, a measure of the venue, its crown) is its offset.
+way is known, and put back. Sigma has what makes the pieces of a line differ, how far the ground under all of it may
+swell, and what the lens may have wrong; what moves all of a line by more is its offset: paint, a measure of the venue,
+its crown.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from worker.calibration.finish.estimate import PRIOR_M, PRIOR_RAD
 from worker.calibration.finish.normal_equations import CLUSTER_POINTS, LEAST_NOISE
 from worker.calibration.finish.robust import tukey_weights
 from worker.calibration.finish.uncertainty import FinishedCamera
-from worker.calibration.scene.camera import Array
+from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import Ground
 from worker.calibration.scene.motion import POSE_NUMBERS, pixel_slopes
+from worker.calibration.scene.parameters import LensParameter, lens_parameters
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.line_measurement import Measurements, measure_lines
 
@@ -213,8 +215,9 @@ class _Offsets:
     """Measured points M of one camera: which `group` of markings they are of and which `patch` of line.
 
     `offset` (M,) px along their normals, `scale` (M,) px per metre, `sigma` (M,) px; `slopes` (M, 6) of the offset by
-    the pose, and what the pose `gives` (6, M): how it moves for an offset of one sigma there; `swells` (M, K): how far
-    they seem to move across their lines for a swell of one standard deviation, by independent parts of the ground.
+    the pose, and what the pose `gives` (6, M): how it moves for an offset of one sigma there; `alike` (M, C): how far
+    they seem to move across their lines, m, by one standard deviation of what moves many of them: parts of the ground
+    and numbers of the lens.
     """
 
     group: NDArray[np.intp]
@@ -224,7 +227,7 @@ class _Offsets:
     sigma: Array
     slopes: Array
     gives: Array
-    swells: Array
+    alike: Array
 
     @classmethod
     def of(
@@ -244,10 +247,13 @@ class _Offsets:
         rises = _rises(ground, measured)
         gives = _given_way(ground, rises, measured, slopes, tukey_weights(offset / sigma), found.uneven_m)
         swell = found.uneven_m * np.linalg.cholesky(np.linalg.inv(ground.precision))
-        swells = rises @ swell / measured.px_per_metre[:, None]
+        by_lens = _by_lens(camera, here[known], measured)
+        # The pose follows what a lens has wrong: what of it is left moves lines.
+        by_lens = by_lens - slopes @ (gives @ (by_lens / sigma[:, None]))
+        alike = np.concatenate([rises @ swell, by_lens], axis=1) / measured.px_per_metre[:, None]
         of_group = group[lines.marking[measured.index]]
         patch = np.unique(np.stack([of_group, measured.index // CLUSTER_POINTS]), axis=1, return_inverse=True)[1]
-        return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, slopes, gives, swells)
+        return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, slopes, gives, alike)
 
     def means(self) -> _Means:
         """Where the paint of each group is by what is measured of it."""
@@ -262,9 +268,9 @@ class _Offsets:
             own = float(np.sum(pulls**2)) * (further + 1)
             spread = (own + USUAL_COUNTS * usual * told) / (further + USUAL_COUNTS)
             spread += LEAST_NOISE * float(np.sum(weight**2 * (self.sigma[its] / self.scale[its]) ** 2))
-            swell = weight @ self.swells[its] / told
+            alike = weight @ self.alike[its] / told
             mean.append(middle)
-            variance.append(spread / told**2 + float(swell @ swell))
+            variance.append(spread / told**2 + float(alike @ alike))
             says.append((weight / self.scale[its]) @ self.slopes[its] / told)
         moves = [self.gives[:, self.group == n] @ (self.scale / self.sigma)[self.group == n] for n in numbers]
         carried = np.array(says).reshape(-1, POSE_NUMBERS) @ np.array(moves).reshape(-1, POSE_NUMBERS).T
@@ -302,6 +308,16 @@ def _rises(ground: Ground, measured: Measurements) -> Array:
     row = np.arange(len(measured))[:, None]
     np.add.at(heights, (row, ground.node[measured.index]), ground.share[measured.index])
     return np.asarray(measured.px_per_metre_up[:, None] * heights)
+
+
+def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
+    """How far (M, C), in px along their normals, points (M, 3) move for one sigma of each number of the lens."""
+    moves = []
+    for number in lens_parameters([camera]):
+        assert isinstance(number, LensParameter)
+        ahead, behind = (number.changed(camera, sign * number.step).project(points) for sign in (1, -1))
+        moves.append(number.expected * np.sum((ahead - behind) * measured.normal, axis=1) / (2 * number.step))
+    return np.nan_to_num(np.stack(moves, axis=1))
 
 
 def _given_way(
