@@ -23,8 +23,7 @@ from service.routes.contract.guarded import Guarded
 from service.store.engine import AWAY
 from service.store.keys import Key
 from service.wire.base import Scope
-from service.wire.problems import KINDS, Problem
-from service.wire.refusals import REASONS
+from service.wire.problems import KINDS, REASONS, Problem
 
 SIGN_IN = "/ui/sign-in"
 # Scripts, styles and pictures are files of this service; nothing inline, nobody frames it.

@@ -12,8 +12,7 @@ from service.api.context import InContext
 from service.routes.contract.documented import FOR_ALL, needs, problems
 from service.routes.contract.guarded import Guarded
 from service.wire.health import Health
-from service.wire.problems import KINDS, Problem, type_of
-from service.wire.refusals import DOCUMENT, REASONS, address_of
+from service.wire.problems import DOCUMENT, KINDS, REASONS, Problem, refusal_of, type_of
 
 router = APIRouter(tags=["health"], route_class=Guarded)
 
@@ -59,7 +58,7 @@ async def explain_refusal(reason: Annotated[str, Path(max_length=64)]) -> dict[s
         raise Problem("not-found", f"The reasons of refusals are {', '.join(REASONS)}.")
     known = REASONS[reason]
     return {
-        "refusal": address_of(reason),
+        "refusal": refusal_of(reason),
         "title": known.title,
         "looks_like": known.looks_like,
         "do": known.do,

@@ -10,7 +10,7 @@ from service.wire.base import Id, Wire
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Intrinsics, Moved, Pose, Row
 from service.wire.options import Coordinates, Landmark
-from service.wire.refusals import address_of
+from service.wire.problems import refusal_of
 
 
 class Sigma(Wire):
@@ -174,13 +174,13 @@ class Result(Wire):
         return [camera.id for camera in self.cameras if camera.accepted]
 
     def refused(self, because: str, reason: str = "all-or-none") -> Result:
-        """The same result of which no pose is to hold, for a `reason` of `refusals` beside those of the gate."""
+        """The same result of which no pose is to hold, for one of `problems.REASONS` beside those of the gate."""
         cameras = [
             camera.model_copy(
                 update={
                     "accepted": False,
                     "rejected_because": camera.rejected_because or because,
-                    "refusal": camera.refusal if camera.rejected_because else address_of(reason),
+                    "refusal": camera.refusal if camera.rejected_because else refusal_of(reason),
                 }
             )
             for camera in self.cameras

@@ -18,8 +18,7 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Moved
 from service.wire.job import JobError, Progress
 from service.wire.options import FieldOptions, Options
-from service.wire.problems import KINDS, type_of
-from service.wire.refusals import address_of
+from service.wire.problems import KINDS, refusal_of, type_of
 from service.wire.results import (
     AnyResult,
     CameraResult,
@@ -195,7 +194,7 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
         id=found.camera.id,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
-        refusal=None if found.refusal is None else address_of(found.refusal.reason),
+        refusal=None if found.refusal is None else refusal_of(found.refusal.reason),
         pose=wire_pose(found.camera.pose),
         intrinsics=lens,
         sigma=_sigma(found.sigma),

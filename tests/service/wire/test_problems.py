@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from service.wire.refusals import DOCUMENT, REASONS, address_of
+from service.wire.problems import DOCUMENT, REASONS, refusal_of
 from worker.calibration.judge import quality
 
 ROOT = Path(__file__).parents[3]
@@ -25,4 +25,4 @@ def test_every_reason_of_the_gate_is_explained():
 def test_every_reason_has_its_part_of_the_document(reason):
     assert REASONS[reason].anchor in anchors()
     assert f"`{reason}`" in (ROOT / DOCUMENT).read_text()
-    assert address_of(reason) == f"/refusals/{reason}"
+    assert refusal_of(reason) == f"/refusals/{reason}"
