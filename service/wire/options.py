@@ -27,6 +27,11 @@ class Options(Handling):
     model_config = ConfigDict(json_schema_extra={"examples": [{"preset": "esc", "seed": 7, "dry_run": True}]})
 
     preset: Literal["esc", "paper", "scpr"] = "esc"
+    search: Literal["auto", "wide"] = Field(
+        "auto",
+        description="auto looks first whether the cameras stand almost where they stood, which takes no search; wide "
+        "searches in any case.",
+    )
     seed: Annotated[Whole, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
     generations: Annotated[Whole, Field(ge=1, le=2000)] = Field(100, description="G of the paper.")
     parents: Annotated[Whole, Field(ge=2, le=4096)] = Field(64, description="μ of the paper.")

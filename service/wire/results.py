@@ -165,6 +165,9 @@ class Result(Wire):
     pairs: list[PairResult] = Field([], description="The cameras that were compared, two by two.")
     loss: float | None
     generations: int
+    path: Literal["near", "wide"] = Field(
+        "wide", description="Whether the poses were found near the stored ones, or by a search."
+    )
     timings_s: dict[str, float]
     provenance: Provenance
 

@@ -21,6 +21,7 @@ from worker.calibration.judge.pairs import (
 from worker.calibration.judge.quality import CameraResult, Gate, believable, ridge_rejection
 from worker.calibration.judge.registration import Response
 from worker.calibration.judge.seam import seam_between
+from worker.calibration.nearby import settle_nearby
 from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
@@ -60,7 +61,8 @@ def calibrate(
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey, usual)
     here = Situation(method, pitch, cameras, seen, options, journey)
-    settled, answer = agree(here, refit_zoomed(here, settle(here)))
+    near = look_nearby(here) if options.search == "auto" else None
+    settled, answer = near or agree(here, refit_zoomed(here, settle(here)))
     with journey.measuring("quality"):
         evidence_before = [one.evidence_before for one in answer.cameras]
         stored = [Seeing(*each) for each in zip(cameras, seen.sight.responses, evidence_before, strict=True)]
@@ -68,11 +70,12 @@ def calibrate(
         loss = here.loss_of(answer.pitch, [one.camera for one in answer.cameras])
         journey.at("refinement", 1.0)
     return Calibration(
-        **vars(answer),
+        **vars(answer) | {"timings_s": {**answer.timings_s, "evolution": answer.timings_s.get("evolution", 0.0)}},
         stitch_error_before_px=stitch_error_px(before, Gate()),
         loss=loss,
         generations=settled.generations,
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
+        path="wide" if near is None else "near",
     )
 
 
@@ -92,6 +95,15 @@ def look(
     with journey.measuring("segmentation"):
         responses = segment_all(pitch, cameras, frames, swayed, segment, journey)
     return Seen(views, Sight([Channels(frames[camera.id], swayed[camera.id]) for camera in cameras], responses))
+
+
+def look_nearby(here: Situation) -> tuple[Settled, Answer] | None:
+    """The answer where all cameras are found near their stored poses and agree; None where a search is needed."""
+    settled = settle_nearby(replace(here, journey=here.journey.unreported()))
+    if settled is None:
+        return None
+    answer = judge(settled.pitch, settled.results, here.seen.sight, here.journey)
+    return (settled, answer) if answer.accepted else None
 
 
 def agree(here: Situation, settled: Settled) -> tuple[Settled, Answer]:

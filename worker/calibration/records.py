@@ -21,6 +21,8 @@ from worker.calibration.see.segmentation import Region
 
 Preset = Literal["esc", "paper", "scpr"]
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
+Search = Literal["auto", "wide"]
+Path = Literal["near", "wide"]
 Verdict = Literal["accepted", "partly", "rejected"]
 
 SHARE_OF_JOB = {"segmentation": (0.0, 0.65), "evolution": (0.65, 0.85), "refinement": (0.85, 0.92)}
@@ -38,11 +40,13 @@ class Segment(Protocol):
 class Options:
     """What a caller may choose; in the paper mu, lambda, G and the trade-off lambda of section III.
 
+    `search`: `auto` looks first whether the cameras stand almost where they stood, `wide` searches in any case.
     `fit_focal_length`: of each camera, as heat changes it; `fit_ridge`: its height; `lens_may_drift`: whether a pose
     may be accepted with another focal length than the stored one. All are for preset `esc`.
     """
 
     preset: Preset = "esc"
+    search: Search = "auto"
     seed: int = 0
     generations: int = 100
     parents: int = 64
@@ -93,12 +97,16 @@ class Answer:
 
 @dataclass(frozen=True)
 class Calibration(Answer):
-    """The answer to frames: new poses. `suspicions`: what the lines contradict of what was given."""
+    """The answer to frames: new poses. `suspicions`: what the lines contradict of what was given.
+
+    `path`: whether they were found `near` their stored poses, or by a search (`wide`).
+    """
 
     stitch_error_before_px: float | None
     loss: float
     generations: int
     suspicions: Sequence[Suspicion]
+    path: Path
 
 
 class CalibrationError(Exception):
@@ -123,6 +131,12 @@ class Journey:
         self.stop = stop
         self.seconds: dict[str, float] = {}
         self.fraction = 0.0
+
+    def unreported(self) -> Journey:
+        """The same journey for what may be done in vain: its time counts, and nobody is told of it."""
+        aside = Journey(lambda _: None, self.stop)
+        aside.seconds = self.seconds
+        return aside
 
     @contextmanager
     def measuring(self, stage: str) -> Iterator[None]:

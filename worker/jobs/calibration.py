@@ -76,6 +76,7 @@ def _result(
         pairs=[wire_pair(*pair) for pair in found.pairs],
         loss=number(found.loss),
         generations=found.generations,
+        path=found.path,
         timings_s=dict(timings_s),
         provenance=provenance,
     )

@@ -7,6 +7,7 @@ from service.wire.options import Options
 def test_options_have_the_documented_defaults():
     assert Options().model_dump(exclude_none=True) == {
         "preset": "esc",
+        "search": "auto",
         "generations": 100,
         "parents": 64,
         "offspring": 128,

@@ -84,7 +84,7 @@ def asked(monkeypatch):
         ]
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
-        return engine.Calibration(pitch, results, against, 0.2, {"evolution": 1.0}, None, 0.1, 3, [doubt])
+        return engine.Calibration(pitch, results, against, 0.2, {"evolution": 1.0}, None, 0.1, 3, [doubt], "near")
 
     class Segmenter:
         sha256 = "f" * 64
