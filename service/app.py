@@ -18,7 +18,7 @@ from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
 from service.pages import ROUTERS as PAGES
-from service.routes import docs, health, jobs, pictures, snapshot, venues
+from service.routes import docs, following, health, jobs, pictures, snapshot, venues
 from service.routes.contract import documented
 from service.routes.submissions import again, frames, intrinsics, locate
 from service.settings import Settings
@@ -53,9 +53,10 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(HttpDefaults)
     documented.document_callback(app)
     documented.document_alarms(app)
+    documented.document_events(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, snapshot, frames, intrinsics, locate, jobs, again, pictures, health, docs):
+    for routes in (venues, following, snapshot, frames, intrinsics, locate, jobs, again, pictures, health, docs):
         app.include_router(routes.router)
     for router in PAGES:
         app.include_router(router)
@@ -65,7 +66,8 @@ def create_app(settings: Settings) -> FastAPI:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
-    beside = [asyncio.create_task(context.watch.run()), asyncio.create_task(context.gate.run())]
+    duties = (context.watch.run, context.watch_venues.run, context.gate.run)
+    beside = [asyncio.create_task(duty()) for duty in duties]
     yield
     for task in beside:
         task.cancel()

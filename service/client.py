@@ -33,6 +33,7 @@ from service.wire.venue import Venue, VenueIn, Venues
 TIMEOUT_S = 75
 # How long a service may be away from somebody who follows a job: a restart, a database that comes back.
 PATIENCE_S = 60.0
+NOT_INSTALLED = "/problems/extra-missing"
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -40,14 +41,20 @@ T = TypeVar("T")
 class Refused(Exception):  # noqa: N818
     """The service answered with a problem: `members` are its JSON object.
 
-    `busy`: trying the same again later can help. Of conflicts, those that the service gives a time for (Retry-After).
+    `busy`: trying the same again later can help. Of conflicts, those that the service gives a time for (Retry-After);
+    and what a proxy says that does not reach the service.
     """
 
     def __init__(self, status: int, members: Mapping[str, Any], retry_after: str | None = None) -> None:
         super().__init__(f"{members.get('title', 'Refused')}: {members.get('detail', '')}")
         self.status = status
         self.members = members
-        self.busy = status in (429, 503) or (status == 409 and retry_after is not None)
+        self.busy = (
+            status == 429
+            or (status == 409 and retry_after is not None)
+            or (status == 503 and members.get("type") != NOT_INSTALLED)
+            or (status in (502, 504) and "type" not in members)
+        )
 
 
 class AsyncClient:
@@ -326,7 +333,8 @@ class Client:
 
 def _connection(url: str, api_key: str | None) -> dict[str, Any]:
     headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
-    return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S}
+    # Where there is no TLS, the certificates of all authorities need not be read, which takes as long as a request.
+    return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S, "verify": not url.startswith("http://")}
 
 
 def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:

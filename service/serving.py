@@ -99,7 +99,7 @@ class _Server(uvicorn.Server):
                 timeout_graceful_shutdown=GRACE_S,
             )
         )
-        self._watch = app.state.context.watch
+        self._context = app.state.context
         self._settings = settings
 
     async def on_tick(self, counter: int) -> bool:
@@ -111,7 +111,7 @@ class _Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop answering."""
-        self._watch.close()
+        self._context.let_go()
         await super().shutdown(sockets)
 
 

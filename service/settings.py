@@ -61,6 +61,7 @@ class Settings(BaseSettings):
     # What a client may send.
     max_body_mb: float = Field(256, gt=0)
     uploads_at_once: int = Field(16, ge=1, description="Uploads that one API process takes at the same time.")
+    followers: int = Field(1000, ge=1, description="Who follows venues at the same time, at one API process.")
     max_frame_mb: float = Field(48, gt=0)
     max_frame_pixels: int = Field(64_000_000, gt=0)
     max_frames_per_camera: int = Field(16, ge=1)
@@ -121,6 +122,9 @@ class Settings(BaseSettings):
     keep_jobs_days: float = Field(400, ge=2, description="With them idempotency keys; the last accepted job stays.")
     keep_revisions_years: float = Field(
         5, ge=1, description="Poses that a calibration brought by itself; what was put, accepted or restored stays."
+    )
+    keep_events_days: float = Field(
+        3, ge=2, description="What happened to venues: who follows one may come back within it and misses nothing."
     )
     min_free_mb: float = Field(500, ge=0, description="With less free on the disk, uploads are refused.")
     tidy_every_s: float = Field(600, gt=0, description="How often a worker looks for what is past its time.")

@@ -25,6 +25,8 @@ PARTS = {
     "colmap": "install pycolmap, which the group dev has on machines that have a wheel of it (make setup)",
     "promtool": "install Prometheus (Debian: apt-get install prometheus)",
     "browser": "install Chromium (Debian: apt-get install chromium)",
+    "nginx": "install nginx (Debian: apt-get install nginx)",
+    "caddy": "install Caddy (Debian: apt-get install caddy)",
 }
 
 

@@ -16,6 +16,7 @@ OURS = [
     (name, service) for name, file in COMPOSE.items() for service, its in file["services"].items() if "build" in its
 ]
 UNITS = sorted((DOCKER / "systemd").glob("*.service"))
+MOST_EXPOSED = 20
 PIN = re.compile(r"^([a-z0-9._-]+)==(\S+)", re.MULTILINE)
 
 
@@ -64,6 +65,17 @@ def test_containers_of_ours_may_write_nowhere_but_where_they_must(file, service)
     assert its["stop_grace_period"] == "20s"
 
 
+@pytest.mark.parametrize(("file", "service"), OURS)
+def test_containers_of_ours_leave_something_to_others(file, service):
+    its = COMPOSE[file]["services"][service]
+    assert its["cpus"] > 0
+    assert its["mem_limit"].endswith("g")
+    assert its["pids_limit"] >= 256
+    # tmpfs is memory: uploads must not take all of it.
+    (spool,) = (entry for entry in its["tmpfs"] if entry.startswith("/tmp"))
+    assert spool == "/tmp:size=1g"
+
+
 def test_the_large_compose_file_has_two_workers_of_names_of_their_own():
     services = COMPOSE["compose.yaml"]["services"]
     workers = [its for its in services.values() if its.get("command") == ["worker"]]
@@ -103,6 +115,18 @@ def test_units_are_understood_by_systemd(unit, tmp_path):
     here.write_text(unit.read_text().replace("/opt/esc/.venv/bin/esc", "/bin/true"))
     verified = subprocess.run(["systemd-analyze", "verify", here], capture_output=True, text=True)
     assert (verified.returncode, verified.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=lambda path: path.name)
+def test_units_are_as_closed_as_systemd_calls_ok(unit, tmp_path):
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("no systemd on this machine")
+    here = tmp_path / unit.name.replace("@", "@1")
+    here.write_text(unit.read_text().replace("/opt/esc/.venv/bin/esc", "/bin/true"))
+    # Of 100: what a service that needs nothing but its port would have is about 10.
+    limit = ["--offline=true", f"--threshold={MOST_EXPOSED}"]
+    judged = subprocess.run(["systemd-analyze", "security", *limit, here], capture_output=True, text=True)
+    assert judged.returncode == 0, judged.stdout + judged.stderr
 
 
 @pytest.mark.parametrize("unit", UNITS, ids=lambda path: path.name)

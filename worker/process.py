@@ -80,7 +80,7 @@ class Worker:
             settings.home_database_url, settings.worker_name, settings.jobs_at_once, self._attempt
         )
         self._retention = Retention(settings, home.expiry, home.blobs, home.workers, self._queue.forget)
-        self._delivering = Delivering(settings, home.deliveries, home.jobs, home.deliveries.now)
+        self._delivering = Delivering(settings, home.deliveries, home.jobs, home.following, home.deliveries.now)
         self._alarms = Alarms(home.venues)
         self._scheduled = Scheduled(
             settings, home.schedules, home.venues, home.submissions, home.from_sources, home.disk

@@ -10,7 +10,7 @@ from service.api.auth import Gate
 from service.api.clicked_pose import ClickedPoses
 from service.api.shared_reads import SharedReads
 from service.api.uploads import Uploads
-from service.api.watch import Watch
+from service.api.watch import Places, Watch
 from service.home import Home
 from service.observe.metrics import Metrics
 from service.observe.readiness import Readiness
@@ -27,11 +27,18 @@ class Context(Home):
         silence_s = settings.takeover_after_s
         self.reads = SharedReads(self.jobs.get)
         self.watch = Watch(self.jobs.states)
+        self.watch_venues = Watch(self.following.newest)
+        self.followers = Places(settings.followers)
         self.metrics = Metrics(lambda: look(self.engine, settings.metrics_venues), self.disk, silence_s)
         self.readiness = Readiness(self.jobs, self.blobs, self.disk, self.workers, silence_s)
         self.gate = Gate(self.keys, self.sessions, settings)
         self.uploads = Uploads(settings)
         self.clicked_poses = ClickedPoses(settings)
+
+    def let_go(self) -> None:
+        """Let everybody go who waits for a job or follows a venue."""
+        self.watch.close()
+        self.watch_venues.close()
 
 
 async def _context(request: Request) -> Context:

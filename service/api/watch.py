@@ -1,22 +1,22 @@
-"""Waiting for jobs: one small query, a few times a second, for everybody who waits."""
+"""Waiting for jobs and venues: one small query of each, a few times a second, for everybody who waits."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from typing import Generic, TypeVar
 
 import structlog
 from starlette.concurrency import run_in_threadpool
 
-from service.store.jobs.reading import State
-
 INTERVAL_S = 0.25
+State = TypeVar("State")
 log = structlog.get_logger()
 
 
-class Watch:
-    """Tells coroutines when the state of a job is the one they wait for."""
+class Watch(Generic[State]):
+    """Tells coroutines when the state of a thing is the one they wait for."""
 
     def __init__(self, read: Callable[[Collection[str]], Mapping[str, State]]) -> None:
         self._read = read
@@ -29,12 +29,12 @@ class Watch:
         """Whether the service is going down, so that nobody should wait again."""
         return self._closed
 
-    async def until(self, job_id: str, reached: Callable[[State], bool], timeout_s: float) -> None:
-        """Return when `reached` holds, after `timeout_s`, or when the service goes down."""
+    async def until(self, name: str, reached: Callable[[State], bool], timeout_s: float) -> None:
+        """Return when `reached` holds of what has this name, after `timeout_s`, or when the service goes down."""
         if self._closed:
             return
         future: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._waiting[future] = (job_id, reached)
+        self._waiting[future] = (name, reached)
         self._someone.set()
         try:
             with suppress(TimeoutError):
@@ -47,12 +47,12 @@ class Watch:
         while True:
             await self._someone.wait()
             try:
-                states = await run_in_threadpool(self._read, {job_id for job_id, _ in self._waiting.values()})
+                states = await run_in_threadpool(self._read, {name for name, _ in self._waiting.values()})
             except Exception:  # the database is away for a moment: they keep waiting, up to their time
-                log.warning("cannot read the states of jobs", exc_info=True)
+                log.warning("cannot read what is waited for", exc_info=True)
                 states = {}
-            for future, (job_id, reached) in self._waiting.items():
-                state = states.get(job_id)
+            for future, (name, reached) in self._waiting.items():
+                state = states.get(name)
                 if state is not None and reached(state) and not future.done():
                     future.set_result(None)
             if not self._waiting:
@@ -65,3 +65,21 @@ class Watch:
         for future in self._waiting:
             if not future.done():
                 future.set_result(None)
+
+
+class Places:
+    """So many may be somewhere at once. To be asked in the event loop."""
+
+    def __init__(self, count: int) -> None:
+        self._free = count
+
+    @contextmanager
+    def taken(self, refusal: Callable[[], Exception]) -> Iterator[None]:
+        """One of them, if there is one left; raises the refusal if there is none."""
+        if not self._free:
+            raise refusal()
+        self._free -= 1
+        try:
+            yield
+        finally:
+            self._free += 1

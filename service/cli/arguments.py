@@ -5,38 +5,31 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from pydantic import BaseModel, ValidationError
-from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.cli.printing import USAGE, fail
-from service.observe import logs
-from service.settings import Settings
 from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
 from service.wire.options import Options
 
+if TYPE_CHECKING:
+    from service.settings import Settings
+
 M = TypeVar("M", bound=BaseModel)
 LOCAL = "http://127.0.0.1:8000"
-
-
-class _Service(BaseSettings):
-    """Which service, and the key for it, where `.env` says so."""
-
-    model_config = SettingsConfigDict(env_prefix="ESC_", env_file=".env", env_ignore_empty=True, extra="ignore")
-
-    url: str | None = None
-    api_key: str | None = None
 
 
 def _or_as_the_file_says(context: typer.Context, option: typer.CallbackParam, value: str | None) -> str | None:
     """What is given on the command line or in the environment, or else in `.env`, or else the default."""
     name = option.name or ""
     source = context.get_parameter_source(name)
-    if source is not None and source.name != "DEFAULT":
+    if (source is not None and source.name != "DEFAULT") or not Path(".env").is_file():
         return value
-    in_file: str | None = getattr(_Service(), name)
+    from service.cli.env_file import Service
+
+    in_file: str | None = getattr(Service(), name)
     return in_file or value
 
 
@@ -126,7 +119,10 @@ OptionsText = Annotated[
 
 
 def settings_of(**given: Any) -> Settings:
-    """The settings, those given on the command line before all others."""
+    """The settings, those given on the command line before all others; with them the log is set up."""
+    from service.observe import logs
+    from service.settings import Settings
+
     try:
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:

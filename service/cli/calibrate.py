@@ -21,7 +21,7 @@ from service.cli.arguments import (
     options_of,
 )
 from service.cli.local import checked_files, engine_settings, failure_told
-from service.cli.printing import bar, err, followed, gate, say, verdict
+from service.cli.printing import bar, followed, gate, say, tell, verdict
 from service.client import Client
 from service.intake.images import PNG_START
 from service.wire.venue import VenueIn
@@ -95,7 +95,7 @@ def run(
     """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
     settings, chosen = engine_settings(), options_of(options)
     if chosen.callback_url is not None:
-        err.print("callback_url is not used: without a service nobody is told. The exit code says how it went.")
+        tell("callback_url is not used: without a service nobody is told. The exit code says how it went.")
     from service.store.jobs.files import picture_file
     from worker.jobs import calibration
 

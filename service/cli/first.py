@@ -16,10 +16,10 @@ from service.cli.printing import (
     REJECTED,
     USAGE,
     bar,
-    err,
     fail,
     followed,
     say,
+    tell,
     tell_field,
     tell_lens,
     tell_pose,
@@ -175,7 +175,7 @@ def fit_field(
     say(result)
     tell_field(result)
     if not result.accepted:
-        err.print(f"Rejected: {result.rejected_because}")
+        tell(f"Rejected: {result.rejected_because}")
         raise typer.Exit(REJECTED)
     fitted = stored.with_poses({camera.id: camera.pose for camera in result.cameras})
     fitted = fitted.model_copy(update={"field": result.field})

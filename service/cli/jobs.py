@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, JobId, OneCamera, Output, Url
-from service.cli.printing import ACCEPTED, FAILED, REJECTED, err, fail, followed, hand_out, say, verdict
+from service.cli.printing import ACCEPTED, FAILED, REJECTED, fail, followed, hand_out, say, tell, verdict
 from service.client import Client
 from service.store.jobs.files import picture_file
 from service.wire.job import Job, Jobs, Kind, Status
@@ -151,7 +151,7 @@ def _to_its_end(client: Client, job: Job) -> None:
             raise typer.Exit(ACCEPTED)
         case LocateResult() | FieldResult():
             if not job.result.accepted:
-                err.print(f"Rejected: {job.result.rejected_because}")
+                tell(f"Rejected: {job.result.rejected_because}")
             raise typer.Exit(ACCEPTED if job.result.accepted else REJECTED)
         case _:
             raise typer.Exit(verdict(job))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.arguments import Data, settings_of
-from service.cli.printing import FAILED, USAGE, err, fail
+from service.cli.printing import FAILED, USAGE, fail, tell
 from service.cli.serve import database_told
 from service.wire.base import ID_PATTERN, Scope
 
@@ -48,7 +48,7 @@ def add_key(
         except KeyExists:
             fail(f"There is a key {name} already: remove it first, or take another name.", USAGE)
     print(key)
-    err.print("Keep it: it is not shown again. Its user sets ESC_API_KEY, or sends it as `Authorization: Bearer ...`.")
+    tell("Keep it: it is not shown again. Its user sets ESC_API_KEY, or sends it as `Authorization: Bearer ...`.")
 
 
 @app.command("list")
@@ -72,9 +72,9 @@ def remove_key(
         if not keys.remove(name):
             fail(f"There is no key {name}; esc key list names those there are.", FAILED)
         left = keys.any()
-    err.print(f"Removed. A service that runs may take it for {BELIEVED_FOR_S:.0f} s more.")
+    tell(f"Removed. A service that runs may take it for {BELIEVED_FOR_S:.0f} s more.")
     if not left:
-        err.print("No key is left: a service on loopback will let anyone on this machine call after its next start.")
+        tell("No key is left: a service on loopback will let anyone on this machine call after its next start.")
 
 
 @contextmanager
@@ -97,10 +97,10 @@ def _keys(data: Path | None) -> Iterator[Keys]:
     with database_told():
         engine = connect(settings.home_database_url)
         # Keys of another folder open nothing, and nothing else would tell.
-        err.print(f"Keys in {engine.url.set(query={}).render_as_string(hide_password=True)}")
+        tell(f"Keys in {engine.url.set(query={}).render_as_string(hide_password=True)}")
         made = engine.dialect.name == "sqlite" and not Path(engine.url.database or "").exists()
         migrate(engine)
         if made:
-            err.print(f"That database is new: no service has used it yet. {ELSEWHERE}")
+            tell(f"That database is new: no service has used it yet. {ELSEWHERE}")
         yield Keys(engine)
         engine.dispose()

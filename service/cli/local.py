@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from service.cli.arguments import files_of, settings_of
 from service.cli.printing import FAILED, fail, in_words
 from service.intake import images
-from service.settings import Settings
 from service.wire.problems import Problem
 from service.wire.venue import Venue
+
+if TYPE_CHECKING:
+    from service.settings import Settings
 
 
 def engine_settings() -> Settings:

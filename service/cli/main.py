@@ -16,7 +16,7 @@ from service.cli import calibrate, first, jobs, keys, serve, venues
 from service.cli.printing import BUSY, FAILED, USAGE, fail, hint, in_words
 from service.client import Refused
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False)
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 for command in (
     serve.up,
     serve.serve,

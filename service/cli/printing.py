@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from pydantic import BaseModel
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service.client import Client
 from service.wire.job import Job
@@ -20,7 +18,11 @@ from service.wire.results import FieldResult, IntrinsicsResult, LocateResult, Re
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
 ZIP_START = b"PK"
-err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+
+
+def tell(line: str) -> None:
+    """Print a line for whoever looks; results alone go to standard output."""
+    print(line, file=sys.stderr)
 
 
 def say(what: BaseModel | dict[str, str]) -> None:
@@ -35,12 +37,12 @@ def hand_out(document: bytes, output: Path | None) -> None:
     else:
         output.write_bytes(document)
         if document.startswith(ZIP_START) and output.suffix != ".zip":
-            err.print(f"{output} is a zip: in this format, each camera has a file of its own (--camera writes one).")
+            tell(f"{output} is a zip: in this format, each camera has a file of its own (--camera writes one).")
 
 
 def fail(message: str, code: int) -> NoReturn:
     """End with a line on standard error."""
-    err.print(message)
+    tell(message)
     sys.exit(code)
 
 
@@ -71,9 +73,9 @@ def verdict(job: Job) -> int:
     if isinstance(job.result, Result):
         return gate(job.result)
     if job.status == "cancelled":
-        err.print(f"Job {job.id} was cancelled before it had a result.")
+        tell(f"Job {job.id} was cancelled before it had a result.")
     if job.error is not None:
-        err.print(f"{job.error.title}: {job.error.detail}")
+        tell(f"{job.error.title}: {job.error.detail}")
     return FAILED
 
 
@@ -82,20 +84,18 @@ def gate(result: Result) -> int:
     if result.accepted:
         return ACCEPTED
     if result.verdict == "partly":
-        err.print(f"Accepted: {', '.join(result.accepted_cameras)}. Not all cameras: {result.rejected_because}")
+        tell(f"Accepted: {', '.join(result.accepted_cameras)}. Not all cameras: {result.rejected_because}")
     else:
-        err.print(f"Rejected: {result.rejected_because}")
+        tell(f"Rejected: {result.rejected_because}")
     return REJECTED
 
 
 def tell_lens(result: IntrinsicsResult) -> None:
     """What a person looks at first."""
     used = sum(photo.fate == "used" for photo in result.photos)
-    err.print(
-        f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px"
-    )
+    tell(f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px")
     (fx, _, cx), (_, fy, cy), _ = result.intrinsics.matrix
-    err.print(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
+    tell(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
     for photo in result.photos:
         told = {
             "used": None,
@@ -105,15 +105,15 @@ def tell_lens(result: IntrinsicsResult) -> None:
         }[photo.fate]
         for words in (told, "is blurred" if photo.blurred else None):
             if words:
-                err.print(f"  {photo.name} {words}")
+                tell(f"  {photo.name} {words}")
     for warning in result.warnings:
-        err.print(f"Warning: {warning}")
+        tell(f"Warning: {warning}")
 
 
 def tell_pose(result: LocateResult) -> None:
     """Where a camera stands, and which clicks are doubted."""
     x, y, z = result.pose.position
-    err.print(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
+    tell(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
     for point in result.points:
         if point.doubted:
             off = "out of view" if point.residual_px is None else f"{point.residual_px:.0f} px off"
@@ -122,11 +122,11 @@ def tell_pose(result: LocateResult) -> None:
                 why = f"; its label and that of {point.exchanged_with} are exchanged"
             elif point.looks_like is not None:
                 why = f"; it is on {point.looks_like}"
-            err.print(f"  {point.world} is {off}{why}")
+            tell(f"  {point.world} is {off}{why}")
     for warning in result.warnings:
-        err.print(f"  {warning[0].upper()}{warning[1:]}.")
+        tell(f"  {warning[0].upper()}{warning[1:]}.")
     if result.rejected_because is not None:
-        err.print(f"  Rejected: {result.rejected_because}")
+        tell(f"  Rejected: {result.rejected_because}")
 
 
 def tell_field(result: FieldResult) -> None:
@@ -134,9 +134,9 @@ def tell_field(result: FieldResult) -> None:
     for measure in result.measures:
         what = measure.name.removesuffix("_m").replace("_", " ")
         if measure.known:
-            err.print(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m (given {measure.given:.3f})")
+            tell(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m (given {measure.given:.3f})")
         else:
-            err.print(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
+            tell(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
 
 
 # How far a job is
@@ -151,8 +151,12 @@ def followed(client: Client, job: Job) -> Job:
 @contextmanager
 def bar() -> Iterator[Callable[[Step | None, str], None]]:
     """A line that shows how far a calibration is, where somebody looks at the terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     columns = (TextColumn("{task.description:<14}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-    with Progress(*columns, TimeElapsedColumn(), console=err, disable=not err.is_terminal) as progress:
+    with Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal) as progress:
         line = progress.add_task("waiting", total=1.0)
 
         def show(step: Step | None, otherwise: str) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.cli.arguments import Data, Host, Port, settings_of
 from service.cli.printing import FAILED, USAGE, fail
-from service.settings import Settings
+
+if TYPE_CHECKING:
+    from service.settings import Settings
 
 
 def up(data: Data = None, host: Host = None, port: Port = None) -> None:

@@ -11,7 +11,7 @@ import typer
 
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, OneCamera, Output, Url, VenueId, checked
 from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
-from service.cli.printing import FAILED, REJECTED, USAGE, err, fail, hand_out, say
+from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, say, tell
 from service.client import Client, Refused
 from service.wire.geometry import Moved
 from service.wire.history import History
@@ -80,7 +80,7 @@ def edit_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None
         except ValueError as error:
             fail(f"Nothing was changed. What was saved is no JSON: {error}", USAGE)
         if not patch:
-            err.print("Nothing was changed.")
+            tell("Nothing was changed.")
             return
         say(client.patch_venue(venue, patch, tag))
 

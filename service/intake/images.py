@@ -12,11 +12,13 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from service.settings import Settings
 from service.wire.problems import Problem
 from service.wire.venue import Camera, Venue
+
+if TYPE_CHECKING:
+    from service.settings import Settings
 
 JPEG_START = b"\xff\xd8\xff"
 PNG_START = b"\x89PNG\r\n\x1a\n"

@@ -30,9 +30,9 @@ from service.store.counts.endings import (
 )
 from service.store.counts.figures import Figures, VenueQuality
 from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Buckets, Key
-from service.store.deliveries import CALLBACKS
 from service.store.engine import AWAY
 from service.store.jobs.submission import PRIORITIES
+from service.store.told.deliveries import CALLBACKS
 from service.store.workers import SeenWorker
 from service.wire.health import AlarmRule
 

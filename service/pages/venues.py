@@ -7,14 +7,15 @@ from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.api.context import Context, InContext, VenueIdPath
+from service.api.context import InContext, VenueIdPath
 from service.pages.shown import Page, page
 from service.pages.sparkline import Sparkline, sparkline
 from service.routes.contract.documented import needs
 from service.routes.contract.guarded import Guarded
 from service.routes.venues import ExistingVenue
-from service.store.counts.past_calibrations import PastCalibration
+from service.store.counts.glances import Glance
 from service.store.revisions import TAKEN
+from service.store.stores import Stores
 from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import Alarm
 from service.wire.history import Revision
@@ -22,7 +23,6 @@ from service.wire.job import Job
 from service.wire.venue import Venue
 
 PER_PAGE = 50
-IN_SPARKLINE = 40
 # What a chart shows, and a table beside it.
 IN_CHART, IN_TABLE = 1000, 12
 router = APIRouter(route_class=Page, include_in_schema=False)
@@ -31,13 +31,17 @@ data = APIRouter(route_class=Guarded, include_in_schema=False)
 
 @dataclass(frozen=True)
 class Row:
-    """A venue in the list: its last calibration that ended, the one that is going on, a curve, and what rings."""
+    """A venue in the list: its last calibration that ended, the one that is going on, and what rings."""
 
     venue: Venue
-    last: PastCalibration | None
+    glance: Glance | None
     active: Job | None
-    curve: Sparkline | None
     alarms: list[Alarm]
+
+    @property
+    def curve(self) -> Sparkline | None:
+        """The stitch errors of the last results."""
+        return sparkline(self.glance.errors, self.glance.limit_px) if self.glance else None
 
 
 @router.get("/", openapi_extra=needs("read"))
@@ -47,24 +51,21 @@ def venues(
     """Every venue, with its last result."""
     found = context.venues.page(after, PER_PAGE + 1)
     shown, more = found[:PER_PAGE], len(found) > PER_PAGE
-    active = context.past_calibrations.active([venue.id for venue in shown])
-    rows = [_row(context, venue, active.get(venue.id)) for venue in shown]
-    return page(request, "venues.html", rows=rows, after=shown[-1].id if more else None, first=after is None)
-
-
-def _row(context: Context, venue: Venue, active: str | None) -> Row:
-    ends = context.past_calibrations.of(venue.id, IN_SPARKLINE)
-    results = [end for end in reversed(ends) if end.accepted is not None]
-    limit = results[-1].stitch_error_limit_px if results else None
-    curve = sparkline([end.stitch_error_px for end in results], limit)
-    health = context.venues.health(venue.id)
-    return Row(
-        venue,
-        ends[0] if ends else None,
-        context.jobs.get(active) if active else None,
-        curve,
-        health.alarms if health else [],
+    return page(
+        request, "venues.html", rows=rows_of(context, shown), after=shown[-1].id if more else None, first=not after
     )
+
+
+def rows_of(context: Stores, venues: list[Venue]) -> list[Row]:
+    """A few queries for all of them, however many jobs there are."""
+    ids = [venue.id for venue in venues]
+    glances, alarms = context.glances.of(ids), context.glances.alarms(ids)
+    active = context.past_calibrations.active(ids)
+    jobs = context.jobs.several(active.values())
+    return [
+        Row(venue, glances.get(venue.id), jobs.get(active.get(venue.id, "")), alarms.get(venue.id, []))
+        for venue in venues
+    ]
 
 
 @router.get("/ui/venues/{venue_id}", openapi_extra=needs("read"))

@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from service.api.context import Context, InContext
+from service.intake.images import PNG_START
 from service.routes.contract.documented import BINARY, needs, problems
 from service.routes.contract.guarded import Guarded
 from service.routes.jobs import Existing
@@ -87,3 +88,22 @@ def _why_deleted(pictures: Pictures, keep_days: float) -> str:
 
 for each in PICTURES:
     _show(*each)
+
+
+@router.get(
+    "/{job_id}/frames/{number}",
+    openapi_extra=needs("read"),
+    response_class=Response,
+    responses={200: {"content": {JPEG: BINARY, PNG: BINARY}}, **problems(404, 410)},
+)
+def job_frame(job: Existing, number: Annotated[int, Path(ge=0, le=10_000)], context: InContext) -> Response:
+    """A frame or photo of a job as it came; `frames` of the job has the addresses of all."""
+    path = context.jobs.frame(job.id, number)
+    data = None if path is None else context.blobs.get(path)
+    if data is None and job.frames:
+        raise Problem("picture-not-found", "The job has no frame of this number.", job=job.id)
+    if data is None:
+        kept = f"{context.settings.keep_frames_days:g} days"
+        raise Problem("frames-deleted", f"It never had any, or they were deleted {kept} after its end.", job=job.id)
+    media_type = PNG if data.startswith(PNG_START) else JPEG
+    return Response(data, media_type=media_type, headers={"Cache-Control": "private, max-age=3600"})

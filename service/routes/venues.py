@@ -17,12 +17,12 @@ from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_known
 from service.settings import Settings
 from service.store.revisions import NoSuchRevision, RevisionUnfit
-from service.wire import callback_urls
 from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
 from service.wire.merge_patch import MEDIA_TYPE, merged
 from service.wire.problems import Problem
+from service.wire.told import callback_urls
 from service.wire.venue import PATCH_EXAMPLES, Camera, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
@@ -278,6 +278,8 @@ def _checked(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
     for told in (venue.alarms, scheduled):
         if told is not None and told.callback_url is not None:
             callback_urls.check(told.callback_url, settings)
+    for webhook in venue.webhooks:
+        callback_urls.check(webhook.url, settings, "webhooks")
     stored = venue.stored()
     sources.check(stored, settings.sources)
     return stored

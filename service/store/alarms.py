@@ -15,11 +15,12 @@ from service.store import tables
 from service.store.counts import tallies
 from service.store.counts.courses import Course, courses_of
 from service.store.counts.figures import note
-from service.store.deliveries import add_alarm_delivery
 from service.store.engine import clock
 from service.store.revisions import TAKEN, newest_revision, revision_at
 from service.store.schedules import schedule_of
-from service.wire.health import Alarm, AlarmEvent, AlarmRule, Alarms, CameraHealth, VenueAlarm, VenueHealth
+from service.store.told.deliveries import add_event_delivery
+from service.store.told.events import add_event
+from service.wire.health import Alarm, AlarmRule, Alarms, CameraHealth, VenueAlarm, VenueHealth
 from service.wire.history import Revision, RevisionCamera
 from service.wire.venue import Venue
 
@@ -164,10 +165,10 @@ def _begin(connection: sa.Connection, venue: Venue, alarm: Alarm) -> None:
 
 
 def _tell(connection: sa.Connection, venue: Venue, what: str, alarm: Alarm, at: datetime) -> None:
+    data = VenueAlarm(venue=venue.id, **alarm.model_dump())
+    event = add_event(connection, venue.id, venue.webhooks, what, data, at)
     if venue.alarms is not None and venue.alarms.callback_url is not None:
-        data = VenueAlarm(venue=venue.id, **alarm.model_dump())
-        event = AlarmEvent.model_validate({"type": what, "timestamp": at, "data": data})
-        add_alarm_delivery(connection, event, venue.alarms.callback_url, at)
+        add_event_delivery(connection, event, venue.alarms.callback_url, at)
 
 
 def _is(venue_id: str, key: Key) -> list[sa.ColumnElement[bool]]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from datetime import datetime, timedelta
+from itertools import takewhile
 
 import sqlalchemy as sa
 
@@ -21,6 +22,7 @@ from service.store.revisions import TAKEN
 
 j = tables.jobs.c
 r = tables.revisions.c
+e = tables.events.c
 left = tables.leftovers.c
 LAST_ACCEPTED = (
     sa.select(r.job)
@@ -81,6 +83,20 @@ class Expiry(Repository):
             ids = list(connection.scalars(old))
             connection.execute(sa.delete(tables.revisions).where(r.id.in_(ids)))
             return len(ids)
+
+    def expire_events(self, before: datetime, limit: int) -> int:
+        """Forget up to `limit` events from before a moment, the oldest of all venues first; says how many.
+
+        The newest stays: it tells who comes back whether something was missed.
+        """
+        with writing(self._engine) as connection:
+            serialise(connection, "expiry")
+            newest = connection.scalar(sa.select(sa.func.max(e.id)))
+            oldest = connection.execute(sa.select(e.id, e.at).order_by(e.id).limit(limit)).all()
+            past = [row.id for row in takewhile(lambda row: row.at < before and row.id != newest, oldest)]
+            if past:
+                connection.execute(sa.delete(tables.events).where(e.id <= past[-1]))
+            return len(past)
 
     def delete_jobs(self, job_ids: Collection[str], now: datetime) -> None:
         """Forget ended jobs with everything that is theirs; their files are to be deleted from `now` on."""

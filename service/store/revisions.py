@@ -15,9 +15,11 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.counts.figures import note
 from service.store.engine import clock
+from service.store.told.events import add_event
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Movement, PosedCamera
 from service.wire.history import Cause, Revision, RevisionCamera
+from service.wire.told.events import Poses
 from service.wire.venue import Camera, Venue
 
 r = tables.revisions.c
@@ -42,14 +44,14 @@ def add_revision(
     stitch_error_px: float | None = None,
 ) -> None:
     """Write down the state that a venue has from now on, inside the caller's serialised transaction."""
-    before = _newest_row(connection, venue.id)
+    before, at = _newest_row(connection, venue.id), clock(connection)
     number = 1 if before is None else before.number + 1
     movements = _movements(connection, venue, number, before, cause, restored)
     connection.execute(
         sa.insert(tables.revisions).values(
             venue=venue.id,
             number=number,
-            at=clock(connection),
+            at=at,
             cause=cause,
             job=job,
             restored_from=None if restored is None else restored.revision,
@@ -59,6 +61,17 @@ def add_revision(
             movements={camera: movement.model_dump() for camera, movement in movements.items()},
         )
     )
+    poses = Poses(
+        venue=venue.id,
+        revision=number,
+        cause=cause,
+        job=job,
+        stitch_error_px=stitch_error_px,
+        ridge=venue.field.ridge,
+        cameras=[camera.posed for camera in venue.cameras],
+        changed=_changed(venue, _cameras(before)),
+    )
+    add_event(connection, venue.id, venue.webhooks, "poses.changed", poses, at)
     drifts = [movement.drift.pixels for movement in movements.values() if movement.drift]
     note(connection, venue.id, drift_px=max((drift for drift in drifts if drift is not None), default=None))
 
@@ -157,6 +170,15 @@ def _movements(
         camera.id: _movement(venue, camera, last.get(camera.id), firsts.get(since[camera.id], {}), since[camera.id])
         for camera in venue.cameras
     }
+
+
+def _changed(venue: Venue, before: dict[str, PosedCamera]) -> list[str]:
+    """The cameras that stand or image otherwise than they did."""
+    return [
+        camera.id
+        for camera in venue.cameras
+        if camera.id not in before or before[camera.id].standing != camera.posed.standing
+    ]
 
 
 def _movement(

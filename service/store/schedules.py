@@ -13,10 +13,11 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.engine import Repository, clock, reading, serialise, writing
-from service.wire.schedule import ScheduleState, next_time
+from service.wire.schedule import Schedule, ScheduleState, next_time, place_of
 from service.wire.venue import Venue
 
 LONGEST_ERROR = 500
+FIRES_BY = ("cron", "time_zone", "exact")
 s = tables.schedules.c
 
 
@@ -28,6 +29,7 @@ class Firing:
     due_at: datetime
     cron: str
     time_zone: str
+    exact: bool
 
 
 class Schedules(Repository):
@@ -45,13 +47,13 @@ class Schedules(Repository):
             rows = connection.execute(due).all()
             put_off = sa.update(tables.schedules).where(s.venue.in_([row.venue for row in rows]))
             connection.execute(put_off.values(look_at=again_at))
-            return [Firing(row.venue, row.due_at, row.cron, row.time_zone) for row in rows]
+            return [Firing(row.venue, row.due_at, row.cron, row.time_zone, row.exact) for row in rows]
 
     def done(self, firing: Firing, now: datetime, job_id: str | None, error: str | None) -> None:
         """Wait for the next time. `error`: why there is no job."""
-        next_at = next_time(firing.cron, firing.time_zone, now)
+        next_at = _next(firing.venue_id, firing, now)
         brought = {} if job_id is None else {"last_job": job_id}
-        self._write(firing, error, due_at=next_at, look_at=next_at, **brought)
+        self._write(firing, error, due_at=next_at, look_at=next_at, last_at=firing.due_at, **brought)
 
     def put_off(self, firing: Firing, until: datetime, why: str) -> None:
         """Fire it again at a moment, for the time that it was due at."""
@@ -64,6 +66,7 @@ class Schedules(Repository):
             s.due_at == firing.due_at,
             s.cron == firing.cron,
             s.time_zone == firing.time_zone,
+            s.exact == firing.exact,
         )
         last_error = None if error is None else error[:LONGEST_ERROR]
         with writing(self._engine) as connection:
@@ -75,12 +78,12 @@ def plan(connection: sa.Connection, venue: Venue) -> None:
     """Let a venue be calibrated by the schedule it has now, inside the caller's serialised transaction."""
     wanted = venue.schedule
     known = connection.execute(sa.select(tables.schedules).where(s.venue == venue.id)).one_or_none()
-    if wanted and known and (known.cron, known.time_zone) == (wanted.cron, wanted.time_zone):
+    if wanted and known and all(getattr(known, name) == getattr(wanted, name) for name in FIRES_BY):
         return
     connection.execute(sa.delete(tables.schedules).where(s.venue == venue.id))
     if wanted is not None:
-        next_at = next_time(wanted.cron, wanted.time_zone, clock(connection))
-        values = {"cron": wanted.cron, "time_zone": wanted.time_zone, "due_at": next_at, "look_at": next_at}
+        next_at = _next(venue.id, wanted, clock(connection))
+        values = {name: getattr(wanted, name) for name in FIRES_BY} | {"due_at": next_at, "look_at": next_at}
         connection.execute(sa.insert(tables.schedules).values(venue=venue.id, **values))
 
 
@@ -89,4 +92,9 @@ def schedule_of(connection: sa.Connection, venue_id: str) -> ScheduleState | Non
     row = connection.execute(sa.select(tables.schedules).where(s.venue == venue_id)).one_or_none()
     if row is None:
         return None
-    return ScheduleState(next_at=row.due_at, last_job=row.last_job, last_error=row.last_error)
+    return ScheduleState(next_at=row.due_at, last_at=row.last_at, last_job=row.last_job, last_error=row.last_error)
+
+
+def _next(venue_id: str, schedule: Schedule | Firing, after: datetime) -> datetime:
+    place = 0.0 if schedule.exact else place_of(venue_id)
+    return next_time(schedule.cron, schedule.time_zone, after, place)

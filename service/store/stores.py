@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from service.store.counts.glances import Glances
 from service.store.counts.past_calibrations import PastCalibrations
-from service.store.deliveries import Deliveries
 from service.store.engine import connect, migrate
 from service.store.expiry import Expiry
 from service.store.jobs.attempts import Attempts
@@ -13,6 +13,8 @@ from service.store.jobs.submission import Submissions
 from service.store.keys import Keys
 from service.store.schedules import Schedules
 from service.store.sessions import Sessions
+from service.store.told.deliveries import Deliveries
+from service.store.told.following import Following
 from service.store.venues import Venues
 from service.store.workers import Workers
 
@@ -29,8 +31,10 @@ class Stores:
         self.jobs = Jobs(engine)
         self.attempts = Attempts(engine)
         self.decisions = Decisions(engine)
+        self.glances = Glances(engine)
         self.past_calibrations = PastCalibrations(engine)
         self.deliveries = Deliveries(engine)
+        self.following = Following(engine)
         self.expiry = Expiry(engine)
         self.workers = Workers(engine)
         self.keys = Keys(engine)

@@ -94,6 +94,8 @@ jobs = sa.Table(
     # From then on the row answers for none of its files, whether or not the store is rid of them.
     sa.Column("frames_deleted_at", Instant),
     sa.Column("pictures_deleted_at", Instant),
+    # wire.job.Job's.
+    sa.Column("asked_by", sa.String(80)),
     # The request that it came with, as its log and its trace call it.
     sa.Column("request_id", sa.String(64)),
     sa.Column("traceparent", sa.String(55)),
@@ -139,11 +141,28 @@ leftovers = sa.Table(
     sa.Index("leftovers_by_due", "due_at"),
 )
 
+# What happened to venues, in the order of each one's transactions; for as long as somebody may come back and ask.
+events = sa.Table(
+    "events",
+    metadata,
+    # Never given twice, also after the last one was deleted: clients go on from it.
+    sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True),
+    sa.Column("venue", sa.String(64), nullable=False),
+    # Of wire.told.events.Event.
+    sa.Column("type", sa.String(32), nullable=False),
+    sa.Column("at", Instant, nullable=False),
+    # Its data; of a job, which is read when it is told, null.
+    sa.Column("data", sa.JSON(none_as_null=True)),
+    sa.Column("job", sa.String(26)),
+    sa.Index("events_by_venue", "venue", "id"),
+    sqlite_autoincrement=True,
+)
+
 # Who is to be told of what: written with what happened, attempted until it succeeds or is given up.
 deliveries = sa.Table(
     "deliveries",
     metadata,
-    # Of the job that has ended, or of an alarm's event.
+    # Of the job that has ended, or one of its own.
     sa.Column("id", sa.String(26), primary_key=True),
     sa.Column("url", sa.String(2048), nullable=False),
     # The host of the URL.
@@ -155,8 +174,8 @@ deliveries = sa.Table(
     sa.Column("due_at", Instant, nullable=False),
     # Why the last attempt that failed did.
     sa.Column("last_error", sa.String(500)),
-    # wire.health.AlarmEvent; null: that the job has ended.
-    sa.Column("event", sa.JSON(none_as_null=True)),
+    # Which of `events`; null: that the job has ended.
+    sa.Column("event", sa.BigInteger),
     sa.Index("deliveries_by_due", "status", "due_at"),
 )
 
@@ -185,6 +204,8 @@ venue_quality = sa.Table(
     sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
     # counts.courses.Course by camera.
     sa.Column("cameras", sa.JSON(none_as_null=True)),
+    # counts.glances.Glance; null: it was never calibrated.
+    sa.Column("glance", sa.JSON(none_as_null=True)),
     # When an alarm rings if nothing happens before.
     sa.Column("alarm_due_at", Instant),
     sa.Index("venues_by_stitch_error", "stitch_error_px"),
@@ -212,9 +233,11 @@ schedules = sa.Table(
     sa.Column("venue", sa.String(64), primary_key=True),
     sa.Column("cron", sa.String(100), nullable=False),
     sa.Column("time_zone", sa.String(64), nullable=False),
+    sa.Column("exact", sa.Boolean, nullable=False),
     # The time it is fired for, and when somebody is to look at it: later while a worker is at it.
     sa.Column("due_at", Instant, nullable=False),
     sa.Column("look_at", Instant, nullable=False),
+    sa.Column("last_at", Instant),
     sa.Column("last_job", sa.String(26)),
     sa.Column("last_error", sa.String(500)),
     sa.Index("schedules_by_look", "look_at"),

@@ -13,6 +13,7 @@ from service.store.counts.figures import note
 from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.revisions import add_revision, revisions_of, state_at
 from service.store.schedules import plan
+from service.store.told.events import add_venue_event
 from service.wire.health import VenueHealth
 from service.wire.history import Cause, Revision
 from service.wire.job import OPEN
@@ -69,6 +70,10 @@ class Venues(Repository):
             venue, credentials = change(before, _credentials(connection, venue_id))
             _keep(connection, venue_id, credentials)
             save_venue(connection, venue)
+            if before is None:
+                add_venue_event(connection, venue, "venue.created", [])
+            elif changed := venue.differs_in(before):
+                add_venue_event(connection, venue, "venue.changed", changed)
             if before is None or not venue.stands_like(before):
                 add_revision(connection, venue, "put")
             settle_alarms(connection, venue)
@@ -115,7 +120,10 @@ class Venues(Repository):
             serialise(connection, venue_lock(venue_id))
             j = tables.jobs.c
             active = connection.scalar(sa.select(j.id).where(j.venue == venue_id, j.status.in_(OPEN)))
-            allow(find_venue(connection, venue_id), active)
+            venue = find_venue(connection, venue_id)
+            allow(venue, active)
+            if venue is not None:
+                add_venue_event(connection, venue, "venue.deleted", [])
             for table in OF_VENUES:
                 connection.execute(sa.delete(table).where(table.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -64,6 +64,9 @@ class Job(Wire):
                     "result": None,
                     "callback": None,
                     "venue_revision": None,
+                    "asked_by": "key truck-7",
+                    "options": {"preset": "esc", "seed": 7},
+                    "frames": {"left": ["/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/frames/0"]},
                     "links": {"self": "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"},
                 }
             ]
@@ -88,6 +91,15 @@ class Job(Wire):
     venue_revision: int | None = Field(
         None, description="The revision of the venue that its poses became, by themselves or by hand; null: none."
     )
+    asked_by: str | None = Field(
+        None, description="`key NAME`: with this API key; `schedule`: that of the venue; null: no key was asked for."
+    )
+    options: dict[str, Any] = Field(
+        {}, description="As they were asked, what was left out filled in, the seed too; without `callback_url`."
+    )
+    frames: dict[str, list[str]] = Field(
+        {}, description="Addresses of the frames as they came, by camera or the name of a photo; empty: none are kept."
+    )
     links: dict[str, str]
 
     @property
@@ -97,11 +109,14 @@ class Job(Wire):
 
 
 class JobEvent(Wire):
-    """What a `callback_url` gets, at least once: a job has ended. Its id is the `webhook-id` of every attempt."""
+    """A job has ended: what a `callback_url` gets, at least once; its id is the `webhook-id` of every attempt.
 
-    type: Literal["job.succeeded", "job.failed", "job.cancelled"]
-    timestamp: datetime = Field(description="When the job ended.")
-    data: Job
+    Who follows the venue is also told when a job was submitted (`job.queued`).
+    """
+
+    type: Literal["job.queued", "job.succeeded", "job.failed", "job.cancelled"]
+    timestamp: datetime = Field(description="When it happened.")
+    data: Job = Field(description="As it is when it is told.")
 
     @classmethod
     def of(cls, job: Job) -> JobEvent:

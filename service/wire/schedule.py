@@ -1,18 +1,23 @@
-"""Schedules of venues and when they fire: cron's five fields, in a time zone."""
+"""Schedules of venues and when they fire: cron's five fields, in a time zone.
+
+Thousands of venues have the same five fields, and cameras, network and queue would have all of them at once. So each
+fires a little after its time, by its name always the same: at most a quarter of an hour, and before its next time.
+"""
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+import hashlib
+from datetime import UTC, datetime, timedelta
 from typing import Annotated, Self
 from zoneinfo import ZoneInfo
 
-from croniter import CroniterError, croniter
 from pydantic import ConfigDict, Field, StringConstraints, model_validator
 
-from service.wire.base import Wire
+from service.wire.base import Flag, Wire
 from service.wire.options import Options
 
 FIELDS = 5
+LONGEST_SPREAD = timedelta(minutes=15)
 
 
 class Schedule(Wire):
@@ -26,6 +31,11 @@ class Schedule(Wire):
         description="Cron's five fields: minute, hour, day, month, day of the week."
     )
     time_zone: Annotated[str, StringConstraints(max_length=64)] = Field("UTC", description="A name of IANA's.")
+    exact: Flag = Field(
+        False,
+        description="Fire at these times to the second. Otherwise up to 15 minutes later, never after the next time, "
+        "and always by the same share of it: venues with the same schedule do not all come at once.",
+    )
     options: Options | None = Field(None, description="Of its calibrations; absent: what they are when none are given.")
 
     @model_validator(mode="after")
@@ -38,6 +48,7 @@ class ScheduleState(Wire):
     """When a venue is calibrated next, and what came of the last time."""
 
     next_at: datetime
+    last_at: datetime | None = Field(description="The last time; null: it has not come yet.")
     last_job: str | None = Field(description="Of the last time; one that had no frames to compute has failed.")
     last_error: str | None = Field(description="Why the last time brought no poses, or is put off.")
 
@@ -46,11 +57,33 @@ class NoSchedule(ValueError):  # noqa: N818
     """Nothing fires by it; the message says why."""
 
 
-def next_time(cron: str, time_zone: str, after: datetime) -> datetime:
-    """The first time after a moment, in UTC. Raises `NoSchedule` for what is no schedule, or never fires.
+def place_of(venue_id: str) -> float:
+    """Where a venue fires between a time and the next one: 0 (included) to 1, always the same."""
+    return int.from_bytes(hashlib.sha256(venue_id.encode()).digest()[:4]) / 2**32
 
-    A time that a clock skips when summer begins fires right after, one that it shows twice in autumn fires twice.
+
+def next_time(cron: str, time_zone: str, after: datetime, place: float = 0.0) -> datetime:
+    """The first time after a moment, in UTC, of what fires at a `place` between two times (see `place_of`).
+
+    Raises `NoSchedule` for what is no schedule, or never fires. A time that a clock skips when summer begins fires
+    right after, one that it shows twice in autumn fires twice.
     """
+    if not place:
+        return _next(cron, time_zone, after)
+    # What is a little late may be of a time that has come before.
+    time = _next(cron, time_zone, after - LONGEST_SPREAD)
+    while True:
+        following = _next(cron, time_zone, time)
+        late = timedelta(seconds=int(place * min(following - time, LONGEST_SPREAD).total_seconds()))
+        if time + late > after:
+            return time + late
+        time = following
+
+
+def _next(cron: str, time_zone: str, after: datetime) -> datetime:
+    # The commands of the client, which start anew each time, seldom look at a schedule.
+    from croniter import CroniterError, croniter
+
     if len(cron.split()) != FIELDS:
         raise NoSchedule(f"{cron!r} is not cron's five fields: minute, hour, day, month, day of the week")
     try:

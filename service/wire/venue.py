@@ -12,6 +12,7 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Pose, PosedCamera, PoseIn, UnposedCamera
 from service.wire.health import Alarms
 from service.wire.schedule import Schedule
+from service.wire.told.events import WEBHOOK_EXAMPLE, Webhook
 
 Accept = Annotated[
     Literal["each", "all"],
@@ -23,6 +24,10 @@ Lens = Annotated[
         description="Of cameras whose zoom or focus moved: `fixed` rejects the pose, `may-drift` accepts it with the "
         "focal length that was found."
     ),
+]
+
+Webhooks = Annotated[
+    list[Webhook], Field(max_length=8, description="Told of what happens to the venue, and of new poses with them.")
 ]
 
 
@@ -109,6 +114,7 @@ VENUE_EXAMPLE: dict[str, Any] = {
 
 PATCH_EXAMPLES: dict[str, Any] = {
     "an alarm": {"value": {"alarms": {"rejected_in_a_row": 3}}},
+    "who is told of new poses": {"value": {"webhooks": [WEBHOOK_EXAMPLE]}},
     "no schedule": {"value": {"schedule": None}},
     "the source of a camera": {"value": {"cameras": {"left": {"source": "http://10.1.0.7/snapshot.jpg"}}}},
 }
@@ -136,6 +142,7 @@ class VenueIn(_Place):
     lens: Lens = "fixed"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
+    webhooks: Webhooks = Field([])
 
     @model_validator(mode="after")
     def _can_be_fetched(self) -> Self:
@@ -174,6 +181,7 @@ class Venue(_Place):
     lens: Lens = "fixed"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
+    webhooks: Webhooks = Field([])
 
     @property
     def poses(self) -> dict[str, Pose]:
@@ -194,6 +202,10 @@ class Venue(_Place):
         """The venue as one sends it."""
         once = {"cameras": {"__all__": {"pose": {"translation"}}}}
         return VenueIn.model_validate(self.model_dump(exclude=once))
+
+    def differs_in(self, other: Venue) -> list[str]:
+        """The parts of the venue that are not as those of another one."""
+        return [name for name in type(self).model_fields if getattr(self, name) != getattr(other, name)]
 
     def stands_like(self, other: Venue) -> bool:
         """Whether the cameras of both are the same and stand alike, with the ridge that their poses belong to."""

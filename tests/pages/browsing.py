@@ -50,13 +50,15 @@ def tab(
     scheme: str = "dark",
     size: tuple[int, int] = (1280, 900),
     forgiven: tuple[str, ...] = (),
+    zone: str = "UTC",
 ) -> Iterator[Page]:
     """A page of a person of their own. Errors on the console but those that contain what is `forgiven` fail the test.
 
     A browser writes there by itself that an answer was an error, such as 422 for a form that was to be refused.
     """
     complaints: list[str] = []
-    context = browser.new_context(base_url=url, color_scheme=scheme, viewport={"width": size[0], "height": size[1]})
+    viewport = {"width": size[0], "height": size[1]}
+    context = browser.new_context(base_url=url, color_scheme=scheme, viewport=viewport, timezone_id=zone)
     context.set_default_timeout(PATIENCE_MS)
     context.expose_function("violated", lambda what: complaints.append(f"policy: {what}"))
     context.add_init_script(WATCH_POLICY)

@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 import sqlalchemy as sa
 
 from service.store import tables
+from service.store.counts.glances import IN_CURVE, note_end
 from service.store.ids import new_id
 from service.wire.geometry import Moved
 from service.wire.options import Options
@@ -53,4 +54,6 @@ def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:
                 "pictures_deleted_at": now,
             }
         )
+        if number >= count - IN_CURVE:
+            note_end(connection, venue_id, "succeeded", found, at, dry_run=False)
     connection.execute(sa.insert(tables.jobs), rows)

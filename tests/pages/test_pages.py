@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.e2e import running
-from tests.e2e.running import SIZE, Service, png
+from tests.e2e.running import SIZE, Service, png, wait_for
 from tests.pages.browsing import differs, grave, look, wait_until
 from tests.pages.stocked import calibrations
 
@@ -272,3 +272,16 @@ def test_the_keyboard_reaches_what_a_page_offers(stub, ended, visit):
         page.keyboard.press("Tab")
         reached.add(page.evaluate("document.activeElement.textContent.trim() || document.activeElement.name"))
     assert {"Skip to the content", "Venues", "Jobs", "Calibrate", "Reject"} <= reached
+
+
+def test_a_job_that_failed_shows_its_frames_with_what_was_wrong_and_what_was_asked(stub, ended, visit):
+    page = visit(stub.url, f"/ui/jobs/{ended['broken']['id']}")
+    left, right = (page.get_by_role("article", name=camera) for camera in ("left", "right"))
+    expect(left.get_by_text("It is black.")).to_be_visible()
+    expect(right.get_by_text("It is black.")).to_have_count(0)
+    pictures = [camera.get_by_role("img") for camera in (left, right)]
+    wait_for(lambda: {picture.evaluate("(img) => img.naturalWidth") for picture in pictures} == {SIZE[0]})
+    asked = page.get_by_role("region", name="What was asked")
+    expect(asked.get_by_text("somebody without a key")).to_be_visible()
+    expect(asked.get_by_text("left, right")).to_be_visible()
+    expect(asked.get_by_text(str(ended["broken"]["options"]["seed"]))).to_be_visible()

@@ -90,8 +90,8 @@ class Stock(Stores):
         """What is to be told of alarms, as it happened."""
         d = tables.deliveries.c
         with self.engine.connect() as connection:
-            events = connection.scalars(sa.select(d.event).where(d.event.is_not(None)))
-            told = [AlarmEvent.model_validate(event) for event in events]
+            numbers = connection.scalars(sa.select(d.event).where(d.event.is_not(None))).all()
+        told = [self.following.get(number) for number in numbers]
         return sorted(told, key=lambda event: (event.timestamp, event.data.rule, event.data.camera or ""))
 
     def callbacks(self) -> dict[str, int]:

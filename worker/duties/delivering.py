@@ -1,4 +1,4 @@
-"""Callbacks: who asked to be told of a job's end or an alarm is told, again and again for a day if need be."""
+"""Callbacks: who asked to be told of a job's end or of a venue's events is told, again for a day if need be."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import httpx
 import structlog
 
 from service.settings import Settings
-from service.store.deliveries import Deliveries, Delivery
 from service.store.jobs.reading import Jobs
+from service.store.told.deliveries import Deliveries, Delivery
+from service.store.told.following import Following
 from service.wire.job import JobEvent
 from worker.duties import webhook
 from worker.duties.hands import Hands
@@ -34,10 +35,18 @@ log = structlog.get_logger()
 class Delivering:
     """Sends what is due by the clock `now`."""
 
-    def __init__(self, settings: Settings, deliveries: Deliveries, jobs: Jobs, now: Callable[[], datetime]) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        deliveries: Deliveries,
+        jobs: Jobs,
+        following: Following,
+        now: Callable[[], datetime],
+    ) -> None:
         self._settings = settings
         self._deliveries = deliveries
         self._jobs = jobs
+        self._following = following
         self._now = now
         self._tls = httpx.create_ssl_context()
         self._senders = Hands(AT_ONCE, "callback")
@@ -63,9 +72,10 @@ class Delivering:
     def _attempt(self, delivery: Delivery) -> None:
         body = self._body(delivery)
         if body is None:
-            self._deliveries.give_up(delivery, "the job was deleted")
+            self._deliveries.give_up(delivery, "what was to be told is no longer kept")
             return
-        with structlog.contextvars.bound_contextvars(**_named(delivery), attempt=delivery.attempt):
+        named = {"job": delivery.id} if delivery.event is None else {"event": delivery.event}
+        with structlog.contextvars.bound_contextvars(**named, receiver=delivery.receiver, attempt=delivery.attempt):
             try:
                 answer = self._send(delivery, body)
             except Exception as error:  # whatever comes of this address, it is one attempt of one delivery
@@ -82,7 +92,8 @@ class Delivering:
     def _body(self, delivery: Delivery) -> bytes | None:
         """What is to be told; None: nothing any more."""
         if delivery.event is not None:
-            return delivery.event.model_dump_json().encode()
+            event = self._following.get(delivery.event)
+            return None if event is None else event.model_dump_json().encode()
         job = self._jobs.get(delivery.id)
         return None if job is None else JobEvent.of(job).model_dump_json().encode()
 
@@ -103,11 +114,6 @@ class Delivering:
     def _give_up(self, delivery: Delivery, why: str) -> None:
         self._deliveries.give_up(delivery, why)
         log.error("callback given up", why=why)
-
-
-def _named(delivery: Delivery) -> dict[str, str]:
-    """For the log."""
-    return {"job": delivery.id} if delivery.event is None else {"venue": delivery.event.data.venue}
 
 
 def _printable(text: str) -> str:

@@ -20,6 +20,8 @@ from service.store.workers import Workers
 
 # Of each kind per round: some seconds on a bucket, a fraction of one in a folder.
 BATCH = 100
+# Rows alone, several of each job.
+EVENTS = 1000
 YEAR = timedelta(days=365.25)
 # Between two rounds while there is more to do: what others write gets its turn.
 BREATH_S = 2.0
@@ -32,7 +34,7 @@ log = structlog.get_logger()
 
 
 class Retention:
-    """Deletes frames, pictures, jobs and revisions after the time that the settings keep them."""
+    """Deletes frames, pictures, jobs, revisions and events after the time that the settings keep them."""
 
     def __init__(
         self,
@@ -73,11 +75,12 @@ class Retention:
             "pictures": self._expiry.expire_pictures(now - timedelta(days=keep.keep_pictures_days), now, BATCH),
             "jobs": self._delete_jobs(now - timedelta(days=keep.keep_jobs_days), now),
             "revisions": self._expiry.expire_revisions(now - keep.keep_revisions_years * YEAR, BATCH),
+            "events": self._expiry.expire_events(now - timedelta(days=keep.keep_events_days), EVENTS),
             "folders": self._sweep(now),
         }
         if any(counts.values()):
             log.info("deleted what is past its time", short_of_room=short_of_room, **counts)
-        return any(count == BATCH for count in counts.values())
+        return any(count >= BATCH for count in counts.values())
 
     def _chosen(self) -> bool:
         """Whether this worker, of those alive, is the one to do it: the first by name."""

@@ -99,7 +99,7 @@ class Scheduled:
             raise Passing("Less is free on the disk than must be.")
         # Fired again after a worker died over it, it is the same job.
         name = f"schedule-{firing.due_at.astimezone(UTC):%Y%m%dT%H%M%SZ}"
-        origin = Origin(request_id=name)
+        origin = Origin(request_id=name, asked_by="schedule")
         try:
             return self._from_sources.calibrate(venue.id, options, name, origin)[0]
         except PASSING as refusal:

@@ -16,7 +16,7 @@ from datetime import datetime
 
 import httpx
 
-from service.wire.callback_urls import is_public
+from service.wire.told.callback_urls import is_public
 from worker.duties import outgoing
 
 # From the first connection to the answer.

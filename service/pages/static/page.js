@@ -56,8 +56,20 @@ export function ago(moment, now = Date.now()) {
   return `${Math.round(seconds / length)} ${unit} ago`;
 }
 
+/** A moment by the clock where the viewer is: 2026-11-21 11:00:09 GMT+1. */
+export function onTheClock(moment) {
+  const zone = new Intl.DateTimeFormat("en", {timeZoneName: "short"}).formatToParts(moment);
+  // Swedish is written as ISO 8601 is.
+  return `${moment.toLocaleString("sv")} ${zone.find(({type}) => type === "timeZoneName").value}`;
+}
+
 function tellTimes() {
-  for (const time of document.querySelectorAll("time[data-ago]")) time.textContent = ago(Date.parse(time.dateTime));
+  for (const time of document.querySelectorAll("time")) {
+    const moment = new Date(time.dateTime);
+    if ("ago" in time.dataset) time.textContent = ago(moment);
+    else time.textContent = onTheClock(moment);
+    time.title = "ago" in time.dataset ? onTheClock(moment) : `${time.dateTime.slice(0, 19).replace("T", " ")} UTC`;
+  }
 }
 
 async function press(button) {
@@ -83,11 +95,13 @@ async function refresh() {
   if (!answer || !answer.ok || answer.redirected) return;
   const there = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[data-refresh]");
   if (there && there.innerHTML !== here.innerHTML && !here.contains(document.activeElement)) here.replaceWith(there);
+  tellTimes();
 }
 
 document.addEventListener("click", (event) => {
   const button = event.target.closest("button[data-call]");
   if (button) press(button);
 });
+tellTimes();
 setInterval(tellTimes, OFTEN);
 if (document.querySelector("[data-refresh]")) setInterval(refresh, OFTEN);

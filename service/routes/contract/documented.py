@@ -14,6 +14,7 @@ from service.wire.health import AlarmEvent
 from service.wire.job import Job, JobEvent
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
 from service.wire.problems import MEDIA_TYPE, ProblemDetails
+from service.wire.told.events import Event
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
 MODELS = (Options, IntrinsicsOptions, LocateOptions, FieldOptions, ProblemDetails)
@@ -69,6 +70,17 @@ def document_alarms(app: FastAPI) -> None:
     @app.webhooks.post("alarm", status_code=204, tags=["venues"])
     def alarm(event: AlarmEvent) -> None:
         """Sent once when an alarm of a venue begins and once when it is over, signed and retried as `job-ended` is."""
+
+
+def document_events(app: FastAPI) -> None:
+    """Add to the document what the `webhooks` of a venue get."""
+
+    @app.webhooks.post("venue-event", status_code=204, tags=["venues"])
+    def venue_event(event: Event) -> None:
+        """Sent to each of a venue's `webhooks` that wants it, signed and retried as `job-ended` is.
+
+        One that had to be tried again can arrive after a later one: of two with poses, the higher `revision` holds.
+        """
 
 
 def reference(model: type[BaseModel]) -> dict[str, str]:

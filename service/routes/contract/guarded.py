@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from typing import Any
 
 from fastapi import Request, Response
@@ -37,7 +38,9 @@ class Guarded(APIRoute):
             return handle
 
         async def guarded(request: Request) -> Response:
-            request.state.key = await request.app.state.context.gate.admit(request, needed)
+            request.state.key = key = await request.app.state.context.gate.admit(request, needed)
+            if key is not None:
+                request.state.origin = replace(request.state.origin, asked_by=f"key {key.name}")
             # Forms may be large, and here one would be held in memory only to be refused.
             if takes_document and is_form(request):
                 raise not_json(request)

@@ -16,10 +16,10 @@ from service.api.problems import invalid
 from service.intake import images
 from service.routes.venues import no_such_venue
 from service.settings import Settings
-from service.wire import callback_urls
 from service.wire.base import OPTIONS_PART
 from service.wire.options import Handling
 from service.wire.problems import Problem
+from service.wire.told import callback_urls
 from service.wire.venue import Venue
 
 LONGEST_OPTIONS = 64 * 1024

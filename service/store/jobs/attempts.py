@@ -148,7 +148,7 @@ def end_without_result(connection: sa.Connection, job_id: str, still: Still, err
     """Fail a job inside the caller's transaction; False, and nothing is done, if the row is not `still` so."""
     row = connection.execute(sa.select(j.kind, j.venue, j.options).where(j.id == job_id)).one()
     brought_none = row.kind == "calibration" and not row.options["dry_run"]
-    if brought_none:
+    if row.venue is not None:
         serialise(connection, venue_lock(row.venue))
     if not _locked(connection, still):
         return False

@@ -38,6 +38,9 @@ class Decisions(Repository):
     def cancel(self, job_id: str) -> None:
         """End a job that is still open; its worker notices."""
         with writing(self._engine) as connection:
+            venue_id = connection.scalar(sa.select(j.venue).where(j.id == job_id))
+            if venue_id is not None:
+                serialise(connection, venue_lock(venue_id))
             end(connection, job_id, still_open(job_id), "cancelled")
 
     def accept(self, job_id: str, cameras: Collection[str] | None = None) -> None:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.deliveries import deliveries_of
 from service.store.engine import Repository, reading
 from service.store.jobs.files import picture_file, picture_folder
 from service.store.jobs.task import Origin
 from service.store.revisions import revisions_of_jobs
+from service.store.told.deliveries import deliveries_of
 from service.store.venues import with_result
 from service.wire.job import CallbackState, Job, Status
 from service.wire.results import Result
@@ -55,6 +56,11 @@ class Jobs(Repository):
             except sa.exc.NoResultFound:
                 return None
 
+    def several(self, job_ids: Collection[str]) -> dict[str, Job]:
+        """Those of several jobs that are there, by their ids."""
+        with reading(self._engine) as connection:
+            return jobs_of(connection, job_ids)
+
     def page(
         self, venue: str | None, status: str | None, before: str | None, limit: int, kind: str | None = None
     ) -> list[Job]:
@@ -91,6 +97,14 @@ class Jobs(Repository):
             found = found_poses(connection, job_id)
         return None if found is None else with_result(*found)
 
+    def frame(self, job_id: str, number: int) -> str | None:
+        """Where a frame of a job lies in the blob store, counted through all of them; None: there is none."""
+        query = sa.select(j.frames).where(j.id == job_id, j.frames_deleted_at.is_(None))
+        with reading(self._engine) as connection:
+            frames = connection.execute(query).scalar_one_or_none() or {}
+        paths = [path for several in frames.values() for path in several]
+        return paths[number] if number < len(paths) else None
+
     def check(self) -> None:
         """Raise unless the database answers, and has them."""
         with reading(self._engine) as connection:
@@ -100,6 +114,12 @@ class Jobs(Repository):
 def read_job(connection: sa.Connection, job_id: str) -> Job:
     """One job as clients see it, which is there."""
     return _jobs(connection, [connection.execute(ONE, {"job_id": job_id}).one()])[0]
+
+
+def jobs_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, Job]:
+    """Those of several jobs that are there, as clients see them."""
+    rows = connection.execute(sa.select(tables.jobs).where(j.id.in_(job_ids))).all() if job_ids else []
+    return {job.id: job for job in _jobs(connection, rows)}
 
 
 def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] | None:
@@ -117,7 +137,7 @@ def asked(row: Any) -> dict[str, Any]:
         "venue": row.venue_document,
         "options": row.options,
         "frames": row.frames,
-        "origin": Origin(row.request_id, row.traceparent),
+        "origin": Origin(row.request_id, row.traceparent, row.asked_by),
     }
 
 
@@ -144,9 +164,21 @@ def _job(row: Any, position: int | None, callback: CallbackState | None, revisio
         error=row.error,
         result=row.result,
         callback=callback,
+        asked_by=row.asked_by,
+        # An address may be a secret, and how far its telling has come is said by `callback`.
+        options={name: value for name, value in row.options.items() if name != "callback_url"},
+        frames=_frames(row),
         venue_revision=revision,
         links=_links(row),
     )
+
+
+def _frames(row: Any) -> dict[str, list[str]]:
+    """By camera, or by the names of photos, addresses that count through all of them."""
+    if row.frames_deleted_at is not None:
+        return {}
+    number = count()
+    return {name: [f"/jobs/{row.id}/frames/{next(number)}" for _ in paths] for name, paths in row.frames.items()}
 
 
 def _positions(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:

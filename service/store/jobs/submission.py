@@ -15,6 +15,7 @@ from service.store.jobs.attempts import end_without_result
 from service.store.jobs.files import frame_folder
 from service.store.jobs.reading import ONE, asked, read_job
 from service.store.jobs.task import Asked
+from service.store.told.events import add_job_event
 from service.store.venues import find_venue, venue_lock
 from service.wire.job import Job, JobError, Kind, Status
 from service.wire.options import Options
@@ -100,7 +101,10 @@ class Submissions(Repository):
             # From here on the frames are the job's.
             folder = frame_folder(submission.job_id)
             connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
-            _insert(connection, submission, venue, "queued", clock(connection))
+            now = clock(connection)
+            _insert(connection, submission, venue, "queued", now)
+            if venue is not None:
+                add_job_event(connection, venue.id, venue.webhooks, "job.queued", submission.job_id, now)
             priority = PRIORITIES[submission.options.priority]
             enqueue(connection, submission.job_id, priority, submission.kind)
             # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
@@ -159,6 +163,7 @@ def _insert(
         "idempotency_key": submission.idempotency_key,
         "venue_document": venue.model_dump(mode="json") if venue else None,
         "frames": submission.frames,
+        "asked_by": submission.origin.asked_by,
         "request_id": submission.origin.request_id,
         "traceparent": submission.origin.traceparent,
         "created_at": now,

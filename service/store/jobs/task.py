@@ -36,10 +36,12 @@ def seeded(options: AnyOptions) -> AnyOptions:
 
 @dataclass(frozen=True)
 class Origin:
-    """The request that a job came with: how the log calls it, and its place in a trace (W3C Trace Context)."""
+    """The request that a job came with: how the log calls it, its place in a trace (W3C Trace Context), and who asked:
+    `key NAME`, or `schedule`."""
 
     request_id: str | None = None
     traceparent: str | None = None
+    asked_by: str | None = None
 
     def names(self) -> dict[str, str]:
         """For every line of the log that comes of it."""
@@ -79,5 +81,8 @@ class Task(Asked):
     last_views: dict[str, View] = {}
 
     def without_addresses(self) -> Task:
-        """The same but for who is told of its end: to compute it nobody need know, and the address may be a secret."""
-        return self.model_copy(update={"options": self.options.model_copy(update={"callback_url": None})})
+        """The same but for who is told of it: to compute it nobody need know, and the addresses may be secrets."""
+        untold = self.venue and self.venue.model_copy(update={"webhooks": [], "alarms": None})
+        return self.model_copy(
+            update={"venue": untold, "options": self.options.model_copy(update={"callback_url": None})}
+        )

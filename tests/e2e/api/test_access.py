@@ -91,6 +91,7 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             job_id=JOB,
             venue_id="nowhere",
             camera="left",
+            number=0,
             kind="not-found",
             reason="lines",
             of_edition="0",
@@ -139,7 +140,7 @@ def test_a_body_is_not_looked_at_before_the_key(guarded):
 def test_from_the_venue_to_the_pose_with_the_keys_that_suffice(guarded, key, name):
     guarded.http.put(f"/venues/{name}", json=venue(name), headers=bearer(key["admin"])).raise_for_status()
     sent = guarded.http.post(f"/venues/{name}/calibrate", files=upload(), headers=bearer(key["calibrate"]))
-    assert sent.status_code == 202
+    assert (sent.status_code, sent.json()["asked_by"]) == (202, "key calibrate")
     with guarded.http.stream("GET", f"/jobs/{sent.json()['id']}/events", headers=bearer(key["read"])) as events:
         assert "event: end" in events.read().decode()
 

@@ -30,6 +30,7 @@ REACHED = {
     ("POST", "/venues/*/cameras/left/locate", 202),
     ("GET", "/jobs/*", 200),
     ("GET", "/jobs/*/events", 200),
+    ("GET", "/jobs/*/frames/0", 200),
     ("GET", "/jobs/*/poses", 200),
     ("GET", "/jobs/*/poses", 422),
     ("GET", "/venues/*/poses", 200),

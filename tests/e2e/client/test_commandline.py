@@ -5,6 +5,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
+from pathlib import Path
 
 import httpx
 import pytest
@@ -243,6 +244,20 @@ def test_the_service_and_its_key_may_be_named_in_a_file(service, name, tmp_path)
 
 def test_the_version_is_told(esc):
     assert esc("--version").stdout == f"esc {version('esc-calibration')}\n"
+
+
+def test_a_shell_is_taught_the_commands():
+    asked = {"_ESC_COMPLETE": "complete_bash", "COMP_WORDS": "esc job wa", "COMP_CWORD": "2"}
+    command = [Path(sys.executable).parent / "esc"]
+    completed = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True)
+    assert completed.stdout.split() == ["wait"]
+
+
+def test_commands_of_the_client_load_neither_the_server_nor_the_engine():
+    heavy = "fastapi sqlalchemy dbos structlog pydantic_settings croniter cv2 numpy"
+    loaded = f"import sys, service.cli.main; print([name for name in {heavy.split()} if name in sys.modules])"
+    told = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
+    assert told.stdout == "[]\n"
 
 
 def test_every_option_and_argument_says_what_it_is_for():

@@ -1,11 +1,14 @@
 import json
 import time
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 from threading import Semaphore
 
 import httpx
 import pytest
+import sqlalchemy as sa
 
+from service.store import tables
 from service.store.blobs import Blobs
 from tests.e2e.running import DEADLINE_S, SIZE, alive, png, upload, venue, wait_for
 from tests.homes import in_both_homes
@@ -364,3 +367,32 @@ def test_the_frames_that_were_sent_are_the_frames_that_are_kept(service, name):
     job = service.submitted(service.venue(name), 5)
     service.end(job)
     assert Blobs(service.blob_url).get(f"frames/{job}/left/0") == png(*SIZE, shade=5)
+
+
+@in_both_homes
+def test_a_job_that_failed_says_what_was_asked_and_shows_its_frames(service, name):
+    job = service.calibrated(service.venue(name, "fail"), dry_run=True, generations=7)
+    assert (job["status"], job["error"]["camera"], job["asked_by"]) == ("failed", "left", None)
+    assert (job["options"]["dry_run"], job["options"]["generations"]) == (True, 7)
+    assert isinstance(job["options"]["seed"], int)
+    assert job["frames"].keys() == {"left", "right"}
+    (address,) = job["frames"]["right"]
+    frame = service.http.get(address)
+    assert (frame.headers["content-type"], frame.content) == ("image/png", png())
+    missing = service.http.get(address[:-1] + "9")
+    assert (missing.status_code, missing.json()["type"]) == (404, "/problems/picture-not-found")
+
+
+@in_both_homes
+def test_a_job_whose_frames_are_past_their_time_names_none(service, name):
+    job = service.calibrated(service.venue(name))
+    (address,) = job["frames"]["left"]
+    with service.database() as connection:
+        j = tables.jobs
+        gone = sa.update(j).where(j.c.id == job["id"]).values(frames_deleted_at=datetime.now(UTC))
+        connection.execute(gone)
+    assert service.job(job["id"])["frames"] == {}
+    assert (service.http.get(address).status_code, service.http.get(address).json()["type"]) == (
+        410,
+        "/problems/frames-deleted",
+    )

@@ -104,7 +104,19 @@ ROWS = {
     "alarms": [{"venue": VENUE.id, "rule": "not-calibrated", "camera": "", "since": NOON, "why": "No poses."}],
     "credentials": [{"venue": VENUE.id, "camera": "left", "userinfo": "user:secret"}],
     "schedules": [
-        {"venue": VENUE.id, "cron": "0 3 * * *", "time_zone": "UTC", "due_at": NOON, "look_at": NOON, "last_job": DONE}
+        {
+            "venue": VENUE.id,
+            "cron": "0 3 * * *",
+            "time_zone": "UTC",
+            "exact": True,
+            "due_at": NOON,
+            "look_at": NOON,
+            "last_job": DONE,
+        }
+    ],
+    "events": [
+        {"venue": VENUE.id, "type": "venue.created", "at": NOON, "data": {"venue": VENUE.id, "changed": []}},
+        {"venue": VENUE.id, "type": "job.succeeded", "at": NOON, "job": DONE},
     ],
     "tallies": [{"metric": ENDED, "labels": "succeeded,accepted,", "value": 3}],
     "revisions": [

@@ -1,11 +1,12 @@
 """Schedules of venues in both homes: fired once, by one worker, whatever happens to workers."""
 
+from collections import Counter
 from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from service.store.schedules import Schedules
-from service.wire.schedule import NoSchedule, Schedule, next_time
+from service.wire.schedule import NoSchedule, Schedule, next_time, place_of
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway
 
@@ -33,6 +34,39 @@ def test_a_schedule_fires_by_the_clock_on_the_wall(cron, zone, after, expected):
     assert next_time(cron, zone, at(after)) == at(expected)
 
 
+def test_venues_with_the_same_schedule_fire_one_after_the_other_within_a_quarter_of_an_hour():
+    times = [next_time("*/15 * * * *", "UTC", NOON, place_of(f"venue-{n}")) for n in range(10_000)]
+    assert NOON < min(times) < max(times) <= NOON + timedelta(minutes=15)
+    # 10 000 in 900 s: 11 a second.
+    assert max(Counter(times).values()) < 30
+    assert times == [next_time("*/15 * * * *", "UTC", NOON, place_of(f"venue-{n}")) for n in range(10_000)]
+
+
+@pytest.mark.parametrize(
+    ("cron", "longest"), [("0 3 * * *", timedelta(minutes=15)), ("*/5 * * * *", timedelta(minutes=5))]
+)
+def test_how_late_a_venue_fires_is_bounded_and_always_the_same(cron, longest):
+    exact = next_time(cron, "UTC", NOON)
+    for place in (0.001, 0.5, 0.999):
+        first = next_time(cron, "UTC", exact - timedelta(seconds=1), place)
+        assert exact <= first < exact + longest
+        # From within the time that it is late, it is still to come; afterwards it is the next time's.
+        assert next_time(cron, "UTC", first - timedelta(seconds=1), place) == first
+        assert next_time(cron, "UTC", first, place) == first + (next_time(cron, "UTC", exact) - exact)
+
+
+@in_both_homes
+def test_a_schedule_that_must_be_exact_is(stock, schedules):
+    spread = put(stock).next_at
+    exact = put(stock, exact=True).next_at
+    assert (exact.minute % 15, exact.second) == (0, 0)
+    assert spread != exact
+    (firing,) = schedules.fire(exact, exact + LEASE, 10)
+    schedules.done(firing, exact, None, None)
+    state = stock.venues.health("v").schedule
+    assert (state.last_at, state.next_at) == (exact, exact + timedelta(minutes=15))
+
+
 @pytest.mark.parametrize(
     ("cron", "zone"),
     [
@@ -53,8 +87,8 @@ def schedules(stock):
     return Schedules(stock.engine)
 
 
-def put(stock, cron="*/15 * * * *"):
-    schedule = None if cron is None else Schedule(cron=cron)
+def put(stock, cron="*/15 * * * *", exact=False):
+    schedule = None if cron is None else Schedule(cron=cron, exact=exact)
     stock.venues.put(stock.venue("v").model_copy(update={"schedule": schedule}), anyway)
     return stock.venues.health("v").schedule
 

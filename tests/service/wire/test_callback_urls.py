@@ -4,9 +4,9 @@ import pytest
 from pydantic import ValidationError
 
 from service.settings import Settings
-from service.wire import callback_urls
 from service.wire.options import Options
 from service.wire.problems import Problem
+from service.wire.told import callback_urls
 
 SECRET = "whsec_" + b64encode(bytes(32)).decode()
 

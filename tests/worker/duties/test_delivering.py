@@ -13,7 +13,7 @@ import pytest
 import sqlalchemy as sa
 
 from service.settings import Settings
-from service.store.deliveries import AT_ONCE_PER_RECEIVER
+from service.store.told.deliveries import AT_ONCE_PER_RECEIVER
 from service.wire.health import Alarms
 from tests.homes import in_both_homes
 from tests.worker.receiver import Dripping, Endless, NulSaying, Receiver, Silent
@@ -71,7 +71,7 @@ def receiver():
 
 
 def callbacks(stock, clock) -> Delivering:
-    return Delivering(stock.settings, stock.deliveries, stock.jobs, clock)
+    return Delivering(stock.settings, stock.deliveries, stock.jobs, stock.following, clock)
 
 
 def look(sender: Delivering) -> None:

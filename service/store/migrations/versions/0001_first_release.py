@@ -70,6 +70,7 @@ def _jobs() -> None:
         sa.Column("updated_at", moment, nullable=False),
         sa.Column("frames_deleted_at", moment),
         sa.Column("pictures_deleted_at", moment),
+        sa.Column("asked_by", sa.String(80)),
         sa.Column("request_id", sa.String(64)),
         sa.Column("traceparent", sa.String(55)),
     )
@@ -101,6 +102,7 @@ def _beside_venues() -> None:
         sa.Column("drift_px", sa.Double),
         sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
         sa.Column("cameras", sa.JSON(none_as_null=True)),
+        sa.Column("glance", sa.JSON(none_as_null=True)),
         sa.Column("alarm_due_at", moment),
     )
     op.create_index("venues_by_stitch_error", "venue_quality", ["stitch_error_px"])
@@ -119,8 +121,10 @@ def _beside_venues() -> None:
         sa.Column("venue", sa.String(64), primary_key=True),
         sa.Column("cron", sa.String(100), nullable=False),
         sa.Column("time_zone", sa.String(64), nullable=False),
+        sa.Column("exact", sa.Boolean, nullable=False),
         sa.Column("due_at", moment, nullable=False),
         sa.Column("look_at", moment, nullable=False),
+        sa.Column("last_at", moment),
         sa.Column("last_job", sa.String(26)),
         sa.Column("last_error", sa.String(500)),
     )
@@ -141,6 +145,17 @@ def _beside_jobs() -> None:
     )
     op.create_index("leftovers_by_due", "leftovers", ["due_at"])
     op.create_table(
+        "events",
+        sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True),
+        sa.Column("venue", sa.String(64), nullable=False),
+        sa.Column("type", sa.String(32), nullable=False),
+        sa.Column("at", moment, nullable=False),
+        sa.Column("data", sa.JSON),
+        sa.Column("job", sa.String(26)),
+        sqlite_autoincrement=True,
+    )
+    op.create_index("events_by_venue", "events", ["venue", "id"])
+    op.create_table(
         "deliveries",
         sa.Column("id", sa.String(26), primary_key=True),
         sa.Column("url", sa.String(2048), nullable=False),
@@ -149,7 +164,7 @@ def _beside_jobs() -> None:
         sa.Column("attempts", sa.Integer, nullable=False),
         sa.Column("due_at", moment, nullable=False),
         sa.Column("last_error", sa.String(500)),
-        sa.Column("event", sa.JSON),
+        sa.Column("event", sa.BigInteger),
     )
     op.create_index("deliveries_by_due", "deliveries", ["status", "due_at"])
     op.create_table(

@@ -17,17 +17,21 @@ GLOBAL_V6 = ipaddress.ip_network("2000::/3")
 NAT64 = ipaddress.ip_network("64:ff9b::/96")
 
 
-def check(url: str, settings: Settings) -> None:
-    """Refuse a `callback_url` that could not be used; a name is looked up only when it is called."""
+def check(url: str, settings: Settings, member: str = "callback_url") -> None:
+    """Refuse an address that could not be told; a name is looked up only when it is called. `member`: what gave it."""
     parsed = httpx.URL(url)
     if not settings.webhook_keys:
-        raise _refusal("Callbacks are signed and this service has no secret: set ESC_WEBHOOK_SECRET, or poll the job.")
+        raise _refusal(
+            member, "Callbacks are signed and this service has no secret: set ESC_WEBHOOK_SECRET, or poll the job."
+        )
     if parsed.scheme != "https" and not settings.callback_allow_http:
-        raise _refusal("Give an https address; http needs ESC_CALLBACK_ALLOW_HTTP=true.", got=parsed.scheme)
+        raise _refusal(member, "Give an https address; http needs ESC_CALLBACK_ALLOW_HTTP=true.", got=parsed.scheme)
     if parsed.userinfo:
-        raise _refusal("Give it without user name and password; the signature says who calls.")
+        raise _refusal(member, "Give it without user name and password; the signature says who calls.")
     if ip_of(parsed.host) and not settings.callback_allow_private and not is_public(parsed.host):
-        raise _refusal("It is not on the public internet; that needs ESC_CALLBACK_ALLOW_PRIVATE=true.", got=parsed.host)
+        raise _refusal(
+            member, "It is not on the public internet; that needs ESC_CALLBACK_ALLOW_PRIVATE=true.", got=parsed.host
+        )
 
 
 def is_public(address: str) -> bool:
@@ -41,5 +45,5 @@ def is_public(address: str) -> bool:
     return ip.is_global and not ip.is_multicast
 
 
-def _refusal(detail: str, **parts: Any) -> Problem:
-    return Problem("callback-refused", f"callback_url: {detail}", **parts)
+def _refusal(member: str, detail: str, **parts: Any) -> Problem:
+    return Problem("callback-refused", f"{member}: {detail}", **parts)

@@ -1,4 +1,4 @@
-"""Deliveries: who is to be told of the end of a job, or of an alarm. All SQL about them.
+"""Deliveries: who is to be told of the end of a job, or of an event of a venue. All SQL about them.
 
 A delivery is written in the transaction that makes true what it tells. To attempt it is to put it off first: whoever
 dies over an attempt leaves it to be attempted again, so it is made at least once, by one worker at a time.
@@ -20,7 +20,6 @@ from service.store import tables
 from service.store.counts import tallies
 from service.store.engine import Repository, reading, serialise, writing
 from service.store.ids import new_id
-from service.wire.health import AlarmEvent
 from service.wire.job import CallbackState
 
 CALLBACKS = "callbacks"
@@ -33,12 +32,12 @@ d = tables.deliveries.c
 
 @dataclass(frozen=True)
 class Delivery:
-    """An attempt, the first is number 1, to tell `url` of an alarm's event, or (None) that the job `id` has ended."""
+    """An attempt, the first is number 1, to tell `url` of an event, or (None) that the job `id` has ended."""
 
     id: str
     url: str
     attempt: int
-    event: AlarmEvent | None
+    event: int | None
     receiver: str
 
 
@@ -80,7 +79,7 @@ class Deliveries(Repository):
             if _write(connection, delivery, status=outcome, **values):
                 tallies.add(connection, {(CALLBACKS, (outcome,)): 1})
                 if delivery.event is not None:
-                    # That of a job goes with its job; nobody asks how far the telling of an alarm has come.
+                    # That of a job goes with its job; nobody asks how far the telling of an event has come.
                     connection.execute(sa.delete(tables.deliveries).where(d.id == delivery.id))
 
 
@@ -114,10 +113,10 @@ def add_delivery(connection: sa.Connection, job_id: str, url: str, now: datetime
     connection.execute(sa.insert(tables.deliveries).values(**told))
 
 
-def add_alarm_delivery(connection: sa.Connection, event: AlarmEvent, url: str, now: datetime) -> None:
-    """Have `url` told of an alarm, when and if the caller's transaction commits."""
+def add_event_delivery(connection: sa.Connection, event: int, url: str, now: datetime) -> None:
+    """Have `url` told of an event, when and if the caller's transaction commits."""
     told = {"id": new_id(), "url": url, "receiver": _receiver(url), "status": "waiting", "due_at": now}
-    connection.execute(sa.insert(tables.deliveries).values(event=event.model_dump(mode="json"), **told))
+    connection.execute(sa.insert(tables.deliveries).values(event=event, **told))
 
 
 def deliveries_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, CallbackState]:
@@ -137,8 +136,7 @@ def deliveries_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[s
 
 
 def _delivery(row: sa.Row[Any]) -> Delivery:
-    event = None if row.event is None else AlarmEvent.model_validate(row.event)
-    return Delivery(row.id, row.url, row.attempts + 1, event, row.receiver)
+    return Delivery(row.id, row.url, row.attempts + 1, row.event, row.receiver)
 
 
 def _receiver(url: str) -> str:

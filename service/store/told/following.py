@@ -1,0 +1,101 @@
+"""Following a venue: what has happened to it since somebody looked last."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+from pydantic import TypeAdapter
+
+from service.store import tables
+from service.store.engine import Repository, reading
+from service.store.jobs.reading import jobs_of
+from service.store.revisions import newest_revision
+from service.store.venues import find_venue
+from service.wire.job import Job
+from service.wire.told.events import Event, EventKind, Poses, PosesEvent, is_of
+
+e = tables.events.c
+LAST = "venue.deleted"
+EVENT: TypeAdapter[Event] = TypeAdapter(Event)
+
+
+@dataclass(frozen=True)
+class Numbered:
+    """An event, and where whoever has seen it goes on."""
+
+    number: int
+    event: Event
+
+
+@dataclass(frozen=True)
+class Page:
+    """Events in order, up to which number they were looked for, and whether there may be more."""
+
+    events: list[Numbered]
+    up_to: int
+    more: bool
+
+
+class Following(Repository):
+    """The events in the database."""
+
+    def newest(self, venue_ids: Collection[str]) -> Mapping[str, int]:
+        """The number of the last event of each of these venues that has had one."""
+        query = sa.select(e.venue, sa.func.max(e.id).label("newest")).where(e.venue.in_(venue_ids)).group_by(e.venue)
+        with reading(self._engine) as connection:
+            return {row.venue: row.newest for row in connection.execute(query)}
+
+    def beginning(self, venue_id: str, seen: int | None) -> Numbered | None:
+        """The poses that hold, for whoever has seen nothing yet or has missed events that are no longer kept.
+
+        None: it can be gone on from `seen`. The venue is there.
+        """
+        with reading(self._engine) as connection:
+            oldest, newest = connection.execute(sa.select(sa.func.min(e.id), sa.func.max(e.id))).one()
+            # The oldest go first, whatever venue they are of, and never all: before the oldest that is kept are those
+            # that may be missed. A number that was never given is one of another database.
+            if seen is not None and oldest is not None and oldest - 1 <= seen <= newest:
+                return None
+            number = connection.scalar(sa.select(sa.func.max(e.id)).where(e.venue == venue_id)) or 0
+            venue, revision = find_venue(connection, venue_id), newest_revision(connection, venue_id)
+        assert venue is not None
+        assert revision is not None
+        poses = Poses(
+            venue=venue_id,
+            cameras=[camera.posed for camera in venue.cameras],
+            changed=[],
+            **{name: getattr(revision, name) for name in ("revision", "cause", "job", "stitch_error_px", "ridge")},
+        )
+        return Numbered(number, PosesEvent(type="poses.current", timestamp=revision.at, data=poses))
+
+    def since(self, venue_id: str, seen: int, kinds: Collection[EventKind], limit: int) -> Page:
+        """What is of these kinds (none given: of any) among the next `limit` events after one that was seen.
+
+        That the venue was deleted is of every kind: nothing comes after it.
+        """
+        query = sa.select(tables.events).where(e.venue == venue_id, e.id > seen).order_by(e.id).limit(limit)
+        with reading(self._engine) as connection:
+            rows = connection.execute(query).all()
+            wanted = [row for row in rows if not kinds or row.type == LAST or is_of(row.type, kinds)]
+            return Page(_told(connection, wanted), rows[-1].id if rows else seen, len(rows) == limit)
+
+    def get(self, number: int) -> Event | None:
+        """One event; None: it is no longer kept, or its job is not."""
+        with reading(self._engine) as connection:
+            row = connection.execute(sa.select(tables.events).where(e.id == number)).one_or_none()
+            told = [] if row is None else _told(connection, [row])
+        return told[0].event if told else None
+
+
+def _told(connection: sa.Connection, rows: Sequence[Any]) -> list[Numbered]:
+    """Those of jobs that were deleted meanwhile are left out."""
+    jobs = jobs_of(connection, {row.job for row in rows if row.job})
+    return [Numbered(row.id, _event(row, jobs)) for row in rows if row.job is None or row.job in jobs]
+
+
+def _event(row: Any, jobs: Mapping[str, Job]) -> Event:
+    data = row.data if row.job is None else jobs[row.job].model_copy(update={"callback": None})
+    return EVENT.validate_python({"type": row.type, "timestamp": row.at, "data": data})

@@ -1,0 +1,73 @@
+"""What happens to a venue, as those hear of it who follow it, and the webhooks that are told."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+
+from service.wire.addresses import CallbackUrl
+from service.wire.base import Id, Wire
+from service.wire.geometry import PosedCamera, Row
+from service.wire.health import AlarmEvent
+from service.wire.history import Cause
+from service.wire.job import JobEvent
+
+# `venue.*`: whatever begins so.
+EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
+WEBHOOK_EXAMPLE: dict[str, Any] = {"url": "https://example.com/poses", "events": ["poses.changed"]}
+
+
+class Webhook(Wire):
+    """An address that is told of what happens to a venue, signed (Standard Webhooks), again for a day if need be."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [WEBHOOK_EXAMPLE]})
+
+    url: CallbackUrl
+    events: Annotated[list[EventKind], Field(min_length=1, max_length=4)] = Field(["poses.changed"])
+
+
+class Poses(Wire):
+    """The cameras of a venue as they stand: what draws on their pictures needs nothing else."""
+
+    venue: Id
+    revision: int = Field(description="In the history of the venue. It grows: of two, the higher one holds.")
+    cause: Cause
+    job: str | None = Field(description="Whose poses these are; of a restored revision, whose were rejected by hand.")
+    stitch_error_px: float | None
+    ridge: list[Row] | None
+    cameras: list[PosedCamera]
+    changed: list[Id] = Field(description="The cameras that stand or image otherwise than by the revision before.")
+
+
+class PosesEvent(Wire):
+    """`poses.changed`: by a calibration, by hand or by PUT. `poses.current`: how a stream of events begins."""
+
+    type: Literal["poses.changed", "poses.current"]
+    timestamp: datetime = Field(description="Since when they hold.")
+    data: Poses
+
+
+class VenueChange(Wire):
+    """A venue that was put, changed or deleted."""
+
+    venue: Id
+    changed: list[str] = Field(description="The parts of it that PUT or PATCH changed.")
+
+
+class VenueEvent(Wire):
+    """Somebody put a venue, changed or deleted it."""
+
+    type: Literal["venue.created", "venue.changed", "venue.deleted"]
+    timestamp: datetime
+    data: VenueChange
+
+
+Event = Annotated[PosesEvent | VenueEvent | JobEvent | AlarmEvent, Field(discriminator="type")]
+
+
+def is_of(event: str, kinds: Collection[EventKind]) -> bool:
+    """Whether an event of this type is of one of the kinds."""
+    return event in kinds or f"{event.partition('.')[0]}.*" in kinds

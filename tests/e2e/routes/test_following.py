@@ -1,0 +1,193 @@
+"""Following a venue: server-sent events and webhooks of a whole service, and the renderer of the documents."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from service import lifeline
+from tests.e2e.running import DEADLINE_S, venue, wait_for
+from tests.e2e.worker.test_callbacks import LOCAL
+from tests.homes import in_both_homes
+from tests.worker.receiver import Receiver
+
+RENDERER = Path(__file__).parents[3] / "docs" / "examples" / "renderer.py"
+
+
+class Stream:
+    """The events of an open stream."""
+
+    def __init__(self, answer: httpx.Response) -> None:
+        assert answer.status_code == 200, answer.read()
+        self.headers = answer.headers
+        self._lines = answer.iter_lines()
+
+    def next(self) -> dict:
+        """The next event: its id, its name and its body."""
+        event = {}
+        for line in self._lines:
+            name, _, value = line.partition(": ")
+            if name:
+                event[name] = value
+            elif "data" in event:
+                return event | {"data": json.loads(event["data"])}
+        raise EOFError
+
+    def until(self, name: str) -> list[dict]:
+        """Those up to the first of a name."""
+        events = [self.next()]
+        while events[-1]["event"] != name:
+            events.append(self.next())
+        return events
+
+
+@contextmanager
+def followed(service, name, last_id=None, **query):
+    headers = {} if last_id is None else {"Last-Event-ID": last_id}
+    url = f"{service.url}/venues/{name}/events"
+    with httpx.stream("GET", url, headers=headers, params=query, timeout=DEADLINE_S) as answer:
+        yield Stream(answer)
+
+
+@in_both_homes
+def test_who_follows_a_venue_is_told_of_its_poses_and_of_whatever_happens(service, name):
+    service.venue(name)
+    with followed(service, name) as stream:
+        assert stream.headers["content-type"].startswith("text/event-stream")
+        assert stream.headers["x-accel-buffering"] == "no"
+        beginning = stream.next()
+        assert beginning["event"] == beginning["data"]["type"] == "poses.current"
+        job = service.calibrated(name)
+        events = stream.until("job.succeeded")
+        assert [event["event"] for event in events] == ["job.queued", "poses.changed", "job.succeeded"]
+        poses = events[1]["data"]["data"]
+        stored = service.http.get(f"/venues/{name}").json()
+        assert [camera["pose"] for camera in poses["cameras"]] == [camera["pose"] for camera in stored["cameras"]]
+        assert (poses["job"], poses["revision"]) == (job["id"], job["venue_revision"])
+        assert events[2]["data"]["data"] == job
+        service.http.patch(
+            f"/venues/{name}", json={"name": "fail"}, headers={"Content-Type": "application/merge-patch+json"}
+        ).raise_for_status()
+        assert stream.next()["data"]["data"] == {"venue": name, "changed": ["name"]}
+        service.http.delete(f"/venues/{name}").raise_for_status()
+        assert stream.next()["event"] == "venue.deleted"
+        with pytest.raises(EOFError):
+            stream.next()
+    assert service.http.get(f"/venues/{name}/events").status_code == 404
+
+
+@in_both_homes
+def test_what_was_missed_is_told_by_another_process_after_a_restart(start):
+    service = start("up").ready()
+    service.venue("v")
+    with followed(service, "v", events="poses.changed") as stream:
+        last_id = stream.next()["id"]
+    service.calibrated("v")
+    service.kill()
+    again = start("serve")
+    with followed(again, "v", last_id, events="poses.changed") as stream:
+        missed = stream.next()
+        assert (missed["event"], missed["data"]["data"]["cause"]) == ("poses.changed", "calibrated")
+    with followed(again, "v", missed["id"]) as stream:
+        assert stream.next()["event"] == "job.succeeded"
+    with followed(again, "v", "nonsense") as stream:
+        assert stream.next()["event"] == "poses.current"
+
+
+def test_a_second_process_tells_what_the_first_was_asked_for(start):
+    one, other = start("up").ready(), start("serve")
+    one.venue("v")
+    with followed(other, "v") as stream:
+        stream.next()
+        one.http.delete("/venues/v").raise_for_status()
+        assert stream.next()["event"] == "venue.deleted"
+
+
+def test_so_many_follow_at_once_and_a_place_is_free_again_when_one_leaves(start):
+    service = start("serve", ESC_FOLLOWERS="2")
+    service.venue("v")
+    threads = _threads(service)
+    with followed(service, "v") as first, followed(service, "v") as second:
+        assert first.next()["event"] == second.next()["event"] == "poses.current"
+        refused = service.http.get("/venues/v/events")
+        assert (refused.status_code, refused.headers["retry-after"]) == (503, "30")
+    wait_for(lambda: _status(service) == 200)
+    assert _threads(service) <= threads + 10
+
+
+def _status(service) -> int:
+    with service.http.stream("GET", "/venues/v/events") as answer:
+        return answer.status_code
+
+
+def _threads(service) -> int:
+    return len([*Path(f"/proc/{service.process.pid}/task").iterdir()])
+
+
+def test_a_service_that_is_stopped_lets_followers_go_at_once(start):
+    service = start("serve")
+    service.venue("v")
+    with followed(service, "v") as stream:
+        stream.next()
+        service.process.send_signal(signal.SIGTERM)
+        with pytest.raises((EOFError, httpx.RemoteProtocolError)):
+            stream.next()
+    assert service.gone() == 0
+
+
+def test_a_webhook_of_a_venue_gets_the_new_poses_signed(start):
+    receiver = Receiver()
+    service = start("up", **LOCAL).ready()
+    webhook = {"url": receiver.url}
+    service.http.put("/venues/v", json=venue("v") | {"webhooks": [webhook]}).raise_for_status()
+    job = service.calibrated("v")
+    wait_for(lambda: len(receiver.received) == 2)
+    receiver.close()
+    by_revision = {json.loads(told.body)["data"]["revision"]: told for told in receiver.received}
+    event = json.loads(by_revision[2].body)
+    assert (event["type"], event["data"]["job"]) == ("poses.changed", job["id"])
+    assert event["data"]["cameras"][0]["pose"] == job["result"]["cameras"][0]["pose"]
+    assert by_revision[2].headers["webhook-signature"].startswith("v1,")
+    assert by_revision[1].headers["webhook-id"] != by_revision[2].headers["webhook-id"]
+
+
+def test_a_webhook_that_could_not_be_told_is_refused(service, name):
+    refused = service.http.put(f"/venues/{name}", json=venue(name) | {"webhooks": [{"url": "https://a.example"}]})
+    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/callback-refused")
+    assert refused.json()["detail"].startswith("webhooks: ")
+    unknown = {"url": "https://a.example", "events": ["poses.*"]}
+    assert service.http.put(f"/venues/{name}", json=venue(name) | {"webhooks": [unknown]}).status_code == 422
+
+
+def test_the_renderer_of_the_documents_has_the_poses_also_after_a_restart_of_the_service(start, tmp_path):
+    service = start("up").ready()
+    service.venue("v")
+    file = tmp_path / "poses.json"
+    command = [sys.executable, RENDERER, service.url, "v", file]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env=os.environ | lifeline.for_child()
+    ) as renderer:
+        try:
+            assert renderer.stdout.readline() == "revision 1 (put)\n"
+            service.calibrated("v")
+            assert renderer.stdout.readline() == "revision 2 (calibrated)\n"
+            port = int(service.url.rpartition(":")[2])
+            service.kill()
+            service.start(port)
+            service.ready()
+            service.calibrated("v", shade=1)
+            assert renderer.stdout.readline() == "revision 3 (calibrated)\n"
+            stored = service.http.get("/venues/v").json()["cameras"]
+            assert [camera["pose"] for camera in json.loads(file.read_text())["cameras"]] == [
+                camera["pose"] for camera in stored
+            ]
+            service.http.delete("/venues/v").raise_for_status()
+            assert renderer.wait(DEADLINE_S) == 1
+        finally:
+            renderer.kill()

@@ -1,0 +1,225 @@
+"""A real nginx and a real Caddy in front, by the samples that operators copy."""
+
+import os
+import shutil
+import socket
+import ssl
+import subprocess
+import time
+import zlib
+from contextlib import ExitStack
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.e2e.routes.test_following import Stream
+from tests.e2e.running import DEADLINE_S, Service, keys_in, png, venue, wait_for
+from tests.worker.duties.test_delivering import certificate
+
+SAMPLES = Path(__file__).parents[2] / "docker" / "proxy"
+NAME = "localhost"
+STALL_S = 3
+# Beside the chunks of a PNG: one that no reader knows.
+LARGE_MB, FRAMES = 40, {"left": 3, "right": 2}
+
+
+class Proxy:
+    """A proxy by a sample in which only names, ports and the certificate are others."""
+
+    def __init__(self, folder: Path, service: Service) -> None:
+        self.folder = folder
+        self.upstream = service.url.removeprefix("http://")
+        certificate(folder, NAME)
+        self.http_port, self.https_port = free_port(), free_port()
+        self.url = f"https://{NAME}:{self.https_port}"
+        with (folder / "log").open("wb") as log:
+            self.process = subprocess.Popen(self.command(), cwd=folder, stdout=log, stderr=log, env=self.environment())
+        self.trusted = ssl.create_default_context(cafile=folder / "certificate.pem")
+        wait_for(self.answers)
+
+    def answers(self) -> bool:
+        assert self.process.poll() is None, (self.folder / "log").read_text()
+        with self.client() as client:
+            return client.get("/livez").status_code == 200
+
+    def client(self, key: str | None = None, address: str = "127.0.0.1", **headers: str) -> httpx.Client:
+        """Somebody at an address of this machine."""
+        if key:
+            headers["Authorization"] = f"Bearer {key}"
+        transport = httpx.HTTPTransport(verify=self.trusted, local_address=address)
+        return httpx.Client(base_url=self.url, transport=transport, headers=headers, timeout=DEADLINE_S)
+
+    def changed(self, text: str, changes: dict[str, str]) -> str:
+        for old, new in changes.items():
+            assert old in text, old
+            text = text.replace(old, new)
+        return text
+
+    def command(self) -> list:
+        raise NotImplementedError
+
+    def environment(self) -> dict[str, str]:
+        return os.environ | {"HOME": str(self.folder), "XDG_DATA_HOME": str(self.folder)}
+
+    def stop(self) -> None:
+        self.process.terminate()
+        self.process.wait(DEADLINE_S)
+
+
+class Nginx(Proxy):
+    program = "nginx"
+    addresses = ("127.0.0.5", "127.0.0.6")
+
+    def command(self) -> list:
+        site = self.changed(
+            (SAMPLES / "nginx.conf").read_text(),
+            {
+                "127.0.0.1:8000": self.upstream,
+                "listen 80;": f"listen 127.0.0.1:{self.http_port};",
+                "listen 443 ssl http2;": f"listen 127.0.0.1:{self.https_port} ssl http2;",
+                "/etc/letsencrypt/live/esc.example.com/fullchain.pem": f"{self.folder}/certificate.pem",
+                "/etc/letsencrypt/live/esc.example.com/privkey.pem": f"{self.folder}/key.pem",
+                "esc.example.com": NAME,
+            },
+        )
+        kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+        places = "".join(f"{kind}_temp_path {self.folder}/{kind};\n" for kind in kinds)
+        main = f"daemon off; pid {self.folder}/pid; error_log stderr; user root;\nevents {{}}\n"
+        whole = f"{main}http {{\naccess_log off;\n{places}{site}}}\n"
+        (self.folder / "nginx.conf").write_text(whole if os.geteuid() == 0 else whole.replace("user root;", ""))
+        return [shutil.which(self.program), "-p", self.folder, "-c", self.folder / "nginx.conf"]
+
+
+class Caddy(Proxy):
+    program = "caddy"
+    addresses = ("127.0.0.7", "127.0.0.8")
+
+    def command(self) -> list:
+        site = self.changed(
+            (SAMPLES / "Caddyfile").read_text(),
+            {
+                "127.0.0.1:8000": self.upstream,
+                "read_body 10m": f"read_body {STALL_S}s",
+                "{\n\tservers": f"{{\n\tadmin off\n\thttp_port {self.http_port}\n\thttps_port {self.https_port}\n"
+                "\tskip_install_trust\n\tservers",
+                "\nesc.example.com {": f"\n{NAME} {{\n\ttls {self.folder}/certificate.pem {self.folder}/key.pem",
+            },
+        )
+        (self.folder / "Caddyfile").write_text(site)
+        return [shutil.which(self.program), "run", "--config", "Caddyfile", "--adapter", "caddyfile"]
+
+
+def free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+@pytest.fixture(scope="module")
+def keyed(tmp_path_factory):
+    """A service with a key that is patient for seconds only."""
+    folder = tmp_path_factory.mktemp("behind")
+    key = keys_in(folder).add("ops", "admin")
+    running = Service(folder, ESC_STALL_TIMEOUT_S=str(STALL_S), ESC_MAX_BODY_MB="256").ready()
+    yield running, key
+    running.kill()
+
+
+@pytest.fixture(scope="module", params=[Nginx, Caddy], ids=lambda kind: kind.program)
+def proxy(request, keyed, missing, tmp_path_factory):
+    if shutil.which(request.param.program) is None:
+        missing(request.param.program)
+    one = request.param(tmp_path_factory.mktemp(request.param.program), keyed[0])
+    yield one
+    one.stop()
+
+
+@pytest.fixture
+def http(proxy, keyed, name):
+    with proxy.client(keyed[1]) as client:
+        client.put(f"/venues/{name}", json=venue(name)).raise_for_status()
+        yield client
+
+
+def large_png() -> bytes:
+    """A small picture with a large chunk."""
+    data = bytes(LARGE_MB * 10**6)
+    chunk = len(data).to_bytes(4, "big") + b"prIv" + data
+    picture = png()
+    return picture[:33] + chunk + zlib.crc32(b"prIv" + data).to_bytes(4, "big") + picture[33:]
+
+
+def test_an_upload_of_200_megabytes_arrives(http, name):
+    frame = large_png()
+    files = [(camera, (f"{camera}.png", frame)) for camera, count in FRAMES.items() for _ in range(count)]
+    sent = http.post(f"/venues/{name}/calibrate", files=files)
+    assert (sent.status_code, sent.headers["location"]) == (202, f"/jobs/{sent.json()['id']}")
+    ended = http.get(sent.headers["location"], params={"wait": 60}).json()
+    assert ended["status"] == "succeeded"
+
+
+def test_what_is_too_large_or_has_no_key_is_refused_by_the_service_itself(http, proxy, name):
+    files = [("left", ("left.png", bytes(49 * 10**6))), ("right", ("right.png", png()))]
+    refused = http.post(f"/venues/{name}/calibrate", files=files)
+    assert (refused.status_code, refused.headers["content-type"]) == (413, "application/problem+json")
+    with proxy.client() as stranger:
+        assert stranger.put(f"/venues/{name}", json=venue(name)).json()["type"] == "/problems/key-missing"
+
+
+def test_events_arrive_when_they_happen(http, name):
+    with http.stream("GET", f"/venues/{name}/events", params={"events": "poses.changed"}) as answer:
+        stream = Stream(answer)
+        assert stream.next()["event"] == "poses.current"
+        moved = venue(name)
+        moved["cameras"][0]["pose"]["position"][0] += 1
+        begun = time.monotonic()
+        http.put(f"/venues/{name}", json=moved).raise_for_status()
+        assert stream.next()["data"]["data"]["changed"] == ["left"]
+        assert time.monotonic() - begun < 5
+
+
+def test_tags_and_conditions_go_through(http, name):
+    tag = http.get(f"/venues/{name}").headers["etag"]
+    assert http.get(f"/venues/{name}", headers={"If-None-Match": tag}).status_code == 304
+    changed = http.put(f"/venues/{name}", json=venue(name, "renamed"), headers={"If-Match": tag})
+    assert changed.status_code == 200
+    assert http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": tag}).status_code == 412
+
+
+def test_guesses_are_limited_by_the_address_of_who_guesses_whatever_they_say_about_themselves(proxy):
+    guessing, another = proxy.addresses
+    with proxy.client("esc_wrong", guessing) as guesser, proxy.client("esc_wrong", another) as other:
+        codes = [
+            guesser.get("/venues", headers={"X-Forwarded-For": f"9.9.9.{number}"}).status_code for number in range(13)
+        ]
+        assert (set(codes[:10]), codes[-1]) == ({401}, 429)
+        assert other.get("/venues").status_code == 401
+
+
+def test_the_cookie_of_the_page_stays_within_https_and_plain_http_leads_there(proxy, keyed):
+    with proxy.client(Origin=proxy.url) as browser:
+        signed_in = browser.post("/ui/sign-in", data={"key": keyed[1], "next": "/"})
+        assert signed_in.status_code == 303
+        assert "Secure" in signed_in.headers["set-cookie"]
+    plain = httpx.get(f"http://{NAME}:{proxy.http_port}/venues", follow_redirects=False)
+    assert plain.status_code in (301, 308)
+    assert plain.headers["location"].startswith(f"https://{NAME}")
+
+
+def test_slow_clients_are_let_go_and_hold_up_nobody(proxy, keyed, http, name):
+    head = (
+        f"POST /venues/{name}/calibrate HTTP/1.1\r\nHost: {NAME}\r\nAuthorization: Bearer {keyed[1]}\r\n"
+        "Content-Type: multipart/form-data; boundary=b\r\nContent-Length: 1000000\r\n\r\n--b\r\n"
+    )
+    with ExitStack() as connections:
+        slow = []
+        for _ in range(30):
+            plain = socket.create_connection(("127.0.0.1", proxy.https_port), timeout=DEADLINE_S)
+            slow.append(connections.enter_context(proxy.trusted.wrap_socket(plain, server_hostname=NAME)))
+            slow[-1].sendall(head.encode())
+        begun = time.monotonic()
+        assert http.get(f"/venues/{name}").status_code == 200
+        assert time.monotonic() - begun < 5
+        # They hear that they are too slow or too many, or nothing (of Caddy 2.6 an empty 200): not that a job began.
+        assert not [answer for answer in (one.recv(4096) for one in slow) if b" 202 " in answer]

@@ -1,0 +1,65 @@
+"""What the list of venues shows, put together as calibrations end."""
+
+from datetime import UTC, datetime
+
+import sqlalchemy as sa
+
+from service.pages.venues import rows_of
+from service.store.counts.glances import IN_CURVE
+from service.wire.health import Alarms
+from tests.homes import in_both_homes
+from tests.worker.stock import anyway
+
+
+def glance(stock, venue="v"):
+    return stock.glances.of([venue]).get(venue)
+
+
+@in_both_homes
+def test_a_venue_shows_how_its_last_calibration_ended_and_the_errors_of_its_results(stock):
+    stock.venue("v")
+    assert glance(stock) is None
+    stock.calibrated("v", dry_run=True)
+    last = glance(stock).last
+    assert (last.status, last.verdict, last.dry_run) == ("succeeded", "accepted", True)
+    assert (last.stitch_error_px, last.moved_px) == (0.2, 1.0)
+    stock.calibrated("v", accepted=False)
+    stock.ended("v", datetime.now(UTC), accepted=None)
+    stock.decisions.cancel(stock.submitted("v"))
+    after = glance(stock)
+    assert (after.last.status, after.last.verdict, after.last.stitch_error_px) == ("cancelled", None, None)
+    # Two results; what has none is no part of the curve.
+    assert after.errors == [0.2, 0.2]
+
+
+def test_a_curve_has_an_end(stock):
+    for _ in range(IN_CURVE + 2):
+        stock.calibrated("v")
+    assert len(glance(stock).errors) == IN_CURVE
+
+
+def test_the_end_of_a_job_whose_venue_was_deleted_is_shown_nowhere(stock):
+    job = stock.submitted("v")
+    stock.venues.delete("v", lambda *_: None)
+    stock.decisions.cancel(job)
+    assert glance(stock) is None
+
+
+@in_both_homes
+def test_the_list_asks_as_often_for_many_venues_as_for_one(stock):
+    rules = Alarms(rejected_in_a_row=1)
+    for name in ("v", "w", "x"):
+        stock.venues.put(stock.venue(name).model_copy(update={"alarms": rules}), anyway)
+        stock.calibrated(name, accepted=name == "w")
+    active = stock.submitted("w")
+    venues = stock.venues.page(None, 10)
+    asked = []
+    sa.event.listen(stock.engine, "before_cursor_execute", lambda *arguments: asked.append(arguments[2]))
+    one = rows_of(stock, venues[1:2])
+    of_one = len(asked)
+    rows = rows_of(stock, venues)
+    assert len(asked) == 2 * of_one
+    assert rows[1] == one[0]
+    assert [[alarm.rule for alarm in row.alarms] for row in rows] == [["rejected-in-a-row"], [], ["rejected-in-a-row"]]
+    assert [row.glance.last.verdict for row in rows] == ["rejected", "accepted", "rejected"]
+    assert [row.active and row.active.id for row in rows] == [None, active, None]
