@@ -54,8 +54,11 @@ def _settings_lost(venue: Venue, stored: Venue) -> list[str]:
     blind = [camera.id for camera in stored.cameras if camera.source and camera.id not in fetched]
     told = {camera.id for camera in venue.cameras if camera.intrinsics.sigma}
     untold = [camera.id for camera in stored.cameras if camera.intrinsics.sigma and camera.id not in told]
+    kept = {camera.id for camera in venue.cameras if camera.ignore}
+    seen_again = [camera.id for camera in stored.cameras if camera.ignore and camera.id not in kept]
     return [
         *lost,
+        *(f"the ignored areas of camera {camera}: the file has none" for camera in seen_again),
         *(f"the source of camera {camera}: the file has none" for camera in blind),
         *(f"the sigma of the lens of camera {camera}: the file has none" for camera in untold),
     ]

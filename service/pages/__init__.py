@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter
 
-from service.pages import assets, calibrate, jobs, newvenue, signin, venues
+from service.pages import assets, calibrate, ignore, jobs, newvenue, signin, venues
 
 ROUTERS: tuple[APIRouter, ...] = (
     assets.router,
@@ -11,6 +11,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     venues.router,
     venues.data,
     calibrate.router,
+    ignore.router,
     newvenue.router,
     newvenue.data,
     jobs.router,

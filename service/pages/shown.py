@@ -23,7 +23,7 @@ from service.routes.contract.guarded import Guarded
 from service.store.engine import AWAY
 from service.store.keys import Key
 from service.wire.base import Scope
-from service.wire.problems import KINDS, Problem
+from service.wire.problems import KINDS, REASONS, Problem
 
 SIGN_IN = "/ui/sign-in"
 # Scripts, styles and pictures are files of this service; nothing inline, nobody frames it.
@@ -42,7 +42,12 @@ templates = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-templates.globals |= {"static": address, "version": version("esc-calibration"), "seam_curve": seam_curve}
+templates.globals |= {
+    "static": address,
+    "version": version("esc-calibration"),
+    "seam_curve": seam_curve,
+    "reasons": REASONS,
+}
 templates.filters |= {
     "figure": words.figure,
     "cm": words.centimetres,

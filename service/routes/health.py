@@ -12,7 +12,7 @@ from service.api.context import InContext
 from service.routes.contract.documented import FOR_ALL, needs, problems
 from service.routes.contract.guarded import Guarded
 from service.wire.health import Health
-from service.wire.problems import KINDS, Problem, type_of
+from service.wire.problems import DOCUMENT, KINDS, REASONS, Problem, refusal_of, type_of
 
 router = APIRouter(tags=["health"], route_class=Guarded)
 
@@ -49,3 +49,18 @@ async def explain(kind: Annotated[str, Path(max_length=64)]) -> dict[str, str | 
     if kind not in KINDS:
         raise Problem("not-found", f"The kinds of problems are {', '.join(KINDS)}.")
     return {"type": type_of(kind), "title": KINDS[kind].title, "status": KINDS[kind].status}
+
+
+@router.get("/refusals/{reason}", openapi_extra=FOR_ALL, responses=problems(404))
+async def explain_refusal(reason: Annotated[str, Path(max_length=64)]) -> dict[str, str]:
+    """What the `refusal` of a camera means: what it looks like, and what to do."""
+    if reason not in REASONS:
+        raise Problem("not-found", f"The reasons of refusals are {', '.join(REASONS)}.")
+    known = REASONS[reason]
+    return {
+        "refusal": refusal_of(reason),
+        "title": known.title,
+        "looks_like": known.looks_like,
+        "do": known.do,
+        "document": f"{DOCUMENT}#{known.anchor}",
+    }

@@ -30,6 +30,8 @@ PaintWidth = Annotated[Number, Field(ge=0.01, le=1)]
 Colour = Annotated[str, StringConstraints(pattern=COLOUR_PATTERN)]
 # Further than this beside the field nothing counts as a marking of it.
 BESIDE_M = 2.0
+# Of other sports on the same ground.
+MOST_OTHER_FIELDS = 16
 
 
 class ArcIn(Wire):
@@ -150,11 +152,13 @@ class OtherField(Wire):
         return [shape.turned(turn).shifted((x, y)) for shape in load(self.template).markings(self.size)]
 
 
+def _kind_of_other(given: Any) -> str:
+    whole = isinstance(given, OtherField) or (isinstance(given, dict) and "template" in given)
+    return "field" if whole else "marking"
+
+
 OtherMarking = Annotated[
-    Annotated[OtherField, Tag("field")] | Annotated[MarkingIn, Tag("marking")],
-    Discriminator(
-        lambda given: "field" if "template" in (given if isinstance(given, dict) else vars(given)) else "marking"
-    ),
+    Annotated[OtherField, Tag("field")] | Annotated[MarkingIn, Tag("marking")], Discriminator(_kind_of_other)
 ]
 
 
@@ -220,6 +224,13 @@ class FieldOfPlay(Wire):
                     f"{shape.name} leaves the {self.length_m:g} x {self.width_m:g} m of the field, "
                     "whose centre is the origin"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _shared_by_few(self) -> Self:
+        others = sum(isinstance(other, OtherField) for other in self.other_markings)
+        if others > MOST_OTHER_FIELDS:
+            raise ValueError(f"other_markings has {others} fields of other sports: at most {MOST_OTHER_FIELDS}")
         return self
 
     @model_validator(mode="after")

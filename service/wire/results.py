@@ -10,6 +10,7 @@ from service.wire.base import Id, Wire
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Intrinsics, Moved, Pose, Row
 from service.wire.options import Coordinates, Landmark
+from service.wire.problems import refusal_of
 
 CPU_S: Any = Field(
     {}, description="Core-seconds, of all threads, of the stages that `timings_s` times; {} of earlier releases."
@@ -70,6 +71,11 @@ class CameraResult(Wire):
     id: Id
     accepted: bool = Field(description="Whether the gate lets its pose replace the stored one.")
     rejected_because: str | None
+    refusal: str | None = Field(
+        None,
+        description="Where the service explains that reason: what it looks like and what to do.",
+        examples=["/refusals/residual"],
+    )
     pose: Pose
     intrinsics: Intrinsics | None = Field(None, description="With fit_focal_length: those the pose belongs to.")
     sigma: Sigma | None
@@ -118,7 +124,9 @@ class PairResult(Wire):
     seam: list[SeamPlace] = Field(
         description="All along what both see, by the lines that both have measured, from end to end; at most 24 places."
     )
-    worst: SeamPlace | None = Field(description="The place of the seam whose error is surely the largest.")
+    worst: SeamPlace | None = Field(
+        description="The place of the seam with the largest error, but for those that are hardly measured."
+    )
 
 
 class Provenance(Wire):
@@ -159,7 +167,7 @@ class Result(Wire):
     stitch_error_before_px: float | None
     stitch_error_limit_px: float | None = Field(None, description="What the gate lets pass at most.")
     pairs: list[PairResult] = Field([], description="The cameras that were compared, two by two.")
-    loss: float | None
+    loss: float | None = Field(description="Of the poses that are answered, by the last level of the search.")
     generations: int
     path: Literal["near", "wide"] = Field(
         "wide", description="Whether the poses were found near the stored ones, or by a search."
@@ -173,10 +181,16 @@ class Result(Wire):
         """Those whose poses may replace the stored ones."""
         return [camera.id for camera in self.cameras if camera.accepted]
 
-    def refused(self, because: str) -> Result:
-        """The same result of which no pose is to hold, for a reason beside those of the gate."""
+    def refused(self, because: str, reason: str = "all-or-none") -> Result:
+        """The same result of which no pose is to hold, for one of `problems.REASONS` beside those of the gate."""
         cameras = [
-            camera.model_copy(update={"accepted": False, "rejected_because": camera.rejected_because or because})
+            camera.model_copy(
+                update={
+                    "accepted": False,
+                    "rejected_because": camera.rejected_because or because,
+                    "refusal": camera.refusal if camera.rejected_because else refusal_of(reason),
+                }
+            )
             for camera in self.cameras
         ]
         reasons = [because] if self.rejected_because is None else [self.rejected_because, because]

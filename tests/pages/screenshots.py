@@ -61,6 +61,7 @@ def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) ->
             ("jobs", "/ui/jobs"),
             ("job", f"/ui/jobs/{job}"),
             ("calibrate", "/ui/venues/newcomer/calibrate"),
+            ("ignore", "/ui/venues/newcomer/ignore"),
         ):
             page.goto(address)
             page.wait_for_load_state("networkidle")

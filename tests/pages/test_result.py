@@ -87,6 +87,21 @@ def test_each_layer_is_drawn_on_each_frame_and_taken_off(venue, name):
         assert differs(bare[camera], look(frames.nth(camera))) < 0.0001
 
 
+def test_what_was_seen_of_each_marking_is_listed_under_its_camera(venue):
+    markings = venue.get_by_role("article", name="left").locator("details.markings")
+    markings.locator("summary").click()
+    circle = markings.get_by_role("row", name="centre circle")
+    expect(circle).to_contain_text("%")
+    expect(circle).to_contain_text("cm")
+
+
+def test_the_seam_has_a_curve_with_its_worst_place(venue):
+    seam = venue.get_by_role("region", name="Along the seam")
+    expect(seam).to_contain_text("left and right: ")
+    assert seam.locator("circle").count() > 4
+    expect(seam.locator("circle.worst")).to_have_count(1)
+
+
 def test_every_format_is_offered_and_comes_as_a_file(venue):
     with venue.expect_download() as saved:
         venue.get_by_role("link", name="opentrackio, all cameras").click()

@@ -10,7 +10,14 @@ import numpy as np
 
 from worker.calibration.finish.diagnosis import suspicions
 from worker.calibration.finish.refinement import Sight
-from worker.calibration.judge.pairs import Pair, Seeing, compared, contradictions, stitch_error_px
+from worker.calibration.judge.pairs import (
+    Pair,
+    Seeing,
+    compared,
+    contradictions,
+    refusal_by_pairs,
+    stitch_error_px,
+)
 from worker.calibration.judge.quality import CameraResult, Gate, believable, ridge_rejection
 from worker.calibration.judge.registration import Response
 from worker.calibration.judge.seam import seam_between
@@ -120,11 +127,11 @@ def judge(pitch: Field, results: Sequence[CameraResult], sight: Sight, journey: 
     ridge = ridge_rejection(pitch, gate)
     reasons = [f"camera {one.camera.id}: {one.rejected_because}" for one in results if not one.accepted]
     reasons += [one.words(gate) for one in against]
-    reasons += [ridge] if ridge else []
-    judged = []
-    for result in results:
-        of_pairs = "; ".join(one.pair.words(gate) for one in against if result.camera.id in one.blamed)
-        judged.append(replace(result, rejected_because=result.rejected_because or of_pairs or ridge))
+    reasons += [ridge.words] if ridge else []
+    judged = [
+        replace(result, refusal=result.refusal or refusal_by_pairs(result.camera.id, against, gate) or ridge)
+        for result in results
+    ]
     held = {result.camera.id for result in judged if result.accepted}
     stitch = stitch_error_px([pair for pair in pairs if not held or held.issuperset(pair.cameras)], gate)
     by_id = {result.camera.id: result for result in judged}

@@ -295,13 +295,13 @@ def judged_alone(
             overlap=overlap_of(finished.pitch, after.camera, response),
             evidence_before=evidence_of(lines, before, channels, response, left_out(pitch, before)),
             moved=Movement.between(pitch, before, after.camera),
-            markings=markings_seen(finished.pitch, after),
+            markings=markings_seen(finished.pitch, after, channels, response),
         )
         for before, after, view, channels, response in zip(
             stored, finished.each, seen.views, seen.sight.channels, seen.sight.responses, strict=True
         )
     ]
-    return [replace(result, rejected_because=alone_rejection(result, gate)) for result in results]
+    return [replace(result, refusal=alone_rejection(result, gate)) for result in results]
 
 
 def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:

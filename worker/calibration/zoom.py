@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from worker.calibration.finish.diagnosis import is_sure
-from worker.calibration.judge.quality import CameraResult, zoom_in_words, zoomed_beyond_doubt
+from worker.calibration.judge.quality import CameraResult, Refusal, zoom_in_words, zoomed_beyond_doubt
 from worker.calibration.scene.camera import Camera
 from worker.calibration.settle import Settled, Situation, settle_without
 
@@ -56,8 +56,9 @@ def _refitted(here: Situation, number: int, result: CameraResult) -> CameraResul
             continue
         found = _with_lens(here, number, likelier, zoom.sigma)
         change = replace(zoom, value=changed_px)
-        refused = None if here.options.lens_may_drift else f"{zoom_in_words(stored, change)}: {WHAT_TO_DO}"
-        return replace(found, zoom=change, rejected_because=refused, lens_found=True) if found.accepted else None
+        moved = Refusal("zoomed", f"{zoom_in_words(stored, change)}: {WHAT_TO_DO}")
+        refusal = None if here.options.lens_may_drift else moved
+        return replace(found, zoom=change, refusal=refusal, lens_found=True) if found.accepted else None
     return None
 
 

@@ -48,7 +48,8 @@ def _draw(given: Given, found: FieldFit) -> Drawn:
     pictures = {}
     for old, new in zip(given.cameras, found.cameras, strict=True):
         try:
-            drawn = overlay((given.pitch, old), (found.pitch, new.camera), given.frames[old.id][0], "field")
+            both = (given.pitch, old), (found.pitch, new.camera)
+            drawn = overlay(*both, given.frames[old.id][0], "field", new.markings)
         except Exception:  # what was rejected may look anywhere; a picture is not worth losing the reason
             log.warning("cannot draw camera %s", old.id, exc_info=True)
             continue

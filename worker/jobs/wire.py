@@ -12,6 +12,7 @@ from service.wire import geometry
 from service.wire.geometry import Moved
 from service.wire.job import Progress
 from service.wire.options import FieldOptions, Options
+from service.wire.problems import refusal_of
 from service.wire.results import (
     AnyResult,
     CameraResult,
@@ -118,6 +119,7 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
         id=found.camera.id,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
+        refusal=None if found.refusal is None else refusal_of(found.refusal.reason),
         pose=wire_pose(found.camera.pose),
         intrinsics=lens,
         sigma=_sigma(found.sigma),

@@ -18,7 +18,8 @@ export const signed = token ? {"X-CSRF-Token": token} : {};
 /** Call the interface; returns the JSON of the answer, null without a body. */
 export async function call(method, address, content) {
   const body = content === undefined || content instanceof FormData ? content : JSON.stringify(content);
-  const headers = {...signed, ...(typeof body === "string" ? {"Content-Type": "application/json"} : {})};
+  const type = method === "PATCH" ? "application/merge-patch+json" : "application/json";
+  const headers = {...signed, ...(typeof body === "string" ? {"Content-Type": type} : {})};
   let answer;
   try {
     answer = await fetch(address, {method, headers, body});

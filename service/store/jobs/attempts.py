@@ -131,7 +131,9 @@ def _move_poses(connection: sa.Connection, task: Task, result: Result) -> Result
     assert isinstance(task.options, Options)
     now_stored = find_venue(connection, task.venue.id)
     if now_stored is None or not now_stored.calibrates_like(task.venue):
-        return result.refused("the venue was changed while the job ran") if result.accepted_cameras else result
+        if not result.accepted_cameras:
+            return result
+        return result.refused("the venue was changed while the job ran", "venue-changed")
     held = [] if task.options.dry_run else result.accepted_cameras
     note_quality(connection, task.venue.id, result, moved=bool(held))
     if held:

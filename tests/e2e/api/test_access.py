@@ -20,12 +20,25 @@ from tests.e2e.running import Service, keys_in, png, upload, venue, wait_for
 
 SCOPES = ("read", "calibrate", "admin")
 # What the service can do is no secret.
-OPEN = {"/livez", "/readyz", "/problems/{kind}", "/docs", "/docs/rapidoc-min.js", "/docs/LICENSE.txt"}
+OPEN = {
+    "/livez",
+    "/readyz",
+    "/problems/{kind}",
+    "/refusals/{reason}",
+    "/docs",
+    "/docs/rapidoc-min.js",
+    "/docs/LICENSE.txt",
+}
 # The way to sign in, and what it is drawn with.
 OPEN |= {"/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
 NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "PATCH": "admin", "DELETE": "admin"}
 # Pages that show nothing but how to change something, and a question that takes a body.
-OTHERWISE = {"/ui/venues/{venue_id}/calibrate": "calibrate", "/ui/new-venue": "admin", "/ui/new-venue/plan": "read"}
+OTHERWISE = {
+    "/ui/venues/{venue_id}/calibrate": "calibrate",
+    "/ui/venues/{venue_id}/ignore": "admin",
+    "/ui/new-venue": "admin",
+    "/ui/new-venue/plan": "read",
+}
 JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"
 
 
@@ -80,6 +93,7 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             camera="left",
             number=0,
             kind="not-found",
+            reason="lines",
             of_edition="0",
             path="page.css",
         )

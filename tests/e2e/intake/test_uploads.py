@@ -242,6 +242,12 @@ def test_every_kind_of_problem_is_explained(service):
     assert service.http.get(type_).json()["title"] == "There is nothing at this address"
 
 
+def test_every_reason_for_a_refusal_is_explained(service):
+    answer = service.http.get("/refusals/residual").json()
+    assert answer["document"] == "docs/refused.md#the-lines"
+    assert service.http.get("/refusals/whim").status_code == 404
+
+
 def test_after_all_this_the_service_is_there_and_has_made_no_mistake(service):
     assert service.http.get("/readyz").status_code == 200
     assert "Traceback" not in (service.data / "log").read_text()

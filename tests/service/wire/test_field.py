@@ -173,8 +173,14 @@ def test_other_markings_are_fields_of_other_sports_and_markings_one_by_one():
         ({"template": "handball", "length_m": 500}, "400"),
         ({"template": "handball", "measures_m": {"hash": 5}}, "hash is not among"),
         ({"name": "neither"}, "exactly one of line"),
+        ([None, None], "valid dictionary"),
     ],
 )
 def test_other_markings_that_cannot_be_are_refused(wrong, told):
     with pytest.raises(ValidationError, match=told):
         FieldOfPlay.model_validate({"other_markings": [wrong]})
+
+
+def test_a_ground_is_shared_by_so_many_sports_at_most():
+    with pytest.raises(ValidationError, match="17 fields of other sports: at most 16"):
+        FieldOfPlay.model_validate({"other_markings": [{"template": "padel"}] * 17})

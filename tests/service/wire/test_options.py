@@ -16,6 +16,7 @@ def test_options_have_the_documented_defaults():
         "fit_focal_length": False,
         "fit_ridge": False,
         "dry_run": False,
+        "pictures": False,
         "priority": "routine",
     }
 

@@ -156,7 +156,7 @@ def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers
 
 
 def test_a_ridge_below_the_ground_is_rejected():
-    assert "ridge at -0.100 m" in ridge_rejection(CROWNED.raised(-0.45), Gate())
+    assert "ridge at -0.100 m" in ridge_rejection(CROWNED.raised(-0.45), Gate()).words
     assert ridge_rejection(CROWNED, Gate()) is None
     assert ridge_rejection(CROWNED.flat(), Gate()) is None
 

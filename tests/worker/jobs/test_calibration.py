@@ -19,7 +19,7 @@ from worker.calibration.finish.diagnosis import Suspicion
 from worker.calibration.finish.uncertainty import Sigma
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.judge.overlap import Overlap
-from worker.calibration.judge.quality import CameraResult, Movement
+from worker.calibration.judge.quality import CameraResult, Movement, Refusal
 from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
@@ -83,7 +83,7 @@ def asked(monkeypatch):
                 overlap=Overlap(0.9, 0.95, 0.05),
                 evidence_before=seen,
                 moved=Movement(0.0, 0.05, float("nan")),
-                rejected_because=asked["against"].get(camera.id),
+                refusal=Refusal("view", asked["against"][camera.id]) if camera.id in asked["against"] else None,
                 markings=asked.get("markings", ()),
             )
             for camera in cameras
@@ -269,6 +269,7 @@ def test_a_venue_that_takes_all_or_nothing_refuses_what_is_accepted_in_part(venu
     assert result.rejected_because == "camera right: it is dark; the venue accepts the poses of all cameras or none"
     assert result.cameras[0].rejected_because == "the venue accepts the poses of all cameras or none"
     assert result.cameras[1].rejected_because == "it is dark"
+    assert [camera.refusal for camera in result.cameras] == ["/refusals/all-or-none", "/refusals/view"]
 
 
 def test_a_ridge_that_was_found_is_accepted_with_all_poses_or_not_at_all(venue, files, asked, means):

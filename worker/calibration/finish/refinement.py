@@ -163,7 +163,9 @@ def _assessed(
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
     finished = judged(ordinary, stored, measured, evidence, unknowns, stitch_weight)
-    each = [replace(one, measured=its) for one, its in zip(finished.each, measured, strict=True)]
+    each = [
+        replace(one, measured=its, uneven_m=ordinary.uneven_m) for one, its in zip(finished.each, measured, strict=True)
+    ]
     return replace(finished, each=each)
 
 

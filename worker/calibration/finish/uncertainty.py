@@ -20,6 +20,7 @@ from worker.calibration.finish.robust import tukey_slopes, tukey_weights
 from worker.calibration.finish.scales import Group, posterior
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.ground import UNEVEN_M
 from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved
 from worker.calibration.scene.parameters import (
     LensParameter,
@@ -89,7 +90,8 @@ class FinishedCamera:
     None where it had too few measurements: `residual_px`, the rms of its lines, `covariance` (6, 6) of (rotation in the
     camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens, field and ground,
     which do not change. `zoom`: what the lines say of the focal length, None where it was found with the pose;
-    `likelier`: the camera with that focal length, where it then is. `measured`: the lines it was judged by.
+    `likelier`: the camera with that focal length, where it then is. `measured`: the lines it was judged by;
+    `uneven_m`: how uneven their ground was taken to be.
     """
 
     camera: Camera
@@ -100,6 +102,7 @@ class FinishedCamera:
     zoom: Deviation | None
     likelier: Camera | None
     measured: Measurements | None = field(default=None, kw_only=True)
+    uneven_m: float = field(default=UNEVEN_M, kw_only=True)
 
     @property
     def elsewhere_m(self) -> float:

@@ -1,14 +1,15 @@
 """What is seen of each marking: how much of it is found, and how far its paint lies from where the venue has it.
 
 The pose follows all lines, so one that is elsewhere pulls it along and looks nearer than it is. How far the pose gives
-way is known, and put back. What bends or swells along a line makes its pieces differ, which its sigma tells; what moves
-all of a line alike (paint, a measure of the venue, the crown of the ground under it) is its offset.
+way is known, and put back. Sigma has what makes the pieces of a line differ, how far the ground under all of it may
+swell, and what the lens may have wrong; what moves all of a line by more is its offset: paint, a measure of the venue,
+its crown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,14 +21,20 @@ from worker.calibration.finish.robust import tukey_weights
 from worker.calibration.finish.uncertainty import FinishedCamera
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.ground import UNEVEN_M, Ground
+from worker.calibration.scene.ground import Ground
 from worker.calibration.scene.motion import POSE_NUMBERS, pixel_slopes
-from worker.calibration.see.line_measurement import Measurements
+from worker.calibration.scene.parameters import LensParameter, lens_parameters
+from worker.calibration.see.contrast import Channels
+from worker.calibration.see.line_measurement import Measurements, measure_lines
 
 Direction = Literal["outside", "inside", "right", "left", "far", "near"]
 OPPOSITE: dict[Direction, Direction] = {"outside": "inside", "right": "left", "far": "near"}
 FEWEST_MEASURED = 6
 """Points of a marking, 25 cm apart, that an offset needs."""
+HARDLY, FARTHER_PX, MOST = 0.5, 30.0, 0.5
+"""A marking of which less is found is looked for so far around its place, in pixels of a 4K frame; if so much of it is
+seen there, that is it."""
+MEASURED = ("index", "pixel", "normal", "px_per_metre", "px_per_metre_up", "length_px")
 LEAST_FREE = 0.1
 """What must be left of an offset when the pose has given way to it: a line that the pose hangs on has none."""
 PUT_BACK_ERROR = 0.3
@@ -75,13 +82,18 @@ class MarkingSeen:
         return OPPOSITE[self.direction]
 
 
-def markings_seen(pitch: Field, found: FinishedCamera) -> list[MarkingSeen]:
-    """What a camera sees of each marking of the `pitch` that it should see; dashes and rows are one marking."""
+def markings_seen(
+    pitch: Field, found: FinishedCamera, channels: Channels, response: NDArray[np.float32]
+) -> list[MarkingSeen]:
+    """What a camera sees of each marking of the `pitch` that it should see; dashes and rows are one marking.
+
+    `channels` of its frame and `response` (H, W), where markings that are not in their places are looked for.
+    """
     lines = pitch.line_points()
     names = pitch.whole_names()
     whole = {name: number for number, name in enumerate(dict.fromkeys(names))}
     group = np.array([whole[name] for name in names])
-    told = _offsets(lines, group, found)
+    told = _offsets(lines, group, found, _farther_away(lines, group, found, channels, response))
     pieces = group[found.evidence.marking]
     seen = []
     for name, number in whole.items():
@@ -98,14 +110,47 @@ def markings_seen(pitch: Field, found: FinishedCamera) -> list[MarkingSeen]:
     return seen
 
 
-def _offsets(lines: LinePoints, group: NDArray[np.intp], found: FinishedCamera) -> dict[int, tuple[float, float]]:
+def _farther_away(
+    lines: LinePoints,
+    group: NDArray[np.intp],
+    found: FinishedCamera,
+    channels: Channels,
+    response: NDArray[np.float32],
+) -> Measurements | None:
+    """The measurements that the camera was judged by, and of markings that it hardly finds those farther away."""
+    measured, evidence, camera = found.measured, found.evidence, found.camera
+    if measured is None:
+        return None
+    pieces = group[evidence.marking]
+    lost = [n for n in np.unique(pieces) if evidence.found[pieces == n].mean() < HARDLY]
+    its = np.flatnonzero(np.isin(group[lines.marking], lost))
+    if len(its) == 0:
+        return measured
+    farther = measure_lines(lines[its], camera, channels, response, FARTHER_PX * camera.intrinsics.relative_size)
+    farther = replace(farther, index=its[farther.index], misfit_px=measured.misfit_px)
+    of_group = group[farther.points.marking]
+    # Something that is seen here and there beside a marking is not it.
+    whole = [n for n in lost if np.sum(of_group == n) >= MOST * np.sum(pieces == n)]
+    elsewhere = ~np.isin(group[measured.points.marking], whole)
+    return _together(lines, measured[elsewhere], farther[np.isin(of_group, whole)])
+
+
+def _together(lines: LinePoints, one: Measurements, other: Measurements) -> Measurements:
+    """The measurements of both."""
+    both = {name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in MEASURED}
+    return Measurements(points=lines[both["index"]], misfit_px=one.misfit_px, **both)
+
+
+def _offsets(
+    lines: LinePoints, group: NDArray[np.intp], found: FinishedCamera, seen: Measurements | None
+) -> dict[int, tuple[float, float]]:
     """Offset and sigma in metres, along their normals, of those groups of markings of which they can be told.
 
     Markings that are elsewhere beyond doubt are let go one after the other, the surest first: what they did to the pose
     says nothing of the others. Where most of the rest is still further off than its sigmas say, no line can be better
     known (the ratio of Birge, 1932, by the median).
     """
-    measured = None if found.measured is None else _Offsets.of(lines, group, found.camera, found.measured)
+    measured = None if seen is None else _Offsets.of(lines, group, found, seen)
     if measured is None:
         return {}
     means = measured.means()
@@ -170,7 +215,9 @@ class _Offsets:
     """Measured points M of one camera: which `group` of markings they are of and which `patch` of line.
 
     `offset` (M,) px along their normals, `scale` (M,) px per metre, `sigma` (M,) px; `slopes` (M, 6) of the offset by
-    the pose, and what the pose `gives` (6, M): how it moves for an offset of one sigma there.
+    the pose, and what the pose `gives` (6, M): how it moves for an offset of one sigma there; `alike` (M, C): how far
+    they seem to move across their lines, m, by one standard deviation of what moves many of them: parts of the ground
+    and numbers of the lens.
     """
 
     group: NDArray[np.intp]
@@ -180,10 +227,14 @@ class _Offsets:
     sigma: Array
     slopes: Array
     gives: Array
+    alike: Array
 
     @classmethod
-    def of(cls, lines: LinePoints, group: NDArray[np.intp], camera: Camera, measured: Measurements) -> _Offsets | None:
+    def of(
+        cls, lines: LinePoints, group: NDArray[np.intp], found: FinishedCamera, measured: Measurements
+    ) -> _Offsets | None:
         """None where nothing can be told."""
+        camera = found.camera
         here = lines.position[measured.index]
         offset = np.sum((measured.pixel - camera.project(here)) * measured.normal, axis=1)
         slopes = np.einsum("mij,mi->mj", pixel_slopes(camera, here), measured.normal)
@@ -192,10 +243,17 @@ class _Offsets:
             return None
         measured, offset, slopes = measured[known], offset[known], slopes[known]
         sigma = measured.sigma_px
-        gives = _given_way(lines, measured, slopes, tukey_weights(offset / sigma))
+        ground = Ground.under(lines)
+        rises = _rises(ground, measured)
+        gives = _given_way(ground, rises, measured, slopes, tukey_weights(offset / sigma), found.uneven_m)
+        swell = found.uneven_m * np.linalg.cholesky(np.linalg.inv(ground.precision))
+        by_lens = _by_lens(camera, here[known], measured)
+        # The pose follows what a lens has wrong: what of it is left moves lines.
+        by_lens = by_lens - slopes @ (gives @ (by_lens / sigma[:, None]))
+        alike = np.concatenate([rises @ swell, by_lens], axis=1) / measured.px_per_metre[:, None]
         of_group = group[lines.marking[measured.index]]
         patch = np.unique(np.stack([of_group, measured.index // CLUSTER_POINTS]), axis=1, return_inverse=True)[1]
-        return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, slopes, gives)
+        return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, slopes, gives, alike)
 
     def means(self) -> _Means:
         """Where the paint of each group is by what is measured of it."""
@@ -210,8 +268,9 @@ class _Offsets:
             own = float(np.sum(pulls**2)) * (further + 1)
             spread = (own + USUAL_COUNTS * usual * told) / (further + USUAL_COUNTS)
             spread += LEAST_NOISE * float(np.sum(weight**2 * (self.sigma[its] / self.scale[its]) ** 2))
+            alike = weight @ self.alike[its] / told
             mean.append(middle)
-            variance.append(spread / told**2)
+            variance.append(spread / told**2 + float(alike @ alike))
             says.append((weight / self.scale[its]) @ self.slopes[its] / told)
         moves = [self.gives[:, self.group == n] @ (self.scale / self.sigma)[self.group == n] for n in numbers]
         carried = np.array(says).reshape(-1, POSE_NUMBERS) @ np.array(moves).reshape(-1, POSE_NUMBERS).T
@@ -243,20 +302,36 @@ class _Offsets:
         return max(squares / (informed - spare), 1.0) if informed > spare else together
 
 
-def _given_way(lines: LinePoints, measured: Measurements, slopes: Array, weight: Array) -> Array:
+def _rises(ground: Ground, measured: Measurements) -> Array:
+    """How far (M, K), in px along their normals, measured points move when a node of the ground rises by a metre."""
+    heights = np.zeros((len(measured), len(ground)))
+    row = np.arange(len(measured))[:, None]
+    np.add.at(heights, (row, ground.node[measured.index]), ground.share[measured.index])
+    return np.asarray(measured.px_per_metre_up[:, None] * heights)
+
+
+def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
+    """How far (M, C), in px along their normals, points (M, 3) move for one sigma of each number of the lens."""
+    moves = []
+    for number in lens_parameters([camera]):
+        assert isinstance(number, LensParameter)
+        ahead, behind = (number.changed(camera, sign * number.step).project(points) for sign in (1, -1))
+        moves.append(number.expected * np.sum((ahead - behind) * measured.normal, axis=1) / (2 * number.step))
+    return np.nan_to_num(np.stack(moves, axis=1))
+
+
+def _given_way(
+    ground: Ground, rises: Array, measured: Measurements, slopes: Array, weight: Array, uneven_m: float
+) -> Array:
     """How the pose (6, M) moves for an offset of one sigma at each measured point, where the ground gives way as well.
 
     `slopes` (M, 6) of the offsets by the pose; `weight` (M,) that the finish gave them.
     """
-    ground, sigma = Ground.under(lines), measured.sigma_px
-    heights = np.zeros((len(measured), len(ground)))
-    row = np.arange(len(measured))[:, None]
-    np.add.at(heights, (row, ground.node[measured.index]), ground.share[measured.index])
-    by_sigma = np.concatenate([slopes, measured.px_per_metre_up[:, None] * heights], axis=1) / sigma[:, None]
+    by_sigma = np.concatenate([slopes, rises], axis=1) / measured.sigma_px[:, None]
     weighted = by_sigma * weight[:, None]
-    information = np.einsum("mi,mj->ij", weighted, by_sigma)
+    information = weighted.T @ by_sigma
     information[:POSE_NUMBERS, :POSE_NUMBERS] += np.diag([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3)
-    information[POSE_NUMBERS:, POSE_NUMBERS:] += ground.precision / UNEVEN_M**2
+    information[POSE_NUMBERS:, POSE_NUMBERS:] += ground.precision / uneven_m**2
     return np.asarray(np.linalg.solve(information, weighted.T)[:POSE_NUMBERS])
 
 

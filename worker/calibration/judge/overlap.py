@@ -48,10 +48,10 @@ def overlap_of(pitch: Field, camera: Camera, response: NDArray[np.float32]) -> O
     found = float(weight[_strongest(response, tolerance)[_rounded(seen.pixel)] > MARKING * coverage].sum())
     marked = (response > MARKING).astype(np.uint8)
     explained = line_band(seen, camera.intrinsics.size, tolerance)
-    area_explained = np.count_nonzero(marked & explained)
+    area_explained = int(np.count_nonzero(marked & explained))
     beside_all = marked & _pitch_area(pitch, camera) & ~explained
     not_counted = left_out(pitch, camera)
-    area_beside = np.count_nonzero(beside_all if not_counted is None else beside_all & ~not_counted)
+    area_beside = int(np.count_nonzero(beside_all if not_counted is None else beside_all & ~not_counted))
     beside = area_beside * found / area_explained if area_explained else float(area_beside)
     unexpected = area_beside / (area_beside + area_explained) if area_beside else 0.0
     return Overlap(found / (expected + beside), found / expected, unexpected)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from worker.calibration.judge.quality import Gate
+from worker.calibration.judge.quality import Gate, Reason, Refusal
 from worker.calibration.judge.registration import Response, pairs_in_common, register_pair, shares_plenty
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
@@ -116,6 +116,15 @@ def contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction]:
         if pair.disagrees(gate) and (loose or (pair.plenty and pair.error_px is not None)):
             found.append(Contradiction(pair, loose or pair.cameras))
     return found
+
+
+def refusal_by_pairs(camera: str, against: Sequence[Contradiction], gate: Gate) -> Refusal | None:
+    """Why a camera is refused that pairs are against, None where none is."""
+    its = [one.pair for one in against if camera in one.blamed]
+    if not its:
+        return None
+    reason: Reason = "not-together" if its[0].error_px is None else "disagree"
+    return Refusal(reason, "; ".join(pair.words(gate) for pair in its))
 
 
 def stitch_error_px(pairs: Sequence[Pair], gate: Gate) -> float | None:

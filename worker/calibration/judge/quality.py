@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -48,6 +49,29 @@ class Gate:
         return seen.by_chance + self.least_agreement * max(1 - seen.by_chance, LEAST_ROOM)
 
 
+Reason = Literal[
+    "view",
+    "lines",
+    "few-lines",
+    "residual",
+    "zoomed",
+    "undetermined",
+    "moved",
+    "stored-better",
+    "not-together",
+    "disagree",
+    "ridge",
+]
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a pose must not replace the stored one: the `reason` in a word, and in words with numbers and what to do."""
+
+    reason: Reason
+    words: str
+
+
 @dataclass(frozen=True)
 class Movement:
     """From the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in pixels."""
@@ -75,8 +99,7 @@ class CameraResult(FinishedCamera):
     """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
 
     `view`: whether its frame could be used, and what is wrong with it if not; `overlap`: of expected lines and the
-    segmentation;
-    `rejected_because`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
+    segmentation; `refusal`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
     camera's lens is not the stored one but what the lines say; `markings`: what is seen of each.
     """
 
@@ -84,14 +107,19 @@ class CameraResult(FinishedCamera):
     overlap: Overlap
     evidence_before: Evidence
     moved: Movement
-    rejected_because: str | None = None
+    refusal: Refusal | None = None
     lens_found: bool = False
     markings: Sequence[MarkingSeen] = field(default=(), kw_only=True)
 
     @property
     def accepted(self) -> bool:
         """Whether the gate lets its pose replace the stored one."""
-        return self.rejected_because is None
+        return self.refusal is None
+
+    @property
+    def rejected_because(self) -> str | None:
+        """The words of its refusal."""
+        return None if self.refusal is None else self.refusal.words
 
 
 def believable(deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate) -> list[Deviation]:
@@ -101,59 +129,69 @@ def believable(deviations: Sequence[Deviation], results: Sequence[CameraResult],
     return [d for d in deviations if (of_field if d.camera is None else d.camera not in lost)]
 
 
-def ridge_rejection(pitch: Field, gate: Gate) -> str | None:
+def ridge_rejection(pitch: Field, gate: Gate) -> Refusal | None:
     """Why a pitch whose ridge was found along with the poses cannot be one; None when it can."""
     height = 0.0 if pitch.ridge is None else float(pitch.ridge[0, 2])
     if 0 <= height <= gate.highest_ridge_m:
         return None
-    return (
+    return Refusal(
+        "ridge",
         f"the lines fit best with a ridge at {height:.3f} m, and a pitch has one between 0 and "
-        f"{gate.highest_ridge_m:.0f} m; calibrate without fit_ridge"
+        f"{gate.highest_ridge_m:.0f} m; calibrate without fit_ridge",
     )
 
 
-def alone_rejection(result: CameraResult, gate: Gate) -> str | None:
+def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
     """Why a camera's pose must not replace the stored one whatever the others say, and what to do; None when it may."""
     if not result.view.usable:
-        return result.view.words
+        return Refusal("view", result.view.words)
     moved, seen = result.moved, result.evidence
     if seen.agreement < gate.least_agreement:
-        return (
+        return Refusal(
+            "lines",
             f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it ought "
             f"to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen anywhere); "
             "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
-            f"{_other_lines(result)}"
+            f"{_other_lines(result)}",
         )
     if result.residual_px is None or result.sigma is None:
-        return f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?"
+        return Refusal(
+            "few-lines",
+            f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?",
+        )
     limit = max(gate.largest_residual_px * result.camera.intrinsics.relative_size, gate.residual_floor_px)
     if result.residual_px > limit:
-        return (
+        return Refusal(
+            "residual",
             f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
-            f"check intrinsics and the field's measures{_other_lines(result)}"
+            f"check intrinsics and the field's measures{_other_lines(result)}",
         )
     if result.zoom is not None and zoomed_beyond_doubt(result, gate):
-        return (
+        return Refusal(
+            "zoomed",
             f"{zoom_in_words(result.camera, result.zoom)}, which puts the camera {result.elsewhere_m:.2f} m from where "
-            "it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again"
+            "it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again",
         )
     sigma = result.sigma
     if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
-        return (
+        return Refusal(
+            "undetermined",
             f"the visible lines do not determine the pose: sigma {sigma.rotation_deg:.2f} degrees (at most "
             f"{gate.largest_sigma_deg} allowed), {sigma.position_m:.2f} m (at most {gate.largest_sigma_m}); let the "
-            "camera see lines in more than one direction, or calibrate its lens again"
+            "camera see lines in more than one direction, or calibrate its lens again",
         )
     if moved.rotation_deg > gate.largest_rotation_deg or moved.position_m > gate.largest_shift_m:
-        return (
+        return Refusal(
+            "moved",
             f"turned by {moved.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
             f"{moved.position_m:.2f} m (at most {gate.largest_shift_m}); if somebody moved the camera, store a new "
-            "first pose"
+            "first pose",
         )
     if seen.agreement < result.evidence_before.agreement - gate.agreement_loss:
-        return (
+        return Refusal(
+            "stored-better",
             f"the stored pose fits the frame better: {result.evidence_before.share:.0%} of the markings' length is "
-            f"seen where it puts them, with the new pose {seen.share:.0%}"
+            f"seen where it puts them, with the new pose {seen.share:.0%}",
         )
     return None
 

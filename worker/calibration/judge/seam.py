@@ -24,6 +24,9 @@ FEWEST_POINTS = 4
 LARGEST_SIGMA_M = 0.2
 """Where lines are seen less well than this, they do not tell."""
 
+WELL_KNOWN = 2.0
+"""Times the usual sigma: places that are known less well are not asked for the worst."""
+
 
 @dataclass(frozen=True)
 class SeamPlace:
@@ -46,8 +49,10 @@ class Seam:
 
     @property
     def worst(self) -> SeamPlace | None:
-        """Where the error is surely largest."""
-        return max(self.places, key=lambda place: place.error_m - place.sigma_m, default=None)
+        """Where the error is largest, but for places that are measured clearly less well than most."""
+        usual = float(np.median([place.sigma_m for place in self.places])) if self.places else 0.0
+        known = [place for place in self.places if place.sigma_m <= WELL_KNOWN * usual]
+        return max(known, key=lambda place: place.error_m, default=None)
 
 
 def seam_between(pitch: Field, first: FinishedCamera, second: FinishedCamera) -> Seam:

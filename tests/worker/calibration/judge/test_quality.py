@@ -71,14 +71,14 @@ def test_a_good_result_passes_the_gate():
     ],
 )
 def test_the_gate_names_the_cause(change, cause):
-    assert cause in alone_rejection(replace(good(), **change), Gate())
+    assert cause in alone_rejection(replace(good(), **change), Gate()).words
 
 
 def test_a_rejection_amid_lines_of_something_else_offers_to_list_them():
     spoiled = replace(good(), evidence=seen(0.4), overlap=Overlap(0.4, 0.9, 0.56))
-    assert "56% of what it takes for lines on the pitch lies beside" in alone_rejection(spoiled, Gate())
-    assert "other_markings" in alone_rejection(spoiled, Gate())
-    assert "other_markings" not in alone_rejection(replace(spoiled, overlap=Overlap(0.4, 0.4, 0.1)), Gate())
+    assert "56% of what it takes for lines on the pitch lies beside" in alone_rejection(spoiled, Gate()).words
+    assert "other_markings" in alone_rejection(spoiled, Gate()).words
+    assert "other_markings" not in alone_rejection(replace(spoiled, overlap=Overlap(0.4, 0.4, 0.1)), Gate()).words
 
 
 def test_a_doubt_of_the_focal_length_that_moves_no_camera_rejects_none():
