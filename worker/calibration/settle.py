@@ -134,7 +134,10 @@ class Situation:
             )
 
     def loss_of(self, pitch: Field, answered: Sequence[Camera]) -> float:
-        """The loss of the last level of the search where the cameras are answered to stand, inf without any of use."""
+        """The loss of the search's middle level where the cameras are answered to stand, inf without any of use.
+
+        The finer levels look at whole frames in full size, which takes more than half a second to say hardly more.
+        """
         group = self.usable
         if not group:
             return float("inf")
@@ -143,11 +146,8 @@ class Situation:
             response if (out := left_out(pitch, camera)) is None else np.where(out, np.float32(0), response)
             for camera, response in zip(cameras, self.of(group).by_network(), strict=True)
         ]
-        level = self.method.levels[-1]
-        if level.alone:
-            alone = [level.objective(pitch, [one], [its], 0.0) for one, its in zip(cameras, seen, strict=True)]
-            return float(np.mean([o.losses(genome_of([c])[None])[0] for o, c in zip(alone, cameras, strict=True)]))
-        together = level.objective(pitch, cameras, seen, self.options.stitch_weight)
+        level = self.method.levels[len(self.method.levels) // 2]
+        together = level.objective(pitch, cameras, seen, 0.0 if level.alone else self.options.stitch_weight)
         return float(together.losses(genome_of(cameras)[None])[0])
 
     def left(self) -> Finished:
