@@ -9,6 +9,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import hypothesis
 import pytest
+import structlog
 
 from service.store.engine import connect, migrate
 from tests.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
@@ -17,6 +18,11 @@ from tests.worker.stock import Stock
 # How long an example takes says how busy the machine is, not whether the property holds.
 hypothesis.settings.register_profile("esc", deadline=None)
 hypothesis.settings.load_profile("esc")
+
+# As the service logs: no test waits for pictures of tracebacks.
+structlog.configure(
+    [structlog.dev.ConsoleRenderer(colors=False, exception_formatter=structlog.dev.plain_traceback)],
+)
 
 # What tests can do without, and how to enable those that cannot.
 PARTS = {

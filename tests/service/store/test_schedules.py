@@ -35,11 +35,11 @@ def test_a_schedule_fires_by_the_clock_on_the_wall(cron, zone, after, expected):
 
 
 def test_venues_with_the_same_schedule_fire_one_after_the_other_within_a_quarter_of_an_hour():
-    times = [next_time("*/15 * * * *", "UTC", NOON, place_of(f"venue-{n}")) for n in range(10_000)]
+    times = [next_time("*/15 * * * *", "UTC", NOON, place_of(f"venue-{n}")) for n in range(1000)]
     assert NOON < min(times) < max(times) <= NOON + timedelta(minutes=15)
-    # 10 000 in 900 s: 11 a second.
-    assert max(Counter(times).values()) < 30
-    assert times == [next_time("*/15 * * * *", "UTC", NOON, place_of(f"venue-{n}")) for n in range(10_000)]
+    # 1000 in 900 s.
+    assert max(Counter(times).values()) < 10
+    assert times == [next_time("*/15 * * * *", "UTC", NOON, place_of(f"venue-{n}")) for n in range(1000)]
 
 
 @pytest.mark.parametrize(
