@@ -56,6 +56,8 @@ bench: $(VENV)/.bench
 # One BLAS thread, as the worker sets it.
 bench-truth: $(VENV)/.train
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.lenses
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.gate
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.drifts
 
 # BEFORE: a clone of an earlier release with its .venv; `git worktree add ../esc-before v0.1.0 && make -C ../esc-before setup`.
 bench-cost: setup

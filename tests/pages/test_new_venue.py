@@ -1,7 +1,9 @@
-"""What the page of a new venue sends on."""
+"""A new venue: what its page sends on, and the whole way from two frames to poses, in a browser, by the real engine."""
 
 import json
 
+import httpx
+import numpy as np
 import pytest
 from playwright.sync_api import expect
 
@@ -40,3 +42,24 @@ def test_how_well_photos_know_a_lens_goes_with_it_until_somebody_changes_its_num
     with page.expect_request(POSE) as by_hand:
         page.get_by_label("fx, px").fill("2000")
     assert by_hand.value.post_data_json["intrinsics"]["sigma"] is None
+
+
+def poses(url):
+    cameras = httpx.get(f"{url}/venues/newcomer").raise_for_status().json()["cameras"]
+    return {camera["id"]: np.array(camera["pose"]["position"]) for camera in cameras}
+
+
+def test_a_newcomer_comes_to_poses_that_are_right(real):
+    for camera, position in poses(real).items():
+        assert np.linalg.norm(position - newcomer.TRUTH[camera].position) < 0.05
+
+
+def test_what_was_accepted_is_rejected_by_hand_and_restored(real, visit):
+    page = visit(real, "/ui/venues/newcomer")
+    accepted = poses(real)
+    page.get_by_role("button", name="Reject").click()
+    expect(page.get_by_text("These poses no longer hold")).to_be_visible()
+    assert any(np.linalg.norm(position - accepted[camera]) > 1e-4 for camera, position in poses(real).items())
+    page.get_by_role("button", name="Restore revision 2").click()
+    expect(page.get_by_text("restored from 2")).to_be_visible()
+    assert all((position == accepted[camera]).all() for camera, position in poses(real).items())
