@@ -17,8 +17,8 @@ from worker.calibration.settle import Settled, Situation
 
 LEAST_CAUGHT = 0.6
 """Share of the expected lines that the finish has to catch from the stored pose to be worth its time."""
-FARTHEST_PX = 8.0
-"""How far the visible lines may have moved on average, in pixels of a 4K frame: well within what is caught."""
+FARTHEST_PX = 12.0
+"""How far the visible lines may have moved on average, in pixels of a 4K frame: within what the finish catches."""
 
 
 def settle_nearby(here: Situation) -> Settled | None:
