@@ -20,6 +20,7 @@ from pydantic import ValidationError
 from service import lifeline
 from service.settings import Settings
 from service.store.jobs.task import Task
+from service.wire.programs.files import files_in
 from worker.message import Files, Given, Means, Message
 
 # Twice as often as a cancellation needs to reach the child.
@@ -82,7 +83,7 @@ class Child:
                         elif message is not None:
                             yield message
                     if last is not None and len(pending) >= sum(last.pictures.values()):
-                        self.pictures = _files(last.pictures, pending)
+                        self.pictures = files_in(pending, last.pictures)
                         yield last
                         return
                 if time.monotonic() - looked >= LOOK_S:
@@ -119,11 +120,3 @@ def _first_line(pending: bytearray) -> bytes | None:
         return None
     pending[:] = rest
     return bytes(line + end)
-
-
-def _files(sizes: dict[str, int], data: bytearray) -> dict[str, bytes]:
-    """The files that lie one behind the other in the data."""
-    files, begin = {}, 0
-    for name, size in sizes.items():
-        files[name], begin = bytes(data[begin : begin + size]), begin + size
-    return files

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import PosedCamera
+from service.wire.programs.files import files_in
 
 # Somebody waits for the program, and all that a venue and a result can be takes as long to load as NumPy.
 if TYPE_CHECKING:
@@ -107,7 +108,4 @@ def packed(told: Drawing | Drawn, files: Mapping[str, bytes]) -> bytes:
 
 def unpacked(sizes: dict[str, int], data: bytes) -> dict[str, bytes]:
     """The files behind the line."""
-    files, begin = {}, data.index(b"\n") + 1
-    for name, size in sizes.items():
-        files[name], begin = data[begin : begin + size], begin + size
-    return files
+    return files_in(data[data.index(b"\n") + 1 :], sizes)
