@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 
 import numpy as np
@@ -23,7 +23,7 @@ from fields.template import load
 from models.training.pitches.conditions import Conditions
 from tests.benchmarks.methods import Seen, engine
 from tests.benchmarks.rows import Rows
-from tests.benchmarks.scenes import FOLDER, HOURS, LAYOUTS, Layout, Scene, as_built, placed_cameras, rendered
+from tests.benchmarks.scenes import FOLDER, HOURS, LAYOUTS, Layout, Scene, as_built, placed_cameras, rendered, seen_well
 from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
 from tests.worker.calibration.see.spoiling import blocked, fogged
@@ -177,8 +177,7 @@ def _taken(rig: str, light: str, kind: str, real: Sequence[Camera]) -> Taken:
 def _frame(rig: str, light: str, camera: Camera, pitch: Field = PITCH, of: str = "") -> Frame:
     """What a camera sees of a pitch; `of`: what is unlike the venue, for the name of the file."""
     drawn = Conditions.named(light, np.random.default_rng([12, list(RIGS).index(rig), HOURS.index(light)]))
-    usual = {"variety": 0.3, "fog": 0.0, "blur": 0.2, "noise": 0.15, "fringe": 0.3, "sharpening": 0.4}
-    conditions = replace(drawn, **usual, jpeg_quality=92, swell=1.0, wobble=1.0)
+    conditions = seen_well(drawn, fringe=0.3, swell=1.0, wobble=1.0)
     return rendered("-".join(["gate", rig, light, camera.id, *of.split()]).replace(" ", "-"), pitch, camera, conditions)
 
 

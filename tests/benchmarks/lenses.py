@@ -20,7 +20,7 @@ import numpy as np
 from models.training.pitches.conditions import Conditions
 from tests.benchmarks.methods import Seen, engine
 from tests.benchmarks.rows import Rows
-from tests.benchmarks.scenes import FOLDER, SIZE, Scene, rendered
+from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, Scene, rendered, seen_well
 from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose
@@ -198,17 +198,8 @@ def _seen(focal: float, view: str, number: int) -> Seen:
     """The frame of a view and what the network says of it; the last few are kept."""
     rng = np.random.default_rng([9, int(focal), list(VIEWS).index(view), number])
     camera = _camera(focal, view, rng)
-    light = replace(
-        Conditions.named(["sun", "cloud", "long shadows", "floodlight"][number % 4], rng),
-        variety=0.3,
-        fog=0.0,
-        blur=0.2,
-        noise=0.15,
-        sharpening=0.4,
-        jpeg_quality=92,
-        swell=1.0,
-        wobble=1.0,
-    )
+    drawn = Conditions.named(HOURS[number % len(HOURS)], rng)
+    light = seen_well(drawn, swell=1.0, wobble=1.0)
     frame = rendered(f"lens-{focal:.0f}-{view}-{number}", PITCH, camera, light)
     return Seen(Scene(view, False, PITCH, [camera], [camera], {camera.id: [frame]}))
 

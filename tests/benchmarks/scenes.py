@@ -90,18 +90,8 @@ def scene(name: str, light: str | None = None) -> Scene:
     believed = placed_cameras(LAYOUTS[layout], rng)
     real = believed if matches else [as_built(camera, rng) for camera in believed]
     drawn = Conditions.named(light or usual, np.random.default_rng([8, number]))
-    conditions = replace(
-        drawn,
-        variety=0.3,
-        fog=0.0,
-        blur=0.2,
-        noise=0.15,
-        fringe=0.0 if matches else 0.3,
-        sharpening=0.4,
-        jpeg_quality=92,
-        swell=0.0 if matches else 1.0,
-        wobble=0.0 if matches else 1.0,
-    )
+    amiss = 0.0 if matches else 1.0
+    conditions = seen_well(drawn, fringe=0.3 * amiss, swell=amiss, wobble=amiss)
     frames = {
         camera.id: [rendered(f"{name}-{light or usual}-{camera.id}".replace(" ", "-"), pitch, camera, conditions)]
         for camera in real
@@ -127,6 +117,11 @@ def _camera(name: str, position: np.ndarray, target: np.ndarray, rng: np.random.
     matrix = np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])
     pose = Pose.looking_at(position + rng.normal(0, 0.1, 3), target, roll_deg=float(rng.normal(0, 1)))
     return Camera(name, Intrinsics(matrix, np.array([k1, 0.92 * k1 * k1, 0, 0, 0]), SIZE), pose)
+
+
+def seen_well(drawn: Conditions, **of_the_venue: float) -> Conditions:
+    """The same light on a usual pitch, through clear air and a good camera; `of_the_venue`: what is off in it."""
+    return replace(drawn, variety=0.3, fog=0.0, blur=0.2, noise=0.15, sharpening=0.4, jpeg_quality=92, **of_the_venue)
 
 
 def as_built(camera: Camera, rng: np.random.Generator) -> Camera:
