@@ -8,6 +8,8 @@ same picture at once: it is the same, and stored under the same name.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from weakref import WeakValueDictionary
 
 from starlette.concurrency import run_in_threadpool
@@ -42,26 +44,12 @@ class Drawings:
         if stored is not None or not together:
             return stored
         lock = self._drawing.setdefault(f"{job_id}/{together[0]}", asyncio.Lock())
-        try:
-            async with asyncio.timeout(PATIENCE_S):
-                await lock.acquire()
-        except TimeoutError:
-            raise _busy() from None
-        try:
-            return await run_in_threadpool(self._stored, pictures, name) or await self._drawn(job_id, pictures, name)
-        finally:
-            lock.release()
-
-    async def _drawn(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
-        try:
-            async with asyncio.timeout(PATIENCE_S):
-                await self._turns.acquire()
-        except TimeoutError:
-            raise _busy() from None
-        try:
-            return await run_in_threadpool(self._draw, job_id, pictures, name)
-        finally:
-            self._turns.release()
+        async with _waited_for(lock):
+            stored = await run_in_threadpool(self._stored, pictures, name)
+            if stored:
+                return stored
+            async with _waited_for(self._turns):
+                return await run_in_threadpool(self._draw, job_id, pictures, name)
 
     def _draw(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
         job = self._jobs.drawable(job_id)
@@ -97,6 +85,16 @@ class Drawings:
         return self._blobs.get(f"{pictures.folder}/{picture_file(name)}")
 
 
-def _busy() -> Problem:
-    headers = {"Retry-After": str(AGAIN_S)}
-    return Problem("unavailable", "Other pictures are being drawn.", headers=headers)
+@asynccontextmanager
+async def _waited_for(turn: asyncio.Lock | asyncio.Semaphore) -> AsyncIterator[None]:
+    """In one's turn, if it comes soon; who has waited long is told to come again."""
+    try:
+        async with asyncio.timeout(PATIENCE_S):
+            await turn.acquire()
+    except TimeoutError:
+        headers = {"Retry-After": str(AGAIN_S)}
+        raise Problem("unavailable", "Other pictures are being drawn.", headers=headers) from None
+    try:
+        yield
+    finally:
+        turn.release()
