@@ -106,7 +106,7 @@ def list_venues(as_json: AsJson = False, url: Url = LOCAL, api_key: ApiKey = Non
 
 @app.command("delete")
 def delete_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
-    """Forget a venue and the history of its poses."""
+    """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures, see `esc job delete`."""
     with Client(url, api_key) as client:
         client.delete_venue(venue)
 

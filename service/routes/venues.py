@@ -101,7 +101,7 @@ def put_venue(
         _require_match(if_match, before)
         tag = _tag(before) if before else None
         if if_none_match is not None and etags.names(if_none_match, tag):
-            raise Problem("venue-changed", "The venue is already there.", got=tag)
+            raise Problem("venue-changed", "The venue is already there.", got=_shown(tag))
 
     def credentials(before: Venue | None, known: dict[str, str]) -> dict[str, str]:
         return sources.credentials_of(stored, venue.credentials, before, known)
@@ -246,7 +246,7 @@ def restore_venue(
 
 @router.delete("/{venue_id}", openapi_extra=needs("admin"), status_code=204, responses=problems(404, 409, 412))
 def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[str | None, Header()] = None) -> None:
-    """Forget a venue and the history of its poses; its jobs stay."""
+    """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures: `DELETE /jobs/{id}`."""
 
     def allow(before: Venue | None, active_job: str | None) -> None:
         if before is None:
@@ -289,7 +289,12 @@ def _require_match(if_match: str | None, before: Venue | None) -> None:
     """Whoever changes a venue changes the one that he has seen."""
     tag = _tag(before) if before else None
     if if_match is not None and not etags.names(if_match, tag):
-        raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=tag)
+        raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=_shown(tag))
+
+
+def _shown(tag: str | None) -> str | None:
+    """A tag as headers have it; None: there is no venue."""
+    return None if tag is None else etags.quoted(tag)
 
 
 def _tag(venue: Venue) -> str:

@@ -67,9 +67,13 @@ def test_the_list_shows_each_venue_with_its_last_result(stub, ended, years, visi
 
 def test_a_rejected_result_is_accepted_by_hand(stub, ended, visit):
     page = visit(stub.url, "/ui/venues/poor")
-    expect(page.get_by_text("the lines do not fit")).to_be_visible()
+    reasons = page.locator(".verdict .reason li")
+    expect(reasons).to_have_text([f"{camera}: the lines do not fit" for camera in ("left", "right")])
     expect(page.get_by_text("The poses from before still hold")).to_be_visible()
-    page.get_by_role("button", name="Accept anyway").click()
+    anyway = page.get_by_role("button", name="Accept anyway")
+    # Nobody is invited to it.
+    expect(anyway).to_have_class("quiet")
+    anyway.click()
     expect(page.get_by_text("These poses hold now")).to_be_visible()
     assert stub.http.get("/venues/poor").json()["cameras"][0]["pose"]["position"][0] == -0.875
 

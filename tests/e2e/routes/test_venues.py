@@ -38,6 +38,7 @@ def test_a_conditional_put_of_an_outdated_venue_is_refused(service, name):
     old, new = (service.http.put(f"/venues/{name}", json=venue(name, b)).headers["etag"] for b in ("accept", "other"))
     answer = service.http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": old})
     assert (answer.status_code, answer.json()["type"]) == (412, "/problems/venue-changed")
+    assert (answer.json()["expected"], answer.json()["got"]) == (old, new)
     assert service.http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": new}).status_code == 200
     assert service.http.put(f"/venues/{name}", json=venue(name), headers={"If-None-Match": "*"}).status_code == 412
 

@@ -204,8 +204,9 @@ def _warnings(best: PointFit, gain: LensGain | None) -> list[str]:
         found.append(_lens_words(gain))
     if position[1] > 0:
         found.append(
-            f"the camera stands at y = {position[1]:.1f} m, beyond the pitch as the labels have it; if it stands on "
-            "the usual side (y < 0), exchange near with far and left with right in all of them"
+            f"the camera stands at y = {position[1]:.1f} m, beyond the pitch as the labels have it: as it should be if "
+            "it is one of the far side; if it stands on the usual side (y < 0), exchange near with far and left with "
+            "right in all of them"
         )
     if 2 * int((~best.doubted).sum()) - POSE_NUMBERS - len(best.free) < FEWEST_SPARE:
         found.append(

@@ -140,7 +140,9 @@ def _measure(
     left = sigma / parameter.expected
     known = left <= TOLD
     detail = ""
-    if left > UNTOUCHED:
+    if not given.template.size and parameter.name in ("length_m", "width_m"):
+        detail = "markings of your own lie where their coordinates say, whatever the measure"
+    elif left > UNTOUCHED:
         detail = "no line that depends on it is in view"
     elif not known:
         detail = f"the lines in view leave {left:.0%} of what was open"

@@ -160,6 +160,7 @@ def test_a_camera_beyond_the_pitch_is_taken_with_a_warning():
     found = first_pose(turned, LENS, {})
     assert found.camera.pose.position[1] > 0
     assert found.rejected_because is None
+    assert "as it should be if it is one of the far side; if it stands on the usual side" in found.warnings[0]
     assert "exchange near with far" in found.warnings[0]
 
 

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fields.template import load
+from fields.template import Template, load
 from tests.worker.calibration.synthetic import (
     BARREL,
     CROWNED,
@@ -76,6 +76,18 @@ def test_what_no_line_in_view_depends_on_is_unknowable_and_stays(name, given):
     assert "in view" in measures[name].detail
     assert measures[name].given == given
     assert (refined.pitch.length, refined.pitch.width) == (104.0, 67.5)
+
+
+def test_markings_of_ones_own_are_where_their_coordinates_say_and_it_is_said_so():
+    lines = {"north": [[-20, 10], [20, 10]], "south": [[-20, -10], [20, -10]], "across": [[-20, -10], [-20, 10]]}
+    own = Template(marking=[{"name": name, "line": line} for name, line in lines.items()])
+    court = Field(40.0, 20.0, 0.12, template=own)
+    opposite = camera("whole", (-5.0, -25.0, 12.0), (-5.0, 0.0), focal=500.0)
+    refined, measures = fitted(court, [opposite], court)
+    for name in ("length_m", "width_m"):
+        assert not measures[name].known
+        assert measures[name].detail == "markings of your own lie where their coordinates say, whatever the measure"
+    assert (refined.pitch.length, refined.pitch.width) == (40.0, 20.0)
 
 
 def test_a_flat_pitch_has_no_ridge_worth_mentioning_and_none_whose_length_could_be_told():
