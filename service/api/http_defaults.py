@@ -21,11 +21,16 @@ class HttpDefaults:
             await self._app(scope, receive, send)
             return
 
-        async def answer(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(FOR_BROWSERS)
-            await send(message)
+        only_head = scope["method"] == "HEAD"
 
-        # Of the answer to HEAD, the server leaves the body out.
-        asked = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
-        await self._app(asked, receive, answer)
+        async def answer(message: Message) -> None:
+            begins = message["type"] == "http.response.start"
+            if begins:
+                MutableHeaders(scope=message).update(FOR_BROWSERS)
+            if begins or not only_head:
+                await send(message)
+            if begins and only_head:
+                # Nobody reads on: streams, which would go on until the client hangs up, hear that it has.
+                await send({"type": "http.response.body"})
+
+        await self._app({**scope, "method": "GET"} if only_head else scope, receive, answer)

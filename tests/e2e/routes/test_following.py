@@ -121,6 +121,17 @@ def test_so_many_follow_at_once_and_a_place_is_free_again_when_one_leaves(start)
     assert _threads(service) <= threads + 10
 
 
+def test_who_asks_for_the_head_of_a_stream_alone_gets_it_and_takes_nobodys_place(start):
+    service = start("serve", ESC_FOLLOWERS="1")
+    service.venue("v")
+    job = service.submitted("v")
+    for _ in range(3):
+        for stream in ("/venues/v/events", f"/jobs/{job}/events"):
+            head = service.http.head(stream, timeout=5)
+            assert (head.status_code, head.headers["content-type"]) == (200, "text/event-stream; charset=utf-8")
+    wait_for(lambda: _status(service) == 200)
+
+
 def _status(service) -> int:
     with service.http.stream("GET", "/venues/v/events") as answer:
         return answer.status_code
