@@ -22,11 +22,11 @@ from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
 
 import httpx
 
-from service.wire.base import OPTIONS_PART, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
-from service.wire.job import Job, Jobs, Kind, Status
+from service.wire.job import Job, Jobs
 from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
+from service.wire.names import OPTIONS_PART, FormatName, Kind, Status
 from service.wire.venue import Venue, VenueIn, Venues
 
 # Longer than the longest poll.

@@ -15,7 +15,7 @@ from dbos import DBOS, DBOSClient, DBOSConfig
 from dbos import WorkflowStatusString as QueueStatus
 
 from service.store.engine import postgresql
-from service.wire.job import Kind
+from service.wire.names import Kind
 
 APPLICATION = "esc"
 QUEUE = "calibration"

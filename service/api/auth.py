@@ -33,7 +33,7 @@ from service.settings import Settings
 from service.store.keys import Key, Keys, hash_of
 from service.store.sessions import Sessions
 from service.wire.addresses import ip_of
-from service.wire.base import Scope
+from service.wire.names import Scope
 from service.wire.problems import Problem
 
 BELIEVED_FOR_S = 5.0

@@ -17,7 +17,7 @@ from service.observe.metrics import Metrics
 from service.observe.readiness import Readiness
 from service.settings import Settings
 from service.store.counts.figures import look
-from service.wire.base import ID_PATTERN, JOB_ID_PATTERN
+from service.wire.names import ID_PATTERN, JOB_ID_PATTERN
 
 
 class Context(Home):

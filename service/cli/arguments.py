@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
-from pydantic import BaseModel, ValidationError
 
 from service.cli.printing import USAGE, fail
-from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
-from service.wire.options import Options
+from service.wire.names import ID_PATTERN, JOB_ID_PATTERN, FormatName
 
 if TYPE_CHECKING:
-    from service.settings import Settings
+    from pydantic import BaseModel
 
-M = TypeVar("M", bound=BaseModel)
+    from service.settings import Settings
+    from service.wire.options import Options
+
+M = TypeVar("M", bound="BaseModel")
 LOCAL = "http://127.0.0.1:8000"
 
 
@@ -120,6 +121,8 @@ OptionsText = Annotated[
 
 def settings_of(**given: Any) -> Settings:
     """The settings, those given on the command line before all others; with them the log is set up."""
+    from pydantic import ValidationError
+
     from service.observe import logs
     from service.settings import Settings
 
@@ -146,11 +149,15 @@ def files_of(frames: Sequence[str]) -> dict[str, list[Path]]:
 
 def options_of(text: str) -> Options:
     """What --options says."""
+    from service.wire.options import Options
+
     return checked(Options, text, "--options")
 
 
 def checked(model: type[M], text: str, source: str) -> M:
     """A model from its JSON; `source` says whose fault it is if it is none."""
+    from pydantic import ValidationError
+
     try:
         return model.model_validate_json(text)
     except ValidationError as error:

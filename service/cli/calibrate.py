@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 from pathlib import Path
 from typing import Annotated
 
@@ -20,11 +19,8 @@ from service.cli.arguments import (
     files_of,
     options_of,
 )
-from service.cli.local import checked_files, engine_settings, failure_told
+from service.cli.calling import called
 from service.cli.printing import bar, followed, gate, say, tell, verdict
-from service.client import Client
-from service.intake.images import PNG_START
-from service.wire.venue import VenueIn
 
 
 def calibrate(
@@ -53,7 +49,7 @@ def calibrate(
     3 as well where only some cameras are accepted. Without frames the service fetches them from the cameras' sources.
     """
     files, chosen = files_of(frames or []), options_of(options)
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         job = client.calibrate(venue, files, chosen.model_dump(mode="json", exclude_unset=True), key)
         if not wait:
             say({"job": job.id, "url": client.url_of(job.links["self"])})
@@ -71,7 +67,9 @@ def snapshot(
     api_key: ApiKey = None,
 ) -> None:
     """Save what the cameras show now, fetched by the service from their sources; prints CAMERA=FILE for each."""
-    with Client(url, api_key) as client:
+    from service.intake.images import PNG_START
+
+    with called(url, api_key) as client:
         cameras = [camera] if camera else [one.id for one in client.venue(venue).cameras]
         output.mkdir(parents=True, exist_ok=True)
         for one in cameras:
@@ -93,10 +91,15 @@ def run(
     options: OptionsText = "{}",
 ) -> None:
     """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
+    import secrets
+
+    from service.cli.local import checked_files, engine_settings, failure_told
+
     settings, chosen = engine_settings(), options_of(options)
     if chosen.callback_url is not None:
         tell("callback_url is not used: without a service nobody is told. The exit code says how it went.")
     from service.store.jobs.files import picture_file
+    from service.wire.venue import VenueIn
     from worker.jobs import calibration
     from worker.message import Means
 

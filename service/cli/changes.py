@@ -10,12 +10,14 @@ import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from service.cli.printing import USAGE, fail
-from service.wire.geometry import Pose
-from service.wire.history import Revision
-from service.wire.venue import Camera, Venue, VenueIn
+
+if TYPE_CHECKING:
+    from service.wire.geometry import Pose
+    from service.wire.history import Revision
+    from service.wire.venue import Camera, Venue, VenueIn
 
 # Of a rotation in radians and a position in metres.
 ROUNDING = 1e-9
@@ -66,6 +68,8 @@ def _settings_lost(venue: Venue, stored: Venue) -> list[str]:
 
 def standing_like(venue: VenueIn, stored: Venue) -> VenueIn:
     """A venue with the poses of another, and the lenses and the ridge that they belong to."""
+    from service.wire.venue import VenueIn
+
     # To the last digit: with both places, not with what one of them gives the other.
     known = {camera.id: camera for camera in VenueIn.model_validate(stored.model_dump()).cameras}
     cameras = [

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import secrets
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from service.cli.arguments import LOCAL, ApiKey, Frames, Url, checked, files_of
-from service.cli.local import checked_files, engine_settings, failure_told
+from service.cli.calling import called
 from service.cli.printing import (
     REJECTED,
     USAGE,
@@ -25,13 +24,12 @@ from service.cli.printing import (
     tell_pose,
     verdict,
 )
-from service.client import Client
-from service.intake import images
-from service.wire.base import ID_PATTERN
-from service.wire.geometry import LensFile, LensModel, PoseIn
-from service.wire.options import ClickedPoints, FieldOptions, IntrinsicsOptions
-from service.wire.results import FieldResult
-from service.wire.venue import CameraIn, Site, Venue, VenueIn
+from service.wire.names import ID_PATTERN, LensModel
+
+if TYPE_CHECKING:
+    from service.wire.options import FieldOptions, IntrinsicsOptions
+    from service.wire.results import FieldResult
+    from service.wire.venue import Venue
 
 field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue: fit its length, width and ridge.")
 
@@ -67,6 +65,9 @@ def intrinsics(
     ] = None,
 ) -> None:
     """Find the lens of a camera from photos of a chessboard. Exit: 0 found (read the warnings), 1 not, 2 usage."""
+    from service.cli.local import engine_settings, failure_told
+    from service.intake import images
+
     settings = engine_settings()
     options = _lens_options(board, square, charuco, model)
     from worker.jobs import intrinsics
@@ -112,6 +113,11 @@ def pose(
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
 ) -> None:
     """Find first poses of cameras from clicked points. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
+    from service.cli.local import engine_settings, failure_told
+    from service.wire.geometry import LensFile, PoseIn
+    from service.wire.options import ClickedPoints
+    from service.wire.venue import CameraIn, Site, VenueIn
+
     engine_settings()
     place = checked(Site, site.read_text(), str(site))
     clicks = checked(ClickedPoints, points.read_text(), str(points)).root
@@ -163,6 +169,10 @@ def fit_field(
 
     A venue's file is fitted here, a stored venue by its service. What is stored stays as it is until `venue put`.
     """
+    import secrets
+
+    from service.wire.options import FieldOptions
+
     options = FieldOptions(seed=secrets.randbelow(2**31) if seed is None else seed)
     if Path(venue).is_file():
         stored, result, drawn = _fit_here(Path(venue), frames, options)
@@ -183,6 +193,9 @@ def fit_field(
 
 
 def _fit_here(file: Path, frames: list[str], options: FieldOptions) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    from service.cli.local import checked_files, engine_settings, failure_told
+    from service.wire.venue import VenueIn
+
     settings = engine_settings()
     from worker.jobs import field
     from worker.message import Means
@@ -197,10 +210,12 @@ def _fit_here(file: Path, frames: list[str], options: FieldOptions) -> tuple[Ven
 def _fit_there(
     venue: str, frames: list[str], options: FieldOptions, url: str, api_key: str | None
 ) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    from service.wire.results import FieldResult
+
     files = files_of(frames)
     if not re.fullmatch(ID_PATTERN, venue):
         fail(f"There is no file {venue}, and it is no id of a venue", USAGE)
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         stored = client.venue(venue)
         job = client.fit_field(venue, files, options.model_dump(mode="json", exclude_unset=True))
         job = followed(client, job)
@@ -211,6 +226,8 @@ def _fit_there(
 
 
 def _lens_options(board: str, square: float, charuco: str | None, model: LensModel) -> IntrinsicsOptions:
+    from service.wire.options import IntrinsicsOptions
+
     counted = re.fullmatch(r"(\d+)[x×](\d+)", board)
     if counted is None:
         fail(f"{board!r} is not COLUMNSxROWS, for instance 9x6", USAGE)

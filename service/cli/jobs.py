@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, JobId, OneCamera, Output, Url
+from service.cli.calling import called
 from service.cli.printing import ACCEPTED, FAILED, REJECTED, fail, followed, hand_out, say, tell, verdict
-from service.client import Client
 from service.store.jobs.files import picture_file
-from service.wire.job import Job, Jobs, Kind, Status
-from service.wire.results import FieldResult, IntrinsicsResult, LocateResult
+from service.wire.names import Kind, Status
+
+if TYPE_CHECKING:
+    from service.client import Client
+    from service.wire.job import Job
 
 app = typer.Typer(
     no_args_is_help=True, help="Jobs of a running service: calibrations, and what comes before the first."
@@ -31,9 +34,11 @@ def list_jobs(
     api_key: ApiKey = None,
 ) -> None:
     """Print a line per job, newest first: id, when it was submitted, venue, kind, status, and what came of it."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         jobs = client.jobs(venue, status, kind, limit)
     if as_json:
+        from service.wire.job import Jobs
+
         say(Jobs(jobs=jobs))
         return
     for job in jobs:
@@ -44,14 +49,14 @@ def list_jobs(
 @app.command("get")
 def get_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print a job as JSON."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         say(client.job(job))
 
 
 @app.command("wait")
 def wait_for_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Follow a job to its end and print it. Exit: 0 accepted, 1 failed or cancelled, 3 rejected, 75 busy."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         _to_its_end(client, client.job(job))
 
 
@@ -65,7 +70,7 @@ def submit_again(
     api_key: ApiKey = None,
 ) -> None:
     """Compute the frames of a job once more, with its options, from the poses that hold now: a new job."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         new = client.again(job)
         if wait:
             _to_its_end(client, new)
@@ -87,7 +92,7 @@ def picture_of_job(
     api_key: ApiKey = None,
 ) -> None:
     """Save a picture of a job and print its file; without a name, print the names of those there are."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         found = client.job(job)
         names = [name for name in found.links if name not in NOT_PICTURES]
         if picture is None:
@@ -111,39 +116,41 @@ def job_poses(
     api_key: ApiKey = None,
 ) -> None:
     """Write the poses that a job found in the format of another tool."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         hand_out(client.job_poses(job, form, camera), output)
 
 
 @app.command("accept")
 def accept_job(job: JobId, camera: OneCamera = None, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Let the poses of a job hold that the gate rejected, or that was a dry run."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         say(client.accept(job, camera))
 
 
 @app.command("reject")
 def reject_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Put back the poses that held before those of a job."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         say(client.reject(job))
 
 
 @app.command("cancel")
 def cancel_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """End a job that is still open."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         say(client.cancel(job))
 
 
 @app.command("delete")
 def delete_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Forget a job that has ended, with its frames and pictures. Poses that it brought to its venue stay."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         client.delete_job(job)
 
 
 def _to_its_end(client: Client, job: Job) -> None:
+    from service.wire.results import FieldResult, IntrinsicsResult, LocateResult
+
     job = followed(client, job)
     say(job)
     match job.result:
@@ -159,6 +166,8 @@ def _to_its_end(client: Client, job: Job) -> None:
 
 def _outcome(job: Job) -> str:
     """The verdict, or what went wrong, in a line."""
+    from service.wire.results import IntrinsicsResult
+
     if job.error is not None:
         return f"{job.error.title}: {job.error.detail}"
     if job.result is None or isinstance(job.result, IntrinsicsResult):

@@ -14,7 +14,7 @@ import typer
 from service.cli.arguments import Data, settings_of
 from service.cli.printing import FAILED, USAGE, fail, tell
 from service.cli.serve import database_told
-from service.wire.base import ID_PATTERN, Scope
+from service.wire.names import ID_PATTERN, Scope
 
 if TYPE_CHECKING:
     from service.store.keys import Keys

@@ -5,16 +5,13 @@ What a command needs is imported where it runs: the client's commands start in a
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from typing import Annotated
 
-import httpx
 import typer
 
 from service import lifeline
 from service.cli import calibrate, first, jobs, keys, serve, venues
-from service.cli.printing import BUSY, FAILED, USAGE, fail, hint, in_words
-from service.client import Refused
+from service.cli.printing import FAILED, fail
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 for command in (
@@ -39,19 +36,14 @@ def main() -> None:
     lifeline.end_with_parent()
     try:
         app()
-    except Refused as refused:
-        fail(in_words(str(refused), refused.members) + hint(refused.status), BUSY if refused.busy else FAILED)
-    except (httpx.InvalidURL, httpx.UnsupportedProtocol) as error:
-        fail(f"--url (ESC_URL) is no address such as http://127.0.0.1:8000: {error}", USAGE)
-    except httpx.TransportError as error:
-        # It may be starting again.
-        fail(f"The service cannot be reached: {error or type(error).__name__}", BUSY)
     except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError, FileExistsError) as error:
         fail(f"{error.filename}: {error.strerror}", FAILED)
 
 
 def _say_version(asked: bool) -> None:
     if asked:
+        from importlib.metadata import version
+
         print(f"esc {version('esc-calibration')}")
         raise typer.Exit
 

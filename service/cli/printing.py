@@ -7,14 +7,15 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from pydantic import BaseModel
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
-from service.client import Client
-from service.wire.job import Job
-from service.wire.job import Progress as Step
-from service.wire.results import FieldResult, IntrinsicsResult, LocateResult, Result
+    from service.client import Client
+    from service.wire.job import Job
+    from service.wire.job import Progress as Step
+    from service.wire.results import FieldResult, IntrinsicsResult, LocateResult, Result
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
 ZIP_START = b"PK"
@@ -27,7 +28,7 @@ def tell(line: str) -> None:
 
 def say(what: BaseModel | dict[str, str]) -> None:
     """Print an answer, as JSON."""
-    print(what.model_dump_json(indent=2) if isinstance(what, BaseModel) else json.dumps(what, indent=2))
+    print(json.dumps(what, indent=2) if isinstance(what, dict) else what.model_dump_json(indent=2))
 
 
 def hand_out(document: bytes, output: Path | None) -> None:
@@ -70,6 +71,8 @@ def hint(status: int) -> str:
 
 def verdict(job: Job) -> int:
     """The exit code for a job that has ended, and a line for whoever looks."""
+    from service.wire.results import Result
+
     if isinstance(job.result, Result):
         return gate(job.result)
     if job.status == "cancelled":

@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 from http import HTTPStatus
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, OneCamera, Output, Url, VenueId, checked
+from service.cli.calling import called
 from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
 from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, say, tell
-from service.client import Client, Refused
-from service.wire.geometry import Moved
-from service.wire.history import History
-from service.wire.venue import Venue, VenueIn, Venues
+
+if TYPE_CHECKING:
+    from service.client import Client
+    from service.wire.geometry import Moved
+    from service.wire.venue import Venue
 
 OTHERWISE = "Keep the poses with --keep-poses, change parts with esc venue set or edit, or put it anyway with --force."
 app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
@@ -35,8 +37,10 @@ def put_venue(
     api_key: ApiKey = None,
 ) -> None:
     """Create or replace a venue from a JSON file. Exit 1: nothing was put, something would be lost by it."""
+    from service.wire.venue import VenueIn
+
     venue = checked(VenueIn, file.read_text(), str(file))
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         before = _stored(client, venue.id)
         if before is None:
             say(client.put_venue(venue))
@@ -65,14 +69,14 @@ def set_venue(
 ) -> None:
     """Change parts of a venue and leave the others as they are, its poses among them."""
     patch = patch_of(changes)
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         say(client.patch_venue(venue, patch))
 
 
 @app.command("edit")
 def edit_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Open a venue in $EDITOR and change what was changed there, unless somebody else has changed it meanwhile."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         stored, tag = client.tagged_venue(venue)
         shown = stored.sent().model_dump(mode="json", exclude_none=True)
         try:
@@ -88,16 +92,18 @@ def edit_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None
 @app.command("get")
 def get_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print a venue with the poses that hold now."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         say(client.venue(venue))
 
 
 @app.command("list")
 def list_venues(as_json: AsJson = False, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print a line per venue: id, name, cameras."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         venues = client.venues()
     if as_json:
+        from service.wire.venue import Venues
+
         say(Venues(venues=venues))
         return
     for venue in venues:
@@ -107,7 +113,7 @@ def list_venues(as_json: AsJson = False, url: Url = LOCAL, api_key: ApiKey = Non
 @app.command("delete")
 def delete_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures, see `esc job delete`."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         client.delete_venue(venue)
 
 
@@ -121,7 +127,7 @@ def venue_poses(
     api_key: ApiKey = None,
 ) -> None:
     """Write the poses that hold now in the format of another tool."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         hand_out(client.venue_poses(venue, form, camera), output)
 
 
@@ -134,9 +140,11 @@ def venue_history(
     api_key: ApiKey = None,
 ) -> None:
     """Print a line per change of the poses, newest first: revision, time, cause, job, pixels moved and drifted."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         revisions = client.history(venue, limit)
     if as_json:
+        from service.wire.history import History
+
         say(History(revisions=revisions))
         return
     for revision in revisions:
@@ -148,7 +156,7 @@ def venue_history(
 @app.command("health")
 def venue_health(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print how a venue is doing: alarms, drift, schedule. Exit: 0 ok, 3 an alarm rings."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         health = client.venue_health(venue)
     say(health)
     if health.state != "ok":
@@ -163,11 +171,13 @@ def restore_venue(
     api_key: ApiKey = None,
 ) -> None:
     """Let the poses of a revision hold again, see `esc venue history`."""
-    with Client(url, api_key) as client:
+    with called(url, api_key) as client:
         say(client.restore(venue, revision))
 
 
 def _stored(client: Client, venue_id: str) -> tuple[Venue, str] | None:
+    from service.client import Refused
+
     try:
         return client.tagged_venue(venue_id)
     except Refused as refused:

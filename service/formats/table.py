@@ -11,7 +11,7 @@ from service.formats import colmap, freed, opencv, opentrackio, plain, soccernet
 from service.formats.archive import archive
 from service.formats.lens import Shot
 from service.settings import Settings
-from service.wire.base import FormatName
+from service.wire.names import FormatName
 from service.wire.problems import Problem
 
 JSON, ZIP = "application/json", "application/zip"

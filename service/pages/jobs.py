@@ -10,8 +10,7 @@ from service.api.context import InContext, JobIdPath
 from service.pages.shown import Page, page
 from service.pages.venues import holds
 from service.routes.contract.documented import needs
-from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
-from service.wire.job import Kind, Status
+from service.wire.names import ID_PATTERN, JOB_ID_PATTERN, FormatName, Kind, Status
 from service.wire.problems import Problem
 
 PER_PAGE = 50

@@ -14,7 +14,7 @@ from service.pages.shown import Page, page
 from service.routes.contract.documented import needs
 from service.routes.contract.guarded import Guarded
 from service.wire.field import FieldOfPlay
-from service.wire.geometry import LensModel
+from service.wire.names import LensModel
 from service.wire.programs.clicked_pose import ClickedCamera, ClickedPose
 
 ARC_STEP_RAD = math.radians(4)

@@ -22,7 +22,7 @@ from service.pages.seam import seam_curve
 from service.routes.contract.guarded import Guarded
 from service.store.engine import AWAY
 from service.store.keys import Key
-from service.wire.base import Scope
+from service.wire.names import Scope
 from service.wire.problems import KINDS, REASONS, Problem
 
 SIGN_IN = "/ui/sign-in"

@@ -16,10 +16,10 @@ from service.routes.venues import ExistingVenue
 from service.store.counts.glances import Glance
 from service.store.revisions import TAKEN
 from service.store.stores import Stores
-from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import Alarm
 from service.wire.history import Revision
 from service.wire.job import Job
+from service.wire.names import ID_PATTERN, FormatName
 from service.wire.venue import Venue
 
 PER_PAGE = 50

@@ -24,8 +24,8 @@ from service.store.jobs.decisions import MovedOn, NoPoses
 from service.store.jobs.files import frame_folder, pictures_folder
 from service.store.jobs.reading import State
 from service.store.revisions import RevisionUnfit
-from service.wire.base import ID_PATTERN, JOB_ID_PATTERN, FormatName
-from service.wire.job import OPEN, Job, Jobs, Kind, Status
+from service.wire.job import Job, Jobs
+from service.wire.names import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Kind, Status
 from service.wire.problems import Problem
 from service.wire.results import Result
 

@@ -14,8 +14,8 @@ from service.routes.contract.guarded import Guarded
 from service.routes.jobs import Existing
 from service.store.jobs.files import picture_file
 from service.store.jobs.reading import Pictures
-from service.wire.base import ID_PATTERN
 from service.wire.job import Job
+from service.wire.names import ID_PATTERN
 from service.wire.problems import Problem
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)

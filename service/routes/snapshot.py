@@ -11,7 +11,7 @@ from service.intake.images import PNG_START
 from service.routes.contract.documented import BINARY, needs, problems
 from service.routes.contract.guarded import Guarded
 from service.routes.venues import camera_of, no_such_venue
-from service.wire.base import ID_PATTERN
+from service.wire.names import ID_PATTERN
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
 PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINARY, "image/png": BINARY}}}

@@ -17,10 +17,10 @@ from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_known
 from service.settings import Settings
 from service.store.revisions import NoSuchRevision, RevisionUnfit
-from service.wire.base import ID_PATTERN, FormatName
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
 from service.wire.merge_patch import MEDIA_TYPE, merged
+from service.wire.names import ID_PATTERN, FormatName
 from service.wire.problems import Problem
 from service.wire.told import callback_urls
 from service.wire.venue import PATCH_EXAMPLES, Camera, Venue, VenueIn, Venues

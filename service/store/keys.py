@@ -12,7 +12,7 @@ import sqlalchemy as sa
 
 from service.store.engine import Repository, reading, serialise, writing
 from service.store.tables import api_keys
-from service.wire.base import Scope
+from service.wire.names import Scope
 
 PREFIX = "esc_"
 k = api_keys.c

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from fields.shapes import Arc, Line, Shape, Spot
 from service.wire.field import FieldOfPlay
-from service.wire.geometry import LensModel, Moved, PosedCamera
+from service.wire.geometry import Moved, PosedCamera
+from service.wire.names import LensModel
 
 Array = NDArray[np.float64]
 # Of all markings together; as many more as there are markings.

@@ -16,7 +16,7 @@ from service.store.schedules import plan
 from service.store.told.events import add_venue_event
 from service.wire.health import VenueHealth
 from service.wire.history import Cause, Revision
-from service.wire.job import OPEN
+from service.wire.names import OPEN
 from service.wire.results import Result
 from service.wire.venue import Venue
 

@@ -1,16 +1,12 @@
-"""What the models of the interface are made of: ids, names, strict numbers, and the class they all are."""
+"""What the models of the interface are made of: names, strict numbers, and the class they all are."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
-JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
-# Parts of an upload.
-OPTIONS_PART = "options"
-PHOTOS_PART = "photos"
+from service.wire.names import ID_PATTERN
 
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 Name = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
@@ -18,11 +14,6 @@ Name = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Whole = Annotated[int, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
-
-# Of files that poses leave in; `service.formats.table` has what is behind the names.
-FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
-# What a key allows; each one includes those before it.
-Scope = Literal["read", "calibrate", "admin"]
 
 
 class Wire(BaseModel):

@@ -7,13 +7,13 @@ Cameras are OpenCV's: x right, y down, z forward, pixel centres at integers.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from service.wire.base import OPTIONS_PART, Id, Number, Whole, Wire
+from service.wire.base import Id, Number, Whole, Wire
+from service.wire.names import OPTIONS_PART, LensModel
 
-LensModel = Literal["opencv", "fisheye"]
 DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
 COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
     "opencv": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"),

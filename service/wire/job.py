@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field
 
 from service.wire.base import Wire
+from service.wire.names import OPEN, Kind, Status
 from service.wire.results import AnyResult
 
 
@@ -36,11 +37,6 @@ class CallbackState(Wire):
     attempts: int = Field(description="Begun so far.")
     last_error: str | None = Field(description="Why the last attempt that failed did.")
     next_attempt_at: datetime | None = Field(description="Null unless waiting.")
-
-
-Kind = Literal["calibration", "intrinsics", "locate", "field"]
-Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]
-OPEN: tuple[Status, ...] = ("queued", "running")
 
 
 class Job(Wire):

@@ -8,7 +8,8 @@ from pydantic import ConfigDict, Field, RootModel, StringConstraints, model_vali
 
 from service.wire.addresses import CallbackUrl
 from service.wire.base import Flag, Id, Number, Whole, Wire
-from service.wire.geometry import LensModel, Metres
+from service.wire.geometry import Metres
+from service.wire.names import LensModel
 
 CHARUCO_PATTERN = r"^((4X4|5X5|6X6|7X7)_(50|100|250|1000)|ARUCO_ORIGINAL|APRILTAG_(16h5|25h9|36h10|36h11))$"
 

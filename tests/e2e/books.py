@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.jobs.files import picture_folder
-from service.wire.job import OPEN
+from service.wire.names import OPEN
 from tests.e2e.running import Service, wait_for
 from tests.homes import files
 

@@ -9,9 +9,9 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
-from service.wire.base import OPTIONS_PART, Scope
 from service.wire.health import AlarmEvent
 from service.wire.job import Job, JobEvent
+from service.wire.names import OPTIONS_PART, Scope
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
 from service.wire.problems import MEDIA_TYPE, ProblemDetails
 from service.wire.told.events import Event

@@ -14,7 +14,7 @@ from service.formats.lens import Shot
 from service.formats.table import formats
 from service.routes.contract.documented import BINARY, headers
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
-from service.wire.base import ID_PATTERN, FormatName
+from service.wire.names import ID_PATTERN, FormatName
 from service.wire.problems import Problem
 from service.wire.venue import Venue
 

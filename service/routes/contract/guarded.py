@@ -12,7 +12,7 @@ from fastapi.routing import APIRoute
 from service.api.body_limit import is_form
 from service.api.problems import not_json
 from service.routes.contract.documented import KEY_SCHEME, problems
-from service.wire.base import Scope
+from service.wire.names import Scope
 
 
 class Guarded(APIRoute):

@@ -16,7 +16,7 @@ from service.api.problems import invalid
 from service.intake import images
 from service.routes.venues import no_such_venue
 from service.settings import Settings
-from service.wire.base import OPTIONS_PART
+from service.wire.names import OPTIONS_PART
 from service.wire.options import Handling
 from service.wire.problems import Problem
 from service.wire.told import callback_urls

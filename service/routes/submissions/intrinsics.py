@@ -13,8 +13,8 @@ from service.routes.contract.documented import FILE, form, needs, problems, subm
 from service.routes.contract.guarded import Guarded
 from service.routes.submissions import forms, taking
 from service.routes.submissions.taking import FromSender, Sender
-from service.wire.base import OPTIONS_PART, PHOTOS_PART
 from service.wire.job import Job
+from service.wire.names import OPTIONS_PART, PHOTOS_PART
 from service.wire.options import IntrinsicsOptions
 from service.wire.problems import Problem
 

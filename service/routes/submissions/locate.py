@@ -15,8 +15,8 @@ from service.routes.jobs import at_its_end, job_answer
 from service.routes.submissions import forms, taking
 from service.routes.submissions.taking import FromSender, Sender
 from service.routes.venues import camera_of
-from service.wire.base import ID_PATTERN, OPTIONS_PART
 from service.wire.job import Job
+from service.wire.names import ID_PATTERN, OPTIONS_PART
 from service.wire.options import LocateOptions
 from service.wire.problems import Problem
 from service.wire.venue import Camera, Venue

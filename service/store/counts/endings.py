@@ -7,7 +7,8 @@ from datetime import datetime
 from typing import get_args
 
 from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Amounts, total
-from service.wire.job import JobError, Kind, Status
+from service.wire.job import JobError
+from service.wire.names import Kind, Status
 from service.wire.problems import KINDS, type_of
 from service.wire.results import AnyResult, Cause, Result
 

@@ -14,7 +14,7 @@ from service.store.counts import tallies
 from service.store.counts.tallies import Key
 from service.store.engine import clock, reading
 from service.store.workers import SeenWorker, seen
-from service.wire.job import OPEN
+from service.wire.names import OPEN
 from service.wire.results import Result
 
 j = tables.jobs.c

@@ -15,7 +15,7 @@ from service.store import tables
 from service.store.engine import Repository, reading
 from service.wire.base import Wire
 from service.wire.health import Alarm
-from service.wire.job import Status
+from service.wire.names import Status
 from service.wire.results import AnyResult, Result, Verdict
 
 IN_CURVE = 40

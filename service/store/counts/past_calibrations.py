@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from service.store import tables
 from service.store.engine import Repository, reading
 from service.wire.geometry import Moved
-from service.wire.job import OPEN, Status
+from service.wire.names import OPEN, Status
 from service.wire.results import Verdict
 
 j = tables.jobs.c

@@ -21,7 +21,8 @@ from service.store.jobs.ending import Still, changed, end, still_open
 from service.store.jobs.reading import ONE, asked
 from service.store.jobs.task import Task
 from service.store.venues import find_venue, let_hold, venue_lock
-from service.wire.job import OPEN, JobError, Progress
+from service.wire.job import JobError, Progress
+from service.wire.names import OPEN
 from service.wire.options import Options
 from service.wire.results import AnyResult, Result
 from service.wire.venue import Venue

@@ -18,7 +18,8 @@ from service.store.engine import clock
 from service.store.jobs.task import OPTIONS
 from service.store.told.deliveries import add_delivery
 from service.store.told.events import add_job_event
-from service.wire.job import OPEN, JobError, Status
+from service.wire.job import JobError
+from service.wire.names import OPEN, Status
 from service.wire.options import Options
 from service.wire.results import AnyResult
 from service.wire.told.events import Webhook

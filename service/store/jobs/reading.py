@@ -16,7 +16,8 @@ from service.store.jobs.task import Origin
 from service.store.revisions import revisions_of_jobs
 from service.store.told.deliveries import deliveries_of
 from service.store.venues import with_result
-from service.wire.job import CallbackState, Job, Status
+from service.wire.job import CallbackState, Job
+from service.wire.names import Status
 from service.wire.results import Result
 from service.wire.venue import Venue
 

@@ -17,7 +17,8 @@ from service.store.jobs.reading import ONE, asked, read_job
 from service.store.jobs.task import Asked
 from service.store.told.events import add_job_event
 from service.store.venues import find_venue, venue_lock
-from service.wire.job import Job, JobError, Kind, Status
+from service.wire.job import Job, JobError
+from service.wire.names import Kind, Status
 from service.wire.options import Options
 from service.wire.venue import Venue
 

@@ -1,3 +1,4 @@
+import ast
 import json
 import os
 import signal
@@ -251,6 +252,36 @@ def test_a_shell_is_taught_the_commands():
     command = [Path(sys.executable).parent / "esc"]
     completed = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True)
     assert completed.stdout.split() == ["wait"]
+
+
+LOADED = """
+import atexit, sys
+atexit.register(lambda: print(sorted({name.partition(".")[0] for name in sys.modules}), file=sys.stderr))
+from service.cli.main import main
+sys.argv = ["esc", *sys.argv[1:]]
+main()
+"""
+
+
+def loaded(*arguments, **environment):
+    """What a command has loaded at its end: packages by their names."""
+    command = [sys.executable, "-c", LOADED, *arguments]
+    ended = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True)
+    return set(ast.literal_eval(ended.stderr.splitlines()[-1]))
+
+
+def test_help_and_completion_load_neither_models_nor_what_travels():
+    packages = loaded("--help")
+    assert {"typer", "rich"} <= packages
+    assert not packages & {"httpx", "pydantic"}
+    # To read its arguments typer takes pydantic, as soon as a command is named.
+    asked = {"_ESC_COMPLETE": "complete_bash", "COMP_WORDS": "esc job wa", "COMP_CWORD": "2"}
+    for packages in (loaded("job", "list", "--help"), loaded("job", "get", "none"), loaded(**asked)):
+        assert "typer" in packages
+        assert not packages & {"httpx", "httpcore", "sqlalchemy", "numpy"}
+    models = "import sys, service.cli.main; print([name for name in sys.modules if name.startswith('service.wire.')])"
+    told = subprocess.run([sys.executable, "-c", models], capture_output=True, text=True, check=True)
+    assert told.stdout == "['service.wire.names']\n"
 
 
 def test_commands_of_the_client_load_neither_the_server_nor_the_engine():

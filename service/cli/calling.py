@@ -1,0 +1,35 @@
+"""The service that a command calls: a client of it, and what is told where it refuses or cannot be reached.
+
+Client and models are imported when a service is called: help and completion, and what is wrong with the arguments of a
+command, are told in a third of the time without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from service.cli.printing import BUSY, FAILED, USAGE, fail, hint, in_words
+
+if TYPE_CHECKING:
+    from service.client import Client
+
+
+@contextmanager
+def called(url: str, api_key: str | None) -> Iterator[Client]:
+    """A client; what goes wrong with the service is a line and an exit code."""
+    import httpx
+
+    from service.client import Client, Refused
+
+    try:
+        with Client(url, api_key) as client:
+            yield client
+    except Refused as refused:
+        fail(in_words(str(refused), refused.members) + hint(refused.status), BUSY if refused.busy else FAILED)
+    except (httpx.InvalidURL, httpx.UnsupportedProtocol) as error:
+        fail(f"--url (ESC_URL) is no address such as http://127.0.0.1:8000: {error}", USAGE)
+    except httpx.TransportError as error:
+        # It may be starting again.
+        fail(f"The service cannot be reached: {error or type(error).__name__}", BUSY)

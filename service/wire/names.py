@@ -1,0 +1,21 @@
+"""Names and words of the interface, without its models: what the help of the command line is made of."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
+# Parts of an upload.
+OPTIONS_PART = "options"
+PHOTOS_PART = "photos"
+
+LensModel = Literal["opencv", "fisheye"]
+# Of files that poses leave in; `service.formats.table` has what is behind the names.
+FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
+# What a key allows; each one includes those before it.
+Scope = Literal["read", "calibrate", "admin"]
+# Of jobs.
+Kind = Literal["calibration", "intrinsics", "locate", "field"]
+Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]
+OPEN: tuple[Status, ...] = ("queued", "running")
