@@ -6,6 +6,10 @@
     async with AsyncClient("http://127.0.0.1:8000", api_key) as client:
         venue = await client.venue("demo")
 
+    with Client("http://127.0.0.1:8000", api_key) as client:
+        for seen, event in client.venue_events("demo", ["poses.changed"]):
+            print(event.type, event.data)
+
 Both have the same methods. A service that refuses raises `Refused`.
 """
 
@@ -13,29 +17,37 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import time
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from types import MethodType
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
 
 import httpx
+from pydantic import TypeAdapter
 
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
 from service.wire.job import Job, Jobs
 from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
-from service.wire.names import OPTIONS_PART, FormatName, Kind, Status
+from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, Status
+from service.wire.told.events import LAST, Event
 from service.wire.venue import Venue, VenueIn, Venues
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
 # How long a service may be away from somebody who follows a job: a restart, a database that comes back.
 PATIENCE_S = 60.0
+# A stream of events says ": ping" every 15 s: one that is silent for longer leads nowhere any more.
+SILENCE_S = 45.0
+# Until a stream that has ended, or could not begin, is asked for again.
+AGAIN_S = 2.0
 NOT_INSTALLED = "/problems/extra-missing"
 P = ParamSpec("P")
 T = TypeVar("T")
+EVENT: TypeAdapter[Event] = TypeAdapter(Event)
 
 
 class Refused(Exception):  # noqa: N818
@@ -134,6 +146,41 @@ class AsyncClient:
         """The poses that hold now, of one camera or all, as a file of another tool's format."""
         return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera))
 
+    async def venue_events(
+        self,
+        venue_id: str,
+        kinds: Sequence[EventKind] = (),
+        seen: str | None = None,
+        patience_s: float = math.inf,
+    ) -> AsyncGenerator[tuple[str, Event]]:
+        """Whatever happens to a venue (of these kinds, absent: of any), each with the id by which to go on after it.
+
+        First comes `poses.current`, or what was missed since the event `seen`. None is missed and none comes twice,
+        whatever breaks meanwhile: what is wrong is raised once the service was away for `patience_s`. Ends when the
+        venue is deleted.
+        """
+        heard = time.monotonic()
+        while True:
+            try:
+                headers = {"Last-Event-ID": seen} if seen else {}
+                lines = self._lines(f"/venues/{venue_id}/events", params={"events": list(kinds)}, headers=headers)
+                told: dict[str, str] = {}
+                async for line in lines:
+                    heard = time.monotonic()
+                    name, _, value = line.partition(": ")
+                    if name:
+                        told[name] = value
+                    elif not line and "data" in told:
+                        seen, event = told["id"], EVENT.validate_json(told["data"])
+                        yield seen, event
+                        if event.type == LAST:
+                            return
+                        told = {}
+            except (httpx.TransportError, Refused) as error:
+                if not _passing(error) or time.monotonic() - heard > patience_s:
+                    raise
+            await self._pause(AGAIN_S)
+
     async def snapshot(self, venue_id: str, camera: str) -> bytes:
         """What a camera shows now, a JPEG or PNG from its source."""
         return await self._ask("GET", f"/venues/{venue_id}/cameras/{camera}/snapshot")
@@ -225,8 +272,7 @@ class AsyncClient:
                 followed = await self.job(followed.id, wait_s=every_s)
                 heard = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                passing = isinstance(error, httpx.TransportError) or error.busy
-                if not passing or time.monotonic() - heard > PATIENCE_S:
+                if not _passing(error) or time.monotonic() - heard > PATIENCE_S:
                     raise
                 await self._pause(every_s)
         return followed
@@ -239,17 +285,21 @@ class AsyncClient:
 
     async def _answer(self, method: str, path: str, **more: Any) -> httpx.Response:
         response = await self._send(method, path, **more)
-        if response.is_success:
-            return response
-        try:
-            members = response.json()
-        except ValueError:
-            members = {"title": f"HTTP {response.status_code}", "detail": response.text[:500]}
-        retry_after = response.headers.get("retry-after")
-        raise Refused(response.status_code, members if isinstance(members, dict) else {}, retry_after)
+        if not response.is_success:
+            raise _refusal(response)
+        return response
 
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
         return await self._http.request(method, path, **more)
+
+    async def _lines(self, path: str, **more: Any) -> AsyncIterator[str]:
+        """The lines of a stream, each as soon as it is there; raises `Refused`."""
+        async with self._http.stream("GET", path, timeout=SILENCE_S, **more) as response:
+            if not response.is_success:
+                await response.aread()
+                raise _refusal(response)
+            async for line in response.aiter_lines():
+                yield line
 
     async def _pause(self, seconds: float) -> None:
         await asyncio.sleep(seconds)
@@ -264,6 +314,14 @@ class _Blocking(AsyncClient):
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
         return self.http.request(method, path, **more)
 
+    async def _lines(self, path: str, **more: Any) -> AsyncIterator[str]:
+        with self.http.stream("GET", path, timeout=SILENCE_S, **more) as response:
+            if not response.is_success:
+                response.read()
+                raise _refusal(response)
+            for line in response.iter_lines():
+                yield line
+
     async def _pause(self, seconds: float) -> None:
         time.sleep(seconds)
 
@@ -276,18 +334,49 @@ class _Method(Generic[P, T]):
 
     def __get__(self, client: Client, owner: type) -> Callable[P, T]:
         """Bind it."""
-        awaited = MethodType(self._method, client._calls)
+        awaited: Callable[P, Coroutine[Any, Any, T]] = MethodType(self._method, client._calls)
 
         @wraps(awaited)
         def method(*arguments: P.args, **named: P.kwargs) -> T:
-            try:
-                awaited(*arguments, **named).send(None)
-            except StopIteration as end:
-                result: T = end.value
-                return result
-            raise AssertionError("a blocking connection waited")
+            return _at_once(awaited(*arguments, **named))
 
         return method
+
+
+class _Stream(Generic[P, T]):
+    """A method of `AsyncClient` that goes on and on, as one of `Client`."""
+
+    def __init__(self, method: Callable[Concatenate[AsyncClient, P], AsyncGenerator[T]]) -> None:
+        self._method = method
+
+    def __get__(self, client: Client, owner: type) -> Callable[P, Iterator[T]]:
+        """Bind it."""
+        awaited: Callable[P, AsyncGenerator[T]] = MethodType(self._method, client._calls)
+
+        @wraps(awaited)
+        def method(*arguments: P.args, **named: P.kwargs) -> Iterator[T]:
+            going_on = awaited(*arguments, **named)
+            try:
+                while True:
+                    try:
+                        one = _at_once(anext(going_on))
+                    except StopAsyncIteration:
+                        return
+                    yield one
+            finally:
+                _at_once(going_on.aclose())
+
+        return method
+
+
+def _at_once(awaitable: Awaitable[T]) -> T:
+    """What something gives that never waits."""
+    try:
+        awaitable.__await__().__next__()
+    except StopIteration as end:
+        result: T = end.value
+        return result
+    raise AssertionError("a blocking connection waited")
 
 
 class Client:
@@ -316,6 +405,7 @@ class Client:
     history = _Method(AsyncClient.history)
     restore = _Method(AsyncClient.restore)
     venue_poses = _Method(AsyncClient.venue_poses)
+    venue_events = _Stream(AsyncClient.venue_events)
     snapshot = _Method(AsyncClient.snapshot)
     calibrate = _Method(AsyncClient.calibrate)
     fit_field = _Method(AsyncClient.fit_field)
@@ -335,6 +425,21 @@ def _connection(url: str, api_key: str | None) -> dict[str, Any]:
     headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
     # Where there is no TLS, the certificates of all authorities need not be read, which takes as long as a request.
     return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S, "verify": not url.startswith("http://")}
+
+
+def _refusal(response: httpx.Response) -> Refused:
+    """Of an answer that was read."""
+    try:
+        members = response.json()
+    except ValueError:
+        members = {"title": f"HTTP {response.status_code}", "detail": response.text[:500]}
+    retry_after = response.headers.get("retry-after")
+    return Refused(response.status_code, members if isinstance(members, dict) else {}, retry_after)
+
+
+def _passing(error: httpx.TransportError | Refused) -> bool:
+    """Whether the service may be back in a moment."""
+    return isinstance(error, httpx.TransportError) or error.busy
 
 
 def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:

@@ -9,7 +9,7 @@ import typer
 
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, JobId, OneCamera, Output, Url
 from service.cli.calling import called
-from service.cli.printing import ACCEPTED, FAILED, REJECTED, fail, followed, hand_out, say, tell, verdict
+from service.cli.printing import ACCEPTED, FAILED, REJECTED, fail, followed, hand_out, outcome, say, tell, verdict
 from service.store.jobs.files import picture_file
 from service.wire.names import Kind, Status
 
@@ -43,7 +43,7 @@ def list_jobs(
         return
     for job in jobs:
         came = f"{job.created_at:%Y-%m-%dT%H:%M:%SZ}"
-        print(f"{job.id}\t{came}\t{job.venue or '-'}\t{job.kind}\t{job.status}\t{_outcome(job)}")
+        print(f"{job.id}\t{came}\t{job.venue or '-'}\t{job.kind}\t{job.status}\t{outcome(job)}")
 
 
 @app.command("get")
@@ -162,14 +162,3 @@ def _to_its_end(client: Client, job: Job) -> None:
             raise typer.Exit(ACCEPTED if job.result.accepted else REJECTED)
         case _:
             raise typer.Exit(verdict(job))
-
-
-def _outcome(job: Job) -> str:
-    """The verdict, or what went wrong, in a line."""
-    from service.wire.results import IntrinsicsResult
-
-    if job.error is not None:
-        return f"{job.error.title}: {job.error.detail}"
-    if job.result is None or isinstance(job.result, IntrinsicsResult):
-        return "-"
-    return "accepted" if job.result.accepted else f"rejected: {job.result.rejected_because}"

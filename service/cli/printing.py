@@ -93,6 +93,17 @@ def gate(result: Result) -> int:
     return REJECTED
 
 
+def outcome(job: Job) -> str:
+    """The verdict, or what went wrong, in a line."""
+    from service.wire.results import IntrinsicsResult
+
+    if job.error is not None:
+        return f"{job.error.title}: {job.error.detail}"
+    if job.result is None or isinstance(job.result, IntrinsicsResult):
+        return "-"
+    return "accepted" if job.result.accepted else f"rejected: {job.result.rejected_because}"
+
+
 def tell_lens(result: IntrinsicsResult) -> None:
     """What a person looks at first."""
     used = sum(photo.fate == "used" for photo in result.photos)

@@ -12,11 +12,13 @@ import typer
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, OneCamera, Output, Url, VenueId, checked
 from service.cli.calling import called
 from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
-from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, say, tell
+from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, outcome, say, tell
+from service.wire.names import EventKind
 
 if TYPE_CHECKING:
     from service.client import Client
     from service.wire.geometry import Moved
+    from service.wire.told.events import Event
     from service.wire.venue import Venue
 
 OTHERWISE = "Keep the poses with --keep-poses, change parts with esc venue set or edit, or put it anyway with --force."
@@ -163,6 +165,27 @@ def venue_health(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> No
         raise typer.Exit(REJECTED)
 
 
+@app.command("follow")
+def follow_venue(
+    venue: VenueId,
+    only: Annotated[EventKind | None, typer.Option("--only", help="Only what is of this kind; otherwise all.")] = None,
+    as_json: AsJson = False,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Print a line for whatever happens to a venue: time, type, what; first for the poses that hold.
+
+    Nothing is missed when the service restarts. Exit: 0 the venue was deleted, 75 the service was away for a minute.
+    """
+    from service.client import PATIENCE_S
+
+    with called(url, api_key) as client:
+        for _, event in client.venue_events(venue, [only] if only else [], patience_s=PATIENCE_S):
+            line = f"{event.timestamp:%Y-%m-%dT%H:%M:%SZ}\t{event.type}\t{_happened(event)}"
+            # Whoever reads a pipe is to have it now.
+            print(event.model_dump_json() if as_json else line, flush=True)
+
+
 @app.command("restore")
 def restore_venue(
     venue: VenueId,
@@ -173,6 +196,22 @@ def restore_venue(
     """Let the poses of a revision hold again, see `esc venue history`."""
     with called(url, api_key) as client:
         say(client.restore(venue, revision))
+
+
+def _happened(event: Event) -> str:
+    from service.wire.health import VenueAlarm
+    from service.wire.job import Job
+    from service.wire.told.events import Poses
+
+    match event.data:
+        case Poses() as poses:
+            return f"revision {poses.revision}, {poses.cause}"
+        case Job() as job:
+            return f"{job.id} {outcome(job)}"
+        case VenueAlarm() as alarm:
+            return alarm.why
+        case change:
+            return " ".join(change.changed) or "-"
 
 
 def _stored(client: Client, venue_id: str) -> tuple[Venue, str] | None:

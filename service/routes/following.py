@@ -16,9 +16,10 @@ from service.routes.contract.documented import needs, problems
 from service.routes.contract.guarded import Guarded
 from service.routes.venues import ExistingVenue
 from service.store.engine import AWAY
-from service.store.told.following import LAST, Numbered
+from service.store.told.following import Numbered
+from service.wire.names import EventKind
 from service.wire.problems import Problem
-from service.wire.told.events import EventKind
+from service.wire.told.events import LAST
 
 log = structlog.get_logger()
 router = APIRouter(tags=["venues"], route_class=Guarded)

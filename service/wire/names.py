@@ -15,6 +15,8 @@ LensModel = Literal["opencv", "fisheye"]
 FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
 # What a key allows; each one includes those before it.
 Scope = Literal["read", "calibrate", "admin"]
+# Of what happens to venues; `venue.*`: whatever begins so.
+EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
 # Of jobs.
 Kind = Literal["calibration", "intrinsics", "locate", "field"]
 Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]

@@ -15,10 +15,10 @@ from service.store.jobs.reading import jobs_of
 from service.store.revisions import newest_revision
 from service.store.venues import find_venue
 from service.wire.job import Job
-from service.wire.told.events import Event, EventKind, Poses, PosesEvent, is_of
+from service.wire.names import EventKind
+from service.wire.told.events import LAST, Event, Poses, PosesEvent, is_of
 
 e = tables.events.c
-LAST = "venue.deleted"
 EVENT: TypeAdapter[Event] = TypeAdapter(Event)
 
 

@@ -14,9 +14,10 @@ from service.wire.geometry import PosedCamera, Row
 from service.wire.health import AlarmEvent
 from service.wire.history import Cause
 from service.wire.job import JobEvent
+from service.wire.names import EventKind
 
-# `venue.*`: whatever begins so.
-EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
+# Nothing comes after it.
+LAST = "venue.deleted"
 WEBHOOK_EXAMPLE: dict[str, Any] = {"url": "https://example.com/poses", "events": ["poses.changed"]}
 
 

@@ -2,13 +2,16 @@
 
 import asyncio
 import inspect
+from contextlib import aclosing
+from itertools import islice
 
 import httpx
 import pytest
 
+from service import client as client_module
 from service.client import AsyncClient, Client, Refused
 from service.wire.venue import VenueIn
-from tests.e2e.running import png, venue, wait_for
+from tests.e2e.running import DEADLINE_S, png, venue, wait_for
 
 
 @pytest.fixture
@@ -58,7 +61,7 @@ def test_the_same_without_blocking(service, frames, name):
 def test_both_clients_have_the_same_methods_with_the_same_signatures():
     clients = Client("http://127.0.0.1:9"), AsyncClient("http://127.0.0.1:9")
     names = [name for name in dir(Client) if not name.startswith("_") and name != "url_of"]
-    assert len(names) == 23
+    assert len(names) == 24
     for name in names:
         blocking, awaited = (getattr(client, name) for client in clients)
         assert inspect.signature(blocking) == inspect.signature(awaited)
@@ -81,3 +84,57 @@ def test_who_follows_a_job_outlives_a_restart_of_the_service(start, frames):
         job = client.follow(client.calibrate("v", frames, {}), restart)
     assert (job.status, restarted) == ("succeeded", [job.id])
     wait_for(lambda: service.http.get("/livez").status_code == 200)
+
+
+def test_who_follows_a_venue_misses_nothing_and_hears_nothing_twice_when_the_service_restarts(start):
+    service = start().ready()
+    port = httpx.URL(service.url).port
+    service.venue("v")
+    told = []
+    with Client(service.url) as client:
+        for _, event in client.venue_events("v", ["poses.changed"]):
+            told.append((event.type, getattr(event.data, "revision", None)))
+            if len(told) == 1:
+                service.calibrated("v")
+            elif len(told) == 2:
+                service.kill()
+                service.start(port)
+                service.calibrated("v", shade=1)
+            elif len(told) == 3:
+                service.http.delete("/venues/v").raise_for_status()
+        everything = [("poses.current", 1), ("poses.changed", 2), ("poses.changed", 3), ("venue.deleted", None)]
+        assert told == everything
+        with pytest.raises(Refused, match="There is no such venue"):
+            next(client.venue_events("v"))
+
+
+def test_who_follows_a_venue_goes_on_where_somebody_else_has_ended(service, name):
+    service.venue(name)
+    with Client(service.url) as client:
+        ((seen, current),) = islice(client.venue_events(name), 1)
+        assert current.data.cameras[0].pose == client.venue(name).cameras[0].pose
+        job = service.calibrated(name)["id"]
+
+    async def rest():
+        async with AsyncClient(service.url) as client, aclosing(client.venue_events(name, seen=seen)) as events:
+            return [(await anext(events))[1] for _ in range(3)]
+
+    queued, changed, ended = asyncio.run(rest())
+    assert [event.type for event in (queued, changed, ended)] == ["job.queued", "poses.changed", "job.succeeded"]
+    assert (changed.data.job, ended.data.id) == (job, job)
+
+
+def test_who_follows_a_venue_of_a_service_that_stays_away_is_told_in_the_end(monkeypatch):
+    monkeypatch.setattr(client_module, "AGAIN_S", 0.05)
+    with Client("http://127.0.0.1:9") as client, pytest.raises(httpx.ConnectError):
+        next(client.venue_events("v", patience_s=0.2))
+
+
+def test_a_follower_that_leaves_off_makes_room_for_another(start):
+    service = start("serve", ESC_FOLLOWERS="1")
+    service.venue("v")
+    with Client(service.url) as client:
+        for _ in range(3):
+            events = client.venue_events("v", patience_s=DEADLINE_S)
+            assert next(events)[1].type == "poses.current"
+            events.close()

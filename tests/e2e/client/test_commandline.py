@@ -207,6 +207,27 @@ def test_jobs_are_listed_waited_for_and_submitted_again(service, esc, name):
     assert esc("job", "list", "--venue", name, "--status", "failed").stdout == ""
 
 
+def test_a_venue_is_followed_line_by_line_until_it_is_deleted(service, name):
+    service.venue(name)
+    command = [sys.executable, "-m", "service.cli", "venue", "follow", name, "--url", service.url]
+    with (
+        subprocess.Popen([*command, "--only", "poses.changed"], stdout=subprocess.PIPE, text=True) as lines,
+        subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, text=True) as whole,
+    ):
+        told = [lines.stdout.readline()]
+        assert json.loads(whole.stdout.readline())["type"] == "poses.current"
+        job = service.calibrated(name)["id"]
+        service.http.delete(f"/venues/{name}").raise_for_status()
+        told += lines.stdout.readlines()
+        documents = [json.loads(line) for line in whole.stdout]
+    assert (lines.returncode, whole.returncode) == (0, 0)
+    what = [line.rstrip("\n").split("\t")[1:] for line in told]
+    poses = [["poses.current", "revision 1, put"], ["poses.changed", "revision 2, calibrated"]]
+    assert what == [*poses, ["venue.deleted", "-"]]
+    assert (documents[-2]["type"], documents[-2]["data"]["id"]) == ("job.succeeded", job)
+    assert documents[-1]["type"] == "venue.deleted"
+
+
 @pytest.mark.parametrize(
     ("command", "says"), [(("job", "get", "01ABC"), "26 capital"), (("venue", "get", "A B"), "64 of a-z")]
 )
