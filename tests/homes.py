@@ -91,6 +91,11 @@ class Servers:
         finally:
             self._postgres.start()
 
+    def kill_database(self) -> None:
+        """All its processes at once, as a crash would; it is started again."""
+        self._postgres.stop(signal.SIGQUIT)
+        self._postgres.start()
+
     @contextmanager
     def bucket_away(self) -> Iterator[None]:
         """It takes requests and does not answer them."""
@@ -170,9 +175,9 @@ class Postgres:
                 assert time.monotonic() < end, self._log.read_text()
                 time.sleep(0.05)
 
-    def stop(self) -> None:
-        """At once: connections are closed and what was not committed is lost."""
-        self._server.send_signal(signal.SIGINT)
+    def stop(self, how: signal.Signals = signal.SIGINT) -> None:
+        """At once: connections are closed and what was not committed is lost; by SIGQUIT without another word."""
+        self._server.send_signal(how)
         self._server.wait(STARTING_S)
 
     def remove(self) -> None:

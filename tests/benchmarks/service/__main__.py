@@ -10,10 +10,11 @@ import argparse
 import os
 from collections.abc import Callable
 
-from tests.benchmarks.service import crashes, endurance, lists, load, outages
+from tests.benchmarks.service import crashes, endurance, kills, lists, load, outages
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], list[str]]] = {
     "crashes": crashes.table,
+    "kills": kills.table,
     "outages": outages.table,
     "pollers": load.table,
     "longrun": endurance.table,
@@ -26,6 +27,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", choices=SECTIONS, default=list(SECTIONS))
     parser.add_argument("--moments", type=int, default=20, help="at which something is killed, per home")
+    parser.add_argument("--seeds", type=int, default=40, help="by which a victim and a moment are drawn, one a round")
+    parser.add_argument("--seed", type=int, help="the first of them; otherwise drawn, and printed")
     parser.add_argument("--away-s", type=float, default=10.0, help="how long the database is away")
     parser.add_argument("--rounds", type=int, default=7, help="jobs alone and jobs with pollers, alternately")
     parser.add_argument("--jobs", type=int, default=500, help="in a row, through the stub of the engine")

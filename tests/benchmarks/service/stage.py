@@ -10,18 +10,20 @@ from pathlib import Path
 import numpy as np
 
 from tests.e2e.running import Service
-from tests.homes import Embedded, Home, Servers, environment, postgres_binaries, postgres_server, s3_server
+from tests.homes import HASTY, Embedded, Home, Servers, environment, postgres_binaries, postgres_server, s3_server
 
+# What PostgreSQL has committed outlives its processes; nothing here has to outlive the machine.
+SURE = ("fsync=off", "full_page_writes=off")
 EMBEDDED, SERVERS = "SQLite, folder", "PostgreSQL, S3"
 
 
 @contextmanager
-def homes() -> Iterator[dict[str, Home]]:
+def homes(postgres_options: Sequence[str] = HASTY) -> Iterator[dict[str, Home]]:
     """Both."""
     binaries = postgres_binaries()
     if binaries is None:
         raise SystemExit("PostgreSQL is needed (Debian: apt-get install postgresql)")
-    with postgres_server(binaries) as postgres, s3_server() as bucket:
+    with postgres_server(binaries, postgres_options) as postgres, s3_server() as bucket:
         yield {EMBEDDED: Embedded(), SERVERS: Servers(postgres, bucket)}
 
 
