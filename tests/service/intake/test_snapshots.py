@@ -1,0 +1,27 @@
+"""What fetches frames."""
+
+import json
+import sys
+
+import pytest
+
+from service.intake.snapshots import Snapshots
+from service.settings import Settings
+from service.wire.problems import Problem
+from service.wire.venue import VenueIn
+from tests.e2e.running import venue
+
+
+def test_the_program_that_fetches_frames_sees_no_secret_of_the_service(monkeypatch, tmp_path):
+    seen = tmp_path / "seen"
+    writing = f"import json, os; open({str(seen)!r}, 'w').write(json.dumps(dict(os.environ)))"
+    secrets = ("ESC_DATABASE_URL", "ESC_WEBHOOK_SECRET", "AWS_SECRET_ACCESS_KEY", "PGPASSWORD")
+    settings = Settings(source_program=[sys.executable, "-c", writing])
+    for name in secrets:
+        monkeypatch.setenv(name, "x")
+    (camera, _) = VenueIn.model_validate(venue("v")).stored().cameras
+    with pytest.raises(Problem, match="No frame of camera left"):
+        Snapshots(settings).take([camera.model_copy(update={"source": "http://127.0.0.1/x"})], {})
+    inherited = json.loads(seen.read_text())
+    assert {"PATH", "OMP_NUM_THREADS"} <= inherited.keys()
+    assert not inherited.keys() & set(secrets)
