@@ -149,10 +149,10 @@ class Expiry(Repository):
         with reading(self._engine) as connection:
             return list(connection.scalars(query))
 
-    def swept(self, folder: str) -> None:
-        """The files of a folder are gone."""
+    def swept(self, folders: Collection[str]) -> None:
+        """The files of these folders are gone."""
         with writing(self._engine) as connection:
-            connection.execute(sa.delete(tables.leftovers).where(left.folder == folder))
+            connection.execute(sa.delete(tables.leftovers).where(left.folder.in_(folders)))
 
     def postpone(self, folder: str, until: datetime) -> None:
         """The files of a folder cannot be deleted now."""

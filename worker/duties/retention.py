@@ -7,8 +7,10 @@ twice and no harm.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta
+from typing import TypeVar
 
 import structlog
 
@@ -21,6 +23,10 @@ from service.store.workers import Workers
 
 # Of each kind per round: some seconds on a bucket, a fraction of one in a folder.
 BATCH = 100
+# Two when its files are past their time, and two more when it is: a round that finds a batch of each deletes as many.
+FOLDERS_OF_A_JOB = 4
+# A bucket takes tens of milliseconds for each, and a disk to be sure of a file that was moved.
+AT_ONCE = 16
 # Rows alone, several of each job.
 EVENTS = 1000
 YEAR = timedelta(days=365.25)
@@ -29,8 +35,9 @@ BREATH_S = 2.0
 # Between two looks at whether a round is due.
 LOOK_S = 10.0
 TRY_AGAIN_AFTER = timedelta(hours=1)
-# A store that is away is asked about so many folders per round.
+# So many among those that are deleted at once, and the store is away.
 FAILURES = 3
+T = TypeVar("T")
 log = structlog.get_logger()
 
 
@@ -52,6 +59,7 @@ class Retention:
         self._disk = Disk(settings)
         self._forget_queued = forget_queued
         self._due = 0.0
+        self._hands = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="retention")
 
     def look(self) -> float:
         """Do a round if one is due and this worker's to do; returns the seconds until it is worth looking again."""
@@ -81,7 +89,8 @@ class Retention:
         }
         if any(counts.values()):
             log.info("deleted what is past its time", short_of_room=short_of_room, **counts)
-        return any(count >= BATCH for count in counts.values())
+        most = dict.fromkeys(counts, BATCH) | {"events": EVENTS, "folders": FOLDERS_OF_A_JOB * BATCH}
+        return any(count >= most[name] for name, count in counts.items())
 
     def _chosen(self) -> bool:
         """Whether this worker, of those alive, is the one to do it: the first by name."""
@@ -91,23 +100,26 @@ class Retention:
     def _expire_frames(self, ended_before: datetime, now: datetime) -> int:
         """What nobody has looked at can be drawn for as long as pictures are kept: its frames stay beside them."""
         job_ids: list[str] = []
-        for old in self._expiry.old_frames(ended_before, BATCH):
-            try:
-                self._keep_for_pictures(old)
-            except AWAY:
-                # Neither do those behind it fare better; the next round tries again.
-                log.warning("cannot keep what pictures are drawn of", job=old.job_id, exc_info=True)
+        for handful in _handfuls(self._expiry.old_frames(ended_before, BATCH)):
+            kept = list(self._hands.map(self._kept_for_pictures, handful))
+            job_ids += [old.job_id for old, there in zip(handful, kept, strict=True) if there]
+            if not all(kept):
+                # Neither do those behind them fare better; the next round tries again.
                 break
-            job_ids.append(old.job_id)
         self._expiry.expire_frames(job_ids, now)
         return len(job_ids)
 
-    def _keep_for_pictures(self, old: OldFrames) -> None:
+    def _kept_for_pictures(self, old: OldFrames) -> bool:
         together = {drawn_together(name) for name in old.pictures} - {()}
-        if all(self._blobs.has(f"{old.folder}/{picture_file(first)}") for first, *_ in together):
-            return
-        for camera, path in old.frames.items():
-            self._blobs.move(path, source_file(old.folder, camera))
+        try:
+            if all(self._blobs.has(f"{old.folder}/{picture_file(first)}") for first, *_ in together):
+                return True
+            for camera, path in old.frames.items():
+                self._blobs.move(path, source_file(old.folder, camera))
+        except AWAY:
+            log.warning("cannot keep what pictures are drawn of", job=old.job_id, exc_info=True)
+            return False
+        return True
 
     def _delete_jobs(self, ended_before: datetime, now: datetime) -> int:
         job_ids = self._expiry.old_jobs(ended_before, BATCH)
@@ -118,18 +130,29 @@ class Retention:
         return len(job_ids)
 
     def _sweep(self, now: datetime) -> int:
-        swept = failed = 0
-        for folder in self._expiry.leftovers(now, BATCH):
-            if failed == FAILURES:
-                # The store is away: those behind these keep their place.
-                break
-            try:
-                self._blobs.delete_under(folder)
-            except Exception:  # whatever the store says about this folder, the others need not wait for it
-                log.warning("cannot delete", folder=folder, exc_info=True)
+        swept = 0
+        for handful in _handfuls(self._expiry.leftovers(now, FOLDERS_OF_A_JOB * BATCH)):
+            deleted = dict(zip(handful, self._hands.map(self._deleted, handful), strict=True))
+            self._expiry.swept([folder for folder, gone in deleted.items() if gone])
+            stuck = [folder for folder, gone in deleted.items() if not gone]
+            for folder in stuck:
                 self._expiry.postpone(folder, now + TRY_AGAIN_AFTER)
-                failed += 1
-            else:
-                self._expiry.swept(folder)
-                swept += 1
+            swept += len(handful) - len(stuck)
+            if len(stuck) >= FAILURES:
+                # Those behind these keep their place.
+                break
         return swept
+
+    def _deleted(self, folder: str) -> bool:
+        try:
+            self._blobs.delete_under(folder)
+        except Exception:  # whatever the store says about this folder, the others need not wait for it
+            log.warning("cannot delete", folder=folder, exc_info=True)
+            return False
+        return True
+
+
+def _handfuls(several: Sequence[T]) -> Iterator[Sequence[T]]:
+    """As many as are dealt with at once."""
+    for first in range(0, len(several), AT_ONCE):
+        yield several[first : first + AT_ONCE]

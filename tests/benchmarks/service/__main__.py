@@ -10,7 +10,7 @@ import argparse
 import os
 from collections.abc import Callable
 
-from tests.benchmarks.service import crashes, endurance, kills, lists, load, outages
+from tests.benchmarks.service import crashes, endurance, fleet, kills, lists, load, outages
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], list[str]]] = {
     "crashes": crashes.table,
@@ -19,6 +19,7 @@ SECTIONS: dict[str, Callable[[argparse.Namespace], list[str]]] = {
     "pollers": load.table,
     "longrun": endurance.table,
     "lists": lists.table,
+    "fleet": fleet.table,
 }
 
 
@@ -34,6 +35,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=500, help="in a row, through the stub of the engine")
     parser.add_argument("--real-jobs", type=int, default=100, help="in a row, through the engine, at reduced size")
     parser.add_argument("--listed-jobs", type=int, default=40_000, help="among which lists find theirs")
+    parser.add_argument("--fleet-days", type=int, default=30, help="of a fleet in fast motion")
+    parser.add_argument("--fleet-jobs", type=int, default=200, help="on each of these days")
     options = parser.parse_args()
     for name in options.only:
         print(f"\n## {name}\n", flush=True)

@@ -19,7 +19,7 @@ import sqlalchemy as sa
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store import tables
 from tests.benchmarks.service.load import ENGINE
-from tests.benchmarks.service.stage import service
+from tests.benchmarks.service.stage import resident_mb, service
 from tests.e2e.books import everything_in, queued, settle
 from tests.e2e.running import Service, wait_for
 from tests.e2e.worker import test_real_engine as reduced
@@ -139,19 +139,14 @@ def _sample(running: Service, worker: int) -> Sample:
         entries = len(queued(connection))
     blobs = running.data / "blobs"
     return Sample(
-        api=_resident_mb(running.process.pid),
-        worker=_resident_mb(worker),
+        api=resident_mb(running.process.pid),
+        worker=resident_mb(worker),
         database=sum(_size_mb(path) for path in running.data.glob("esc.sqlite*")),
         files_kb=1000 * sum(_size_mb(blobs / path) for path in everything_in(running.blob_url)),
         jobs=jobs,
         queued=entries,
         poses=poses,
     )
-
-
-def _resident_mb(process: int) -> float:
-    status = Path(f"/proc/{process}/status").read_text()
-    return int(status.partition("VmRSS:")[2].split()[0]) / 1000
 
 
 def _size_mb(path: Path) -> float:

@@ -40,6 +40,12 @@ def service(home: Home, *arguments: str, **settings: str) -> Iterator[Service]:
             running.kill()
 
 
+def resident_mb(process: int) -> float:
+    """The memory of a process."""
+    status = Path(f"/proc/{process}/status").read_text()
+    return int(status.partition("VmRSS:")[2].split()[0]) / 1000
+
+
 def spread(seconds: Sequence[float], digits: int = 1) -> str:
     """Median, and the least and the most."""
     if not len(seconds):

@@ -11,7 +11,7 @@ from service.store.blobs import FolderAway
 from service.store.jobs.files import source_file
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock
-from worker.duties.retention import FAILURES, TRY_AGAIN_AFTER, Retention
+from worker.duties.retention import AT_ONCE, FOLDERS_OF_A_JOB, TRY_AGAIN_AFTER, Retention
 
 pytestmark = in_both_homes
 NOW = datetime(2026, 11, 21, 10, tzinfo=UTC)
@@ -166,7 +166,7 @@ def test_a_folder_that_cannot_be_deleted_holds_up_no_other(stock, retention, mon
 
 
 def test_a_store_that_is_away_holds_up_a_round_for_few_folders(stock, retention, monkeypatch):
-    for days in range(FAILURES + 3):
+    for days in range(AT_ONCE + 3):
         stock.ended("a", ago(days=4 + days), accepted=None)
     asked = []
 
@@ -177,11 +177,27 @@ def test_a_store_that_is_away_holds_up_a_round_for_few_folders(stock, retention,
     with monkeypatch.context() as patch:
         patch.setattr(stock.blobs, "delete_under", away)
         assert not retention.round(NOW)
-    assert len(asked) == FAILURES
+    assert len(asked) == AT_ONCE
     # Those that were not asked for kept their place, those that failed come an hour later.
     retention.round(NOW)
-    assert len(stock.files()) == FAILURES
+    assert len(stock.files()) == AT_ONCE
     retention.round(NOW + TRY_AGAIN_AFTER)
+    assert stock.files() == set()
+
+
+def test_a_round_deletes_all_that_as_many_jobs_leave_and_many_at_once(stock, retention, monkeypatch):
+    batch = 2 * AT_ONCE // FOLDERS_OF_A_JOB
+    monkeypatch.setattr("worker.duties.retention.BATCH", batch)
+    folders = [f"frames/{stock.ended('a', ago(days=3), accepted=None)}" for _ in range(FOLDERS_OF_A_JOB * batch)]
+    stock.expiry.expire_frames([folder.partition("/")[2] for folder in folders], NOW)
+    together, delete_under = Barrier(AT_ONCE), stock.blobs.delete_under
+
+    def in_company(folder):
+        together.wait(60)
+        delete_under(folder)
+
+    monkeypatch.setattr(stock.blobs, "delete_under", in_company)
+    assert retention.round(NOW)
     assert stock.files() == set()
 
 
