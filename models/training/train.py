@@ -1,10 +1,11 @@
-"""Train the U-Net on rendered pitches: `python -m models.training.train`.
+"""Train the U-Net on rendered courts and pitches: `python -m models.training.train`.
 
 Starts where it stopped when called again. The default budget is two hours: enough for a usable model on two cores.
-Ends with the export, quantised, to `models/unet.onnx`.
+Ends with the export, quantised, to `models/unet.onnx`. Several shapes learn from the same batches, to be compared; each
+is exported into the folder of the run then, and the one to serve is chosen by `quantise.py`.
 
-    python -m models.training.train --device cuda --batch 64 --workers 14 --minutes 240
-    python -m models.training.train --run runs/longer --start runs/unet/checkpoint.pt --minutes 60
+    python -m models.training.train --device cuda --batch 48 --size 256 --workers 15 --kept 100000 --minutes 30
+    python -m models.training.train --run runs/shapes --shape 16-32-64-128-256 --shape 24-48-96-192/2 --minutes 600
 """
 
 from __future__ import annotations
@@ -12,31 +13,32 @@ from __future__ import annotations
 import argparse
 import copy
 import json
+import math
 import signal
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 from tqdm import tqdm
 
 from models import MODEL_PATH
-from models.training.data.cache import SHARD_CROPS, Crops, start_workers
-from models.training.data.stream import Batch, Stream
+from models.training.data.makers import Makers
+from models.training.data.pool import Batch, Pool
 from models.training.network.export import export
 from models.training.network.quantise import quantise
 from models.training.network.served import load_served
-from models.training.network.unet import LEAK, UNet, focal_loss
+from models.training.network.unet import LEAK, PAPER, SERVED, Shape, UNet, focal_loss
 
 EPOCH_STEPS = 100
 WARM_UP_EPOCHS = 2
 LEARNING_RATE = 1e-3
 LAST_RATE = 0.05  # of the first one
 WEIGHT_DECAY = 1e-4
-AVERAGE = 0.995
+AVERAGE = 0.998
 SAVE_EVERY_S = 240
 BAR = "{percentage:5.1f}% |{bar}| {elapsed}<{remaining} {postfix}"
 
@@ -50,27 +52,28 @@ def main() -> None:
     if device.type == "cpu":
         torch.set_num_threads(options.threads)
     options.run.mkdir(parents=True, exist_ok=True)
-    folder = options.crops or options.run / "crops"
-    workers = start_workers(folder, options.seed, options.workers, options.shards)
-    crops = Crops(folder, np.random.default_rng([options.seed, 1, int(time.time())]))
-    pitches = round(options.pitches * options.batch)
-    while pitches and crops.refresh() < SHARD_CROPS:
-        time.sleep(1)
     seed = int(time.time())
-    stream = Stream(crops, options.batch - pitches, pitches, options.size, seed, options.workers)
-    training = Training(device, Budget(60 * options.minutes, options.steps), options.leak, options.gamma)
-    checkpoint = options.run / "checkpoint.pt"
-    if checkpoint.exists():
-        training.load(checkpoint)
-    elif options.start:
-        training.load_weights(options.start, torch.from_numpy(stream.next().pictures))
-    train(training, stream, options, checkpoint)
-    for worker in workers:
-        worker.terminate()
-    if training.done >= 1 and not options.no_export:
-        exported = options.run / "unet.onnx"
+    makers = Makers(options.made, options.pitches, seed, options.workers)
+    pool = Pool(makers, device, options.kept, options.size, options.repeats, seed)
+    teacher = _teacher(options.teacher, options.threshold, pool.batch(64).pictures) if options.teacher else None
+    budget = Budget(60 * options.minutes, options.steps)
+    trainings = []
+    for shape in options.shape or [SERVED]:
+        training = Training(Recipe(shape, options.leak, options.gamma, options.rate), device, budget, options.run)
+        if training.checkpoint.exists():
+            training.load()
+        elif options.start:
+            start = options.start / training.checkpoint.name if options.start.is_dir() else options.start
+            training.load_weights(start, pool.batch(64).pictures)
+        trainings.append(training)
+    train(trainings, pool, options.batch, teacher)
+    for training in trainings:
+        if training.done < 1 or options.no_export:
+            continue
+        exported = training.checkpoint.with_suffix(".onnx")
         export(training.average, exported, options.threshold)
-        print(json.dumps(quantise(exported, MODEL_PATH), indent=1))
+        served = MODEL_PATH if len(trainings) == 1 else exported.with_suffix(".served.onnx")
+        print(json.dumps(quantise(exported, served), indent=1))
 
 
 @dataclass(frozen=True)
@@ -85,16 +88,31 @@ class Budget:
         return min(1.0, steps / self.steps if self.steps else seconds / self.seconds)
 
 
-class Training:
-    """Network, running average of its weights, optimiser and schedule."""
+@dataclass(frozen=True)
+class Recipe:
+    """What is trained, and how: slope of LeakyReLU below 0 (0 is ReLU), exponent of the focal loss, first rate."""
 
-    def __init__(self, device: torch.device, budget: Budget, leak: float, gamma: float) -> None:
+    shape: Shape = SERVED
+    leak: float = LEAK
+    gamma: float = 1.0
+    rate: float = LEARNING_RATE
+
+    def __str__(self) -> str:
+        """As a name of a file."""
+        return f"{self.shape}-leak-{self.leak:g}-gamma-{self.gamma:g}".replace("/", "by")
+
+
+class Training:
+    """Network, running average of its weights, optimiser and schedule; kept in the folder `run`."""
+
+    def __init__(self, recipe: Recipe, device: torch.device, budget: Budget, run: Path) -> None:
         torch.manual_seed(0)
-        self.device, self.budget, self.gamma = device, budget, gamma
+        self.recipe, self.device, self.budget = recipe, device, budget
+        self.checkpoint = run / f"{recipe}.pt"
         self.step, self.elapsed_s = 0, 0.0
-        self.network = UNet(leak).to(device, memory_format=torch.channels_last)
+        self.network = UNet(recipe.shape, recipe.leak).to(device, memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.network).eval()
-        self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+        self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=recipe.rate, weight_decay=WEIGHT_DECAY)
 
     @property
     def done(self) -> float:
@@ -104,25 +122,23 @@ class Training:
     def learning_rate(self) -> float:
         """Two epochs of warm-up, then exponentially down."""
         warm = min(1.0, (self.step + 1) / (WARM_UP_EPOCHS * EPOCH_STEPS))
-        return LEARNING_RATE * warm * LAST_RATE**self.done
+        return self.recipe.rate * warm * LAST_RATE**self.done
 
-    def learn(self, batch: Batch) -> float:
-        """One step; the loss."""
+    def learn(self, batch: Batch) -> Tensor:
+        """One step; the loss ()."""
         for group in self.optimiser.param_groups:
             group["lr"] = self.learning_rate()
-        pictures = torch.from_numpy(batch.pictures).to(self.device, memory_format=torch.channels_last)
-        targets, asked = (torch.from_numpy(plane).to(self.device) for plane in (batch.targets, batch.asked))
         # On processors single precision is a quarter faster than bfloat16.
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.device.type != "cpu"):
-            logits = self.network(pictures)
-        loss = focal_loss(logits.float(), targets, self.gamma, asked=asked)
+            logits = self.network(batch.pictures)
+        loss = focal_loss(logits.float(), batch.targets, self.recipe.gamma, asked=batch.asked)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
         self.optimiser.step()
         self.step += 1
         self._follow()
-        return float(loss.detach())
+        return loss.detach()
 
     @torch.no_grad()
     def _follow(self) -> None:
@@ -133,10 +149,12 @@ class Training:
             else:
                 mean.copy_(value)
 
-    def save(self, path: Path) -> None:
+    def save(self) -> None:
         """Everything needed to go on."""
-        partial = path.with_suffix(".partial")
+        partial = self.checkpoint.with_suffix(".partial")
         state = {
+            "shape": str(self.recipe.shape),
+            "leak": self.recipe.leak,
             "step": self.step,
             "elapsed_s": self.elapsed_s,
             "network": self.network.state_dict(),
@@ -144,11 +162,11 @@ class Training:
             "optimiser": self.optimiser.state_dict(),
         }
         torch.save(state, partial)
-        partial.rename(path)
+        partial.rename(self.checkpoint)
 
-    def load(self, path: Path) -> None:
-        """Go on from a checkpoint."""
-        state = torch.load(path, map_location=self.device, weights_only=True)
+    def load(self) -> None:
+        """Go on from the checkpoint."""
+        state = torch.load(self.checkpoint, map_location=self.device, weights_only=True)
         self.step, self.elapsed_s = state["step"], state["elapsed_s"]
         self.network.load_state_dict(state["network"])
         self.average.load_state_dict(state["average"])
@@ -168,51 +186,89 @@ class Training:
         self.average.load_state_dict(state["average"])
 
 
-def train(training: Training, stream: Stream, options: argparse.Namespace, checkpoint: Path) -> None:
-    """Steps until the time is up, a checkpoint every few minutes, a line in the log every epoch."""
-    training.network.train()
+def train(trainings: Sequence[Training], pool: Pool, batch_size: int, teacher: UNet | None = None) -> None:
+    """Steps on the same batches until the time is up, checkpoints every few minutes, a line in the log every epoch."""
+    for training in trainings:
+        training.network.train()
+    first = trainings[0]
     saved = before = time.monotonic()
-    losses: list[float] = []
-    log = (options.run / "log.jsonl").open("a")
-    progress = tqdm(total=100, initial=100 * training.done, unit="%", mininterval=5, bar_format=BAR)
+    losses: list[Tensor] = []
+    log = first.checkpoint.with_name("log.jsonl").open("a")
+    progress = tqdm(total=100, initial=100 * first.done, unit="%", mininterval=5, bar_format=BAR)
     stopped = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stopped.set())
-    while training.done < 1 and not stopped.is_set():
-        losses.append(training.learn(stream.next()))
+    while first.done < 1 and not stopped.is_set():
+        batch = pool.batch(batch_size)
+        if teacher:
+            batch = taught(batch, teacher)
+        losses.append(torch.stack([training.learn(batch) for training in trainings]))
         now = time.monotonic()
-        training.elapsed_s += now - before
+        for training in trainings:
+            training.elapsed_s += now - before
         before = now
-        progress.update(100 * training.done - progress.n)
-        if training.step % EPOCH_STEPS == 0:
-            line = {"step": training.step, "loss": float(np.mean(losses)), "crops": stream.crops.refresh()}
+        progress.update(100 * first.done - progress.n)
+        if first.step % EPOCH_STEPS == 0:
+            means = torch.stack(losses).mean(dim=0).tolist()
+            line = {"step": first.step, "loss": [round(mean, 4) for mean in means], "crops": pool.made}
             progress.set_postfix(line)
-            log.write(json.dumps({**line, "elapsed_s": training.elapsed_s, "rate": training.learning_rate()}) + "\n")
+            log.write(json.dumps({**line, "elapsed_s": first.elapsed_s, "rate": first.learning_rate()}) + "\n")
             log.flush()
             losses.clear()
         if now - saved > SAVE_EVERY_S:
-            training.save(checkpoint)
+            for training in trainings:
+                training.save()
             saved = now
-    training.save(checkpoint)
+    for training in trainings:
+        training.save()
+    log.close()
     progress.close()
+
+
+@torch.no_grad()
+def taught(batch: Batch, teacher: UNet) -> Batch:
+    """The batch with targets half way to what `teacher` answers; where nothing is asked, its answer at half the weight.
+
+    Distillation (Hinton 2015): a teacher says how sure one can be of a line, the truth only that it is there.
+    """
+    with torch.autocast(batch.pictures.device.type, torch.bfloat16, enabled=batch.pictures.device.type != "cpu"):
+        answers = torch.sigmoid(teacher(batch.pictures).float())
+    targets = answers + batch.asked * (batch.targets - answers) / 2
+    return Batch(batch.pictures, targets, (1 + batch.asked) / 2)
+
+
+@torch.no_grad()
+def _teacher(path: Path, threshold: float, pictures: Tensor) -> UNet:
+    """A served model in the paper's shape, as it answered before its export made one half of `threshold`."""
+    network = UNet(PAPER).to(pictures.device, memory_format=torch.channels_last)
+    load_served(network, path, pictures)
+    network.head.bias += math.log(threshold / (1 - threshold))
+    return network.eval()
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--run", type=Path, default=Path("runs/unet"), help="folder of checkpoint and log")
-    parser.add_argument("--crops", type=Path, help="folder of rendered crops, which runs may share; RUN/crops")
+    parser.add_argument(
+        "--shape", type=Shape.parse, action="append", help=f"as 24-48-96-192/2, several times for several; {SERVED}"
+    )
     parser.add_argument("--device", default="auto", help="auto, cpu or cuda")
     parser.add_argument("--minutes", type=float, default=120.0, help="budget of the whole schedule")
     parser.add_argument("--batch", type=int, default=6)
     parser.add_argument("--size", type=int, default=224, help="pixels of a crop, a multiple of 32")
     parser.add_argument("--pitches", type=float, default=0.34, help="share of rendered pitches; the rest are courts")
+    parser.add_argument("--made", type=int, default=288, help="pixels of a crop as it is made; windows of it are shown")
     parser.add_argument("--workers", type=int, default=1, help="processes that render")
-    parser.add_argument("--shards", type=int, default=400, help=f"of {SHARD_CROPS} crops per worker")
+    parser.add_argument("--kept", type=int, default=4096, help="crops kept where the training runs, 5 bytes a pixel")
+    parser.add_argument("--repeats", type=float, default=4.0, help="how often a crop is shown; slows down to that")
+    parser.add_argument("--rate", type=float, default=LEARNING_RATE, help="first learning rate")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--steps", type=int, help="budget in steps instead of minutes")
     parser.add_argument("--gamma", type=float, default=1.0, help="of the focal loss; 0 is cross entropy")
     parser.add_argument("--leak", type=float, default=LEAK, help="slope of LeakyReLU below 0; 0 is ReLU")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--start", type=Path, help="checkpoint, or served model, to start from")
+    parser.add_argument("--start", type=Path, help="checkpoint, folder of them, or served model to start from")
+    parser.add_argument(
+        "--teacher", type=Path, help="served model in the paper's shape whose answers are learnt as well"
+    )
     parser.add_argument("--threshold", type=float, default=0.37, help="probability that the exported model calls 0.5")
     parser.add_argument("--no-export", action="store_true")
     return parser.parse_args()

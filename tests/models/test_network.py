@@ -7,22 +7,23 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra `train`: pip install '.[train]'")
 
 from models import MODEL_PATH  # noqa: E402
-from models.training.courts.court import random_court  # noqa: E402
-from models.training.data.stream import courts  # noqa: E402
+from models.training.data.alter import altered  # noqa: E402
+from models.training.data.makers import Makers, random_planes  # noqa: E402
+from models.training.data.pool import Batch, Pool  # noqa: E402
 from models.training.network.export import export, fold  # noqa: E402
 from models.training.network.quantise import quantise  # noqa: E402
-from models.training.network.served import load_served  # noqa: E402
-from models.training.network.unet import UNet, focal_loss  # noqa: E402
-from models.training.train import Budget, Training  # noqa: E402
+from models.training.network.served import TEACHER_PATH, load_served  # noqa: E402
+from models.training.network.unet import PAPER, SERVED, Shape, UNet, focal_loss  # noqa: E402
+from models.training.train import Budget, Recipe, Training, taught  # noqa: E402
 
 pytestmark = [pytest.mark.train, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
 
 
-@pytest.fixture(scope="module")
-def network():
+@pytest.fixture(scope="module", params=[PAPER, SERVED], ids=str)
+def network(request):
     torch.manual_seed(0)
     torch.set_num_threads(1)
-    model = UNet()
+    model = UNet(request.param)
     model.train()
     with torch.no_grad():  # so that the normalisation has seen something
         for _ in range(3):
@@ -97,27 +98,91 @@ def test_a_few_steps_learn_a_bright_stripe(network):
     assert losses[-1] < 0.5 * losses[0]
 
 
-def test_the_served_model_is_read_back_with_its_weights():
-    batch = courts(np.random.default_rng(1), 4, 160)
-    pictures = torch.from_numpy(batch.pictures)
-    network = UNet()
-    load_served(network, MODEL_PATH, pictures)
+@pytest.mark.parametrize(("path", "shape"), [(MODEL_PATH, SERVED), (TEACHER_PATH, PAPER)], ids=["served", "teacher"])
+def test_an_exported_model_is_read_back_with_its_weights(path, shape):
+    planes = np.stack([random_planes(np.random.default_rng(seed), 160, 0.0) for seed in range(4)])
+    pictures = torch.from_numpy(planes[:, :3].astype(np.float32) / 255)
+    network = UNet(shape)
+    load_served(network, path, pictures)
     with torch.no_grad():
         again = torch.sigmoid(network.eval()(pictures)).numpy()
-    session = onnxruntime.InferenceSession(str(MODEL_PATH), providers=["CPUExecutionProvider"])
-    served = session.run(None, {"picture": batch.pictures})[0]
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    served = session.run(None, {"picture": pictures.numpy()})[0]
     assert np.abs(again - served).mean() < 0.01
     assert np.corrcoef(again.ravel(), served.ravel())[0, 1] > 0.95
 
 
-def test_a_training_begins_with_the_weights_that_are_kept_for_it():
-    training = Training(torch.device("cpu"), Budget(60), 0.01, 1.0)
-    training.load_weights(MODEL_PATH.parent / "training" / "courts.pt", torch.zeros(1, 3, 32, 32))
-    court = random_court(np.random.default_rng(3), 160)
-    picture = torch.from_numpy(court.frame[..., ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255)
-    with torch.no_grad():
-        seen = torch.sigmoid(training.average.eval()(picture))[0, 0].numpy()
-    assert seen[court.target > 0.5].mean() > 2 * seen[court.target < 0.05].mean()
+def test_a_training_goes_on_where_it_was_saved(tmp_path):
+    batch = Batch(torch.rand(2, 3, 32, 32), torch.zeros(2, 1, 32, 32), torch.ones(2, 1, 32, 32))
+    torch.manual_seed(0)
+    first, again = (Training(Recipe(), torch.device("cpu"), Budget(60), tmp_path) for _ in range(2))
+    first.learn(batch)
+    first.save()
+    again.load()
+    assert again.step == 1
+    for one, other in zip(first.network.parameters(), again.network.parameters(), strict=True):
+        assert torch.equal(one, other)
+
+
+def test_a_shape_is_what_its_name_says():
+    assert Shape.parse(str(SERVED)) == SERVED
+    assert Shape.parse("16-32-64-128-256") == PAPER
+    with pytest.raises(ValueError, match="invalid literal"):
+        Shape.parse("wide")
+
+
+def test_crops_are_shown_as_often_as_asked_and_no_more():
+    class Counted(Makers):
+        def __init__(self):
+            self.size, self.packs = 40, 0
+
+        def wait(self):
+            self.packs += 1
+            return np.full((8, 5, 40, 40), self.packs, np.uint8)
+
+        def made(self):
+            return []
+
+    makers = Counted()
+    pool = Pool(makers, torch.device("cpu"), capacity=16, size=32, repeats=2.0, seed=1)
+    for _ in range(12):
+        batch = pool.batch(4)
+        assert batch.pictures.shape == (4, 3, 32, 32)
+    assert makers.packs == 3
+    assert set(torch.round(255 * batch.pictures).flatten().int().tolist()) <= {2, 3}  # the last sixteen are kept
+
+
+def test_windows_of_a_crop_keep_its_planes_together():
+    ramp = torch.arange(64.0).expand(64, 64) / 64
+    planes = torch.stack([ramp, ramp.T, 1 - ramp, ramp, ramp.T]).expand(32, -1, -1, -1)
+    windows = altered(planes, 32, torch.Generator().manual_seed(2))
+    torch.testing.assert_close(windows[:, 0], windows[:, 3])
+    torch.testing.assert_close(windows[:, 1], windows[:, 4])
+    torch.testing.assert_close(windows[:, 0], 1 - windows[:, 2])
+    assert len({round(float(window.mean()), 4) for window in windows[:, 0]}) > 16
+
+
+def test_a_window_that_is_only_cut_is_the_crop_pixel_for_pixel():
+    crop = torch.rand(1, 5, 48, 48)
+    cut = [crop[0, :, top : top + 32, left : left + 32] for top in range(17) for left in range(17)]
+    found = 0
+    for seed in range(12):
+        window = altered(crop, 32, torch.Generator().manual_seed(seed))[0]
+        turned = (window, window.flip(-1), window.flip(-2), window.flip(-1, -2))
+        found += any(torch.allclose(way, piece, atol=1e-4) for way in turned for piece in cut)
+    assert found >= 4
+
+
+def test_a_teacher_counts_half_and_alone_where_nothing_is_asked():
+    class Sure(torch.nn.Module):
+        def forward(self, pictures):
+            return torch.full((len(pictures), 1, 8, 8), 20.0)
+
+    asked = torch.ones(1, 1, 8, 8)
+    asked[..., :4] = 0
+    batch = taught(Batch(torch.zeros(1, 3, 8, 8), torch.zeros(1, 1, 8, 8), asked), Sure())
+    assert batch.targets[0, 0, 0].tolist() == pytest.approx([1.0] * 4 + [0.5] * 4)
+    assert batch.asked[0, 0, 0].tolist() == pytest.approx([0.5] * 4 + [1.0] * 4)
 
 
 def test_what_is_not_asked_for_costs_nothing():

@@ -16,7 +16,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from models.training.network.unet import LEAK, UNet
+from models.training.network.unet import Shape, UNet
 
 OPSET = 18
 
@@ -67,10 +67,11 @@ def fold(network: UNet) -> UNet:
     return folded
 
 
-def load(checkpoint: Path, leak: float = LEAK) -> UNet:
+def load(checkpoint: Path) -> UNet:
     """The averaged weights of a checkpoint."""
-    network = UNet(leak)
-    network.load_state_dict(torch.load(checkpoint, map_location="cpu", weights_only=True)["average"])
+    state = torch.load(checkpoint, map_location="cpu", weights_only=True)
+    network = UNet(Shape.parse(state["shape"]), state["leak"])
+    network.load_state_dict(state["average"])
     return network.eval()
 
 

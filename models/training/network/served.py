@@ -1,4 +1,4 @@
-"""The weights of the served network, to train on from: `unet.onnx` back into the U-Net it was made of."""
+"""The weights of an exported network, to train on from or to teach: the file back into the U-Net it was made of."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from onnx import numpy_helper
 from torch import Tensor, nn
 
 from models.training.network.unet import UNet
+
+TEACHER_PATH = Path(__file__).parents[1] / "teacher.onnx"
+"""The network in the paper's shape that the served one has learnt from."""
 
 
 @torch.no_grad()
@@ -73,6 +76,6 @@ def _becomes_shift_by(bias: Tensor):  # type: ignore[no-untyped-def]
         normalisation.running_mean.copy_(mean)
         normalisation.running_var.copy_(variance)
         normalisation.weight.copy_(torch.sqrt(variance + normalisation.eps))
-        normalisation.bias.copy_(mean + bias)
+        normalisation.bias.copy_(mean + bias.to(mean.device))
 
     return hook
