@@ -3,9 +3,10 @@
 import importlib.util
 import os
 
-# One BLAS thread, as the worker sets it, before NumPy is loaded: several only wait for each other where all cores are
-# busy with tests. What the tests start inherits it.
+# One thread of BLAS, as the worker sets it, before NumPy is loaded, and one of the network: several only wait for each
+# other where all cores are busy with tests. What the tests start inherits it.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["ESC_THREADS"] = "1"
 
 import hypothesis
 import pytest
