@@ -1,9 +1,12 @@
 """One browser for all, and services: one with the real engine, one whose venues' names say what happens."""
 
+import shutil
+
 import pytest
 
 from tests.demo.__main__ import service
 from tests.e2e.running import Service, wait_for
+from tests.once import made_once
 from tests.pages import newcomer
 from tests.pages.browsing import browser_at, chromium, tab
 
@@ -33,9 +36,13 @@ def stub(tmp_path_factory):
 @pytest.fixture(scope="package")
 def real(browser, tmp_path_factory):
     """The address of a service with the real engine, after a newcomer went the whole way on its page."""
-    with service(tmp_path_factory.mktemp("real")) as url:
-        with tab(browser, url) as page:
+
+    def go(data):
+        with service(data) as url, tab(browser, url) as page:
             newcomer.goes_the_whole_way(page)
+
+    data = shutil.copytree(made_once(tmp_path_factory, "newcomer", go), tmp_path_factory.mktemp("real") / "data")
+    with service(data) as url:
         yield url
 
 
