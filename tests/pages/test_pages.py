@@ -44,9 +44,9 @@ def frames(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def one_tab(stub, browser):
+def one_tab(stub, people):
     """A tab in which page after page is looked at: to open one costs more than to look."""
-    with tab(browser, stub.url) as page:
+    with tab(people(stub.url)) as page:
         yield page
 
 

@@ -7,8 +7,8 @@ from tests.pages.browsing import differs, look, tab, wait_until
 
 
 @pytest.fixture(scope="module")
-def one_tab(real, browser):
-    with tab(browser, real) as page:
+def one_tab(real, people):
+    with tab(people(real)) as page:
         yield page
 
 
