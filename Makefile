@@ -17,8 +17,9 @@ $(VENV)/.installed: requirements.lock pyproject.toml
 demo: setup
 	$(BIN)/python -m tests.demo
 
+# Compiled files are kept even where the machine says not to: each of hundreds of processes would compile them anew.
 test: setup
-	$(BIN)/pytest --numprocesses=auto --dist=worksteal
+	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
 
 check: setup
 	$(BIN)/ruff format --check .

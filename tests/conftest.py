@@ -1,11 +1,14 @@
 """What a machine may lack, and the homes that tests run in."""
 
 import importlib.util
+import itertools
 import os
+from pathlib import Path
 
-# One BLAS thread, as the worker sets it, before NumPy is loaded: several only wait for each other where all cores are
-# busy with tests. What the tests start inherits it.
+# One thread of BLAS, as the worker sets it, before NumPy is loaded, and one of the network: several only wait for each
+# other where all cores are busy with tests. What the tests start inherits it.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["ESC_THREADS"] = "1"
 
 import hypothesis
 import pytest
@@ -24,6 +27,8 @@ structlog.configure(
     [structlog.dev.ConsoleRenderer(colors=False, exception_formatter=structlog.dev.plain_traceback)],
 )
 
+# Tests of the whole service, and of its pages in a browser.
+WHOLE_SERVICE = [Path(__file__).parent / folder for folder in ("e2e", "pages")]
 # What tests can do without, and how to enable those that cannot.
 PARTS = {
     "postgres": "install PostgreSQL (Debian: apt-get install postgresql)",
@@ -49,7 +54,31 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+    items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+
+
+def dealt(items, processes):
+    """The tests in such an order that no core is idle before all of them are.
+
+    xdist gives each process a part of the list, all of a size; who is done takes from the end of what another has. The
+    first process begins with the long tests. The others begin with those of the whole service, which wait more than
+    they compute, and beside which the long ones compute; what only computes fills the end.
+    """
+    long, waiting, computing = [], [], []
+    for item in items:
+        of_the_whole = any(item.path.is_relative_to(folder) for folder in WHOLE_SERVICE)
+        (long if item.get_closest_marker("long") else waiting if of_the_whole else computing).append(item)
+    others = max(1, processes - 1)
+    ends = [len(waiting) * number // others for number in range(others + 1)]
+    begins = [waiting[begin:end] for begin, end in itertools.pairwise(ends)]
+    begins = [long, *begins] if processes > 1 else [long + waiting]
+    order = []
+    for number, begin in enumerate(begins):
+        part = (len(items) - len(order)) // (processes - number)
+        filling = max(0, part - len(begin))
+        order += begin + computing[:filling]
+        computing = computing[filling:]
+    return order + computing
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -16,7 +16,7 @@ from worker.calibration.see.segmentation import Segmenter, whole_frame
 
 @pytest.fixture(scope="module")
 def model():
-    return Segmenter(MODEL_PATH, threads=2)
+    return Segmenter(MODEL_PATH, threads=1)
 
 
 def test_the_card_names_this_very_file():

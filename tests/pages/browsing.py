@@ -7,7 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect, sync_playwright
 
 from tests.e2e.running import wait_for
 
@@ -44,32 +44,36 @@ def browser_at(path: str) -> Iterator[Browser]:
 
 
 @contextmanager
-def tab(
-    browser: Browser,
-    url: str,
-    scheme: str = "dark",
-    size: tuple[int, int] = (1280, 900),
-    forgiven: tuple[str, ...] = (),
-    zone: str = "UTC",
-) -> Iterator[Page]:
-    """A page of a person of their own. Errors on the console but those that contain what is `forgiven` fail the test.
+def person(
+    browser: Browser, url: str, scheme: str = "dark", size: tuple[int, int] = (1280, 900), zone: str = "UTC"
+) -> Iterator[BrowserContext]:
+    """Somebody who looks at a service; what the browser keeps for them is theirs."""
+    viewport = {"width": size[0], "height": size[1]}
+    context = browser.new_context(base_url=url, color_scheme=scheme, viewport=viewport, timezone_id=zone)
+    context.set_default_timeout(PATIENCE_MS)
+    try:
+        yield context
+    finally:
+        context.close()
+
+
+@contextmanager
+def tab(context: BrowserContext, forgiven: tuple[str, ...] = ()) -> Iterator[Page]:
+    """A page of a person. Errors on the console but those that contain what is `forgiven` fail the test.
 
     A browser writes there by itself that an answer was an error, such as 422 for a form that was to be refused.
     """
     complaints: list[str] = []
-    viewport = {"width": size[0], "height": size[1]}
-    context = browser.new_context(base_url=url, color_scheme=scheme, viewport=viewport, timezone_id=zone)
-    context.set_default_timeout(PATIENCE_MS)
-    context.expose_function("violated", lambda what: complaints.append(f"policy: {what}"))
-    context.add_init_script(WATCH_POLICY)
     page = context.new_page()
+    page.expose_function("violated", lambda what: complaints.append(f"policy: {what}"))
+    page.add_init_script(WATCH_POLICY)
     page.on("console", lambda said: complaints.append(f"{said.type}: {said.text}") if said.type == "error" else None)
     page.on("pageerror", lambda error: complaints.append(f"script: {error}"))
     page.on("dialog", lambda dialog: dialog.accept())
     try:
         yield page
     finally:
-        context.close()
+        page.close()
     unforgiven = [one for one in complaints if not any(part in one for part in forgiven)]
     assert not unforgiven, unforgiven
 

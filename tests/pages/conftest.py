@@ -1,11 +1,16 @@
 """One browser for all, and services: one with the real engine, one whose venues' names say what happens."""
 
+import shutil
+from contextlib import ExitStack
+from functools import cache
+
 import pytest
 
 from tests.demo.__main__ import service
 from tests.e2e.running import Service, wait_for
+from tests.once import made_once
 from tests.pages import newcomer
-from tests.pages.browsing import browser_at, chromium, tab
+from tests.pages.browsing import browser_at, chromium, person, tab
 
 # Worker and engine load libraries first.
 STARTING_S = 120
@@ -33,24 +38,41 @@ def stub(tmp_path_factory):
 @pytest.fixture(scope="package")
 def real(browser, tmp_path_factory):
     """The address of a service with the real engine, after a newcomer went the whole way on its page."""
-    with service(tmp_path_factory.mktemp("real")) as url:
-        with tab(browser, url) as page:
+
+    def go(data):
+        with service(data) as url, person(browser, url) as somebody, tab(somebody) as page:
             newcomer.goes_the_whole_way(page)
+
+    data = shutil.copytree(made_once(tmp_path_factory, "newcomer", go), tmp_path_factory.mktemp("real") / "data")
+    with service(data) as url:
         yield url
 
 
+@pytest.fixture(scope="package")
+def people(browser):
+    """Somebody for each way to look at a service, who has it open: that costs more than to look at a page of it."""
+    with ExitStack() as known:
+
+        @cache
+        def whoever(url, **how):
+            somebody = known.enter_context(person(browser, url, **how))
+            # The next pages are drawn by the process that draws this one, and have what it has loaded.
+            somebody.new_page().goto("/livez")
+            return somebody
+
+        yield whoever
+
+
 @pytest.fixture
-def visit(browser):
-    """Opens a page of a service; what its console says is looked at in the end."""
-    opened = []
+def visit(people):
+    """Opens a page of a service for somebody who is not signed in; what its console says is looked at in the end."""
+    with ExitStack() as opened:
 
-    def visit(url, path="/", **how):
-        one = tab(browser, url, **how)
-        page = one.__enter__()
-        opened.append(one)
-        page.goto(path)
-        return page
+        def visit(url, path="/", forgiven=(), **how):
+            somebody = people(url, **how)
+            opened.callback(somebody.clear_cookies)
+            page = opened.enter_context(tab(somebody, forgiven))
+            page.goto(path)
+            return page
 
-    yield visit
-    for one in opened:
-        one.__exit__(None, None, None)
+        yield visit

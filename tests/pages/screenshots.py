@@ -18,7 +18,7 @@ from service.store.engine import connect, writing
 from tests.demo.__main__ import service
 from tests.e2e.running import venue
 from tests.pages import newcomer
-from tests.pages.browsing import browser_at, chromium, tab
+from tests.pages.browsing import browser_at, chromium, person, tab
 from tests.pages.stocked import calibrations
 
 DESK, PHONE = (1280, 860), (390, 844)
@@ -34,7 +34,7 @@ def main(folder: Path) -> None:
     if path is None:
         raise SystemExit("install Chromium (Debian: apt-get install chromium)")
     with tempfile.TemporaryDirectory(prefix="esc-pages-") as data, service(Path(data)) as url, browser_at(path) as one:
-        with tab(one, url) as page:
+        with person(one, url) as somebody, tab(somebody) as page:
             newcomer.goes_the_whole_way(page)
             job = page.url.rpartition("/")[2]
             stock(page, Path(data))
@@ -53,7 +53,7 @@ def stock(page: Page, data: Path) -> None:
 
 
 def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) -> None:
-    with tab(browser, url, scheme, DESK) as page:
+    with person(browser, url, scheme, DESK) as somebody, tab(somebody) as page:
         for name, address in (
             ("venues", "/"),
             ("venue", "/ui/venues/newcomer"),
@@ -77,7 +77,7 @@ def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) ->
         newcomer.describe_a_camera(page, 0)
         newcomer.click_points(page, 0, "left")
         save(page, folder / f"new-venue-{scheme}.webp")
-    with tab(browser, url, scheme, PHONE) as page:
+    with person(browser, url, scheme, PHONE) as somebody, tab(somebody) as page:
         for name, address in (("venues", "/"), ("venue", "/ui/venues/newcomer")):
             page.goto(address)
             page.wait_for_load_state("networkidle")

@@ -7,10 +7,10 @@ from playwright.sync_api import expect
 
 from tests.e2e import running
 from tests.e2e.running import SIZE, Service, png, wait_for
-from tests.pages.browsing import differs, grave, look, wait_until
+from tests.pages.browsing import differs, grave, look, tab, wait_until
 from tests.pages.stocked import calibrations
 
-PHONE = (390, 800)
+DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 800}
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +41,13 @@ def frames(tmp_path):
         return path
 
     return {"left": file("left"), "right": file("right"), "wide": file("wide", width=2 * SIZE[0])}
+
+
+@pytest.fixture(scope="module")
+def one_tab(stub, people):
+    """A tab in which page after page is looked at: to open one costs more than to look."""
+    with tab(people(stub.url)) as page:
+        yield page
 
 
 @pytest.fixture
@@ -252,21 +259,22 @@ PAGES = {
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("name", PAGES)
-def test_nothing_serious_keeps_anybody_from_using_a_page(stub, years, ended, visit, name, scheme):
+def test_nothing_serious_keeps_anybody_from_using_a_page(stub, years, ended, one_tab, name, scheme):
     stub.venue("bare")
-    path = PAGES[name].format(job=ended["fine"]["id"], failed=ended["broken"]["id"])
-    page = visit(stub.url, path, scheme=scheme)
-    page.wait_for_load_state("networkidle")
-    assert grave(page) == []
+    one_tab.set_viewport_size(DESK)
+    one_tab.emulate_media(color_scheme=scheme)
+    one_tab.goto(PAGES[name].format(job=ended["fine"]["id"], failed=ended["broken"]["id"]))
+    one_tab.wait_for_load_state("networkidle")
+    assert grave(one_tab) == []
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_phone_shows_a_page_without_scrolling_sideways(stub, years, ended, visit, name):
+def test_a_phone_shows_a_page_without_scrolling_sideways(stub, years, ended, one_tab, name):
     stub.venue("bare")
-    path = PAGES[name].format(job=ended["fine"]["id"], failed=ended["broken"]["id"])
-    page = visit(stub.url, path, size=PHONE)
-    page.wait_for_load_state("networkidle")
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+    one_tab.set_viewport_size(PHONE)
+    one_tab.goto(PAGES[name].format(job=ended["fine"]["id"], failed=ended["broken"]["id"]))
+    one_tab.wait_for_load_state("networkidle")
+    assert one_tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
 
 
 def test_the_keyboard_reaches_what_a_page_offers(stub, ended, visit):

@@ -3,14 +3,23 @@
 import pytest
 from playwright.sync_api import expect
 
-from tests.pages.browsing import differs, look, wait_until
+from tests.pages.browsing import differs, look, tab, wait_until
+
+
+@pytest.fixture(scope="module")
+def one_tab(real, people):
+    with tab(people(real)) as page:
+        yield page
 
 
 @pytest.fixture
-def venue(real, visit):
-    page = visit(real, "/ui/venues/newcomer")
-    page.locator(".loupe").wait_for()
-    return page
+def venue(one_tab):
+    """The page of the venue, loaded anew."""
+    # Where no pointer of the test before is over a picture.
+    one_tab.mouse.move(0, 0)
+    one_tab.goto("/ui/venues/newcomer")
+    one_tab.locator(".loupe").wait_for()
+    return one_tab
 
 
 def test_the_slider_shows_the_stored_poses_on_its_left_and_the_new_ones_on_its_right(venue):

@@ -1,6 +1,5 @@
 """The commands of docs/first-calibration.md as they stand there, on real cameras: from photos and clicks to poses."""
 
-import fcntl
 import json
 import os
 import re
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.once import made_once
 from tests.real.pair import FOLDER
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
@@ -38,19 +38,8 @@ def typed(step: str, folder: Path) -> subprocess.CompletedProcess:
 
 @pytest.fixture(scope="module")
 def lenses(real_pair, tmp_path_factory) -> Path:
-    """Files of the lenses, from every other photo: to look for boards takes longer than all the rest.
-
-    The processes that share a run of the tests share them: the first makes them, the others wait for it.
-    """
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "lenses"
-    folder.mkdir(exist_ok=True)
-    with (folder / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not (folder / "made").exists():
-            make_lenses(folder)
-            (folder / "made").touch()
-    return folder
+    """Files of the lenses, from every other photo: to look for boards takes longer than all the rest."""
+    return made_once(tmp_path_factory, "lenses", make_lenses)
 
 
 def make_lenses(folder: Path) -> None:
@@ -81,11 +70,16 @@ def exchanged_labels(said: str) -> set[tuple[str, str]]:
 @pytest.fixture(scope="module")
 def walked(lenses, real_pair, tmp_path_factory) -> tuple[Path, str]:
     """The folder at the end of the walk with exchanged labels, and what was said of the points."""
-    folder = beginning(tmp_path_factory.mktemp("walk"), lenses, exchanged=True)
-    _, *steps = commands()
-    pose, *_ = [typed(step, folder) for step in steps]
-    (folder / "poses.json").write_text(pose.stdout)
-    return folder, pose.stderr
+
+    def walk(folder: Path) -> None:
+        beginning(folder, lenses, exchanged=True)
+        _, *steps = commands()
+        pose, *_ = [typed(step, folder) for step in steps]
+        (folder / "poses.json").write_text(pose.stdout)
+        (folder / "said").write_text(pose.stderr)
+
+    folder = made_once(tmp_path_factory, "walk", walk)
+    return folder, (folder / "said").read_text()
 
 
 @pytest.mark.parametrize(("side", "bare"), [("left", "right"), ("right", "left")])

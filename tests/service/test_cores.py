@@ -50,5 +50,6 @@ def test_a_mask_of_cores_holds(machine, monkeypatch):
 
 
 def test_threads_are_as_many_unless_somebody_says_otherwise(monkeypatch):
+    monkeypatch.delenv("ESC_THREADS")
     assert Settings().threads == cores.usable()
     assert Settings(threads=7).threads == 7

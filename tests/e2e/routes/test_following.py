@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from service import lifeline
-from tests.e2e.running import DEADLINE_S, venue, wait_for
+from tests.e2e.running import DEADLINE_S, Service, venue, wait_for
 from tests.e2e.worker.test_callbacks import LOCAL
 from tests.homes import in_both_homes
 from tests.worker.receiver import Receiver
@@ -100,13 +100,16 @@ def test_what_was_missed_is_told_by_another_process_after_a_restart(start):
         assert stream.next()["event"] == "poses.current"
 
 
-def test_a_second_process_tells_what_the_first_was_asked_for(start):
-    one, other = start("up").ready(), start("serve")
-    one.venue("v")
-    with followed(other, "v") as stream:
-        stream.next()
-        one.http.delete("/venues/v").raise_for_status()
-        assert stream.next()["event"] == "venue.deleted"
+def test_a_second_process_tells_what_the_first_was_asked_for(service, name):
+    service.venue(name)
+    other = Service(service.data, "serve")
+    try:
+        with followed(other, name) as stream:
+            stream.next()
+            service.http.delete(f"/venues/{name}").raise_for_status()
+            assert stream.next()["event"] == "venue.deleted"
+    finally:
+        other.kill()
 
 
 def test_so_many_follow_at_once_and_a_place_is_free_again_when_one_leaves(start):
