@@ -6,11 +6,15 @@ search. What it finds has to pass the same gate; whatever does not is searched f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from worker.calibration.finish.diagnosis import is_sure
 from worker.calibration.finish.refinement import SEARCH_PX, measure_all
 from worker.calibration.judge.quality import CameraResult
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.field import LinePoints
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.line_measurement import Measurements
 from worker.calibration.settle import Settled, Situation
@@ -24,22 +28,24 @@ FARTHEST_PX = 12.0
 def settle_nearby(here: Situation) -> Settled | None:
     """Where the cameras ended without a search; None where one of them has to be searched for."""
     everyone = list(range(len(here.cameras)))
-    if not here.method.tries_again or here.usable != everyone or not _all_caught(here):
+    if not here.method.tries_again or here.usable != everyone:
         return None
-    finished = here.finished(here.cameras)
+    lines = here.pitch.line_points()
+    caught = measure_all(lines, here.cameras, here.seen.sight, SEARCH_PX[0])
+    if not _all_caught(lines, here.cameras, caught):
+        return None
+    finished = here.finished_nearby(caught)
     results = here.judged(finished)
     if not all(_stayed(result, here.options.lens_may_drift) for result in results):
         return None
     return Settled(finished.pitch, list(here.cameras), results, everyone, finished.deviations, generations=0)
 
 
-def _all_caught(here: Situation) -> bool:
+def _all_caught(lines: LinePoints, cameras: Sequence[Camera], caught: Sequence[Measurements]) -> bool:
     """Whether every camera sees most of its lines near enough to where its stored pose expects them."""
-    lines = here.pitch.line_points()
-    measured = measure_all(lines, here.cameras, here.seen.sight, SEARCH_PX[0])
     return all(
         _share_caught(SeenLines.from_camera(lines, camera), found) >= LEAST_CAUGHT
-        for camera, found in zip(here.cameras, measured, strict=True)
+        for camera, found in zip(cameras, caught, strict=True)
     )
 
 

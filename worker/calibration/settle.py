@@ -37,6 +37,7 @@ from worker.calibration.search.search import (
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.left_out import left_out, of_use
+from worker.calibration.see.line_measurement import Measurements
 from worker.calibration.see.ridge_response import ridge_response
 from worker.calibration.see.view import ViewCondition
 
@@ -133,11 +134,15 @@ class Situation:
                 self.pitch, begun, self.seen.sight, asked.stitch_weight, self._free(), stored=self.cameras
             )
 
-    def loss_of(self, pitch: Field, answered: Sequence[Camera]) -> float:
-        """The loss of the search's middle level where the cameras are answered to stand, inf without any of use.
+    def finished_nearby(self, caught: Sequence[Measurements]) -> Finished:
+        """Where the finish leaves cameras that begin at their stored poses, from which it has `caught` the lines."""
+        with self.journey.measuring("refinement"):
+            self.journey.at("refinement", 0.0)
+            weight = self.options.stitch_weight
+            return refine(self.pitch, self.cameras, self.seen.sight, weight, self._free(), caught=caught)
 
-        The finer levels look at whole frames in full size, which takes more than half a second to say hardly more.
-        """
+    def loss_of(self, pitch: Field, answered: Sequence[Camera]) -> float:
+        """The loss of the search's last level where the cameras are answered to stand, inf without any of use."""
         group = self.usable
         if not group:
             return float("inf")
@@ -146,7 +151,7 @@ class Situation:
             response if (out := left_out(pitch, camera)) is None else np.where(out, np.float32(0), response)
             for camera, response in zip(cameras, self.of(group).by_network(), strict=True)
         ]
-        level = self.method.levels[len(self.method.levels) // 2]
+        level = self.method.levels[-1]
         together = level.objective(pitch, cameras, seen, 0.0 if level.alone else self.options.stitch_weight)
         return float(together.losses(genome_of(cameras)[None])[0])
 
@@ -265,11 +270,10 @@ def _tried_alone(here: Situation, found: Camera) -> _Attempt:
 
 
 def _other_starts(here: Situation, *, lost: bool) -> Iterator[Camera]:
-    """Where ridges lead a camera that is lost, its stored pose, and where the network leads it without the others."""
+    """Where ridges lead a camera that is lost, and its stored pose."""
     if lost:
         yield here.searched(here.by_ridges()).cameras[0]
     yield here.cameras[0]
-    yield here.searched(here.by_network()).cameras[0]
 
 
 def _attempt(here: Situation, begun: Camera) -> _Attempt:

@@ -35,7 +35,9 @@ MOST_STEPS = 4
 MISFIT_FLATTENS_PX = 0.3
 """Error that nothing explains at which the ground is taken for half as uneven as its heights say."""
 SETTLED_M = 5e-5
-"""Cameras that a step, or a whole round, moves less than this have arrived."""
+"""Cameras that a step moves less than this are where these measurements lead."""
+ARRIVED_M = 1e-4
+"""Cameras that a whole round moves less than this have arrived."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +60,13 @@ def refine(
     free: Sequence[Parameter] = (),
     searches_px: Sequence[float] = SEARCH_PX,
     stored: Sequence[Camera] | None = None,
+    caught: Sequence[Measurements] | None = None,
 ) -> Finished:
     """Measure the lines and move the cameras onto them, round by round with a narrower search.
 
     `stored`: where the cameras stood when that was last known, if not where they begin. `free`: numbers of lenses and
-    field to be found along with the poses; pitch and cameras come back with them.
+    field to be found along with the poses; pitch and cameras come back with them. `caught`: what the first round
+    measures, if that is known.
     """
     if stitch_weight == 0 and len(cameras) > 1 and not free:
         return _each_alone(pitch, cameras, sight)
@@ -70,8 +74,8 @@ def refine(
     here = Estimate.at(pitch, cameras, unknowns)
     for search in searches_px:
         unknowns = unknowns.around(here.pitch, here.lines)
-        measured = measure_all(here.on_ground(unknowns), here.cameras, sight, search)
-        before = here
+        measured = caught or measure_all(here.on_ground(unknowns), here.cameras, sight, search)
+        caught, before = None, here
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
         # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
         here = _down_huber(here, cameras, measured, unknowns, stitch_weight)
@@ -81,7 +85,7 @@ def refine(
         # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
         uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
         here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
-        if here.farthest_from(before) < SETTLED_M:
+        if here.farthest_from(before) < ARRIVED_M:
             break
     here = replace(here, uneven_m=unevenness(here, measured, unknowns, stitch_weight, ORDINARY))
     # Judged by a wider search than the last round's, which could not see an error larger than itself.

@@ -51,11 +51,9 @@ def _blurred(blur_px: float, mutation: float, alone: bool) -> Level:
 COARSE_TO_FINE = (
     _blurred(48, 4, alone=True),
     _blurred(16, 1.5, alone=True),
-    _blurred(6, 0.5, alone=True),
-    _blurred(2, 0.2, alone=False),
-    _blurred(0.8, 0.1, alone=False),
+    _blurred(6, 0.5, alone=False),
 )
-"""Preset `esc`: each level pulls from about one blur away, and hands over within the next one's.
+"""Preset `esc`: each level pulls from about one blur away, and hands over within the next one's reach, or the finish's.
 
 Cameras are searched for one by one until they are near: six numbers are found faster than 6 N, and two cameras that are
 both far off agree best about the wrong lines.

@@ -17,7 +17,7 @@ from worker.calibration.scene.camera import Array
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import BLUE, CLEARLY, CONTRASTS, GREEN, OPPOSES, RED, Channels, possible_signs
 from worker.calibration.see.line_profile import blurred_line
-from worker.calibration.see.sampling import bilinear
+from worker.calibration.see.sampling import bilinear_planes
 
 LENS_BLUR_PX = 0.9
 """Standard deviation of lens, sensor and compression together: it softens the edges of the expected profile."""
@@ -226,10 +226,13 @@ def _profiles(image: NDArray[np.float32], seen: SeenLines, bend: Array, offsets:
     """
     along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1)
     total = np.zeros((len(seen), len(offsets)))
+    if not len(seen):
+        return total
+    across = (offsets * seen.normal[:, :1], offsets * seen.normal[:, 1:])
     for shift in ALONG_PX:
         on_line = seen.pixel + shift * along + (bend * shift**2 / 2)[:, None] * seen.normal
-        where = on_line[:, None] + offsets[None, :, None] * seen.normal[:, None]
-        total += bilinear(image, where, outside=np.nan)
+        column, row = (on_line[:, axis : axis + 1] + across[axis] for axis in (0, 1))
+        total += bilinear_planes(image, column, row, outside=np.nan)
     return total / len(ALONG_PX)
 
 
