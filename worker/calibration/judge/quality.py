@@ -36,7 +36,7 @@ class Gate:
     agreement_loss: float = 0.1
     largest_residual_px: float = 2.5
     residual_floor_px: float = 1.25
-    largest_sigma_deg: float = 1.0
+    largest_sigma_deg: float = 1.5
     largest_sigma_m: float = 0.5
     largest_zoomed_m: float = 0.2
     largest_rotation_deg: float = 8.0
