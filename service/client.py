@@ -19,7 +19,8 @@ import asyncio
 import json
 import math
 import time
-from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
+from contextlib import aclosing
 from functools import wraps
 from pathlib import Path
 from types import MethodType
@@ -157,25 +158,27 @@ class AsyncClient:
 
         First comes `poses.current`, or what was missed since the event `seen`. None is missed and none comes twice,
         whatever breaks meanwhile: what is wrong is raised once the service was away for `patience_s`. Ends when the
-        venue is deleted.
+        venue is deleted; where that happened while nobody was connected, with `Refused` (404).
         """
+        path, params = f"/venues/{venue_id}/events", {"events": list(kinds)}
         heard = time.monotonic()
         while True:
             try:
                 headers = {"Last-Event-ID": seen} if seen else {}
-                lines = self._lines(f"/venues/{venue_id}/events", params={"events": list(kinds)}, headers=headers)
                 told: dict[str, str] = {}
-                async for line in lines:
-                    heard = time.monotonic()
-                    name, _, value = line.partition(": ")
-                    if name:
-                        told[name] = value
-                    elif not line and "data" in told:
-                        seen, event = told["id"], EVENT.validate_json(told["data"])
-                        yield seen, event
-                        if event.type == LAST:
-                            return
-                        told = {}
+                async with aclosing(self._lines(path, params=params, headers=headers)) as lines:
+                    async for line in lines:
+                        name, _, value = line.partition(": ")
+                        if name:
+                            told[name] = value
+                        elif not line and "data" in told:
+                            seen, event = told["id"], EVENT.validate_json(told["data"])
+                            yield seen, event
+                            if event.type == LAST:
+                                return
+                            told = {}
+                        # Also after whoever asked has taken its time over an event.
+                        heard = time.monotonic()
             except (httpx.TransportError, Refused) as error:
                 if not _passing(error) or time.monotonic() - heard > patience_s:
                     raise
@@ -292,14 +295,17 @@ class AsyncClient:
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
         return await self._http.request(method, path, **more)
 
-    async def _lines(self, path: str, **more: Any) -> AsyncIterator[str]:
+    async def _lines(self, path: str, **more: Any) -> AsyncGenerator[str]:
         """The lines of a stream, each as soon as it is there; raises `Refused`."""
+        rest = b""
         async with self._http.stream("GET", path, timeout=SILENCE_S, **more) as response:
             if not response.is_success:
                 await response.aread()
                 raise _refusal(response)
-            async for line in response.aiter_lines():
-                yield line
+            async for piece in response.aiter_bytes():
+                *lines, rest = _split(rest + piece)
+                for line in lines:
+                    yield line.decode()
 
     async def _pause(self, seconds: float) -> None:
         await asyncio.sleep(seconds)
@@ -314,13 +320,16 @@ class _Blocking(AsyncClient):
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
         return self.http.request(method, path, **more)
 
-    async def _lines(self, path: str, **more: Any) -> AsyncIterator[str]:
+    async def _lines(self, path: str, **more: Any) -> AsyncGenerator[str]:
+        rest = b""
         with self.http.stream("GET", path, timeout=SILENCE_S, **more) as response:
             if not response.is_success:
                 response.read()
                 raise _refusal(response)
-            for line in response.iter_lines():
-                yield line
+            for piece in response.iter_bytes():
+                *lines, rest = _split(rest + piece)
+                for line in lines:
+                    yield line.decode()
 
     async def _pause(self, seconds: float) -> None:
         time.sleep(seconds)
@@ -425,6 +434,14 @@ def _connection(url: str, api_key: str | None) -> dict[str, Any]:
     headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
     # Where there is no TLS, the certificates of all authorities need not be read, which takes as long as a request.
     return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S, "verify": not url.startswith("http://")}
+
+
+def _split(stream: bytes) -> list[bytes]:
+    """The lines of a stream of events, the last of them as far as it has come.
+
+    Not what Python splits by, as httpx does: the names in an event may have separators of Unicode in them.
+    """
+    return stream.split(b"\n")
 
 
 def _refusal(response: httpx.Response) -> Refused:

@@ -246,7 +246,7 @@ def _teacher(path: Path, threshold: float, pictures: Tensor) -> UNet:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--run", type=Path, default=Path("runs/unet"), help="folder of checkpoint and log")
     parser.add_argument(
         "--shape", type=Shape.parse, action="append", help=f"as 24-48-96-192/2, several times for several; {SERVED}"
@@ -269,7 +269,9 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--teacher", type=Path, help="served model in the paper's shape whose answers are learnt as well"
     )
-    parser.add_argument("--threshold", type=float, default=0.37, help="probability that the exported model calls 0.5")
+    parser.add_argument(
+        "--threshold", type=float, default=0.37, help="probability that the exported model, and the teacher, call 0.5"
+    )
     parser.add_argument("--no-export", action="store_true")
     return parser.parse_args()
 

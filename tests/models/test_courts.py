@@ -7,6 +7,7 @@ from fields.template import load
 from models.training.courts.court import paint, random_court, render_court
 from models.training.courts.floors import hard_court
 from models.training.courts.layouts import field_layout
+from models.training.data import makers
 from worker.calibration.scene.camera import Camera, Intrinsics, Pose, inside
 from worker.calibration.scene.field import Field, LinePoints
 
@@ -106,3 +107,9 @@ def test_a_crop_is_the_same_for_the_same_seed():
     assert np.array_equal(first.frame, again.frame)
     assert np.array_equal(first.target, again.target)
     assert first.target.max() <= 1
+
+
+def test_who_waits_for_crops_that_nobody_makes_is_told(monkeypatch):
+    monkeypatch.setattr(makers, "LOOK_S", 0.01)
+    with pytest.raises(RuntimeError, match="no process makes crops any more"):
+        makers.Makers(size=64, pitches=0.0, seed=1, workers=0).wait()

@@ -35,7 +35,7 @@ BREATH_S = 2.0
 # Between two looks at whether a round is due.
 LOOK_S = 10.0
 TRY_AGAIN_AFTER = timedelta(hours=1)
-# So many among those that are deleted at once, and the store is away.
+# So many among those that are moved or deleted at once, and the store is away.
 FAILURES = 3
 T = TypeVar("T")
 log = structlog.get_logger()
@@ -98,16 +98,21 @@ class Retention:
         return min((worker.name for worker in alive), default="") == self._settings.worker_name
 
     def _expire_frames(self, ended_before: datetime, now: datetime) -> int:
-        """What nobody has looked at can be drawn for as long as pictures are kept: its frames stay beside them."""
+        """What nobody has looked at can be drawn for as long as pictures are kept: its frames stay beside them.
+
+        Says how many jobs were dealt with, those among them whose frames have to stay for the time being.
+        """
         job_ids: list[str] = []
+        dealt_with = 0
         for handful in _handfuls(self._expiry.old_frames(ended_before, BATCH)):
             kept = list(self._hands.map(self._kept_for_pictures, handful))
             job_ids += [old.job_id for old, there in zip(handful, kept, strict=True) if there]
-            if not all(kept):
+            if kept.count(False) >= FAILURES:
                 # Neither do those behind them fare better; the next round tries again.
                 break
+            dealt_with += len(handful)
         self._expiry.expire_frames(job_ids, now)
-        return len(job_ids)
+        return dealt_with
 
     def _kept_for_pictures(self, old: OldFrames) -> bool:
         together = {drawn_together(name) for name in old.pictures} - {()}

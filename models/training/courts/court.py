@@ -1,4 +1,4 @@
-"""Crops of courts that exist nowhere: cheap, endlessly varied, never shown twice.
+"""Crops of courts that exist nowhere: cheap, endlessly varied, none made twice.
 
     crop = random_court(np.random.default_rng(7), 224)
     frame = render_court(pitch, camera, np.random.default_rng(7))

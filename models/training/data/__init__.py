@@ -1,1 +1,1 @@
-"""What the network eats: pitches kept on disk, courts made as fast as they are learnt."""
+"""What the network eats: crops made as fast as they are learnt, kept where it computes, and altered each time."""

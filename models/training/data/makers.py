@@ -18,6 +18,8 @@ PACK = 8
 """Crops that a process hands over at once."""
 AHEAD = 8
 """Packs that wait at most, of each process."""
+LOOK_S = 5.0
+"""Between two looks at whether anybody still makes crops, while there are none."""
 
 Planes = NDArray[np.uint8]
 """Crops (N, 5, S, S): red, green, blue, share of the pixel that paint covers, and whether the pixel's answer counts."""
@@ -45,13 +47,19 @@ class Makers:
         context = multiprocessing.get_context("spawn")
         self.size = size
         self._queue: Queue[Planes] = context.Queue(AHEAD * workers)
-        for worker in range(workers):
-            job = (self._queue, [seed, worker], size, pitches)
-            context.Process(target=_make, args=job, daemon=True).start()
+        jobs = ((self._queue, [seed, worker], size, pitches) for worker in range(workers))
+        self._processes = [context.Process(target=_make, args=job, daemon=True) for job in jobs]
+        for process in self._processes:
+            process.start()
 
     def wait(self) -> Planes:
-        """The next crops, as soon as there are some."""
-        return self._queue.get()
+        """The next crops, as soon as there are some; raises RuntimeError if there will be none."""
+        while True:
+            try:
+                return self._queue.get(timeout=LOOK_S)
+            except Empty:
+                if not any(process.is_alive() for process in self._processes):
+                    raise RuntimeError("no process makes crops any more: see above what ended them") from None
 
     def made(self) -> list[Planes]:
         """All that wait."""

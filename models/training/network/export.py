@@ -1,4 +1,6 @@
-"""Export to ONNX: `python -m models.training.network.export runs/unet/checkpoint.pt --to runs/unet/unet.onnx`.
+"""Export to ONNX.
+
+    python -m models.training.network.export runs/unet/24-48-96-192by2-leak-0.01-gamma-1.pt --to runs/unet/unet.onnx
 
 One input, float32 N x 3 x H x W, RGB in 0..1; one output, float32 N x 1 x H x W, probability of a field marking. H and
 W are free multiples of 32; batch normalisation is folded into the convolutions.
@@ -76,7 +78,7 @@ def load(checkpoint: Path) -> UNet:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("--to", type=Path, required=True, help="float32; `quantise.py` makes the served model of it")
     parser.add_argument("--threshold", type=float, default=0.5, help="what becomes 0.5")

@@ -2,7 +2,9 @@
 
 import asyncio
 import inspect
+import time
 from contextlib import aclosing
+from datetime import UTC, datetime
 from itertools import islice
 
 import httpx
@@ -10,6 +12,8 @@ import pytest
 
 from service import client as client_module
 from service.client import AsyncClient, Client, Refused
+from service.wire.health import AlarmEvent, VenueAlarm
+from service.wire.told.events import VenueChange, VenueEvent
 from service.wire.venue import VenueIn
 from tests.e2e.running import DEADLINE_S, png, venue, wait_for
 
@@ -138,3 +142,63 @@ def test_a_follower_that_leaves_off_makes_room_for_another(start):
             events = client.venue_events("v", patience_s=DEADLINE_S)
             assert next(events)[1].type == "poses.current"
             events.close()
+
+
+MOMENT = datetime(2026, 11, 21, 10, tzinfo=UTC)
+DELETED = VenueEvent(type="venue.deleted", timestamp=MOMENT, data=VenueChange(venue="v", changed=[]))
+
+
+def stream_of(*events):
+    """As the service sends them."""
+    said = (f": ping\n\nid: {number}\ndata: {event.model_dump_json()}\n\n" for number, event in enumerate(events))
+    return "".join(said).encode()
+
+
+def answered(content):
+    """A connection on which every answer has this content: the bytes of a stream."""
+    return {
+        "transport": httpx.MockTransport(lambda _: httpx.Response(200, content=content())),
+        "base_url": "http://esc",
+    }
+
+
+def test_whatever_a_name_in_an_event_is_made_of_the_event_arrives_as_it_was(monkeypatch):
+    why = "line \u2028 \x85 \x1e end"
+    alarm = VenueAlarm(rule="not-calibrated", camera=None, since=MOMENT, why=why, venue="v")
+    events = [AlarmEvent(type="alarm.began", timestamp=MOMENT, data=alarm), DELETED]
+
+    def piecemeal():
+        """In pieces that end in the middle of lines and of characters."""
+        return (bytes([byte]) for byte in stream_of(*events))
+
+    async def awaited():
+        for piece in piecemeal():
+            yield piece
+
+    async def told():
+        async with AsyncClient("http://esc") as client:
+            monkeypatch.setattr(client, "_http", httpx.AsyncClient(**answered(awaited)))
+            return [event async for _, event in client.venue_events("v")]
+
+    with Client("http://esc") as client:
+        monkeypatch.setattr(client._calls, "http", httpx.Client(**answered(piecemeal)))
+        assert [event for _, event in client.venue_events("v")] == events
+    assert asyncio.run(told()) == events
+
+
+def test_who_takes_time_over_an_event_does_not_take_the_service_for_away(monkeypatch):
+    monkeypatch.setattr(client_module, "AGAIN_S", 0.0)
+    created = DELETED.model_copy(update={"type": "venue.created"})
+
+    def breaks_off():
+        yield stream_of(created)
+        raise httpx.ReadError("gone")
+
+    streams = [breaks_off(), iter([stream_of(DELETED)])]
+    with Client("http://esc") as client:
+        monkeypatch.setattr(client._calls, "http", httpx.Client(**answered(lambda: streams.pop(0))))
+        told = []
+        for _, event in client.venue_events("v", patience_s=0.1):
+            told.append(event)
+            time.sleep(0.2)
+    assert told == [created, DELETED]

@@ -69,6 +69,25 @@ def test_frames_that_cannot_be_kept_for_pictures_do_not_go(stock, retention, mon
     assert stock.files() == {f"pictures/{unseen}", f"pictures/{later}"}
 
 
+def test_frames_that_cannot_be_kept_for_pictures_hold_up_no_others(stock, retention, monkeypatch):
+    stuck, *others = [
+        stock.ended("a", ago(days=3, hours=n), accepted=False, drawn=False) for n in range(AT_ONCE + 2, 0, -1)
+    ]
+    monkeypatch.setattr("worker.duties.retention.BATCH", AT_ONCE + 2)
+    move = stock.blobs.move
+
+    def refuse(path, to):
+        if stuck in path:
+            raise FolderAway(path)
+        return move(path, to)
+
+    monkeypatch.setattr(stock.blobs, "move", refuse)
+    # A full batch, and so at once a further round.
+    assert retention.round(NOW)
+    gone = {job for job in (stuck, *others) if f"frames/{job}" not in stock.files()}
+    assert gone == set(others)
+
+
 def test_a_job_with_deleted_pictures_links_to_none(stock, retention):
     job = stock.ended("a", ago(days=15), accepted=False)
     assert "preview" in stock.jobs.get(job).links

@@ -69,7 +69,7 @@ def refine(
     measures, if that is known.
     """
     if stitch_weight == 0 and len(cameras) > 1 and not free:
-        return _each_alone(pitch, cameras, sight)
+        return _each_alone(pitch, cameras, sight, stored or cameras, caught)
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     here = Estimate.at(pitch, cameras, unknowns)
     for search in searches_px:
@@ -141,11 +141,17 @@ def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, sear
     ]
 
 
-def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight) -> Finished:
+def _each_alone(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    sight: Sight,
+    stored: Sequence[Camera],
+    caught: Sequence[Measurements] | None,
+) -> Finished:
     """Cameras that need not agree, each on a ground of its own."""
     ends = [
-        refine(pitch, [camera], Sight([channels], [response]), 0.0)
-        for camera, channels, response in zip(cameras, sight.channels, sight.responses, strict=True)
+        refine(pitch, [camera], sight.of([n]), 0.0, stored=[stored[n]], caught=caught and [caught[n]])
+        for n, camera in enumerate(cameras)
     ]
     deviations = [deviation for end in ends for deviation in end.deviations if deviation.camera is not None]
     return Finished(pitch, [end.each[0] for end in ends], deviations, [])

@@ -226,8 +226,6 @@ def _profiles(image: NDArray[np.float32], seen: SeenLines, bend: Array, offsets:
     """
     along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1)
     total = np.zeros((len(seen), len(offsets)))
-    if not len(seen):
-        return total
     across = (offsets * seen.normal[:, :1], offsets * seen.normal[:, 1:])
     for shift in ALONG_PX:
         on_line = seen.pixel + shift * along + (bend * shift**2 / 2)[:, None] * seen.normal

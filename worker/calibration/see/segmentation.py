@@ -24,7 +24,7 @@ from worker.calibration.scene.camera import Array, Camera, Frame
 from worker.calibration.scene.field import Field
 
 HALO_PX = 96
-"""Context that a pixel's answer depends on (four poolings reach 94 px), a multiple of what they pool."""
+"""Context that answers depend on (three poolings of 2 x 2 px reach 92 px beyond a region), a multiple of the pooled."""
 GRID_PX = 32
 """Regions begin and end on this grid: then the network pools the same pixels together as in the whole frame."""
 REGION_PX = 1920

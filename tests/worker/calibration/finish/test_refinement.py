@@ -158,6 +158,17 @@ def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
     assert together.error_px < alone.error_px / 2
 
 
+def test_cameras_that_need_not_agree_end_as_each_does_by_itself():
+    cameras, channels, responses = scene()
+    stored, begun, sight = [moved(c, by=(0.3, 0.0, 0.0)) for c in cameras], a_little_off(), Sight(channels, responses)
+    together = refine(CROWNED, begun, sight, 0.0, stored=stored)
+    for n, end in enumerate(together.each):
+        alone = refine(CROWNED, [begun[n]], sight.of([n]), 0.0, stored=[stored[n]])
+        np.testing.assert_array_equal(end.camera.pose.position, alone.each[0].camera.pose.position)
+        of_its_lens = [d for d in alone.deviations if d.camera is not None]
+        assert [d for d in together.deviations if d.camera == end.camera.id] == of_its_lens
+
+
 def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
     cameras, channels, responses = scene()
     black = Channels([np.zeros((*responses[1].shape, 3), dtype=np.uint8)])
