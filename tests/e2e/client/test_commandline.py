@@ -236,6 +236,16 @@ def test_an_id_that_is_none_is_told_in_words(esc, command, says):
     assert (answer.returncode, says in " ".join(answer.stderr.replace("│", " ").split())) == (2, True), answer.stderr
 
 
+@pytest.mark.parametrize(
+    "command",
+    [("venue", "put", "left.png"), ("pose", "left.png", "left.png", "left=left.png", "-o", "first.json")],
+)
+def test_a_picture_in_place_of_a_document_is_told(esc, command):
+    answer = esc(*command)
+    assert answer.returncode == 2
+    assert answer.stderr.startswith("left.png: Invalid JSON"), answer.stderr
+
+
 def test_each_part_of_a_venue_that_is_wrong_is_told_once(service, esc, name):
     service.venue(name)
     answer = esc("venue", "set", name, "field.length_m=abc", "cameras.left.size=3")
