@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import signal
 import socket
@@ -76,7 +77,9 @@ def _listen(settings: Settings) -> socket.socket:
             backlog=2048,
         )
     except OSError as error:
-        raise CannotListen(f"Cannot listen on {_authority(settings.host, settings.port)}: {error.strerror}.") from None
+        taken = " Does the service run already? --port chooses another." if error.errno == errno.EADDRINUSE else ""
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise CannotListen(f"Cannot listen on {_authority(settings.host, settings.port)}: {why}.{taken}") from None
 
 
 def _authority(host: str, port: int) -> str:

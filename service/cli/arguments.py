@@ -154,12 +154,12 @@ def options_of(text: str) -> Options:
     return checked(Options, text, "--options")
 
 
-def checked(model: type[M], text: str, source: str) -> M:
-    """A model from its JSON; `source` says whose fault it is if it is none."""
+def checked(model: type[M], document: str | bytes, source: str) -> M:
+    """A model from its JSON, which may be any file's content; `source` says whose fault it is if it is none."""
     from pydantic import ValidationError
 
     try:
-        return model.model_validate_json(text)
+        return model.model_validate_json(document)
     except ValidationError as error:
-        lines = [f"{source}: {'.'.join(map(str, e['loc']))} {e['msg']}" for e in error.errors()]
+        lines = [" ".join(filter(None, (f"{source}:", ".".join(map(str, e["loc"])), e["msg"]))) for e in error.errors()]
         fail("\n".join(lines), USAGE)

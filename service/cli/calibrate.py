@@ -103,7 +103,7 @@ def run(
     from worker.jobs import calibration
     from worker.message import Means
 
-    stored = checked(VenueIn, venue.read_text(), str(venue)).stored()
+    stored = checked(VenueIn, venue.read_bytes(), str(venue)).stored()
     if chosen.seed is None:
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
     chosen = chosen.model_copy(update={"pictures": True})

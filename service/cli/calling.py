@@ -32,4 +32,4 @@ def called(url: str, api_key: str | None) -> Iterator[Client]:
         fail(f"--url (ESC_URL) is no address such as http://127.0.0.1:8000: {error}", USAGE)
     except httpx.TransportError as error:
         # It may be starting again.
-        fail(f"The service cannot be reached: {error or type(error).__name__}", BUSY)
+        fail(f"The service at {url} cannot be reached: {error or type(error).__name__}", BUSY)

@@ -119,9 +119,9 @@ def pose(
     from service.wire.venue import CameraIn, Site, VenueIn
 
     engine_settings()
-    place = checked(Site, site.read_text(), str(site))
-    clicks = checked(ClickedPoints, points.read_text(), str(points)).root
-    given = {camera: checked(LensFile, path.read_text(), str(path)) for camera, (path, *_) in files_of(lenses).items()}
+    place = checked(Site, site.read_bytes(), str(site))
+    clicks = checked(ClickedPoints, points.read_bytes(), str(points)).root
+    given = {camera: checked(LensFile, path.read_bytes(), str(path)) for camera, (path, *_) in files_of(lenses).items()}
     seen = {camera: path.read_bytes() for camera, (path, *_) in files_of(frame or []).items()}
     for camera in given.keys() - clicks.keys():
         fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
@@ -200,7 +200,7 @@ def _fit_here(file: Path, frames: list[str], options: FieldOptions) -> tuple[Ven
     from worker.jobs import field
     from worker.message import Means
 
-    stored = checked(VenueIn, file.read_text(), str(file)).stored()
+    stored = checked(VenueIn, file.read_bytes(), str(file)).stored()
     files = checked_files(stored, frames, settings)
     with failure_told(), bar() as show:
         solution = field.solve(stored, files, options, Means.of(settings), lambda step: show(step, ""))

@@ -41,7 +41,7 @@ def put_venue(
     """Create or replace a venue from a JSON file. Exit 1: nothing was put, something would be lost by it."""
     from service.wire.venue import VenueIn
 
-    venue = checked(VenueIn, file.read_text(), str(file))
+    venue = checked(VenueIn, file.read_bytes(), str(file))
     with called(url, api_key) as client:
         before = _stored(client, venue.id)
         if before is None:

@@ -36,7 +36,8 @@ def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -
         if name not in ids:
             raise Problem(
                 "unknown-camera",
-                f"Venue {venue.id} has the cameras {', '.join(ids)}; name each file part by its camera.",
+                f"Venue {venue.id} has the cameras {', '.join(ids)} and no {name[:64]!r}; name each file part by its "
+                "camera.",
                 camera=name[:64],
                 expected=ids,
             )

@@ -28,6 +28,8 @@ from service.wire.venue import PATCH_EXAMPLES, Camera, Venue, VenueIn, Venues
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # While a job is open.
 RETRY_AFTER_S = 2
+# What a camera cannot be without; its id is the name that it is patched by.
+WHOLE_CAMERA = ("image_size", "intrinsics", "pose")
 PATCH_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -136,7 +138,7 @@ def patch_venue(
         try:
             venue = VenueIn.model_validate(merged(_patchable(before, patch), patch))
         except ValidationError as error:
-            raise invalid(error, "body") from None
+            raise _misnamed_camera(before, patch) or invalid(error, "body") from None
         stored = _checked(venue, venue_id, context.settings)
         return stored, sources.credentials_of(stored, venue.credentials, before, known)
 
@@ -268,6 +270,18 @@ def _patchable(venue: Venue, patch: dict[str, Any]) -> dict[str, Any]:
         if isinstance(pose, dict):
             del camera["pose"]["position" if "translation" in pose else "translation"]
     return document
+
+
+def _misnamed_camera(venue: Venue, patch: dict[str, Any]) -> Problem | None:
+    """What to say of a patch for a camera that the venue does not have, and that is no whole one either."""
+    by_id = patch.get("cameras")
+    ids = [camera.id for camera in venue.cameras]
+    for name, camera in by_id.items() if isinstance(by_id, dict) else ():
+        if name not in ids and isinstance(camera, dict) and any(part not in camera for part in WHOLE_CAMERA):
+            where = f"body.cameras.{name[:64]}"
+            message = f"The venue has the cameras {', '.join(ids)}; a new one needs {', '.join(WHOLE_CAMERA)}"
+            return Problem("invalid-request", f"{where}: {message}", errors=[{"where": where, "message": message}])
+    return None
 
 
 def _checked(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:

@@ -75,7 +75,6 @@ def walked(lenses, real_pair, tmp_path_factory) -> tuple[Path, str]:
         beginning(folder, lenses, exchanged=True)
         _, *steps = commands()
         pose, *_ = [typed(step, folder) for step in steps]
-        (folder / "poses.json").write_text(pose.stdout)
         (folder / "said").write_text(pose.stderr)
 
     folder = made_once(tmp_path_factory, "walk", walk)

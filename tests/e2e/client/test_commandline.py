@@ -165,7 +165,7 @@ def test_refused_frames_are_a_failure_and_an_absent_service_may_come_back(servic
     refused = esc("calibrate", name, "left=left.png")
     assert (refused.returncode, "right" in refused.stderr) == (1, True)
     absent = esc("calibrate", name, *FRAMES, ESC_URL="http://127.0.0.1:9")
-    assert (absent.returncode, "cannot be reached" in absent.stderr) == (75, True)
+    assert (absent.returncode, "http://127.0.0.1:9 cannot be reached" in absent.stderr) == (75, True)
     assert "Traceback" not in refused.stderr + absent.stderr
 
 
@@ -234,6 +234,23 @@ def test_a_venue_is_followed_line_by_line_until_it_is_deleted(service, name):
 def test_an_id_that_is_none_is_told_in_words(esc, command, says):
     answer = esc(*command)
     assert (answer.returncode, says in " ".join(answer.stderr.replace("│", " ").split())) == (2, True), answer.stderr
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("venue", "put", "left.png"), ("pose", "left.png", "left.png", "left=left.png", "-o", "first.json")],
+)
+def test_a_picture_in_place_of_a_document_is_told(esc, command):
+    answer = esc(*command)
+    assert answer.returncode == 2
+    assert answer.stderr.startswith("left.png: Invalid JSON"), answer.stderr
+
+
+def test_each_part_of_a_venue_that_is_wrong_is_told_once(service, esc, name):
+    service.venue(name)
+    answer = esc("venue", "set", name, "field.length_m=abc", "cameras.left.size=3")
+    assert answer.returncode == 1
+    assert [answer.stderr.count(part) for part in ("field.length_m", "cameras.0.size")] == [1, 1], answer.stderr
 
 
 def test_a_job_that_failed_is_listed_with_why(service, esc, name):
@@ -358,6 +375,7 @@ def test_a_port_in_use_is_told(service, tmp_path):
     answer = esc_process(tmp_path, "serve", "--port", str(httpx.URL(service.url).port))
     assert answer.returncode == 2
     assert "Cannot listen" in answer.stderr
+    assert "--port chooses another" in answer.stderr
 
 
 def test_a_wrong_setting_is_told(tmp_path):

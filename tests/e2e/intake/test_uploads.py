@@ -133,6 +133,7 @@ def test_an_unknown_camera_is_named(service, stadium, camera):
     answer = service.http.post(f"/venues/{stadium}/calibrate", files=[*upload(), (camera, ("x.png", png()))])
     assert answer.status_code == 422
     assert answer.json()["type"] == "/problems/unknown-camera"
+    assert repr(camera[:64]) in answer.json()["detail"]
 
 
 def test_too_many_frames_of_a_camera_are_refused(service, stadium):

@@ -118,6 +118,12 @@ def test_a_patch_that_makes_no_venue_is_refused_and_changes_nothing(service, nam
     assert service.http.get(f"/venues/{name}").json() == before
 
 
+def test_a_patch_of_a_camera_with_a_slip_in_its_name_is_told_those_there_are(service, name):
+    service.http.put(f"/venues/{name}", json=venue(name))
+    problem = patched(service, name, {"cameras": {"lefft": {"source": "http://127.0.0.1/x"}}}).json()
+    assert problem["detail"].startswith("body.cameras.lefft: The venue has the cameras left, right")
+
+
 def test_there_is_nothing_to_patch_of_a_venue_that_is_not_there(service, name):
     assert patched(service, name, {}).status_code == 404
 

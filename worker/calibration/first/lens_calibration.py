@@ -149,8 +149,8 @@ def _common_size(photos: Sequence[Photo]) -> tuple[int, int]:
     sizes = Counter(photo.size for photo in photos if photo.sighting is not None)
     if not sizes:
         raise NoLens(
-            f"none of {len(photos)} photos shows the board: are columns and rows its inner corners, where four squares "
-            "meet, and is all of it in the picture?"
+            f"none of {len(photos)} photos shows the board: columns and rows are those of its inner corners, where "
+            "four squares meet, and all of it has to be in the picture"
         )
     return sizes.most_common(1)[0][0]
 
