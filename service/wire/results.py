@@ -167,7 +167,7 @@ class Result(Wire):
     stitch_error_before_px: float | None
     stitch_error_limit_px: float | None = Field(None, description="What the gate lets pass at most.")
     pairs: list[PairResult] = Field([], description="The cameras that were compared, two by two.")
-    loss: float | None = Field(description="Of the poses that are answered, by the last level of the search.")
+    loss: float | None = Field(description="Of the poses that are answered, by the middle level of the search.")
     generations: int
     path: Literal["near", "wide"] = Field(
         "wide", description="Whether the poses were found near the stored ones, or by a search."

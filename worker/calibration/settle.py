@@ -142,7 +142,10 @@ class Situation:
             return refine(self.pitch, self.cameras, self.seen.sight, weight, self._free(), caught=caught)
 
     def loss_of(self, pitch: Field, answered: Sequence[Camera]) -> float:
-        """The loss of the search's last level where the cameras are answered to stand, inf without any of use."""
+        """The loss of the search's middle level where the cameras are answered to stand, inf without any of use.
+
+        A finer one looks at larger pictures, which takes a third of a second to say hardly more.
+        """
         group = self.usable
         if not group:
             return float("inf")
@@ -151,7 +154,7 @@ class Situation:
             response if (out := left_out(pitch, camera)) is None else np.where(out, np.float32(0), response)
             for camera, response in zip(cameras, self.of(group).by_network(), strict=True)
         ]
-        level = self.method.levels[-1]
+        level = self.method.levels[len(self.method.levels) // 2]
         together = level.objective(pitch, cameras, seen, 0.0 if level.alone else self.options.stitch_weight)
         return float(together.losses(genome_of(cameras)[None])[0])
 

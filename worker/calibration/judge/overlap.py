@@ -70,8 +70,8 @@ def _rounded(pixels: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _pitch_area(pitch: Field, camera: Camera) -> NDArray[np.uint8]:
-    """1 inside the pitch and `AROUND_PITCH_M` around it, at an eighth of the picture's detail."""
-    coarse = camera.intrinsics.scaled(0.125)
+    """1 inside the pitch and `AROUND_PITCH_M` around it, at a sixteenth of the picture's detail."""
+    coarse = camera.intrinsics.scaled(1 / 16)
     width, height = coarse.size
     x, y = np.meshgrid(np.arange(width), np.arange(height))
     rays = Camera(camera.id, coarse, camera.pose).rays(np.stack([x, y], axis=-1))
