@@ -32,9 +32,9 @@ JOBS_MEASURED = 3
 class Measured:
     """What one job of two 4K cameras costs."""
 
-    # `measure`, on two cores of a rented server that others used too; alone on it a job takes 7 s (`make demo`).
-    core_s: float = 12.3
-    elapsed_s: float = 7.0
+    # `make bench-cost`, near the stored pose, on two quiet cores of a rented server.
+    core_s: float = 3.9
+    elapsed_s: float = 3.6
     frame_mb: float = 5.76
     frames: int = 2
     # Of the masks; the other pictures are drawn when somebody looks, and are then so many and so large.
