@@ -19,16 +19,15 @@ import asyncio
 import json
 import math
 import time
-from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import aclosing
-from functools import wraps
 from pathlib import Path
-from types import MethodType
-from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
+from typing import Any, Self
 
 import httpx
 from pydantic import TypeAdapter
 
+from service.blocking import Call, Stream
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
 from service.wire.job import Job, Jobs
@@ -46,8 +45,6 @@ SILENCE_S = 45.0
 # Until a stream that has ended, or could not begin, is asked for again.
 AGAIN_S = 2.0
 NOT_INSTALLED = "/problems/extra-missing"
-P = ParamSpec("P")
-T = TypeVar("T")
 EVENT: TypeAdapter[Event] = TypeAdapter(Event)
 
 
@@ -335,99 +332,46 @@ class _Blocking(AsyncClient):
         time.sleep(seconds)
 
 
-class _Method(Generic[P, T]):
-    """A method of `AsyncClient` as one of `Client`."""
-
-    def __init__(self, method: Callable[Concatenate[AsyncClient, P], Coroutine[Any, Any, T]]) -> None:
-        self._method = method
-
-    def __get__(self, client: Client, owner: type) -> Callable[P, T]:
-        """Bind it."""
-        awaited: Callable[P, Coroutine[Any, Any, T]] = MethodType(self._method, client._calls)
-
-        @wraps(awaited)
-        def method(*arguments: P.args, **named: P.kwargs) -> T:
-            return _at_once(awaited(*arguments, **named))
-
-        return method
-
-
-class _Stream(Generic[P, T]):
-    """A method of `AsyncClient` that goes on and on, as one of `Client`."""
-
-    def __init__(self, method: Callable[Concatenate[AsyncClient, P], AsyncGenerator[T]]) -> None:
-        self._method = method
-
-    def __get__(self, client: Client, owner: type) -> Callable[P, Iterator[T]]:
-        """Bind it."""
-        awaited: Callable[P, AsyncGenerator[T]] = MethodType(self._method, client._calls)
-
-        @wraps(awaited)
-        def method(*arguments: P.args, **named: P.kwargs) -> Iterator[T]:
-            going_on = awaited(*arguments, **named)
-            try:
-                while True:
-                    try:
-                        one = _at_once(anext(going_on))
-                    except StopAsyncIteration:
-                        return
-                    yield one
-            finally:
-                _at_once(going_on.aclose())
-
-        return method
-
-
-def _at_once(awaitable: Awaitable[T]) -> T:
-    """What something gives that never waits."""
-    try:
-        awaitable.__await__().__next__()
-    except StopIteration as end:
-        result: T = end.value
-        return result
-    raise AssertionError("a blocking connection waited")
-
-
 class Client:
     """One service, by its URL; each call waits for its answer."""
 
     def __init__(self, url: str, api_key: str | None = None) -> None:
-        self._calls = _Blocking(url, api_key)
+        self.calls = _Blocking(url, api_key)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._calls.http.close()
+        self.calls.http.close()
 
     def url_of(self, path: str) -> str:
         """The address of something the service linked to."""
-        return str(self._calls.http.base_url.join(path))
+        return str(self.calls.http.base_url.join(path))
 
-    put_venue = _Method(AsyncClient.put_venue)
-    patch_venue = _Method(AsyncClient.patch_venue)
-    tagged_venue = _Method(AsyncClient.tagged_venue)
-    venue = _Method(AsyncClient.venue)
-    venues = _Method(AsyncClient.venues)
-    delete_venue = _Method(AsyncClient.delete_venue)
-    venue_health = _Method(AsyncClient.venue_health)
-    history = _Method(AsyncClient.history)
-    restore = _Method(AsyncClient.restore)
-    venue_poses = _Method(AsyncClient.venue_poses)
-    venue_events = _Stream(AsyncClient.venue_events)
-    snapshot = _Method(AsyncClient.snapshot)
-    calibrate = _Method(AsyncClient.calibrate)
-    fit_field = _Method(AsyncClient.fit_field)
-    job = _Method(AsyncClient.job)
-    jobs = _Method(AsyncClient.jobs)
-    again = _Method(AsyncClient.again)
-    delete_job = _Method(AsyncClient.delete_job)
-    cancel = _Method(AsyncClient.cancel)
-    accept = _Method(AsyncClient.accept)
-    reject = _Method(AsyncClient.reject)
-    job_poses = _Method(AsyncClient.job_poses)
-    picture = _Method(AsyncClient.picture)
-    follow = _Method(AsyncClient.follow)
+    put_venue = Call(AsyncClient.put_venue)
+    patch_venue = Call(AsyncClient.patch_venue)
+    tagged_venue = Call(AsyncClient.tagged_venue)
+    venue = Call(AsyncClient.venue)
+    venues = Call(AsyncClient.venues)
+    delete_venue = Call(AsyncClient.delete_venue)
+    venue_health = Call(AsyncClient.venue_health)
+    history = Call(AsyncClient.history)
+    restore = Call(AsyncClient.restore)
+    venue_poses = Call(AsyncClient.venue_poses)
+    venue_events = Stream(AsyncClient.venue_events)
+    snapshot = Call(AsyncClient.snapshot)
+    calibrate = Call(AsyncClient.calibrate)
+    fit_field = Call(AsyncClient.fit_field)
+    job = Call(AsyncClient.job)
+    jobs = Call(AsyncClient.jobs)
+    again = Call(AsyncClient.again)
+    delete_job = Call(AsyncClient.delete_job)
+    cancel = Call(AsyncClient.cancel)
+    accept = Call(AsyncClient.accept)
+    reject = Call(AsyncClient.reject)
+    job_poses = Call(AsyncClient.job_poses)
+    picture = Call(AsyncClient.picture)
+    follow = Call(AsyncClient.follow)
 
 
 def _connection(url: str, api_key: str | None) -> dict[str, Any]:

@@ -2,10 +2,9 @@
 
 import {call, Refused, signed} from "./page.js";
 import {objection, sizeOf} from "./frames.js";
+import {drawn, Sighting} from "./sighting.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 const FEWEST = 4;
-const LOUPE = {side: 200, reach: 25};
 const PAUSE = 250;
 const most = Number(document.getElementById("limits").dataset.bytes);
 const pitchForm = document.getElementById("pitch");
@@ -13,13 +12,6 @@ const createButton = document.getElementById("create");
 const missing = document.getElementById("missing");
 const cameras = [];
 let plan = null;
-
-function drawn(name, attributes, inside) {
-  const element = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  if (inside) inside.append(element);
-  return element;
-}
 
 function complain(place, text) {
   place.textContent = text || "";
@@ -317,89 +309,6 @@ function residual(point) {
   if (!point) return "–";
   const doubt = point.looks_like ? `, rather ${point.looks_like}` : point.doubted ? ", not it" : "";
   return point.residual_px === null ? "out of sight" : `${point.residual_px.toFixed(1)} px${doubt}`;
-}
-
-/** The frame that points are clicked in: what was clicked, the field as the pose has it, a loupe, a cross for keys. */
-class Sighting {
-  constructor(camera) {
-    this.camera = camera;
-    this.box = camera.one(".sighting");
-    this.canvas = camera.one("[data-frame]");
-    this.marks = camera.one("[data-marks]");
-    this.loupe = camera.one("[data-loupe]");
-    this.box.addEventListener("pointermove", (event) => this.aim(this.pixel(event)));
-    this.box.addEventListener("pointerleave", () => { this.loupe.hidden = true; });
-    this.box.addEventListener("click", (event) => camera.set(this.pixel(event)));
-    this.box.addEventListener("keydown", (event) => this.onKey(event));
-  }
-
-  async show(file, [width, height]) {
-    this.bitmap = await createImageBitmap(file, {imageOrientation: "none"});
-    this.canvas.width = Math.min(width, 1920);
-    this.canvas.height = Math.round((height * this.canvas.width) / width);
-    this.canvas.getContext("2d").drawImage(this.bitmap, 0, 0, this.canvas.width, this.canvas.height);
-    this.marks.setAttribute("viewBox", `-0.5 -0.5 ${width} ${height}`);
-    this.cross = [width / 2, height / 2];
-    this.unit = width / 400;
-  }
-
-  /** Where in the frame, whose pixel centres are at integers. */
-  pixel(event) {
-    const rect = this.canvas.getBoundingClientRect();
-    const place = (value, start, extent, size) => Math.round(10 * (((value - start) / extent) * size - 0.5)) / 10;
-    return [place(event.clientX, rect.left, rect.width, this.bitmap.width), place(event.clientY, rect.top, rect.height, this.bitmap.height)];
-  }
-
-  aim([x, y]) {
-    if (!this.bitmap) return;
-    this.cross = [x, y];
-    this.loupe.hidden = false;
-    const context = this.loupe.getContext("2d");
-    const {side, reach} = LOUPE;
-    context.imageSmoothingEnabled = false;
-    context.fillRect(0, 0, side, side);
-    context.drawImage(this.bitmap, x + 0.5 - reach, y + 0.5 - reach, 2 * reach, 2 * reach, 0, 0, side, side);
-    context.strokeStyle = "#fff";
-    context.beginPath();
-    for (const [a, b, c, d] of [[side / 2, 0, side / 2, side], [0, side / 2, side, side / 2]]) {
-      context.moveTo(a, b);
-      context.lineTo(c, d);
-    }
-    context.stroke();
-    // Out of the way of what it shows.
-    this.loupe.classList.toggle("left", x > this.bitmap.width / 2);
-    this.drawCross();
-  }
-
-  onKey(event) {
-    const steps = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
-    if (event.key === "Enter") this.camera.set(this.cross.map((value) => Math.round(value * 10) / 10));
-    else if (event.key in steps) {
-      const far = event.shiftKey ? 50 : 1;
-      const last = [this.bitmap.width - 1, this.bitmap.height - 1];
-      this.aim(this.cross.map((value, axis) => Math.min(last[axis], Math.max(0, value + far * steps[event.key][axis]))));
-    } else return;
-    event.preventDefault();
-  }
-
-  drawCross() {
-    this.marks.querySelector(".cross")?.remove();
-    const [x, y] = this.cross;
-    drawn("path", {class: "cross", d: `M${x - 4 * this.unit} ${y}h${8 * this.unit}M${x} ${y - 4 * this.unit}v${8 * this.unit}`}, this.marks);
-  }
-
-  draw(points, answer) {
-    this.marks.replaceChildren();
-    if (answer) for (const line of answer.lines) drawn("polyline", {class: "expected", points: line.map((place) => place.join(",")).join(" ")}, this.marks);
-    for (const {name, pixel} of points) {
-      const at = answer ? answer.asked.findIndex((point) => point.name === name) : -1;
-      const expected = at >= 0 ? answer.expected[at] : null;
-      const doubted = at >= 0 && answer.result && answer.result.points[at].doubted;
-      if (expected) drawn("line", {class: "residual", x1: pixel[0], y1: pixel[1], x2: expected[0], y2: expected[1]}, this.marks);
-      const mark = drawn("circle", {class: doubted ? "click doubted" : "click", cx: pixel[0], cy: pixel[1], r: 2 * this.unit}, this.marks);
-      drawn("title", {}, mark).textContent = name;
-    }
-  }
 }
 
 // The end

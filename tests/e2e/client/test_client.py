@@ -181,7 +181,7 @@ def test_whatever_a_name_in_an_event_is_made_of_the_event_arrives_as_it_was(monk
             return [event async for _, event in client.venue_events("v")]
 
     with Client("http://esc") as client:
-        monkeypatch.setattr(client._calls, "http", httpx.Client(**answered(piecemeal)))
+        monkeypatch.setattr(client.calls, "http", httpx.Client(**answered(piecemeal)))
         assert [event for _, event in client.venue_events("v")] == events
     assert asyncio.run(told()) == events
 
@@ -196,7 +196,7 @@ def test_who_takes_time_over_an_event_does_not_take_the_service_for_away(monkeyp
 
     streams = [breaks_off(), iter([stream_of(DELETED)])]
     with Client("http://esc") as client:
-        monkeypatch.setattr(client._calls, "http", httpx.Client(**answered(lambda: streams.pop(0))))
+        monkeypatch.setattr(client.calls, "http", httpx.Client(**answered(lambda: streams.pop(0))))
         told = []
         for _, event in client.venue_events("v", patience_s=0.1):
             told.append(event)
