@@ -19,11 +19,12 @@ from models.training.data.pool import Pool
 from models.training.evaluate import rendered
 from models.training.network.export import export, load
 from models.training.network.unet import LEAK, PAPER
+from models.training.pitches.crops import CROP_SIZE
 from models.training.train import Budget, Recipe, Training, train
 from worker.calibration.see.segmentation import Segmenter
 
 FOLDER = Path("runs/ablation")
-STEPS, BATCH, SIZE_PX, MADE_PX = 2000, 6, 224, 288
+STEPS, BATCH, SIZE_PX = 2000, 6, 224
 GAMMA = 1.0
 SEED, KEPT = 1, 4096
 # Seed of worlds that neither training nor the test draws.
@@ -59,7 +60,7 @@ def trained(steps: int, workers: int, threads: int, device: torch.device) -> lis
             training.load()
     step = trainings[0].step
     if step < steps:
-        makers = Makers(MADE_PX, pitches=1.0, seed=SEED + step, workers=workers)
+        makers = Makers(CROP_SIZE, pitches=1.0, seed=SEED + step, workers=workers)
         train(trainings, Pool(makers, device, KEPT, SIZE_PX, repeats=3.0, seed=SEED + step), BATCH)
     return [training.checkpoint for training in trainings]
 

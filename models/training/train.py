@@ -32,6 +32,7 @@ from models.training.network.export import export
 from models.training.network.quantise import quantise
 from models.training.network.served import load_served
 from models.training.network.unet import LEAK, PAPER, SERVED, Shape, UNet, focal_loss
+from models.training.pitches.crops import CROP_SIZE
 
 EPOCH_STEPS = 100
 WARM_UP_EPOCHS = 2
@@ -256,7 +257,9 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--batch", type=int, default=6)
     parser.add_argument("--size", type=int, default=224, help="pixels of a crop, a multiple of 32")
     parser.add_argument("--pitches", type=float, default=0.34, help="share of rendered pitches; the rest are courts")
-    parser.add_argument("--made", type=int, default=288, help="pixels of a crop as it is made; windows of it are shown")
+    parser.add_argument(
+        "--made", type=int, default=CROP_SIZE, help="pixels of a crop as it is made; windows of it are shown"
+    )
     parser.add_argument("--workers", type=int, default=1, help="processes that render")
     parser.add_argument("--kept", type=int, default=4096, help="crops kept where the training runs, 5 bytes a pixel")
     parser.add_argument("--repeats", type=float, default=4.0, help="how often a crop is shown; slows down to that")
