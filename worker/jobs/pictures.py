@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED
 from worker.calibration.draw import layers, mosaic
 from worker.calibration.draw.overlays import overlay
-from worker.calibration.draw.viewpoint import viewpoint
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
+from worker.calibration.stitch.views import ViewChoice, chosen_view
 from worker.jobs.reading import Picture, jpeg, png
 
 # Of the frames that layers are laid over: a wide screen. The overlays have the size of the frames.
@@ -75,7 +75,7 @@ def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.uint8]])
 
 def _stitched(scene: Scene) -> dict[str, bytes]:
     """One view by the new poses, where one camera hands over to another in it, and the view by the stored poses."""
-    view = viewpoint(*scene.found, PREVIEW_WIDTH)
+    view = chosen_view(*scene.found, ViewChoice(width=PREVIEW_WIDTH))
     # Somebody may wait, and each of them keeps a core busy.
     with ThreadPoolExecutor(2) as both:
         after, before = both.map(
