@@ -1,0 +1,1 @@
+"""Cameras that shake while they film: where each of them was when each frame of a clip was taken."""

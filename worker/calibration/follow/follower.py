@@ -1,0 +1,172 @@
+"""Follows the cameras of an installation through a clip: frame by frame the lines, over time the filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from worker.calibration.finish.refinement import SEARCH_PX, Sight, refine
+from worker.calibration.finish.uncertainty import Sigma
+from worker.calibration.follow.lines import FollowedLines
+from worker.calibration.follow.motion_filter import GATE, State, Step, smoothed
+from worker.calibration.records import CalibrationError
+from worker.calibration.scene.camera import Array, Camera, Frame
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.motion import moved
+from worker.calibration.see.contrast import Channels
+
+FIRST_SEARCH_PX = (28.0, *SEARCH_PX)
+"""Round by round, in pixels of a 4K frame: the first frame may be taken at the end of a swing."""
+
+LEAST_AGREEMENT = 0.3
+"""Of the lines that the first frame has to show where the cameras are found, beyond what chance would."""
+
+How = Literal["measured", "coasted", "refused"]
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A camera when one frame was taken.
+
+    `how`: whether its lines were `measured`, or it went on as it went because they were not looked for or not seen
+    (`coasted`), or because they contradicted all that was known (`refused`). `motion_covariance` (6, 6) of turn (rad)
+    and shift (m): how sure the motion since the reference is; `covariance`: with how sure the reference is.
+    """
+
+    camera: Camera
+    how: How
+    motion_covariance: Array
+    covariance: Array
+
+    @property
+    def sigma(self) -> Sigma:
+        """How sure the pose is."""
+        return Sigma.from_covariance(self.covariance)
+
+    @property
+    def motion_sigma(self) -> Sigma:
+        """How sure its motion is."""
+        return Sigma.from_covariance(self.motion_covariance)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """All cameras when the frames of this number, from 0, were taken."""
+
+    number: int
+    cameras: Sequence[Followed]
+
+
+class Follower:
+    """Takes the frames of a clip one after the other, and says where the cameras were `look_ahead` frames before.
+
+    `cameras`: as stored, at most a fraction of a degree off; `first`: the first frames of the clip, by camera.
+    `every`: lines are measured in every so many-th frame. Raises `CalibrationError` if the first frame of a camera does
+    not show its lines.
+    """
+
+    def __init__(
+        self,
+        pitch: Field,
+        cameras: Sequence[Camera],
+        first: Mapping[str, Frame],
+        frames_per_second: float,
+        every: int = 1,
+        look_ahead: int = 0,
+    ) -> None:
+        references = _references(pitch, cameras, first)
+        self._tracks = [_Track(pitch, *each, first[each[0].id]) for each in references]
+        self._seconds = 1 / frames_per_second
+        self._every = every
+        self._look_ahead = look_ahead
+        self._taken = 1
+        self._told = 0
+
+    @property
+    def references(self) -> list[Camera]:
+        """The cameras where the first frame shows them: the ones that motion is counted from."""
+        return [track.lines.reference for track in self._tracks]
+
+    def see(self, frames: Mapping[str, Frame]) -> Moment | None:
+        """Take the next frames; a camera that has none coasts. None as long as there is not enough to look ahead."""
+        looked = self._taken % self._every == 0
+        for track in self._tracks:
+            track.see(frames.get(track.lines.reference.id) if looked else None, self._seconds)
+        self._taken += 1
+        return self._next() if self._taken - self._told > self._look_ahead else None
+
+    def rest(self) -> list[Moment]:
+        """What is left to tell after the last frames."""
+        return [self._next() for _ in range(self._taken - self._told)]
+
+    def _next(self) -> Moment:
+        self._told += 1
+        return Moment(self._told - 1, [track.oldest() for track in self._tracks])
+
+
+class _Track:
+    """One camera on its way."""
+
+    def __init__(self, pitch: Field, reference: Camera, covariance: Array, first: Frame) -> None:
+        self.lines = FollowedLines(pitch, reference)
+        self._covariance = covariance
+        seen = self.lines.sighted(first, reference)
+        if seen is None:
+            raise _not_seen(reference)
+        self.lines.learn(seen, reference)
+        self._last = State.at_reference(np.linalg.inv(self.lines.observed(seen).information))
+        self._steps = [Step(0.0, self._last, self._last)]
+        self._how: list[How] = ["measured"]
+
+    def see(self, frame: Frame | None, seconds: float) -> None:
+        """Take the next frame, so long after the one before; None: it is not looked at, or not there."""
+        expected = self._last.after(seconds)
+        how, self._last = self._known(frame, expected)
+        self._steps.append(Step(seconds, expected, self._last))
+        self._how.append(how)
+
+    def oldest(self) -> Followed:
+        """The oldest moment that has not been told, as everything since then has it; it is forgotten then."""
+        state, how = smoothed(self._steps)[0], self._how[0]
+        del self._steps[0], self._how[0]
+        motion = state.change_covariance
+        return Followed(moved(self.lines.reference, state.change), how, motion, self._covariance + motion)
+
+    def _known(self, frame: Frame | None, expected: State) -> tuple[How, State]:
+        if frame is None:
+            return "coasted", expected
+        seen = self.lines.sighted(frame, moved(self.lines.reference, expected.change))
+        if seen is None:
+            return "coasted", expected
+        observed = self.lines.observed(seen)
+        if expected.surprise(observed) > GATE:
+            return "refused", expected
+        known = expected.with_observed(observed)
+        self.lines.learn(seen, moved(self.lines.reference, known.change))
+        return "measured", known
+
+
+def _references(
+    pitch: Field, cameras: Sequence[Camera], first: Mapping[str, Frame]
+) -> list[tuple[Camera, Array]]:
+    """The cameras where their first frames show them, and the covariances (6, 6) of their poses."""
+    responses = [np.zeros(first[camera.id].shape[:2], np.float32) for camera in cameras]
+    sight = Sight([Channels([first[camera.id]]) for camera in cameras], responses)
+    found = []
+    for one in refine(pitch, cameras, sight, 0.5, searches_px=FIRST_SEARCH_PX).each:
+        if one.covariance is None or one.evidence.agreement < LEAST_AGREEMENT:
+            raise _not_seen(one.camera)
+        found.append((one.camera, one.covariance))
+    return found
+
+
+def _not_seen(camera: Camera) -> CalibrationError:
+    return CalibrationError(
+        camera.id,
+        "lines-not-seen",
+        f"The first frame of camera {camera.id} does not show its lines near where its stored pose expects them; "
+        "calibrate the venue with a frame of this clip first.",
+    )

@@ -1,0 +1,124 @@
+"""What the painted lines of one frame say of the pose of a camera that is almost where it is expected. No network.
+
+Lens, paint and ground put each piece of line a little beside where the model has it, frame after frame by as much. That
+is learned, piece by piece, while the clip runs: otherwise the pose would jump whenever a player hides some of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.finish.normal_equations import CLUSTER_POINTS
+from worker.calibration.finish.robust import huber_weights, tukey_weights
+from worker.calibration.follow.motion_filter import Observed
+from worker.calibration.scene.camera import Array, Camera, Frame
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved, pixel_slopes
+from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.see.contrast import Channels
+from worker.calibration.see.line_measurement import measure_lines
+
+APART_PX = 12.0
+"""Pieces of line are looked at about so far apart, in pixels of a 4K frame."""
+SEARCH_PX = 8.0
+"""How far from where it is expected a line is looked for, in pixels of a 4K frame."""
+FEWEST_PIECES = 40
+"""With fewer pieces of line a frame says nothing."""
+BESIDE_PX = 1.0
+"""How far a piece of line may lie beside its place for good, one standard deviation, in pixels of a 4K frame."""
+NOISE_PX = 0.08
+"""Least error of the measurement of a piece, in pixels of the frame."""
+PICTURE_PX = 0.02
+"""Error that all pieces of a frame have in common: what a codec and the grid of pixels do to every line alike."""
+PRIOR_RAD, PRIOR_M = 0.03, 1.0
+"""Holds the directions of which lines say nothing; much wider than anything that is followed."""
+STEPS = 3
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """Pieces of line as one frame shows them, M of them.
+
+    `expected`: the camera they were looked for with; `piece` (M,): which of them; `offset` (M,) px: how far each is
+    from where that camera expects it, and `slope` (M, 6): how that expectation moves with its pose.
+    """
+
+    expected: Camera
+    piece: NDArray[np.intp]
+    offset: Array
+    slope: Array
+
+
+class FollowedLines:
+    """The lines that one camera is followed by; `reference`: the camera that changes are counted from."""
+
+    def __init__(self, pitch: Field, reference: Camera) -> None:
+        self.reference = reference
+        lines = pitch.line_points()
+        scale = reference.intrinsics.relative_size
+        chosen = SeenLines.from_camera(lines, reference).thinned(APART_PX * scale).index
+        self._pieces = lines[chosen]
+        self._patch = chosen // CLUSTER_POINTS
+        self._search_px = SEARCH_PX * scale
+        self._beside_before = (BESIDE_PX * scale) ** -2
+        self._beside_weight = np.full(len(chosen), self._beside_before)
+        self._beside_sum = np.zeros(len(chosen))
+        width, height = reference.intrinsics.size
+        self._no_network = np.zeros((height, width), np.float32)
+
+    def sighted(self, frame: Frame, expected: Camera) -> Sighting | None:
+        """The pieces that a frame shows near where a camera expects them; None where they are too few."""
+        found = measure_lines(self._pieces, expected, Channels([frame]), self._no_network, self._search_px)
+        points = found.points.position
+        offset = np.sum((found.pixel - expected.project(points)) * found.normal, axis=1)
+        slope = np.einsum("mij,mi->mj", pixel_slopes(expected, points), found.normal)
+        good = np.isfinite(offset) & np.isfinite(slope).all(axis=1)
+        if good.sum() < FEWEST_PIECES:
+            return None
+        return Sighting(expected, found.index[good], offset[good], slope[good])
+
+    def observed(self, seen: Sighting) -> Observed:
+        """What they say of the pose: robust least squares, with what pieces of one patch err together."""
+        variance = NOISE_PX**2 + 1 / self._beside_weight[seen.piece]
+        rows, values = seen.slope / np.sqrt(variance)[:, None], self._left(seen) / np.sqrt(variance)
+        prior = np.diag(np.repeat([PRIOR_RAD, PRIOR_M], 3) ** -2.0)
+        change = np.zeros(POSE_NUMBERS)
+        for weigh in (*STEPS * [huber_weights], *STEPS * [tukey_weights]):
+            weight = weigh(values - rows @ change)
+            information = (rows * weight[:, None]).T @ rows
+            change = np.linalg.solve(information + prior, rows.T @ (weight * values))
+        spread = self._spread(seen, rows * (weight * (values - rows @ change))[:, None])
+        together = float(np.trace(np.linalg.solve(information + prior, spread))) / POSE_NUMBERS
+        known = information / max(1.0, together)
+        of_picture = np.diag(np.repeat([PICTURE_PX / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
+        return Observed(
+            change_between(self.reference, moved(seen.expected, change)),
+            np.linalg.solve(np.eye(POSE_NUMBERS) + known @ of_picture, known),
+        )
+
+    def learn(self, seen: Sighting, now: Camera) -> None:
+        """Keep how far beside their places the pieces lie when the camera is where it is `now` known to be."""
+        left = seen.offset - seen.slope @ change_between(seen.expected, now)
+        known = left - self._beside[seen.piece]
+        counted = tukey_weights(known / np.sqrt(NOISE_PX**2 + 1 / self._beside_weight[seen.piece])) > 0
+        which = seen.piece[counted]
+        self._beside_weight[which] += NOISE_PX**-2
+        self._beside_sum[which] += left[counted] * NOISE_PX**-2
+
+    @property
+    def _beside(self) -> Array:
+        """How far, in px along its normal, each piece lies beside its place."""
+        return self._beside_sum / self._beside_weight
+
+    def _left(self, seen: Sighting) -> Array:
+        return seen.offset - self._beside[seen.piece]
+
+    def _spread(self, seen: Sighting, pulls: Array) -> Array:
+        """How the sum of pulls (M, 6) varies, (6, 6), those of a patch taken as one."""
+        patches, patch = np.unique(self._patch[seen.piece], return_inverse=True)
+        sums = np.zeros((len(patches), POSE_NUMBERS))
+        np.add.at(sums, patch, pulls)
+        return sums.T @ sums

@@ -1,0 +1,120 @@
+"""A Kalman filter of one camera's pose that expects it to go on as it goes, and its smoother (Rauch, Tung, Striebel).
+
+A state (12,) is a change (6,) of the pose beside a reference (see `scene.motion`) and how fast it changes, per second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from worker.calibration.scene.camera import Array
+from worker.calibration.scene.motion import POSE_NUMBERS
+
+TURNING_RAD_S2, SHIFTING_M_S2 = np.radians(15.0), 1.0
+"""Accelerations, one standard deviation: a mast in wind, 0.3 degrees at 0.5 Hz and a tenth of that at 3 Hz and more."""
+FIRST_RAD_S, FIRST_M_S = np.radians(3.0), 0.2
+"""How fast a camera may move when the clip begins."""
+GATE = 38.3
+"""Squared innovations in standard deviations that six numbers pass by chance once in a million (chi-square)."""
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What one frame says: `change` (6,) of the pose from its reference, and the `information` (6, 6) on it.
+
+    Directions of which nothing is known have no information, whatever `change` says of them.
+    """
+
+    change: Array
+    information: Array
+
+
+@dataclass(frozen=True)
+class State:
+    """What is known at one moment: `mean` (12,), `covariance` (12, 12)."""
+
+    mean: Array
+    covariance: Array
+
+    @classmethod
+    def at_reference(cls, covariance: Array) -> State:
+        """A camera that is where its reference is, as sure (6, 6) as that was seen, and moves nobody knows how."""
+        speed = np.diag(np.repeat([FIRST_RAD_S, FIRST_M_S], 3) ** 2)
+        return cls(np.zeros(2 * POSE_NUMBERS), np.pad(covariance, (0, POSE_NUMBERS)) + np.pad(speed, (POSE_NUMBERS, 0)))
+
+    @property
+    def change(self) -> Array:
+        """Of the pose, (6,)."""
+        return self.mean[:POSE_NUMBERS]
+
+    @property
+    def change_covariance(self) -> Array:
+        """Of that, (6, 6)."""
+        return self.covariance[:POSE_NUMBERS, :POSE_NUMBERS]
+
+    def after(self, seconds: float) -> State:
+        """What is to be expected later."""
+        onward = _onward(seconds)
+        return State(onward @ self.mean, onward @ self.covariance @ onward.T + _unforeseen(seconds))
+
+    def surprise(self, observed: Observed) -> float:
+        """Squared innovation in its own standard deviations: about as much as numbers were observed, if all is well."""
+        away, weighted = self._innovation(observed)
+        return float(away @ weighted)
+
+    def with_observed(self, observed: Observed) -> State:
+        """What is known when a frame has been seen as well."""
+        _, weighted = self._innovation(observed)
+        spread = self.covariance[:, :POSE_NUMBERS]
+        gain = spread @ np.linalg.solve(self._unknown_part(observed), observed.information)
+        kept = np.eye(len(self.mean)) - np.pad(gain, ((0, 0), (0, POSE_NUMBERS)))
+        covariance = kept @ self.covariance
+        return State(self.mean + spread @ weighted, (covariance + covariance.T) / 2)
+
+    def _innovation(self, observed: Observed) -> tuple[Array, Array]:
+        """How far (6,) the frame is from what was expected, and that weighted with the inverse of its covariance."""
+        away = observed.change - self.change
+        return away, np.linalg.solve(self._unknown_part(observed), observed.information @ away)
+
+    def _unknown_part(self, observed: Observed) -> Array:
+        """(6, 6) 1 + information x covariance: with it no information has to be inverted, of which there may be none."""
+        return np.eye(POSE_NUMBERS) + observed.information @ self.change_covariance
+
+
+@dataclass(frozen=True)
+class Step:
+    """One moment of a filter: what was `expected` and what was `known` once the frame had been seen.
+
+    `seconds`: since the moment before.
+    """
+
+    seconds: float
+    expected: State
+    known: State
+
+
+def smoothed(steps: Sequence[Step]) -> list[State]:
+    """What is known of each moment when all of them have been seen."""
+    known = [steps[-1].known]
+    for before, later in zip(reversed(steps[:-1]), reversed(steps[1:]), strict=True):
+        gain = np.linalg.solve(later.expected.covariance, _onward(later.seconds) @ before.known.covariance).T
+        mean = before.known.mean + gain @ (known[-1].mean - later.expected.mean)
+        covariance = before.known.covariance + gain @ (known[-1].covariance - later.expected.covariance) @ gain.T
+        known.append(State(mean, (covariance + covariance.T) / 2))
+    return known[::-1]
+
+
+def _onward(seconds: float) -> Array:
+    onward = np.eye(2 * POSE_NUMBERS)
+    onward[:POSE_NUMBERS, POSE_NUMBERS:] = seconds * np.eye(POSE_NUMBERS)
+    return onward
+
+
+def _unforeseen(seconds: float) -> Array:
+    """Covariance (12, 12) of what accelerations that stay for the whole time and then change do to a state."""
+    variance = np.diag(np.repeat([TURNING_RAD_S2, SHIFTING_M_S2], 3) ** 2)
+    shape = np.array([[seconds**4 / 4, seconds**3 / 2], [seconds**3 / 2, seconds**2]])
+    return np.kron(shape, variance)
