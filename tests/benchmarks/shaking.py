@@ -9,17 +9,22 @@ only. Players walk through it, and each frame has noise of its own and a JPEG's 
 from __future__ import annotations
 
 import argparse
+import pickle
 import time
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 
-from tests.demo.render import FIELD, HERE, cameras
+from tests.benchmarks.scenes import as_built
+from tests.demo.render import FIELD, HERE, cameras, outdated
 from worker.calibration.follow.follower import Follower, Moment
-from worker.calibration.scene.camera import Array, Camera, Frame, Pose, rotation_angles_deg, rotation_matrices, rotation_vectors
+from worker.calibration.scene.camera import Array, Camera, Frame, inside
 from worker.calibration.scene.motion import change_between, moved
+from worker.calibration.stitch.moving import MovingPanorama
 from worker.calibration.stitch.views import View, ViewChoice, chosen_view
 
 SWING_DEG, SWING_HZ = 0.3, 0.5
@@ -32,6 +37,14 @@ PLAYERS, PLAYER_M, PLAYER_M_S = 16, (0.6, 1.85), 3.0
 # The map from a shaken frame to the still picture is computed at every n-th pixel.
 STEP_PX = 8
 FAR_M = 300.0
+# Frames relative to 4K, and columns of the panorama.
+SIZES = {"1080p": (0.5, 1920), "4k": (1.0, 3840)}
+FOLDER = Path("build/shaking")
+# Where a camera counts this much in the view, the far line is its alone; how it is read across itself.
+SURE = 0.98
+OFFSETS_PX, ALONG_PX = np.arange(-6, 6.25, 0.25), (-4.0, -2.0, 0.0, 2.0, 4.0)
+# A profile that differs more from the usual one, as a part of its variance, is that of a player.
+UNLIKE = 0.2
 
 
 @dataclass(frozen=True)
@@ -70,8 +83,8 @@ class Clip:
         """Where it is when a frame is taken."""
         return moved(self.still, self._swing.change(number / FRAMES_PER_SECOND))
 
-    def frame(self, number: int) -> Frame:
-        """What it shows then."""
+    def packed(self, number: int) -> bytes:
+        """What it shows then, a JPEG."""
         now = self.camera(number)
         behind = self._behind(now)
         source = self.still.project(behind).astype(np.float32)
@@ -82,8 +95,7 @@ class Clip:
         self._walk(shaken, now, number)
         down, right = self._rng.integers(0, 64, 2)
         noisy = np.clip(shaken + self._noise[down : down + height, right : right + width, None], 0, 255).astype(np.uint8)
-        packed = cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
-        return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), np.uint8)
+        return cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
 
     def _behind(self, now: Camera) -> Array:
         """What of the world is behind the pixels of the grid: the ground, or what is far away."""
@@ -109,6 +121,84 @@ class Clip:
                 cv2.rectangle(frame, box[0], box[1], shirt.tolist(), -1)
 
 
+@dataclass(frozen=True)
+class Run:
+    """One way to follow: lines in every so many-th frame, the smoother so many frames ahead."""
+
+    every: int
+    look_ahead: int
+
+
+@dataclass
+class Told:
+    """What a follower said of all frames, and what it took: core milliseconds a frame and camera."""
+
+    run: Run
+    moments: list[Moment]
+    follower: Follower
+    milliseconds: float
+
+
+RUNS = (Run(1, 0), Run(1, 25), Run(2, 25), Run(5, 25))
+
+
+class FarLine:
+    """The far touchline in a panorama: where it lies in the view, by truth and by what the picture shows.
+
+    Cameras that are followed are told; None: as if they stood still.
+    """
+
+    def __init__(self, view: View, panorama: MovingPanorama, references: list[Camera]) -> None:
+        self._view, self._panorama, self._references = view, panorama, references
+        points = FIELD.lift(np.stack([np.linspace(-48, 48, 97), np.full(97, FIELD.width / 2)], axis=1))
+        self._weights = [part.weight for part in panorama.at(references).parts]
+        place = view.project(points)
+        column, row = np.rint(place).astype(int).T
+        shown = np.array([weight[row, column] for weight in self._weights])
+        self._camera, sure = shown.argmax(axis=0), shown.max(axis=0) > SURE
+        self._points, self._place, self._camera = points[sure], place[sure], self._camera[sure]
+        beyond = view.project(self._points + [0.0, 0.1, 0.0]) - self._place
+        self._across = beyond / np.linalg.norm(beyond, axis=1, keepdims=True)
+
+    def by_truth(self, true: list[Camera], told: list[Camera]) -> Array:
+        """How far (N,) px across itself the line lies from its place in the view."""
+        off = np.empty(len(self._points))
+        for number, (real, believed) in enumerate(zip(true, told, strict=True)):
+            its = self._camera == number
+            rays = believed.rays(real.project(self._points[its]))
+            down = (self._points[its, 2] - believed.pose.position[2]) / rays[:, 2]
+            shown = self._view.project(believed.pose.position + rays * down[:, None])
+            off[its] = np.sum((shown - self._place[its]) * self._across[its], axis=1)
+        return off
+
+    def profiles(self, frames: Mapping[str, Frame], told: list[Camera]) -> Array:
+        """Brightness (N, S) across the line as the panorama of the frames shows it, around its place in the view."""
+        along = np.stack([-self._across[:, 1], self._across[:, 0]], axis=1)
+        parts = self._panorama.at(told).parts
+        profile = np.zeros((len(self._points), len(OFFSETS_PX)))
+        for aside in ALONG_PX:
+            start = self._place + aside * along
+            where = (start[:, None] + OFFSETS_PX[:, None] * self._across[:, None]).astype(np.float32)
+            for number, part in enumerate(parts):
+                its = self._camera == number
+                source = cv2.remap(part.source, where[its], None, cv2.INTER_LINEAR)
+                green = np.ascontiguousarray(frames[part.camera][..., 1]).astype(np.float32)
+                profile[its] += cv2.remap(green, source, None, cv2.INTER_LINEAR)
+        return profile / len(ALONG_PX)
+
+
+def moves(profiles: Array) -> Array:
+    """How far (T, N) px profiles (T, N, S) lie from their medians over time; NaN where something else is seen."""
+    usual = np.median(profiles, axis=0)
+    slope = np.gradient(usual, OFFSETS_PX, axis=1)
+    off = profiles - usual
+    off -= off.mean(axis=2, keepdims=True)
+    slope -= slope.mean(axis=1, keepdims=True)
+    found = -np.sum(off * slope, axis=2) / np.sum(slope**2, axis=1)
+    left = off + found[..., None] * slope
+    return np.where(np.sum(left**2, axis=2) < UNLIKE * np.sum((usual - usual.mean(axis=1, keepdims=True)) ** 2, axis=1), found, np.nan)
+
+
 def clips(scale: float, seed: int = 19) -> list[Clip]:
     """Those of the demo's cameras, in frames `scale` times as large as 4K."""
     rng = np.random.default_rng(seed)
@@ -118,3 +208,118 @@ def clips(scale: float, seed: int = 19) -> list[Clip]:
         picture = np.asarray(cv2.imread(str(HERE / f"{camera.id}.jpg")), np.uint8)
         made.append(Clip(camera.with_lens(lens), cv2.resize(picture, lens.size, interpolation=cv2.INTER_AREA), rng))
     return made
+
+
+def packed_frames(made: list[Clip], count: int, path: Path) -> list[dict[str, bytes]]:
+    """JPEGs of the frames, rendered before or now: they take longer to render than to follow."""
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(pickle.dumps([{clip.still.id: clip.packed(number) for clip in made} for number in range(count)]))
+    return pickle.loads(path.read_bytes())
+
+
+def unpacked(packed: dict[str, bytes]) -> dict[str, Frame]:
+    """The frames of a moment."""
+    return {
+        name: np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), np.uint8)
+        for name, jpeg in packed.items()
+    }
+
+
+def followed(made: list[Clip], packed: list[dict[str, bytes]], run: Run, lens: str) -> Told:
+    """The clip from its first frame to its last."""
+    stored = [stored_camera(clip.still, number, lens) for number, clip in enumerate(made)]
+    follower = Follower(FIELD, stored, unpacked(packed[0]), FRAMES_PER_SECOND, run.every, run.look_ahead)
+    moments, spent = [], 0.0
+    for each in packed[1:]:
+        frames = unpacked(each)
+        begun = time.process_time()
+        moment = follower.see(frames)
+        spent += time.process_time() - begun
+        moments += [] if moment is None else [moment]
+    return Told(run, moments + follower.rest(), follower, 1000 * spent / (len(packed) - 1) / len(made))
+
+
+def stored_camera(camera: Camera, number: int, lens: str) -> Camera:
+    """As the venue has it: a few centimetres and a tenth of a degree off; its lens `exact`, or as a `usual` one is."""
+    rng = np.random.default_rng([20, number])
+    known = camera if lens == "exact" else as_built(camera, rng)
+    return known.with_pose(outdated(camera.pose, 0.05, 0.1, rng))
+
+
+def report(made: list[Clip], packed: list[dict[str, bytes]], told: Told, width: int) -> None:
+    """Print the row of one run."""
+    count = len(packed)
+    references = told.follower.references
+    view = chosen_view(FIELD, references, ViewChoice(width=width))
+    line = FarLine(view, MovingPanorama(FIELD, view, references), references)
+    true = [[clip.camera(number) for clip in made] for number in range(count)]
+    found = [[one.camera for one in moment.cameras] for moment in told.moments]
+    some = range(0, count, max(1, count // 50))
+    still, followed_ = (
+        rms_about_mean(np.array([line.by_truth(true[n], there[n]) for n in range(count)]))
+        for there in (count * [references], found)
+    )
+    shown = moves(np.array([line.profiles(unpacked(packed[n]), found[n]) for n in some]))
+    error = np.array(
+        [[change_between(a, b) for a, b in zip(*both, strict=True)] for both in zip(true, found, strict=True)]
+    )
+    about_mean = error - error.mean(axis=0)
+    sigma = np.array([[one.covariance for one in moment.cameras] for moment in told.moments])
+    motion_sigma = np.array([[one.motion_covariance for one in moment.cameras] for moment in told.moments])
+    how = Counter(one.how for moment in told.moments for one in moment.cameras)
+    print(
+        f"every {told.run.every}, look ahead {told.run.look_ahead}: {dict(how)}; {told.milliseconds:.0f} core ms a frame and camera\n"
+        f"  in the frames: {in_frames(made, true, count * [references]):.2f} px rms unfollowed, {in_frames(made, true, found):.3f} followed\n"
+        f"  far line in {width} columns: {still:.2f} px rms unfollowed, {followed_:.3f} followed by truth, "
+        f"{rms_about_mean(shown):.3f} as the picture shows it\n"
+        f"  pose: {pose_rms(error)}, error/sigma {ratio(error, sigma):.2f}\n"
+        f"  motion: {pose_rms(about_mean)}, error/sigma {ratio(about_mean, motion_sigma):.2f}",
+        flush=True,
+    )
+
+
+def in_frames(made: list[Clip], true: list[list[Camera]], told: list[list[Camera]]) -> float:
+    """How far lines lie from where cameras that are told expect them, about the mean of each place, px rms."""
+    squares = []
+    for number, clip in enumerate(made):
+        points = FIELD.line_points(2.0).position
+        points = points[inside(clip.still.project(points), clip.still.intrinsics.size, 40)]
+        off = np.array([real[number].project(points) - there[number].project(points) for real, there in zip(true, told, strict=True)])
+        squares.append(np.mean(np.sum((off - off.mean(axis=0)) ** 2, axis=-1)))
+    return float(np.sqrt(np.mean(squares)))
+
+
+def rms_about_mean(values: Array) -> float:
+    """Of values (T, N), each about its own mean over time; NaN counts for nothing."""
+    known = values[:, np.isfinite(values).any(axis=0)]
+    return float(np.sqrt(np.nanmean((known - np.nanmean(known, axis=0)) ** 2)))
+
+
+def pose_rms(error: Array) -> str:
+    """Of errors (..., 6) of poses."""
+    turn, shift = (np.sqrt(np.mean(np.sum(part**2, axis=-1))) for part in (error[..., :3], error[..., 3:]))
+    return f"{np.degrees(turn):.4f} degrees and {100 * shift:.2f} cm rms"
+
+
+def ratio(error: Array, covariance: Array) -> float:
+    """Rms of errors (..., 6) in their own standard deviations, all directions alike."""
+    return float(np.sqrt(np.mean(np.sum(error * np.linalg.solve(covariance, error[..., None])[..., 0], -1)) / 6))
+
+
+def main() -> None:
+    """Render the clip, follow it in every way, print the rows."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--size", choices=SIZES, default="1080p")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--lens", choices=("exact", "usual"), default="exact", help="whether the lenses are known exactly")
+    arguments = parser.parse_args()
+    scale, width = SIZES[arguments.size]
+    made, count = clips(scale), round(arguments.seconds * FRAMES_PER_SECOND)
+    packed = packed_frames(made, count, FOLDER / f"{arguments.size}-{count}.pickle")
+    for run in RUNS:
+        report(made, packed, followed(made, packed, run, arguments.lens), width)
+
+
+if __name__ == "__main__":
+    main()

@@ -94,15 +94,15 @@ def panorama(
     pitch: Field, view: View, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
 ) -> Panorama:
     """How the cameras' frames become one view. `lights` by camera; a camera that has none is taken as it is."""
-    points = view.behind(pitch, _every_nth_pixel(view.size))
+    points = view.behind(pitch, every_nth_pixel(view.size))
     pixels = [camera.project(points) for camera in cameras]
     qualities = np.stack(
         [
-            _every_pixel(quality(camera.intrinsics.size, at), view.size)
+            every_pixel(quality(camera.intrinsics.size, at), view.size)
             for camera, at in zip(cameras, pixels, strict=True)
         ]
     )
-    sources = [_every_pixel(at, view.size) for at in pixels]
+    sources = [every_pixel(at, view.size) for at in pixels]
     valid = np.stack([inside(at, camera.intrinsics.size) for camera, at in zip(cameras, sources, strict=True)])
     weights = seam_weights(np.where(valid, np.maximum(qualities, 1e-9), np.float32(0)))
     lights = lights or {}
@@ -129,17 +129,15 @@ def seam_weights(qualities: NDArray[np.float32]) -> NDArray[np.float32]:
     return weights
 
 
-def _every_nth_pixel(size: tuple[int, int]) -> Array:
-    """Positions (h, w, 2) of the centres of blocks of `GEOMETRY_STEP` pixels, one block more on each side."""
-    x, y = (GEOMETRY_STEP * (np.arange(-1, -(-extent // GEOMETRY_STEP) + 1) + 0.5) - 0.5 for extent in size)
+def every_nth_pixel(size: tuple[int, int], step: int = GEOMETRY_STEP) -> Array:
+    """Positions (h, w, 2) of the centres of blocks of `step` pixels, one block more on each side."""
+    x, y = (step * (np.arange(-1, -(-extent // step) + 1) + 0.5) - 0.5 for extent in size)
     return np.stack(np.meshgrid(x, y), axis=-1)
 
 
-def _every_pixel(values: NDArray[Any], size: tuple[int, int]) -> NDArray[np.float32]:
-    """Values (h, w[, 2]) at `_every_nth_pixel`, linearly interpolated to every pixel (height, width[, 2])."""
+def every_pixel(values: NDArray[Any], size: tuple[int, int], step: int = GEOMETRY_STEP) -> NDArray[np.float32]:
+    """Values (h, w[, 2]) at `every_nth_pixel`, linearly interpolated to every pixel (height, width[, 2])."""
     width, height = size
-    fine = cv2.resize(
-        values.astype(np.float32), None, fx=GEOMETRY_STEP, fy=GEOMETRY_STEP, interpolation=cv2.INTER_LINEAR
-    )
+    fine = cv2.resize(values.astype(np.float32), None, fx=step, fy=step, interpolation=cv2.INTER_LINEAR)
     dense = np.asarray(fine, np.float32)
-    return dense[GEOMETRY_STEP : GEOMETRY_STEP + height, GEOMETRY_STEP : GEOMETRY_STEP + width]
+    return dense[step : step + height, step : step + width]
