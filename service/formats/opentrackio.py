@@ -12,29 +12,90 @@ from __future__ import annotations
 import json
 import math
 import uuid
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from service.formats.lens import RADIAL, TANGENTIAL, Shot, product, transposed
+from service.wire.problems import Problem
 
 SENSOR_WIDTH_MM = 36.0
 # Camera axes from OpenCV's (x right, y down, z ahead) to x right, y ahead, z up.
 AHEAD_IS_Y = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
+# A second of timecode has no more.
+MOST_FRAMES = 120
 SOURCES = uuid.UUID("3d6b2a0e-7f3c-5c8f-9d2b-52b8f4a7c1e6")
 
 
+@dataclass(frozen=True)
+class Frame:
+    """Which frame of a clip a sample is of: its `number` from 0 at `rate` frames a second. `status`: of the tracking."""
+
+    number: int
+    rate: Fraction
+    status: str
+
+
 def write(shot: Shot) -> bytes:
-    """One sample."""
-    sample = {
+    """One sample of a camera that stands still: it names a pose, not a moment of a stream."""
+    return (json.dumps(_identified(_sample(shot)), indent=2) + "\n").encode()
+
+
+def write_frame(shot: Shot, frame: Frame) -> bytes:
+    """One sample of a clip, a line of JSON. Its timecode counts from 00:00:00:00 at the first frame, without drops.
+
+    The samples travel beside the video, whose frames they are of: nobody knows by a clock when those were taken.
+    """
+    moment = {
+        "tracker": {"status": frame.status},
+        "timing": {
+            "mode": "external",
+            "sampleRate": _rational(frame.rate),
+            "sequenceNumber": frame.number,
+            "timecode": _timecode(frame),
+        },
+    }
+    return (json.dumps(_identified(_sample(shot) | moment), separators=(",", ":")) + "\n").encode()
+
+
+def _sample(shot: Shot) -> dict[str, Any]:
+    return {
         "protocol": {"name": "OpenTrackIO", "version": [1, 0, 1]},
         "static": {"camera": _sensor(shot)},
         "lens": _lens(shot),
         "transforms": [_transform(shot)],
+        "sourceId": uuid.uuid5(SOURCES, shot.id).urn,
+        "sourceNumber": shot.number,
     }
-    sample["sourceId"] = uuid.uuid5(SOURCES, shot.id).urn
-    sample["sourceNumber"] = shot.number
-    # The same sample has the same id: it names a pose, not a moment of a stream.
-    sample["sampleId"] = uuid.uuid5(SOURCES, json.dumps(sample, sort_keys=True)).urn
-    return (json.dumps(sample, indent=2) + "\n").encode()
+
+
+def _identified(sample: dict[str, Any]) -> dict[str, Any]:
+    """The same sample has the same id."""
+    return sample | {"sampleId": uuid.uuid5(SOURCES, json.dumps(sample, sort_keys=True)).urn}
+
+
+def _timecode(frame: Frame) -> dict[str, Any]:
+    """Counted in whole frames a second, as timecode without drops is: 29.97 by 30."""
+    a_second = math.ceil(frame.rate)
+    if a_second > MOST_FRAMES:
+        raise Problem(
+            "format-cannot-hold",
+            f"opentrackio holds timecode of up to {MOST_FRAMES} frames a second; the clip has {float(frame.rate):g}.",
+            got=float(frame.rate),
+        )
+    seconds, frames = divmod(frame.number, a_second)
+    return {
+        "hours": seconds // 3600 % 24,
+        "minutes": seconds // 60 % 60,
+        "seconds": seconds % 60,
+        "frames": frames,
+        "frameRate": _rational(frame.rate),
+        "dropFrame": False,
+    }
+
+
+def _rational(rate: Fraction) -> dict[str, int]:
+    return {"num": rate.numerator, "denom": rate.denominator}
 
 
 def _sensor(shot: Shot) -> dict[str, Any]:

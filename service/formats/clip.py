@@ -1,0 +1,85 @@
+"""The poses of a clip, frame by frame, as files beside its video: OpenTrackIO samples, FreeD packets and a table."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from service.formats import freed, opentrackio
+from service.formats.lens import Shot
+
+COLUMNS = (
+    "frame",
+    "camera",
+    "status",
+    *(f"rotation_{axis}_rad" for axis in "xyz"),
+    *(f"position_{axis}_m" for axis in "xyz"),
+    "sigma_rotation_deg",
+    "sigma_position_m",
+    "motion_sigma_rotation_deg",
+    "motion_sigma_position_m",
+)
+
+
+@dataclass(frozen=True)
+class FollowedShot:
+    """A camera when a frame was taken, and how that is known.
+
+    `status`: what the tracking says of it. `sigma` and `motion_sigma`: one standard deviation of its pose, and of its
+    motion since the first frame: of the rotation in degrees, of the position in metres.
+    """
+
+    shot: Shot
+    status: str
+    sigma: tuple[float, float]
+    motion_sigma: tuple[float, float]
+
+
+class ClipPoses:
+    """Three files, `stem` with `.jsonl`, `.d1` and `.csv`: open while the clip runs, a frame after the other.
+
+    A line of JSON, a packet and a row per camera and frame, the cameras of a frame one after the other. Raises `Problem`
+    (`format-cannot-hold`) for a lens or place that a format has no room for.
+    """
+
+    def __init__(self, stem: Path, rate: Fraction, freed_axes: str) -> None:
+        self._rate = rate
+        self._axes = freed_axes
+        self._number = 0
+        with ExitStack() as opening:
+            self._samples, self._packets = (opening.enter_context(_beside(stem, end).open("wb")) for end in ("jsonl", "d1"))
+            self._table = opening.enter_context(_beside(stem, "csv").open("w", newline="", encoding="utf-8"))
+            self._files = opening.pop_all()
+        self._rows = csv.writer(self._table)
+        self._rows.writerow(COLUMNS)
+
+    def add(self, cameras: Sequence[FollowedShot]) -> None:
+        """The next frame, its cameras in the order of the venue."""
+        for camera in cameras:
+            frame = opentrackio.Frame(self._number, self._rate, camera.status)
+            self._samples.write(opentrackio.write_frame(camera.shot, frame))
+            self._rows.writerow(self._row(camera))
+        self._packets.write(freed.write([camera.shot for camera in cameras], self._axes))
+        self._number += 1
+
+    def _row(self, camera: FollowedShot) -> list[str | int]:
+        pose = camera.shot.camera.pose
+        numbers = (*pose.rotation, *pose.position, *camera.sigma, *camera.motion_sigma)
+        return [self._number, camera.shot.id, camera.status, *(f"{value:.8g}" for value in numbers)]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._files.close()
+
+
+def _beside(stem: Path, end: str) -> Path:
+    """A stem may have dots of its own."""
+    return stem.with_name(f"{stem.name}.{end}")
