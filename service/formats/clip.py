@@ -44,8 +44,8 @@ class FollowedShot:
 class ClipPoses:
     """Three files, `stem` with `.jsonl`, `.d1` and `.csv`: open while the clip runs, a frame after the other.
 
-    A line of JSON, a packet and a row per camera and frame, the cameras of a frame one after the other. Raises `Problem`
-    (`format-cannot-hold`) for a lens or place that a format has no room for.
+    A line of JSON, a packet and a row per camera and frame, the cameras of a frame one after the other. Raises
+    `Problem` (`format-cannot-hold`) for a lens or place that a format has no room for.
     """
 
     def __init__(self, stem: Path, rate: Fraction, freed_axes: str) -> None:
@@ -53,7 +53,9 @@ class ClipPoses:
         self._axes = freed_axes
         self._number = 0
         with ExitStack() as opening:
-            self._samples, self._packets = (opening.enter_context(_beside(stem, end).open("wb")) for end in ("jsonl", "d1"))
+            self._samples, self._packets = (
+                opening.enter_context(_beside(stem, end).open("wb")) for end in ("jsonl", "d1")
+            )
             self._table = opening.enter_context(_beside(stem, "csv").open("w", newline="", encoding="utf-8"))
             self._files = opening.pop_all()
         self._rows = csv.writer(self._table)
@@ -76,7 +78,9 @@ class ClipPoses:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._files.close()
 
 

@@ -29,7 +29,7 @@ SOURCES = uuid.UUID("3d6b2a0e-7f3c-5c8f-9d2b-52b8f4a7c1e6")
 
 @dataclass(frozen=True)
 class Frame:
-    """Which frame of a clip a sample is of: its `number` from 0 at `rate` frames a second. `status`: of the tracking."""
+    """Which frame of a clip a sample is of: its `number` from 0, at `rate` a second. `status`: of the tracking."""
 
     number: int
     rate: Fraction

@@ -1,9 +1,9 @@
 """How still a shaking rig stands when it is followed: `python -m tests.benchmarks.shaking`.
 
-The two cameras of the demo on a mast in wind: each turns by 0.3 degrees at 0.5 Hz about each of its axes, in phases of
-its own, trembles by 0.03 degrees at 3 Hz, and sways by 2 cm, as a mast does that bends. Each frame is the demo's picture
-as the camera would take it from where it then is: what is on the ground moves as the ground does, what is far away turns
-only. Players walk through it, and each frame has noise of its own and a JPEG's losses.
+The two cameras of the demo on a mast in wind: each turns by 0.3 degrees at 0.5 Hz about each of its axes, in phases
+of its own, trembles by 0.03 degrees at 3 Hz, and sways by 2 cm, as a mast does that bends. Each frame is the demo's
+picture as the camera would take it from where it then is: what is on the ground moves as the ground does, what is far
+away turns only. Players walk through it, and each frame has noise of its own and a JPEG's losses.
 """
 
 from __future__ import annotations
@@ -94,7 +94,9 @@ class Clip:
         shaken = cv2.remap(self._picture, place, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
         self._walk(shaken, now, number)
         down, right = self._rng.integers(0, 64, 2)
-        noisy = np.clip(shaken + self._noise[down : down + height, right : right + width, None], 0, 255).astype(np.uint8)
+        noisy = np.clip(shaken + self._noise[down : down + height, right : right + width, None], 0, 255).astype(
+            np.uint8
+        )
         return cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
 
     def _behind(self, now: Camera) -> Array:
@@ -196,7 +198,11 @@ def moves(profiles: Array) -> Array:
     slope -= slope.mean(axis=1, keepdims=True)
     found = -np.sum(off * slope, axis=2) / np.sum(slope**2, axis=1)
     left = off + found[..., None] * slope
-    return np.where(np.sum(left**2, axis=2) < UNLIKE * np.sum((usual - usual.mean(axis=1, keepdims=True)) ** 2, axis=1), found, np.nan)
+    return np.where(
+        np.sum(left**2, axis=2) < UNLIKE * np.sum((usual - usual.mean(axis=1, keepdims=True)) ** 2, axis=1),
+        found,
+        np.nan,
+    )
 
 
 def clips(scale: float, seed: int = 19) -> list[Clip]:
@@ -214,7 +220,9 @@ def packed_frames(made: list[Clip], count: int, path: Path) -> list[dict[str, by
     """JPEGs of the frames, rendered before or now: they take longer to render than to follow."""
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(pickle.dumps([{clip.still.id: clip.packed(number) for clip in made} for number in range(count)]))
+        path.write_bytes(
+            pickle.dumps([{clip.still.id: clip.packed(number) for clip in made} for number in range(count)])
+        )
     return pickle.loads(path.read_bytes())
 
 
@@ -234,9 +242,9 @@ def followed(made: list[Clip], packed: list[dict[str, bytes]], run: Run, lens: s
     for each in packed[1:]:
         frames = unpacked(each)
         begun = time.process_time()
-        moment = follower.see(frames)
+        follower.see(frames)
+        moments += follower.settled()
         spent += time.process_time() - begun
-        moments += [] if moment is None else [moment]
     return Told(run, moments + follower.rest(), follower, 1000 * spent / (len(packed) - 1) / len(made))
 
 
@@ -268,9 +276,12 @@ def report(made: list[Clip], packed: list[dict[str, bytes]], told: Told, width: 
     sigma = np.array([[one.covariance for one in moment.cameras] for moment in told.moments])
     motion_sigma = np.array([[one.motion_covariance for one in moment.cameras] for moment in told.moments])
     how = Counter(one.how for moment in told.moments for one in moment.cameras)
+    unfollowed = count * [references]
     print(
-        f"every {told.run.every}, look ahead {told.run.look_ahead}: {dict(how)}; {told.milliseconds:.0f} core ms a frame and camera\n"
-        f"  in the frames: {in_frames(made, true, count * [references]):.2f} px rms unfollowed, {in_frames(made, true, found):.3f} followed\n"
+        f"every {told.run.every}, look ahead {told.run.look_ahead}: {dict(how)}; "
+        f"{told.milliseconds:.0f} core ms a frame and camera\n"
+        f"  in the frames: {in_frames(made, true, unfollowed):.2f} px rms unfollowed, "
+        f"{in_frames(made, true, found):.3f} followed\n"
         f"  far line in {width} columns: {still:.2f} px rms unfollowed, {followed_:.3f} followed by truth, "
         f"{rms_about_mean(shown):.3f} as the picture shows it\n"
         f"  pose: {pose_rms(error)}, error/sigma {ratio(error, sigma):.2f}\n"
@@ -285,7 +296,12 @@ def in_frames(made: list[Clip], true: list[list[Camera]], told: list[list[Camera
     for number, clip in enumerate(made):
         points = FIELD.line_points(2.0).position
         points = points[inside(clip.still.project(points), clip.still.intrinsics.size, 40)]
-        off = np.array([real[number].project(points) - there[number].project(points) for real, there in zip(true, told, strict=True)])
+        off = np.array(
+            [
+                real[number].project(points) - there[number].project(points)
+                for real, there in zip(true, told, strict=True)
+            ]
+        )
         squares.append(np.mean(np.sum((off - off.mean(axis=0)) ** 2, axis=-1)))
     return float(np.sqrt(np.mean(squares)))
 
@@ -312,7 +328,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--size", choices=SIZES, default="1080p")
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--lens", choices=("exact", "usual"), default="exact", help="whether the lenses are known exactly")
+    parser.add_argument(
+        "--lens", choices=("exact", "usual"), default="exact", help="whether the lenses are known exactly"
+    )
     arguments = parser.parse_args()
     scale, width = SIZES[arguments.size]
     made, count = clips(scale), round(arguments.seconds * FRAMES_PER_SECOND)

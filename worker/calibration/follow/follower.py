@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from worker.calibration.finish.refinement import SEARCH_PX, Sight, refine
+from worker.calibration.finish import refinement
+from worker.calibration.finish.refinement import Sight, refine
 from worker.calibration.finish.uncertainty import Sigma
-from worker.calibration.follow.lines import FollowedLines
+from worker.calibration.follow.lines import FollowedLines, Sighting
 from worker.calibration.follow.motion_filter import GATE, State, Step, smoothed
 from worker.calibration.records import CalibrationError
 from worker.calibration.scene.camera import Array, Camera, Frame
@@ -18,8 +19,11 @@ from worker.calibration.scene.field import Field
 from worker.calibration.scene.motion import moved
 from worker.calibration.see.contrast import Channels
 
-FIRST_SEARCH_PX = (28.0, *SEARCH_PX)
+FIRST_SEARCH_PX = (28.0, *refinement.SEARCH_PX)
 """Round by round, in pixels of a 4K frame: the first frame may be taken at the end of a swing."""
+SEARCH_PX, LOST_SEARCH_PX = (8.0, 3.0), (28.0, 14.0)
+"""The same for later frames, and before that where lines may be farther off than `KNOWN` of the first of it."""
+KNOWN = 0.5
 
 LEAST_AGREEMENT = 0.3
 """Of the lines that the first frame has to show where the cameras are found, beyond what chance would."""
@@ -61,11 +65,12 @@ class Moment:
 
 
 class Follower:
-    """Takes the frames of a clip one after the other, and says where the cameras were `look_ahead` frames before.
+    """Takes the frames of a clip one after the other.
 
-    `cameras`: as stored, at most a fraction of a degree off; `first`: the first frames of the clip, by camera.
-    `every`: lines are measured in every so many-th frame. Raises `CalibrationError` if the first frame of a camera does
-    not show its lines.
+    What it `see`s of a moment it says at once; what it makes of that moment once it has seen `look_ahead` frames more
+    is `settled`. `cameras`: as stored, at most a fraction of a degree off; `first`: the first frames of the clip, by
+    camera. `every`: lines are measured in every so many-th frame. Raises `CalibrationError` if the first frame of a
+    camera does not show its lines.
     """
 
     def __init__(
@@ -77,34 +82,38 @@ class Follower:
         every: int = 1,
         look_ahead: int = 0,
     ) -> None:
-        references = _references(pitch, cameras, first)
-        self._tracks = [_Track(pitch, *each, first[each[0].id]) for each in references]
+        self._tracks = [_Track(pitch, *each, first[each[0].id]) for each in _references(pitch, cameras, first)]
         self._seconds = 1 / frames_per_second
         self._every = every
         self._look_ahead = look_ahead
         self._taken = 1
-        self._told = 0
+        self._settled = 0
 
     @property
     def references(self) -> list[Camera]:
         """The cameras where the first frame shows them: the ones that motion is counted from."""
         return [track.lines.reference for track in self._tracks]
 
-    def see(self, frames: Mapping[str, Frame]) -> Moment | None:
-        """Take the next frames; a camera that has none coasts. None as long as there is not enough to look ahead."""
+    def see(self, frames: Mapping[str, Frame]) -> Moment:
+        """Take the next frames; a camera that has none coasts."""
         looked = self._taken % self._every == 0
         for track in self._tracks:
             track.see(frames.get(track.lines.reference.id) if looked else None, self._seconds)
         self._taken += 1
-        return self._next() if self._taken - self._told > self._look_ahead else None
+        return Moment(self._taken - 1, [track.newest() for track in self._tracks])
+
+    def settled(self) -> list[Moment]:
+        """The moments that enough frames have been seen after, each of them once."""
+        return self._settle(self._taken - self._look_ahead)
 
     def rest(self) -> list[Moment]:
-        """What is left to tell after the last frames."""
-        return [self._next() for _ in range(self._taken - self._told)]
+        """The last moments, after the last frames."""
+        return self._settle(self._taken)
 
-    def _next(self) -> Moment:
-        self._told += 1
-        return Moment(self._told - 1, [track.oldest() for track in self._tracks])
+    def _settle(self, until: int) -> list[Moment]:
+        numbers = range(self._settled, until)
+        self._settled = max(self._settled, until)
+        return [Moment(number, [track.oldest() for track in self._tracks]) for number in numbers]
 
 
 class _Track:
@@ -113,32 +122,39 @@ class _Track:
     def __init__(self, pitch: Field, reference: Camera, covariance: Array, first: Frame) -> None:
         self.lines = FollowedLines(pitch, reference)
         self._covariance = covariance
-        seen = self.lines.sighted(first, reference)
+        seen = self.lines.sighted(first, reference, SEARCH_PX[-1:])
         if seen is None:
             raise _not_seen(reference)
         self.lines.learn(seen, reference)
-        self._last = State.at_reference(np.linalg.inv(self.lines.observed(seen).information))
-        self._steps = [Step(0.0, self._last, self._last)]
+        self._last = State.at_reference(np.asarray(np.linalg.inv(self.lines.observed(seen).information), float))
+        self._steps = [Step(0.0, self._last)]
         self._how: list[How] = ["measured"]
 
     def see(self, frame: Frame | None, seconds: float) -> None:
         """Take the next frame, so long after the one before; None: it is not looked at, or not there."""
-        expected = self._last.after(seconds)
+        expected = self._last.after(seconds).drawn_back(seconds)
         how, self._last = self._known(frame, expected)
-        self._steps.append(Step(seconds, expected, self._last))
+        self._steps.append(Step(seconds, self._last))
         self._how.append(how)
 
+    def newest(self) -> Followed:
+        """The moment of the last frame, by all frames up to it."""
+        return self._followed(self._last, self._how[-1])
+
     def oldest(self) -> Followed:
-        """The oldest moment that has not been told, as everything since then has it; it is forgotten then."""
+        """The oldest moment that has not settled, by all frames so far; it is forgotten then."""
         state, how = smoothed(self._steps)[0], self._how[0]
         del self._steps[0], self._how[0]
+        return self._followed(state, how)
+
+    def _followed(self, state: State, how: How) -> Followed:
         motion = state.change_covariance
         return Followed(moved(self.lines.reference, state.change), how, motion, self._covariance + motion)
 
     def _known(self, frame: Frame | None, expected: State) -> tuple[How, State]:
         if frame is None:
             return "coasted", expected
-        seen = self.lines.sighted(frame, moved(self.lines.reference, expected.change))
+        seen = self._sighted(frame, expected)
         if seen is None:
             return "coasted", expected
         observed = self.lines.observed(seen)
@@ -148,10 +164,20 @@ class _Track:
         self.lines.learn(seen, moved(self.lines.reference, known.change))
         return "measured", known
 
+    def _sighted(self, frame: Frame, expected: State) -> Sighting | None:
+        """The lines, from where the camera is expected; step by step where that is hardly known."""
+        hardly = self._off_px(expected) > KNOWN * SEARCH_PX[0]
+        searches = (*LOST_SEARCH_PX, *SEARCH_PX) if hardly else SEARCH_PX
+        return self.lines.sighted(frame, moved(self.lines.reference, expected.change), searches)
 
-def _references(
-    pitch: Field, cameras: Sequence[Camera], first: Mapping[str, Frame]
-) -> list[tuple[Camera, Array]]:
+    def _off_px(self, expected: State) -> float:
+        """How far lines may be from where they are expected, one standard deviation in pixels of a 4K frame."""
+        lens = self.lines.reference.intrinsics
+        turn = float(np.sqrt(np.trace(expected.change_covariance[:3, :3])))
+        return turn * lens.focal_length_px / lens.relative_size
+
+
+def _references(pitch: Field, cameras: Sequence[Camera], first: Mapping[str, Frame]) -> list[tuple[Camera, Array]]:
     """The cameras where their first frames show them, and the covariances (6, 6) of their poses."""
     responses = [np.zeros(first[camera.id].shape[:2], np.float32) for camera in cameras]
     sight = Sight([Channels([first[camera.id]]) for camera in cameras], responses)

@@ -6,6 +6,7 @@ is learned, piece by piece, while the clip runs: otherwise the pose would jump w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,13 +24,15 @@ from worker.calibration.see.line_measurement import measure_lines
 
 APART_PX = 12.0
 """Pieces of line are looked at about so far apart, in pixels of a 4K frame."""
-SEARCH_PX = 8.0
-"""How far from where it is expected a line is looked for, in pixels of a 4K frame."""
-FEWEST_PIECES = 40
-"""With fewer pieces of line a frame says nothing."""
+COARSELY = 3
+"""All rounds but the last look at every so many-th piece."""
+FEWEST_PIECES, FEWEST_SHARE = 20, 0.3
+"""With fewer pieces of line, or with less than this share of those that are usually found, a frame says nothing."""
+NOVELTY = 0.05
+"""By so much of the difference a frame changes how many are usual."""
 BESIDE_PX = 1.0
 """How far a piece of line may lie beside its place for good, one standard deviation, in pixels of a 4K frame."""
-NOISE_PX = 0.08
+NOISE_PX = 0.06
 """Least error of the measurement of a piece, in pixels of the frame."""
 PICTURE_PX = 0.02
 """Error that all pieces of a frame have in common: what a codec and the grid of pixels do to every line alike."""
@@ -61,24 +64,41 @@ class FollowedLines:
         scale = reference.intrinsics.relative_size
         chosen = SeenLines.from_camera(lines, reference).thinned(APART_PX * scale).index
         self._pieces = lines[chosen]
+        self._some = np.arange(0, len(chosen), COARSELY)
         self._patch = chosen // CLUSTER_POINTS
-        self._search_px = SEARCH_PX * scale
+        self._scale = scale
         self._beside_before = (BESIDE_PX * scale) ** -2
         self._beside_weight = np.full(len(chosen), self._beside_before)
         self._beside_sum = np.zeros(len(chosen))
         width, height = reference.intrinsics.size
+        self._usual = 0.0
         self._no_network = np.zeros((height, width), np.float32)
 
-    def sighted(self, frame: Frame, expected: Camera) -> Sighting | None:
-        """The pieces that a frame shows near where a camera expects them; None where they are too few."""
-        found = measure_lines(self._pieces, expected, Channels([frame]), self._no_network, self._search_px)
+    def sighted(self, frame: Frame, expected: Camera, searches_px: Sequence[float]) -> Sighting | None:
+        """The pieces that a frame shows near where a camera expects them; None where they are too few.
+
+        `searches_px`: how near, in pixels of a 4K frame, round by round from where the last one saw the camera. What
+        is measured far from where it was expected is a little off, so the last round is a narrow one.
+        """
+        channels = Channels([frame])
+        for search in searches_px[:-1]:
+            seen = self._within(search, channels, expected, self._some)
+            if seen is None:
+                return None
+            expected = moved(self.reference, self.observed(seen).change)
+        return self._within(searches_px[-1], channels, expected, np.arange(len(self._pieces)))
+
+    def _within(
+        self, search_px: float, channels: Channels, expected: Camera, pieces: NDArray[np.intp]
+    ) -> Sighting | None:
+        found = measure_lines(self._pieces[pieces], expected, channels, self._no_network, search_px * self._scale)
         points = found.points.position
         offset = np.sum((found.pixel - expected.project(points)) * found.normal, axis=1)
         slope = np.einsum("mij,mi->mj", pixel_slopes(expected, points), found.normal)
         good = np.isfinite(offset) & np.isfinite(slope).all(axis=1)
-        if good.sum() < FEWEST_PIECES:
+        if good.sum() < max(FEWEST_PIECES, FEWEST_SHARE * self._usual * len(pieces) / len(self._pieces)):
             return None
-        return Sighting(expected, found.index[good], offset[good], slope[good])
+        return Sighting(expected, pieces[found.index[good]], offset[good], slope[good])
 
     def observed(self, seen: Sighting) -> Observed:
         """What they say of the pose: robust least squares, with what pieces of one patch err together."""
@@ -89,14 +109,14 @@ class FollowedLines:
         for weigh in (*STEPS * [huber_weights], *STEPS * [tukey_weights]):
             weight = weigh(values - rows @ change)
             information = (rows * weight[:, None]).T @ rows
-            change = np.linalg.solve(information + prior, rows.T @ (weight * values))
+            change = np.asarray(np.linalg.solve(information + prior, rows.T @ (weight * values)), float)
         spread = self._spread(seen, rows * (weight * (values - rows @ change))[:, None])
         together = float(np.trace(np.linalg.solve(information + prior, spread))) / POSE_NUMBERS
         known = information / max(1.0, together)
         of_picture = np.diag(np.repeat([PICTURE_PX / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
         return Observed(
             change_between(self.reference, moved(seen.expected, change)),
-            np.linalg.solve(np.eye(POSE_NUMBERS) + known @ of_picture, known),
+            np.asarray(np.linalg.solve(np.eye(POSE_NUMBERS) + known @ of_picture, known), float),
         )
 
     def learn(self, seen: Sighting, now: Camera) -> None:
@@ -105,6 +125,7 @@ class FollowedLines:
         known = left - self._beside[seen.piece]
         counted = tukey_weights(known / np.sqrt(NOISE_PX**2 + 1 / self._beside_weight[seen.piece])) > 0
         which = seen.piece[counted]
+        self._usual += (len(seen.piece) - self._usual) * (NOVELTY if self._usual else 1.0)
         self._beside_weight[which] += NOISE_PX**-2
         self._beside_sum[which] += left[counted] * NOISE_PX**-2
 

@@ -17,6 +17,8 @@ TURNING_RAD_S2, SHIFTING_M_S2 = np.radians(15.0), 1.0
 """Accelerations, one standard deviation: a mast in wind, 0.3 degrees at 0.5 Hz and a tenth of that at 3 Hz and more."""
 FIRST_RAD_S, FIRST_M_S = np.radians(3.0), 0.2
 """How fast a camera may move when the clip begins."""
+BACK_RAD, BACK_M = np.radians(0.3), 0.03
+"""A mast comes back: with lines unseen for a second, it is about so near to its reference."""
 GATE = 38.3
 """Squared innovations in standard deviations that six numbers pass by chance once in a million (chi-square)."""
 
@@ -60,39 +62,37 @@ class State:
         onward = _onward(seconds)
         return State(onward @ self.mean, onward @ self.covariance @ onward.T + _unforeseen(seconds))
 
+    def drawn_back(self, seconds: float) -> State:
+        """The same with what a mast is known to do for so long: next to nothing where lines are seen."""
+        information = np.diag(np.repeat([BACK_RAD, BACK_M], 3) ** -2.0) * seconds
+        return self.with_observed(Observed(np.zeros(POSE_NUMBERS), information))
+
     def surprise(self, observed: Observed) -> float:
         """Squared innovation in its own standard deviations: about as much as numbers were observed, if all is well."""
-        away, weighted = self._innovation(observed)
-        return float(away @ weighted)
+        away, root, known = self._weighed(observed)
+        return float(away @ root @ np.linalg.solve(known, root.T @ away))
 
     def with_observed(self, observed: Observed) -> State:
-        """What is known when a frame has been seen as well."""
-        _, weighted = self._innovation(observed)
-        spread = self.covariance[:, :POSE_NUMBERS]
-        gain = spread @ np.linalg.solve(self._unknown_part(observed), observed.information)
-        kept = np.eye(len(self.mean)) - np.pad(gain, ((0, 0), (0, POSE_NUMBERS)))
-        covariance = kept @ self.covariance
-        return State(self.mean + spread @ weighted, (covariance + covariance.T) / 2)
+        """What is known when a frame has been seen as well. Joseph's form: a covariance that stays one."""
+        away, root, known = self._weighed(observed)
+        gain = np.linalg.solve(known, (self.covariance[:, :POSE_NUMBERS] @ root).T).T
+        kept = np.eye(len(self.mean)) - np.pad(gain @ root.T, ((0, 0), (0, POSE_NUMBERS)))
+        return State(self.mean + gain @ (root.T @ away), kept @ self.covariance @ kept.T + gain @ gain.T)
 
-    def _innovation(self, observed: Observed) -> tuple[Array, Array]:
-        """How far (6,) the frame is from what was expected, and that weighted with the inverse of its covariance."""
-        away = observed.change - self.change
-        return away, np.linalg.solve(self._unknown_part(observed), observed.information @ away)
-
-    def _unknown_part(self, observed: Observed) -> Array:
-        """(6, 6) 1 + information x covariance: with it no information has to be inverted, of which there may be none."""
-        return np.eye(POSE_NUMBERS) + observed.information @ self.change_covariance
+    def _weighed(self, observed: Observed) -> tuple[Array, Array, Array]:
+        """How far (6,) the frame is from what was expected, a root (6, 6) of its information, and the covariance (6, 6)
+        of what is new when it is looked at through that root: nothing has to be inverted of which nothing is known.
+        """
+        values, vectors = np.linalg.eigh(observed.information)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        return observed.change - self.change, root, np.eye(POSE_NUMBERS) + root.T @ self.change_covariance @ root
 
 
 @dataclass(frozen=True)
 class Step:
-    """One moment of a filter: what was `expected` and what was `known` once the frame had been seen.
-
-    `seconds`: since the moment before.
-    """
+    """One moment of a filter: what was `known` once its frame had been seen. `seconds`: since the moment before."""
 
     seconds: float
-    expected: State
     known: State
 
 
@@ -100,10 +100,13 @@ def smoothed(steps: Sequence[Step]) -> list[State]:
     """What is known of each moment when all of them have been seen."""
     known = [steps[-1].known]
     for before, later in zip(reversed(steps[:-1]), reversed(steps[1:]), strict=True):
-        gain = np.linalg.solve(later.expected.covariance, _onward(later.seconds) @ before.known.covariance).T
-        mean = before.known.mean + gain @ (known[-1].mean - later.expected.mean)
-        covariance = before.known.covariance + gain @ (known[-1].covariance - later.expected.covariance) @ gain.T
-        known.append(State(mean, (covariance + covariance.T) / 2))
+        onward, foretold = _onward(later.seconds), before.known.after(later.seconds)
+        gain = np.linalg.solve(foretold.covariance, onward @ before.known.covariance).T
+        kept = np.eye(len(gain)) - gain @ onward
+        mean = before.known.mean + gain @ (known[-1].mean - foretold.mean)
+        # As a sum of what can be no less than nothing.
+        later_too = known[-1].covariance + _unforeseen(later.seconds)
+        known.append(State(mean, kept @ before.known.covariance @ kept.T + gain @ later_too @ gain.T))
     return known[::-1]
 
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, inside
+from worker.calibration.scene.camera import Camera, inside
 from worker.calibration.scene.field import Field
 from worker.calibration.stitch.light import Light
 from worker.calibration.stitch.panorama import Panorama, Part, every_nth_pixel, every_pixel, panorama
@@ -38,6 +38,7 @@ class MovingPanorama:
         self._step = max(1, view.size[0] // MOTION_COLUMNS)
         self._points = view.behind(pitch, every_nth_pixel(view.size, self._step))
         self._before = [camera.project(self._points) for camera in cameras]
+        self._used = [_used(part, self._step) for part in self._still.parts]
 
     def at(self, cameras: Sequence[Camera]) -> Panorama:
         """The panorama where the same cameras, in the same order, are elsewhere by a degree or two."""
@@ -49,9 +50,11 @@ class MovingPanorama:
             replace(part, source=part.source + every_pixel(motion, self._still.size, self._step))
             for part, motion in zip(self._still.parts, motions, strict=True)
         ]
-        if any(
-            np.abs(motion).max() > STILL_BORDER * part.frame_size[0] for part, motion in zip(parts, motions, strict=True)
-        ):
+        farthest = max(
+            float(np.abs(motion[used]).max(initial=0.0)) / part.frame_size[0]
+            for part, motion, used in zip(parts, motions, self._used, strict=True)
+        )
+        if farthest > STILL_BORDER:
             parts = _within_frames(parts, self._still.seen, margin=0.0)
         return Panorama(self._still.size, parts)
 
@@ -70,15 +73,26 @@ def _within_frames(parts: Sequence[Part], seen: NDArray[np.bool_], margin: float
     return [replace(part, weight=weight * share) for part, weight in zip(parts, weights, strict=True)]
 
 
+def _used(part: Part, step: int) -> NDArray[np.bool_]:
+    """Which of `every_nth_pixel` (h, w) have to do with pixels where a camera counts."""
+    reach = cv2.dilate((part.weight > 0).astype(np.uint8), np.ones((2 * step + 1, 2 * step + 1), np.uint8))
+    height, width = part.weight.shape
+    column, row = (
+        np.clip(np.rint(at), 0, last - 1).astype(int)
+        for at, last in zip(np.moveaxis(every_nth_pixel((width, height), step), -1, 0), (width, height), strict=True)
+    )
+    return np.asarray(reach, bool)[row, column]
+
+
 def _filled(motion: NDArray[np.float32]) -> NDArray[np.float32]:
     """Motion (h, w, 2) with means of the neighbours where it is NaN, and none farther off."""
-    known = np.isfinite(motion).all(axis=-1)
+    known = np.asarray(np.isfinite(motion).all(axis=-1))
     for _ in range(FILLED):
         if known.all():
             break
         weight = cv2.blur(known.astype(np.float32), (3, 3))
         around = cv2.blur(np.where(known[..., None], motion, np.float32(0)), (3, 3))
-        reached = ~known & (weight > 0)
+        reached = np.logical_not(known) & (weight > 0)
         motion[reached] = (around / np.maximum(weight, 1e-6)[..., None])[reached]
-        known |= reached
+        known = known | reached
     return np.nan_to_num(motion)
