@@ -101,7 +101,7 @@ def camera_of(camera: geometry.PosedCamera) -> Camera:
 def light_of(light: geometry.Light) -> Light:
     """How a camera's picture is evened out, for the engine: colours from blue to red."""
     red, green, blue = light.gain
-    return Light((blue, green, red), light.contrast, light.falloff)
+    return Light((blue, green, red), light.contrast, light.falloff, light.reach)
 
 
 def watching(camera: geometry.PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:
