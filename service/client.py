@@ -44,6 +44,8 @@ PATIENCE_S = 60.0
 SILENCE_S = 45.0
 # Until a stream that has ended, or could not begin, is asked for again.
 AGAIN_S = 2.0
+# Where a service asks for more time than this (Retry-After), it is asked again all the same.
+LONGEST_PAUSE_S = 60.0
 NOT_INSTALLED = "/problems/extra-missing"
 EVENT: TypeAdapter[Event] = TypeAdapter(Event)
 
@@ -52,13 +54,14 @@ class Refused(Exception):  # noqa: N818
     """The service answered with a problem: `members` are its JSON object.
 
     `busy`: trying the same again later can help. Of conflicts, those that the service gives a time for (Retry-After);
-    and what a proxy says that does not reach the service.
+    and what a proxy says that does not reach the service. `retry_after_s`: when, where the service says it.
     """
 
     def __init__(self, status: int, members: Mapping[str, Any], retry_after: str | None = None) -> None:
         super().__init__(f"{members.get('title', 'Refused')}: {members.get('detail', '')}")
         self.status = status
         self.members = members
+        self.retry_after_s = _seconds(retry_after)
         self.busy = (
             status == 429
             or (status == 409 and retry_after is not None)
@@ -154,12 +157,14 @@ class AsyncClient:
         """Whatever happens to a venue (of these kinds, absent: of any), each with the id by which to go on after it.
 
         First comes `poses.current`, or what was missed since the event `seen`. None is missed and none comes twice,
-        whatever breaks meanwhile: what is wrong is raised once the service was away for `patience_s`. Ends when the
+        whatever breaks meanwhile: what is wrong is raised once the service was away for `patience_s`. A busy service is
+        asked again when it says (Retry-After), at the latest after a minute. Ends when the
         venue is deleted; where that happened while nobody was connected, with `Refused` (404).
         """
         path, params = f"/venues/{venue_id}/events", {"events": list(kinds)}
         heard = time.monotonic()
         while True:
+            pause_s = AGAIN_S
             try:
                 headers = {"Last-Event-ID": seen} if seen else {}
                 told: dict[str, str] = {}
@@ -179,7 +184,8 @@ class AsyncClient:
             except (httpx.TransportError, Refused) as error:
                 if not _passing(error) or time.monotonic() - heard > patience_s:
                     raise
-            await self._pause(AGAIN_S)
+                pause_s = _pause_s(error, AGAIN_S)
+            await self._pause(pause_s)
 
     async def snapshot(self, venue_id: str, camera: str) -> bytes:
         """What a camera shows now, a JPEG or PNG from its source."""
@@ -274,7 +280,7 @@ class AsyncClient:
             except (httpx.TransportError, Refused) as error:
                 if not _passing(error) or time.monotonic() - heard > PATIENCE_S:
                     raise
-                await self._pause(every_s)
+                await self._pause(_pause_s(error, every_s))
         return followed
 
     # How it travels
@@ -401,6 +407,17 @@ def _refusal(response: httpx.Response) -> Refused:
 def _passing(error: httpx.TransportError | Refused) -> bool:
     """Whether the service may be back in a moment."""
     return isinstance(error, httpx.TransportError) or error.busy
+
+
+def _pause_s(error: httpx.TransportError | Refused, otherwise_s: float) -> float:
+    """How long to wait before asking again: as long as the service says, within reason."""
+    asked_s = error.retry_after_s if isinstance(error, Refused) else None
+    return otherwise_s if asked_s is None else min(max(asked_s, otherwise_s), LONGEST_PAUSE_S)
+
+
+def _seconds(retry_after: str | None) -> float | None:
+    """What the header says; a proxy may write the time at which, which is passed over."""
+    return float(retry_after) if retry_after is not None and retry_after.isascii() and retry_after.isdigit() else None
 
 
 def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:
