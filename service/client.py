@@ -10,19 +10,20 @@
         for seen, event in client.venue_events("demo", ["poses.changed"]):
             print(event.type, event.data)
 
-Both have the same methods. A service that refuses raises `Refused`.
+Both have the same methods. A service that refuses raises `Refused`. What only some methods need is imported there: a
+command that lists venues takes as long to load it as to be answered.
 """
 
 from __future__ import annotations
 
-import asyncio
 import json
 import math
 import time
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import aclosing
+from functools import cache
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import httpx
 from pydantic import TypeAdapter
@@ -30,11 +31,13 @@ from pydantic import TypeAdapter
 from service.blocking import Call, Stream
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
-from service.wire.job import Job, Jobs
 from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, Status
-from service.wire.told.events import LAST, Event
 from service.wire.venue import Venue, VenueIn, Venues
+
+if TYPE_CHECKING:
+    from service.wire.job import Job
+    from service.wire.told.events import Event
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
@@ -47,7 +50,6 @@ AGAIN_S = 2.0
 # Where a service asks for more time than this (Retry-After), it is asked again all the same.
 LONGEST_PAUSE_S = 60.0
 NOT_INSTALLED = "/problems/extra-missing"
-EVENT: TypeAdapter[Event] = TypeAdapter(Event)
 
 
 class Refused(Exception):  # noqa: N818
@@ -161,6 +163,8 @@ class AsyncClient:
         asked again when it says (Retry-After), at the latest after a minute. Ends when the
         venue is deleted; where that happened while nobody was connected, with `Refused` (404).
         """
+        from service.wire.told.events import LAST
+
         path, params = f"/venues/{venue_id}/events", {"events": list(kinds)}
         heard = time.monotonic()
         while True:
@@ -174,7 +178,7 @@ class AsyncClient:
                         if name:
                             told[name] = value
                         elif not line and "data" in told:
-                            seen, event = told["id"], EVENT.validate_json(told["data"])
+                            seen, event = told["id"], _event().validate_json(told["data"])
                             yield seen, event
                             if event.type == LAST:
                                 return
@@ -205,7 +209,7 @@ class AsyncClient:
         The job may be an older one if the content is the same.
         """
         sent = _upload(files, options, idempotency_key)
-        return Job.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
+        return _job(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
 
     async def fit_field(
         self,
@@ -216,12 +220,12 @@ class AsyncClient:
     ) -> Job:
         """Submit frames by which to fit the measures of a venue's pitch; the venue stays as it is."""
         sent = _upload(files, options, idempotency_key)
-        return Job.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/field/fit", **sent))
+        return _job(await self._ask("POST", f"/venues/{venue_id}/field/fit", **sent))
 
     async def job(self, job_id: str, wait_s: float = 0) -> Job:
         """A job, at its end or after `wait_s`."""
         params = {"wait": wait_s} if wait_s else {}
-        return Job.model_validate_json(await self._ask("GET", f"/jobs/{job_id}", params=params))
+        return _job(await self._ask("GET", f"/jobs/{job_id}", params=params))
 
     async def jobs(
         self,
@@ -231,6 +235,8 @@ class AsyncClient:
         most: int | None = None,
     ) -> list[Job]:
         """Jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
+        from service.wire.job import Jobs
+
         chosen = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
         page = Jobs.model_validate_json(await self._ask("GET", "/jobs", params=chosen))
         found = page.jobs
@@ -242,7 +248,7 @@ class AsyncClient:
 
     async def again(self, job_id: str) -> Job:
         """Submit the frames of a job once more, from the poses that hold now: another job."""
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/again"))
+        return _job(await self._ask("POST", f"/jobs/{job_id}/again"))
 
     async def delete_job(self, job_id: str) -> None:
         """Forget a job that has ended, with its frames and pictures."""
@@ -250,16 +256,16 @@ class AsyncClient:
 
     async def cancel(self, job_id: str) -> Job:
         """End a job."""
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/cancel"))
+        return _job(await self._ask("POST", f"/jobs/{job_id}/cancel"))
 
     async def accept(self, job_id: str, camera: str | None = None) -> Job:
         """Let the poses that a calibration found hold, of one camera or all, whatever the gate said."""
         params = {"camera": camera} if camera else {}
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/accept", params=params))
+        return _job(await self._ask("POST", f"/jobs/{job_id}/accept", params=params))
 
     async def reject(self, job_id: str) -> Job:
         """Put back what was before the poses of a calibration."""
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/reject"))
+        return _job(await self._ask("POST", f"/jobs/{job_id}/reject"))
 
     async def job_poses(self, job_id: str, form: FormatName, camera: str | None = None) -> bytes:
         """The poses that a job found, of one camera or all, as a file of another tool's format."""
@@ -311,6 +317,8 @@ class AsyncClient:
                     yield line.decode()
 
     async def _pause(self, seconds: float) -> None:
+        import asyncio
+
         await asyncio.sleep(seconds)
 
 
@@ -384,6 +392,19 @@ def _connection(url: str, api_key: str | None) -> dict[str, Any]:
     headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
     # Where there is no TLS, the certificates of all authorities need not be read, which takes as long as a request.
     return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S, "verify": not url.startswith("http://")}
+
+
+def _job(answer: bytes) -> Job:
+    from service.wire.job import Job
+
+    return Job.model_validate_json(answer)
+
+
+@cache
+def _event() -> TypeAdapter[Event]:
+    from service.wire.told.events import Event
+
+    return TypeAdapter(Event)
 
 
 def _split(stream: bytes) -> list[bytes]:
