@@ -11,7 +11,6 @@ from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.calibrate import calibrate
 from worker.calibration.draw.mosaic import birdseye, stitched
 from worker.calibration.draw.overlays import overlay
-from worker.calibration.draw.viewpoint import viewpoint
 from worker.calibration.records import Options
 from worker.calibration.scene.camera import (
     FISHEYE_DISTORTION_LENGTHS,
@@ -26,6 +25,7 @@ from worker.calibration.scene.camera import (
 )
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.segmentation import reachable_regions
+from worker.calibration.stitch.views import ViewChoice, chosen_view
 
 SIZE = (1920, 1080)
 # Of wide action and dome cameras, and a lens of the opposite sign.
@@ -179,5 +179,5 @@ def test_outdated_poses_of_fisheyes_are_found_again_and_drawn():
     above = birdseye(CROWNED, after, first)
     halfway = above[:, above.shape[1] // 2 - 2 : above.shape[1] // 2 + 3].max(axis=1)
     assert np.median(halfway[above.shape[0] // 8 : -above.shape[0] // 8].min(axis=1)) > 150
-    assert stitched(CROWNED, viewpoint(CROWNED, after, 960), after, first).picture.std() > 20
+    assert stitched(CROWNED, chosen_view(CROWNED, after, ViewChoice(width=960)), after, first).picture.std() > 20
     assert overlay((CROWNED, outdated[0]), (CROWNED, after[0]), first["left"]).shape == first["left"].shape

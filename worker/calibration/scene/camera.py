@@ -387,7 +387,7 @@ def project_planes(points: Plane, rotations: Array, positions: Array, intrinsics
     return intrinsics.distort_planes(x / depth, y / depth)
 
 
-def inside(pixels: Array, size: tuple[int, int], margin: float = 0.0) -> NDArray[np.bool_]:
+def inside(pixels: NDArray[np.floating[Any]], size: tuple[int, int], margin: float = 0.0) -> NDArray[np.bool_]:
     """Which pixels (..., 2) lie in a picture of `size` (width, height), at least `margin` from its border."""
     x, y = pixels[..., 0], pixels[..., 1]
     return (x >= margin) & (y >= margin) & (x <= size[0] - 1 - margin) & (y <= size[1] - 1 - margin)

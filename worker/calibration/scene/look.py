@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -22,21 +21,13 @@ def ground_grid(columns: int, rows: int, step_m: float, centre: tuple[float, flo
     return np.stack(np.meshgrid(x, y), axis=-1)
 
 
-@dataclass(frozen=True)
-class Look:
-    """One camera's part of a picture: values (H, W[, C]), where they are valid, and how well the camera sees there."""
+def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask) -> NDArray[Any]:
+    """Values (H, W[, C]) of an image at pixels (H, W, 2) that are `valid`, 0 elsewhere.
 
-    values: NDArray[Any]
-    valid: Mask
-    quality: NDArray[np.float32]
-
-
-def look_through(camera: Camera, image: NDArray[Any], pixels: Array) -> Look:
-    """Sample a camera's image at pixels (H, W, 2), each at the level of detail that its surroundings call for."""
-    valid = inside(pixels, camera.intrinsics.size)
-    x, y = (np.ascontiguousarray(pixels[..., axis], np.float32) for axis in (0, 1))
-    area = _footprint(x, y)
-    level = np.clip(np.floor(0.5 * np.log2(np.maximum(area, 1.0))), 0, 5).astype(np.uint8)
+    Where the pixels lie wider than those of the image, means over about the area between them.
+    """
+    x, y = (np.array(pixels[..., axis], np.float32) for axis in (0, 1))
+    level = np.clip(np.floor(0.5 * np.log2(np.maximum(_footprint(x, y), 1.0))), 0, 5).astype(np.uint8)
     values = np.zeros((*valid.shape, *image.shape[2:]), image.dtype)
     x[~valid] = y[~valid] = 0
     for number in np.unique(level[valid]):
@@ -46,13 +37,21 @@ def look_through(camera: Camera, image: NDArray[Any], pixels: Array) -> Look:
         # Far and near lie in bands of the picture.
         around = box(chosen)
         place = (x[around] + 0.5) * scale[0] - 0.5, (y[around] + 0.5) * scale[1] - 0.5
-        sampled = cv2.remap(small, *place, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        values[around][chosen[around]] = sampled[chosen[around]]
-    # 1 in the middle of the camera's picture, next to 0 at its border; the better, the finer it resolves the point.
-    width, height = camera.intrinsics.size
+        found = cv2.remap(small, *place, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        values[around][chosen[around]] = found[chosen[around]]
+    return values
+
+
+def quality(size: tuple[int, int], pixels: Array) -> NDArray[np.float32]:
+    """How well a camera of `size` sees at its pixels (H, W, 2), neighbours in a picture: 0 outside of its frame.
+
+    1 in the middle of the frame, next to 0 at its border; the better, the finer it resolves the point.
+    """
+    x, y = (np.ascontiguousarray(pixels[..., axis], np.float32) for axis in (0, 1))
+    width, height = size
     middle = (1 - np.abs(2 * x / (width - 1) - 1)) * (1 - np.abs(2 * y / (height - 1) - 1))
-    quality = np.where(valid, np.maximum(middle, 1e-6) * np.sqrt(np.maximum(area, 1e-6)), 0)
-    return Look(values, valid, quality)
+    found: NDArray[np.float32] = np.maximum(middle, 1e-6) * np.sqrt(np.maximum(_footprint(x, y), 1e-6))
+    return found
 
 
 def box(mask: Mask) -> tuple[slice, slice]:
@@ -68,8 +67,8 @@ def ground_view(pitch: Field, camera: Camera, image: NDArray[Any], grid_xy: Arra
     the area between the points of the grid where that is coarser than the image.
     """
     pixels = camera.project(pitch.lift(grid_xy))
-    seen = look_through(camera, image, pixels)
-    return seen.values, seen.valid & camera.sees(pixels)
+    valid = inside(pixels, camera.intrinsics.size)
+    return sampled(image, pixels, valid), valid & camera.sees(pixels)
 
 
 def _footprint(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -6,7 +6,7 @@ import numpy as np
 from tests.worker.calibration.synthetic import CROWNED, pair
 from worker.calibration.draw.layers import mask_layer, new_layer, seam_layer, stored_layer
 from worker.calibration.draw.mosaic import stitched
-from worker.calibration.draw.viewpoint import viewpoint
+from worker.calibration.stitch.views import ViewChoice, chosen_view
 
 LEFT, RIGHT = pair()
 SMALL = (LEFT.intrinsics.size[0] // 2, LEFT.intrinsics.size[1] // 2)
@@ -61,7 +61,7 @@ def test_the_seam_is_where_one_camera_hands_over_and_not_where_nobody_sees():
 
 def test_two_sets_of_poses_are_stitched_from_one_place():
     frames = {camera.id: np.full((*camera.intrinsics.size[::-1], 3), 90, np.uint8) for camera in (LEFT, RIGHT)}
-    view = viewpoint(CROWNED, [LEFT, RIGHT], 480)
+    view = chosen_view(CROWNED, [LEFT, RIGHT], ViewChoice(width=480))
     whole, alone = (stitched(CROWNED, view, cameras, frames) for cameras in ([LEFT, RIGHT], [LEFT]))
     assert whole.picture.shape == alone.picture.shape == (*view.size[::-1], 3)
     assert set(np.unique(whole.owner)) >= {0, 1}

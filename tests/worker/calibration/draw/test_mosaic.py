@@ -15,9 +15,7 @@ from tests.worker.calibration.synthetic import (
     pair,
     pair_frames,
 )
-from worker.calibration.draw import mosaic
-from worker.calibration.draw.mosaic import BACKDROP, birdseye, stitched
-from worker.calibration.draw.viewpoint import Viewpoint, viewpoint, world_behind
+from worker.calibration.draw.mosaic import birdseye, stitched
 from worker.calibration.scene.camera import (
     Array,
     Camera,
@@ -28,7 +26,9 @@ from worker.calibration.scene.camera import (
     rotation_vectors,
 )
 from worker.calibration.scene.field import Field
-from worker.calibration.scene.look import ground_grid, look_through
+from worker.calibration.stitch.light import LARGEST_GAIN, lights
+from worker.calibration.stitch.panorama import BACKDROP, panorama, seam_weights
+from worker.calibration.stitch.views import View, ViewChoice, chosen_view
 
 CAMERAS = pair()
 FRAME_SIZE = (960, 540)
@@ -47,7 +47,7 @@ def lines_across(picture: NDArray[np.uint8], y: int, x: slice) -> int:
 
 def preview(pitch: Field, cameras: list[Camera], pictures: dict[str, NDArray[np.uint8]], width: int) -> Frame:
     """The cameras' pictures, stitched as they are seen from between them."""
-    return stitched(pitch, viewpoint(pitch, cameras, width), cameras, pictures).picture
+    return stitched(pitch, chosen_view(pitch, cameras, ViewChoice(width=width)), cameras, pictures).picture
 
 
 def turned(one: Camera, yaw_deg: float) -> Camera:
@@ -56,14 +56,14 @@ def turned(one: Camera, yaw_deg: float) -> Camera:
     return one.with_pose(Pose(rotation_vectors(one.pose.matrix @ about_vertical), one.pose.position))
 
 
-def halfway(view: Viewpoint, y: float) -> Array:
+def halfway(view: View, y: float) -> Array:
     """Where the preview shows a point of the halfway line."""
     return view.project(CROWNED.lift(np.array([0.0, y])))
 
 
 def test_the_preview_shows_the_pitch_where_its_viewpoint_says() -> None:
     picture = preview(CROWNED, CAMERAS, frames(), 1200)
-    view = viewpoint(CROWNED, CAMERAS, 1200)
+    view = chosen_view(CROWNED, CAMERAS, ViewChoice(width=1200))
     assert picture.shape == (view.size[1], 1200, 3)
     for y in (-25.0, -15.0, 5.0):
         x, row = halfway(view, y)
@@ -73,7 +73,7 @@ def test_the_preview_shows_the_pitch_where_its_viewpoint_says() -> None:
 
 
 def test_a_preview_of_true_poses_shows_one_halfway_line() -> None:
-    view = viewpoint(CROWNED, CAMERAS, 1200)
+    view = chosen_view(CROWNED, CAMERAS, ViewChoice(width=1200))
     picture = preview(CROWNED, CAMERAS, frames(), 1200)
     x, y = halfway(view, -25.0)
     assert lines_across(picture, round(y), slice(round(x) - 60, round(x) + 60)) == 1
@@ -82,7 +82,7 @@ def test_a_preview_of_true_poses_shows_one_halfway_line() -> None:
 def test_a_preview_of_wrong_poses_shows_two() -> None:
     # Each camera turned towards the other: either shows the line on its own side of the seam.
     wrong = [turned(CAMERAS[0], -0.6), turned(CAMERAS[1], 0.6)]
-    view = viewpoint(CROWNED, wrong, 1200)
+    view = chosen_view(CROWNED, wrong, ViewChoice(width=1200))
     x, y = halfway(view, -25.0)
     picture = preview(CROWNED, wrong, frames(), 1200)
     assert lines_across(picture, round(y), slice(round(x) - 60, round(x) + 60)) == 2
@@ -97,7 +97,7 @@ def test_the_preview_has_no_hole_in_it() -> None:
 
 
 def test_exposures_are_evened_out() -> None:
-    view = viewpoint(CROWNED, CAMERAS, 1200)
+    view = chosen_view(CROWNED, CAMERAS, ViewChoice(width=1200))
     picture = preview(CROWNED, CAMERAS, frames(0.85), 1200)
     x, y = np.rint(halfway(view, -20.0)).astype(int)
     left, right = picture[y, x - 150 : x - 50].mean(axis=0), picture[y, x + 50 : x + 150].mean(axis=0)
@@ -108,23 +108,17 @@ def test_exposures_are_evened_out() -> None:
 
 
 def test_an_exposure_gain_is_bounded() -> None:
-    grid = ground_grid(60, 60, 0.2)
-    looks = [
-        look_through(one, np.full((540, 960, 3), value, np.uint8), one.project(CROWNED.lift(grid)))
-        for one, value in zip(CAMERAS, (200, 40), strict=True)
-    ]
-    gains = mosaic.exposure_gains(looks)
-    assert gains.max() <= mosaic.LARGEST_GAIN + 1e-6
-    assert gains.min() >= 1 / mosaic.LARGEST_GAIN - 1e-6
+    pictures = {one.id: np.full((540, 960, 3), value, np.uint8) for one, value in zip(CAMERAS, (200, 40), strict=True)}
+    found = lights(CROWNED, CAMERAS, pictures)
+    assert all(1 / LARGEST_GAIN <= gain <= LARGEST_GAIN for light in found.values() for gain in light.gain)
 
 
 def test_feathers_sum_to_one_wherever_a_camera_sees() -> None:
     quality = np.random.default_rng(0).uniform(0, 1, (3, 40, 50)).astype(np.float32)
     quality[:, :5] = 0
-    for sharpness in (mosaic.DETAIL_SHARPNESS, mosaic.SMOOTH_SHARPNESS):
-        total = mosaic.seam_weights(quality, sharpness).sum(axis=0)
-        assert total[5:] == pytest.approx(1.0, abs=1e-5)
-        assert (total[:5] == 0).all()
+    total = seam_weights(quality).sum(axis=0)
+    assert total[5:] == pytest.approx(1.0, abs=1e-5)
+    assert (total[:5] == 0).all()
 
 
 def test_the_geometry_of_the_preview_is_exact_to_a_twentieth_of_a_pixel() -> None:
@@ -134,14 +128,12 @@ def test_the_geometry_of_the_preview_is_exact_to_a_twentieth_of_a_pixel() -> Non
         camera(name, (x, -48.0, 10.0), (20 * x, -5.0), focal=2600.0, distortion=lens, size=size)
         for name, x in (("left", -1.0), ("right", 1.0))
     ]
-    view = viewpoint(CROWNED, wide, 1920)
-    dense = world_behind(CROWNED, view, np.stack(np.meshgrid(*map(np.arange, view.size)), axis=-1) * 1.0)
-    coarse = world_behind(CROWNED, view, mosaic._every_nth_pixel(view.size))
-    for one in wide:
-        exact = one.project(dense)
-        quick = mosaic._every_pixel(one.project(coarse), view)
+    view = chosen_view(CROWNED, wide, ViewChoice(width=1920))
+    dense = view.behind(CROWNED, np.stack(np.meshgrid(*map(np.arange, view.size)), axis=-1) * 1.0)
+    for one, part in zip(wide, panorama(CROWNED, view, wide).parts, strict=True):
+        exact, quick = one.project(dense), part.source
         # On the ground; at the horizon the world bends away more sharply than anyone could see.
-        judged = inside(exact, size, margin=8) & (np.abs(dense[..., 1]) < 200)
+        judged = (part.weight > 0) & inside(exact, size, margin=8) & (np.abs(dense[..., 1]) < 200)
         assert np.linalg.norm(exact - quick, axis=-1)[judged].max() < 0.1
         assert np.quantile(np.linalg.norm(exact - quick, axis=-1)[judged], 0.999) < 0.05
 
@@ -166,7 +158,7 @@ def test_cameras_that_face_each_other_are_seen_from_outside() -> None:
         camera("far", (0.0, 55.0, 15.0), (0.0, 0.0), focal=450.0),
     ]
     pictures = {one.id: paint_frame(PITCH, one) for one in facing}
-    view = viewpoint(PITCH, facing, 960)
+    view = chosen_view(PITCH, facing, ViewChoice(width=960))
     assert view.pose.position[1] < -50
     assert view.pose.position[2] >= 15
     picture = preview(PITCH, facing, pictures, 960)
@@ -204,6 +196,6 @@ def test_the_centre_mark_is_in_the_centre_pixel_of_the_birdseye_view() -> None:
 @pytest.mark.parametrize("by", [(0.0, 0.0, 700.0), (1100.0, 0.0, 0.0), (0.0, -60.0, 60.0)])
 def test_a_preview_of_poses_that_are_far_off_stays_a_picture(by: tuple[float, float, float]) -> None:
     lost = CAMERAS[1].with_pose(Pose(CAMERAS[1].pose.rotation, CAMERAS[1].pose.position + np.array(by)))
-    width, height = viewpoint(PITCH, [CAMERAS[0], lost], 960).size
+    width, height = chosen_view(PITCH, [CAMERAS[0], lost], ViewChoice(width=960)).size
     assert width == 960
     assert 140 <= height <= 960
