@@ -29,6 +29,8 @@ import httpx
 from pydantic import TypeAdapter
 
 from service.blocking import Call, Stream
+from service.refused import Refused as Refused
+from service.refused import passing, pause_s_of, refusal
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
 from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
@@ -47,29 +49,6 @@ PATIENCE_S = 60.0
 SILENCE_S = 45.0
 # Until a stream that has ended, or could not begin, is asked for again.
 AGAIN_S = 2.0
-# Where a service asks for more time than this (Retry-After), it is asked again all the same.
-LONGEST_PAUSE_S = 60.0
-NOT_INSTALLED = "/problems/extra-missing"
-
-
-class Refused(Exception):  # noqa: N818
-    """The service answered with a problem: `members` are its JSON object.
-
-    `busy`: trying the same again later can help. Of conflicts, those that the service gives a time for (Retry-After);
-    and what a proxy says that does not reach the service. `retry_after_s`: when, where the service says it.
-    """
-
-    def __init__(self, status: int, members: Mapping[str, Any], retry_after: str | None = None) -> None:
-        super().__init__(f"{members.get('title', 'Refused')}: {members.get('detail', '')}")
-        self.status = status
-        self.members = members
-        self.retry_after_s = _seconds(retry_after)
-        self.busy = (
-            status == 429
-            or (status == 409 and retry_after is not None)
-            or (status == 503 and members.get("type") != NOT_INSTALLED)
-            or (status in (502, 504) and "type" not in members)
-        )
 
 
 class AsyncClient:
@@ -186,9 +165,9 @@ class AsyncClient:
                         # Also after whoever asked has taken its time over an event.
                         heard = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                if not _passing(error) or time.monotonic() - heard > patience_s:
+                if not passing(error) or time.monotonic() - heard > patience_s:
                     raise
-                pause_s = _pause_s(error, AGAIN_S)
+                pause_s = pause_s_of(error, AGAIN_S)
             await self._pause(pause_s)
 
     async def snapshot(self, venue_id: str, camera: str) -> bytes:
@@ -284,9 +263,9 @@ class AsyncClient:
                 followed = await self.job(followed.id, wait_s=every_s)
                 heard = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                if not _passing(error) or time.monotonic() - heard > PATIENCE_S:
+                if not passing(error) or time.monotonic() - heard > PATIENCE_S:
                     raise
-                await self._pause(_pause_s(error, every_s))
+                await self._pause(pause_s_of(error, every_s))
         return followed
 
     # How it travels
@@ -298,7 +277,7 @@ class AsyncClient:
     async def _answer(self, method: str, path: str, **more: Any) -> httpx.Response:
         response = await self._send(method, path, **more)
         if not response.is_success:
-            raise _refusal(response)
+            raise refusal(response)
         return response
 
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
@@ -310,7 +289,7 @@ class AsyncClient:
         async with self._http.stream("GET", path, timeout=SILENCE_S, **more) as response:
             if not response.is_success:
                 await response.aread()
-                raise _refusal(response)
+                raise refusal(response)
             async for piece in response.aiter_bytes():
                 *lines, rest = _split(rest + piece)
                 for line in lines:
@@ -336,7 +315,7 @@ class _Blocking(AsyncClient):
         with self.http.stream("GET", path, timeout=SILENCE_S, **more) as response:
             if not response.is_success:
                 response.read()
-                raise _refusal(response)
+                raise refusal(response)
             for piece in response.iter_bytes():
                 *lines, rest = _split(rest + piece)
                 for line in lines:
@@ -413,32 +392,6 @@ def _split(stream: bytes) -> list[bytes]:
     Not what Python splits by, as httpx does: the names in an event may have separators of Unicode in them.
     """
     return stream.split(b"\n")
-
-
-def _refusal(response: httpx.Response) -> Refused:
-    """Of an answer that was read."""
-    try:
-        members = response.json()
-    except ValueError:
-        members = {"title": f"HTTP {response.status_code}", "detail": response.text[:500]}
-    retry_after = response.headers.get("retry-after")
-    return Refused(response.status_code, members if isinstance(members, dict) else {}, retry_after)
-
-
-def _passing(error: httpx.TransportError | Refused) -> bool:
-    """Whether the service may be back in a moment."""
-    return isinstance(error, httpx.TransportError) or error.busy
-
-
-def _pause_s(error: httpx.TransportError | Refused, otherwise_s: float) -> float:
-    """How long to wait before asking again: as long as the service says, within reason."""
-    asked_s = error.retry_after_s if isinstance(error, Refused) else None
-    return otherwise_s if asked_s is None else min(max(asked_s, otherwise_s), LONGEST_PAUSE_S)
-
-
-def _seconds(retry_after: str | None) -> float | None:
-    """What the header says; a proxy may write the time at which, which is passed over."""
-    return float(retry_after) if retry_after is not None and retry_after.isascii() and retry_after.isdigit() else None
 
 
 def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:

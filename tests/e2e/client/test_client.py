@@ -13,6 +13,7 @@ import httpx
 import pytest
 
 from service import client as client_module
+from service import refused as refused_module
 from service.client import AsyncClient, Client, Refused
 from service.wire.health import AlarmEvent, VenueAlarm
 from service.wire.told.events import VenueChange, VenueEvent
@@ -244,7 +245,7 @@ def busy_service(retry_after):
 @pytest.mark.parametrize("blocking", [True, False])
 def test_a_busy_service_is_asked_again_when_it_says(retry_after, least_s, most_s, blocking, monkeypatch):
     monkeypatch.setattr(client_module, "AGAIN_S", 0.05)
-    monkeypatch.setattr(client_module, "LONGEST_PAUSE_S", 1.5)
+    monkeypatch.setattr(refused_module, "LONGEST_PAUSE_S", 1.5)
 
     async def awaited(url):
         async with AsyncClient(url) as client:

@@ -40,7 +40,7 @@ LEFT = ("cameras", 0)
         (
             (*LEFT, "colour"),
             1,
-            "cameras.left.colour is not known; known are id, image_size, intrinsics, pose, ignore, source",
+            "cameras.left.colour is not known; known are id, image_size, intrinsics, pose, ",
         ),
         (("field", "length_m"), "abc", "field.length_m: expected a number, came 'abc'"),
         ((*LEFT, "pose", "position", 2), None, "cameras.left.pose.position.2: expected a number, came null"),
