@@ -2,7 +2,7 @@
 
 The demo's pair and the real pair are calibrated by a service from outdated poses. Beside each seam, in pieces of a few
 rows, the medians of what either camera shows are compared, colour by colour: as they are, and evened out. Printed: the
-median piece, in brightness and in colour, and that of nine in ten; with `--pictures` both seams at four times their size.
+median piece, in brightness and in colour, and that of nine in ten; with `--pictures` both seams, four times as large.
 """
 
 from __future__ import annotations
