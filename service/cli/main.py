@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from service import lifeline
-from service.cli import calibrate, first, jobs, keys, serve, venues
+from service.cli import calibrate, first, jobs, keys, serve, stitch, venues
 from service.cli.printing import FAILED, fail
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
@@ -23,6 +23,7 @@ for command in (
     calibrate.run,
     first.intrinsics,
     first.pose,
+    stitch.stitch,
 ):
     app.command()(command)
 app.add_typer(venues.app, name="venue")

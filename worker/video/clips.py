@@ -65,13 +65,13 @@ class Clip:
     address: str
     container: InputContainer
     video: VideoStream
-    with_sound: bool
     facts: Facts
     since: float
     broken: int = field(default=0, init=False)
+    sound: AudioStream | None = field(default=None, init=False)
 
     @classmethod
-    def open(cls, camera: str, address: str, with_sound: bool = False, since: float = 0.0) -> Self:
+    def open(cls, camera: str, address: str, since: float = 0.0) -> Self:
         """A clip as it is; `since`, of `time.monotonic`, is for live streams. `VideoFault` where none can be read."""
         if find_spec("av") is None:
             raise VideoFault(NO_PYAV)
@@ -93,8 +93,7 @@ class Clip:
         rate = video.average_rate or video.guessed_rate or USUAL_RATE
         seconds = None if live or container.duration is None else container.duration / av.time_base
         size = video.codec_context.width, video.codec_context.height
-        with_sound = with_sound and bool(container.streams.audio)
-        return cls(camera, address, container, video, with_sound, Facts(size, Fraction(rate), seconds), since)
+        return cls(camera, address, container, video, Facts(size, Fraction(rate), seconds), since)
 
     @property
     def live(self) -> bool:
@@ -102,9 +101,13 @@ class Clip:
         return is_live(self.address)
 
     @property
-    def sound(self) -> AudioStream | None:
-        """The sound that is read along, if there is any and it is wanted."""
-        return self.container.streams.audio[0] if self.with_sound else None
+    def has_sound(self) -> bool:
+        """Whether it can be listened to."""
+        return bool(self.container.streams.audio)
+
+    def listen(self) -> None:
+        """Read the sound along with the pictures."""
+        self.sound = self.container.streams.audio[0]
 
     def shots(self, begin_s: float = 0.0) -> Iterator[Shot]:
         """The pictures from about a time on, to the end; `VideoFault` where a picture is not as the first one."""
@@ -114,9 +117,9 @@ class Clip:
         for packet in self._packets():
             if packet.stream.type == "audio":
                 if packet.pts is not None:
-                    sound.append(packet)  # type: ignore[arg-type]
+                    sound.append(packet)
                 continue
-            frames, lost = _decoded(packet)  # type: ignore[arg-type]
+            frames, lost = _decoded(packet)
             broken += lost
             for frame in frames:
                 if frame.is_corrupt or frame.pts is None or frame.time_base is None:
@@ -167,7 +170,7 @@ class Clip:
     def _packets(self) -> Iterator[Packet[AudioStream] | Packet[VideoStream]]:
         import av
 
-        streams = (self.video, self.sound) if self.sound is not None else (self.video,)
+        streams = (self.video,) if self.sound is None else (self.video, self.sound)
         try:
             yield from self.container.demux(*streams)  # type: ignore[misc]
         except av.EOFError:
@@ -177,7 +180,9 @@ class Clip:
             if not self.live and isinstance(error, av.InvalidDataError):
                 self.broken += 1
                 return
-            raise VideoFault(f"camera {self.camera}: {without_login(self.address)} broke off: {_words(error)}") from None
+            raise VideoFault(
+                f"camera {self.camera}: {without_login(self.address)} broke off: {_words(error)}"
+            ) from None
 
     def _check(self, frame: av.VideoFrame, at_s: float) -> None:
         if (frame.width, frame.height) != self.facts.size:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Any
 
 import cv2
 import numpy as np
@@ -44,6 +45,25 @@ class Renderer:
         ]
         self._levels = _levels_used(self._strips, len(panorama.parts))
         self._pool = ThreadPoolExecutor(threads)
+        self._weights = [part.weight for part in panorama.parts]
+        self.move(panorama)
+
+    def fits(self, panorama: Panorama) -> bool:
+        """Whether a panorama is of the same cameras, each counting where it did: `move` is enough for it."""
+        return len(panorama.parts) == len(self._weights) and all(
+            part.weight is weight for part, weight in zip(panorama.parts, self._weights, strict=True)
+        )
+
+    def move(self, panorama: Panorama) -> None:
+        """Sample frames where a panorama says that `fits`: a tenth of the work of a new renderer."""
+        self._maps = list(
+            self._pool.map(
+                lambda strip: [
+                    _maps(panorama.parts[stretch.camera], strip.rows, stretch) for stretch in strip.stretches
+                ],
+                self._strips,
+            )
+        )
 
     def render(self, pictures: Mapping[str, Picture], onto: Planes) -> None:
         """Make the view of one picture of each camera in planes (H, W), (H/2, W/2), (H/2, W/2)."""
@@ -54,31 +74,31 @@ class Renderer:
                 self._levels,
             )
         )
-        for _ in self._pool.map(lambda strip: self._make(strip, levels, onto), self._strips):
+        for _ in self._pool.map(lambda strip, maps: self._make(strip, maps, levels, onto), self._strips, self._maps):
             pass
 
     def close(self) -> None:
         """Let go of the threads."""
         self._pool.shutdown()
 
-    def _make(self, strip: _Strip, levels: Sequence[Mapping[int, Planes]], onto: Planes) -> None:
+    def _make(self, strip: _Strip, maps: Sequence[_Maps], levels: Sequence[Mapping[int, Planes]], onto: Planes) -> None:
         rows, half_rows = strip.rows, _halved(strip.rows)
         here = onto[0][rows], onto[1][half_rows], onto[2][half_rows]
         if strip.unseen:
             here[0][:] = round(BLACK + BACKDROP * 219 / 255)
             here[1][:] = here[2][:] = NO_COLOUR
-        for stretch in strip.stretches:
+        for stretch, at in zip(strip.stretches, maps, strict=True):
             columns, half_columns = stretch.columns, _halved(stretch.columns)
             target = here[0][:, columns], here[1][:, half_columns], here[2][:, half_columns]
             view = self._views[stretch.camera]
             source = levels[stretch.camera][stretch.level]
             if stretch.share is None and not view.lit:
-                _sample(source, stretch, target)
+                _sample(source, at, target)
                 continue
-            made = tuple(np.empty(plane.shape, np.uint8) for plane in target)
-            _sample(source, stretch, made)
+            made: Sequence[Any] = [np.empty(plane.shape, np.uint8) for plane in target]
+            _sample(source, at, made)
             if view.lit:
-                made = _evened(view, stretch, made)
+                made = _evened(view, at, made)
             for plane, new, share in zip(target, made, stretch.share or 3 * (None,), strict=True):
                 plane[:] = new if share is None else cv2.blendLinear(new, plane, share, 1 - share)
 
@@ -107,18 +127,13 @@ class _View:
 class _Stretch:
     """Columns of a strip that show one camera at one level of detail.
 
-    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone. `rise`, of luma
-    (h, w) and of colours (h/2, w/2, 3): by which part of 255ths of `_Stretch.steepest` it is multiplied more.
+    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone.
     """
 
     camera: int
     level: int
     columns: slice
-    luma: Map
-    chroma: Map
     share: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]] | None
-    rise: tuple[Plane, Plane, Plane] | None
-    steepest: float
 
 
 @dataclass(frozen=True)
@@ -126,6 +141,20 @@ class _Strip:
     rows: slice
     unseen: bool
     stretches: Sequence[_Stretch]
+
+
+@dataclass(frozen=True)
+class _Maps:
+    """Where a stretch is sampled.
+
+    `rise`: what its lens takes from the corners: of luma (h, w), of luma at the resolution of chroma (h/2, w/2) and of
+    colours (h/2, w/2, 3), in 255ths of `steepest`.
+    """
+
+    luma: Map
+    chroma: Map
+    rise: tuple[Plane, Plane, Plane] | None
+    steepest: float
 
 
 # In advance
@@ -160,8 +189,8 @@ def _stretches(number: int, part: Part, rows: slice, share: NDArray[np.float32])
         if level >= 0:
             together = [block for block, *_ in blocks]
             columns = slice(together[0].start, together[-1].stop)
-            own = None if alone else share[:, columns]
-            found.append(_stretch(number, part, columns, source[:, columns], own, level))
+            own = None if alone else _shares(share[:, columns])
+            found.append(_Stretch(number, level, columns, own))
     return found
 
 
@@ -172,43 +201,33 @@ def _level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
     return int(np.clip(np.floor(0.5 * np.log2(max(area, 1.0))), 0, LARGEST_LEVEL))
 
 
-def _stretch(
-    number: int, part: Part, columns: slice, source: NDArray[np.float32], share: NDArray[np.float32] | None, level: int
-) -> _Stretch:
-    counts = np.ones(source.shape[:2], np.float32) if share is None else (share > 0).astype(np.float32)
-    # Chroma is where the left pixels of its four are on the average, of those that count.
-    upper, lower = source[::2, ::2], source[1::2, ::2]
-    shares = counts[::2, ::2, None], counts[1::2, ::2, None]
-    total = np.maximum(shares[0] + shares[1], 1e-9)
-    between = np.where(
-        shares[0] + shares[1] > 0, (upper * shares[0] + lower * shares[1]) / total, (upper + lower) / 2
-    ).astype(np.float32)
-    rise, steepest = _rise(part, source, between)
-    chroma = (between - np.array([0, CHROMA_ROW], np.float32)) / 2
-    return _Stretch(
-        number, level, columns, _map(source, level), _map(chroma, level), _shares(share), rise, steepest
+def _maps(part: Part, rows: slice, stretch: _Stretch) -> _Maps:
+    source = part.source[rows, stretch.columns]
+    between = (source[::2, ::2] + source[1::2, ::2]) / 2
+    if stretch.share is not None:
+        # Between two rows of which only one is seen there is nothing.
+        upper, lower = (stretch.share[0][row::2, ::2, None] > 0 for row in (0, 1))
+        between = np.where(upper & ~lower, source[::2, ::2], np.where(lower & ~upper, source[1::2, ::2], between))
+    chroma = ((between - np.array([0, CHROMA_ROW])) / 2).astype(np.float32)
+    return _Maps(
+        _map(source, stretch.level), _map(chroma, stretch.level), *_rise(part, source, between.astype(np.float32))
     )
 
 
 def _map(source: NDArray[np.float32], level: int) -> Map:
     at = ((source + 0.5) / (1 << level) - 0.5).astype(np.float32)
-    places, parts = cv2.convertMaps(np.ascontiguousarray(at), None, cv2.CV_16SC2)
+    places, parts = cv2.convertMaps(at[..., 0], at[..., 1], cv2.CV_16SC2)
     return np.asarray(places, np.int16), np.asarray(parts, np.uint16)
 
 
-def _shares(
-    share: NDArray[np.float32] | None,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]] | None:
-    if share is None:
-        return None
-    half = (share[::2, ::2] + share[1::2, ::2]) / 2
+def _shares(share: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    half = ((share[::2, ::2] + share[1::2, ::2]) / 2).astype(np.float32)
     return np.ascontiguousarray(share), half, half
 
 
 def _rise(
     part: Part, source: NDArray[np.float32], between: NDArray[np.float32]
 ) -> tuple[tuple[Plane, Plane, Plane] | None, float]:
-    """What a lens takes from the corners, of luma, of luma at the resolution of chroma, and of colours."""
     if part.light.falloff == 0:
         return None, 0.0
     luma, chroma = (part.light.rise(at, part.frame_size) - 1 for at in (source, between))
@@ -227,8 +246,9 @@ def _levels_used(strips: Sequence[_Strip], cameras: int) -> list[list[int]]:
     return [sorted(levels) for levels in used]
 
 
-def _rounded(values: NDArray[np.floating]) -> Plane:
-    return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+def _rounded(values: NDArray[np.floating[Any]]) -> Plane:
+    rounded: Plane = np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    return rounded
 
 
 def _halved(extent: slice) -> slice:
@@ -254,31 +274,31 @@ def _shrunk(plane: Plane) -> Plane:
     return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _sample(source: Planes, stretch: _Stretch, target: Sequence[Plane]) -> None:
-    for plane, at, onto in zip(source, (stretch.luma, stretch.chroma, stretch.chroma), target, strict=True):
+def _sample(source: Planes, maps: _Maps, target: Sequence[Plane]) -> None:
+    for plane, at, onto in zip(source, (maps.luma, maps.chroma, maps.chroma), target, strict=True):
         cv2.remap(plane, *at, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)
 
 
-def _evened(view: _View, stretch: _Stretch, planes: Sequence[Plane]) -> tuple[Plane, Plane, Plane]:
+def _evened(view: _View, maps: _Maps, planes: Sequence[Any]) -> Sequence[Any]:
     """The planes in the light of the other cameras."""
     luma, blue, red = planes
-    coarse = cv2.resize(luma, (blue.shape[1], blue.shape[0]), interpolation=cv2.INTER_AREA)
-    colours = cv2.LUT(cv2.transform(cv2.merge((coarse, blue, red)), FROM_PLANES), view.tones)
+    coarse: Any = cv2.resize(luma, (blue.shape[1], blue.shape[0]), interpolation=cv2.INTER_AREA)
+    colours: Any = cv2.LUT(cv2.transform(cv2.merge((coarse, blue, red)), FROM_PLANES), view.tones)
     luma, coarse = cv2.LUT(luma, view.luma), cv2.LUT(coarse, view.luma)
-    if stretch.rise is not None:
-        of_luma, of_coarse, of_colours = stretch.rise
-        colours = _raised(colours, of_colours, stretch.steepest, 0)
-        luma = _raised(luma, of_luma, stretch.steepest, BLACK)
-        coarse = _raised(coarse, of_coarse, stretch.steepest, BLACK)
+    if maps.rise is not None:
+        of_luma, of_coarse, of_colours = maps.rise
+        colours = _raised(colours, of_colours, maps.steepest, 0)
+        luma = _raised(luma, of_luma, maps.steepest, BLACK)
+        coarse = _raised(coarse, of_coarse, maps.steepest, BLACK)
     evened, blue, red = cv2.split(cv2.transform(colours, TO_PLANES))
     # What its colour adds to the luma of a pixel, around 128 so that it fits into a byte.
     added = cv2.addWeighted(evened, 1, coarse, -1, NO_COLOUR)
     added = cv2.resize(added, (luma.shape[1], luma.shape[0]), interpolation=cv2.INTER_LINEAR)
-    return (cv2.addWeighted(luma, 1, added, 1, -NO_COLOUR), blue, red)  # type: ignore[return-value]
+    return cv2.addWeighted(luma, 1, added, 1, -NO_COLOUR), blue, red
 
 
-def _raised(values: Plane, part: Plane, steepest: float, black: int) -> Plane:
+def _raised(values: Any, part: Plane, steepest: float, black: int) -> Any:
     """Values above `black` multiplied by what the lens took from them."""
-    above = cv2.subtract(values, black) if black else values
+    above = cv2.addWeighted(values, 1, values, 0, -black) if black else values
     change = cv2.multiply(above, part, scale=abs(steepest) / 255)
-    return cv2.add(values, change) if steepest > 0 else cv2.subtract(values, change)  # type: ignore[return-value]
+    return cv2.add(values, change) if steepest > 0 else cv2.subtract(values, change)

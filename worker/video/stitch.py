@@ -21,7 +21,7 @@ from worker.calibration.scene.field import Field
 from worker.calibration.stitch.light import Light, lights
 from worker.calibration.stitch.panorama import Panorama, panorama
 from worker.calibration.stitch.views import View, ViewChoice, chosen_view
-from worker.video.clips import Clip
+from worker.video.clips import Clip, Shot
 from worker.video.faults import VideoFault
 from worker.video.planes import Picture, planes_of
 from worker.video.render import Renderer
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 # Frames whose sides are to each other as those of the lens to this part have its aspect ratio.
 SAME_ASPECT = 0.005
+SILENT = "none"
 # A clip that ends this much before the others has ended early.
 EARLY_S = 0.25
 ROUNDING_S = 1e-6
@@ -57,7 +58,8 @@ class Geometry(Protocol):
     def at(self, number: int, pictures: Mapping[str, Picture]) -> Panorama:
         """The panorama of the `number`th picture of the view, of the cameras that have one.
 
-        The same object as before as long as nothing moves: what renders it is made anew for another one.
+        The same object as before as long as nothing moves. Where sources alone have moved, and the weights are the
+        objects they were, tables of the renderer are kept; for other panoramas all are made anew.
         """
         ...
 
@@ -101,8 +103,9 @@ class Offset:
 class Plan:
     """What is made of the clips.
 
-    `offsets`: when a camera's clip began in the time of the first one's, in seconds or in frames of its own; found where
-    there is none. `begin_s`, `end_s`: in the time of the first clip. `sound`: the camera whose sound is kept.
+    `offsets`: when a camera's clip began in the time of the first one's; found where there is none. `begin_s` and
+    `end_s`: in the time of the first clip. `sound`: the camera whose sound is kept, `SILENT`: none, None: the first
+    that has any.
     """
 
     output: str
@@ -120,9 +123,9 @@ class Plan:
 class Stitched:
     """What was made. `seconds`: of video; `took_s`: until it was whole.
 
-    `found`: what the clips said of offsets that were not given; `ended`: when clips ended before the others, in the time
-    of the first; `broken`: frames that could not be decoded, `repeated`: how many pictures of the view hold another
-    frame in place of such.
+    `found`: what the clips said of offsets that were not given; `ended`: when clips ended before the others did, in the
+    time of the first; `broken`: frames that could not be decoded, `repeated`: how many pictures of the view hold
+    another frame in place of such.
     """
 
     size: tuple[int, int]
@@ -147,11 +150,11 @@ def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, f
     _check_cameras(scene, addresses, plan)
     with ExitStack() as stack:
         clips = {
-            camera: stack.enter_context(Clip.open(camera, address, camera == plan.sound, started))
-            for camera, address in addresses.items()
+            camera: stack.enter_context(Clip.open(camera, address, started)) for camera, address in addresses.items()
         }
-        if plan.sound is not None and clips[plan.sound].sound is None:
-            raise VideoFault(f"--audio: the clip of camera {plan.sound} has no sound; --audio none makes a silent one")
+        heard = _heard(clips, plan.sound)
+        if heard is not None:
+            heard.listen()
         fitted = {camera.id: _fitted(camera, clips.get(camera.id)) for camera in scene.cameras}
         offsets, found = _offsets(scene, clips, fitted, plan, told)
         rate = plan.rate or next(iter(clips.values())).facts.rate
@@ -170,7 +173,7 @@ def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, f
         geometry = follow(scene.pitch, view, shown, light)
         ends = _ends(clips, offsets)
         expected = _expected(ends, moments.begin_s, rate, plan)
-        sound = None if plan.sound is None else Sound(clips[plan.sound], moments.begin_s - offsets[plan.sound])
+        sound = None if heard is None else Sound(heard, moments.begin_s - offsets[heard.camera])
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
             for count in _rendered(moments, geometry, view.size, writer, plan.threads):
                 told(f"{count / (time.monotonic() - started):.1f} fps", min(1.0, count / expected))
@@ -198,10 +201,14 @@ def _rendered(
     try:
         for pictures in moments:
             now = geometry.at(moments.count, pictures)
-            if renderer is None or now is not before:
+            if renderer is not None and renderer.fits(now):
+                if now is not before:
+                    renderer.move(now)
+            else:
                 if renderer is not None:
                     renderer.close()
-                before, renderer = now, Renderer(now, threads)
+                renderer = Renderer(now, threads)
+            before = now
             frame = av.VideoFrame(*size, "yuv420p")
             renderer.render(pictures, planes_of(frame))
             moments.count += 1
@@ -275,7 +282,11 @@ class Moments:
 
 def _check_cameras(scene: Scene, addresses: Mapping[str, str], plan: Plan) -> None:
     known = [camera.id for camera in scene.cameras]
-    for what, cameras in (("clip", addresses), ("--offset", plan.offsets), ("--audio", filter(None, [plan.sound]))):
+    for what, cameras in (
+        ("clip", addresses),
+        ("--offset", plan.offsets),
+        ("--audio", [] if plan.sound in (None, SILENT) else [plan.sound]),
+    ):
         for camera in cameras:
             if camera not in known:
                 raise VideoFault(f"{what}: the venue has no camera {camera}; it has {', '.join(known)}")
@@ -286,6 +297,17 @@ def _check_cameras(scene: Scene, addresses: Mapping[str, str], plan: Plan) -> No
         raise VideoFault(
             f"No clip of camera {', '.join(missing)}. --allow-missing makes the view of what the others see."
         )
+
+
+def _heard(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
+    """The clip whose sound is kept."""
+    if wanted == SILENT:
+        return None
+    if wanted is None:
+        return next((clip for clip in clips.values() if clip.has_sound), None)
+    if not clips[wanted].has_sound:
+        raise VideoFault(f"--audio: the clip of camera {wanted} has no sound; --audio none makes a silent one")
+    return clips[wanted]
 
 
 def _fitted(camera: Camera, clip: Clip | None) -> Camera:
@@ -326,8 +348,7 @@ def _offsets(
         told(f"sync {camera}", number / len(clips))
         begin_s = max(0.0, (plan.begin_s or 0.0) - offsets.get(camera, 0.0))
         with Clip.open(camera, clip.address) as again:
-            shots = takewhile(lambda shot, end=begin_s + LOOKED_AT_S: shot.time_s < end, again.shots(begin_s))
-            motions[camera] = places.motion(camera, shots)
+            motions[camera] = places.motion(camera, _until(begin_s + LOOKED_AT_S, again.shots(begin_s)))
     offsets, found = chained(places, motions, offsets)
     for camera, answer in found.items():
         if answer.second_s is None:
@@ -338,6 +359,10 @@ def _offsets(
                 "is assumed"
             )
     return offsets, found
+
+
+def _until(end_s: float, shots: Iterator[Shot]) -> Iterator[Shot]:
+    return takewhile(lambda shot: shot.time_s < end_s, shots)
 
 
 def _track(stack: ExitStack, clip: Clip, offset_s: float, begin_s: float | None, rate: Fraction) -> Track:

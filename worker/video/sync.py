@@ -29,7 +29,7 @@ NOISE = 3.0
 # Fewer cells or seconds than this that both have say nothing.
 LEAST_CELLS, LEAST_S = 4, 2.0
 # How alike the signals are at least, 1 being the same; and how much of that no other lag may reach.
-LEAST_STRENGTH, SECOND_BEST = 0.25, 0.8
+LEAST_STRENGTH, SECOND_BEST = 0.3, 0.6
 # Lags this near belong to the same peak, in steps.
 PEAK_STEPS = 2
 
@@ -80,16 +80,14 @@ class Places:
         for shot in shots:
             luma = shot.picture.planes[0]
             small = cv2.resize(luma, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA).astype(np.float32)
-            seen = cv2.remap(small, at, None, cv2.INTER_LINEAR)
+            seen = cv2.remap(small, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
             if before is not None:
                 change = np.where(within, np.maximum(np.abs(seen - before[1]) - NOISE, 0), 0).astype(np.float32)
                 times.append((shot.time_s + before[0]) / 2)
                 changes.append(_pooled(change).ravel() / np.maximum(share.ravel(), 1e-6))
             before = shot.time_s, np.asarray(seen, np.float32)
         cells = share.size
-        return Motion(
-            np.array(times), np.array(changes, np.float32).reshape(-1, cells), (share.ravel() > 0.5)
-        )
+        return Motion(np.array(times), np.array(changes, np.float32).reshape(-1, cells), (share.ravel() > 0.5))
 
     def common(self, first: str, second: str) -> int:
         """How many pixels of the coarse view both see."""
@@ -156,7 +154,8 @@ def _peak(likeness: Array, offsets: Array) -> Found:
 def _pooled(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Means (h, w) of the cells of values (H, W)."""
     height, width = values.shape
-    return values.reshape(height // CELL, CELL, width // CELL, CELL).mean(axis=(1, 3))
+    cells = values.reshape(height // CELL, CELL, width // CELL, CELL)
+    return np.asarray(cells.mean(axis=(1, 3)), np.float32)
 
 
 def chained(

@@ -58,7 +58,7 @@ class Reading:
                 if self._over.is_set():
                     return
             self._queue.put(None)
-        except BaseException as error:  # noqa: BLE001
+        except BaseException as error:
             self._queue.put(error)
 
 
@@ -98,10 +98,10 @@ class Track:
             return None
         if self._next is None and own > self._now.time_s + LAST_SHOWN * self.interval_s:
             return None
-        self._bridge(own)
+        self._bridge()
         return self._now
 
-    def _bridge(self, own: float) -> None:
+    def _bridge(self) -> None:
         """Count and limit the pictures that stand in for broken ones between this one and the next."""
         if self._now is None or self._next is None or not self._next.broken:
             return

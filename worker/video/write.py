@@ -56,7 +56,7 @@ class Sound:
 
 
 class Writer:
-    """Takes pictures of `size` and `rate` one after the other. Use as a context: what ends in an error leaves no file."""
+    """Takes one picture after the other. Use it as a context: what ends in an error leaves no file."""
 
     def __init__(
         self,
@@ -116,14 +116,14 @@ class Writer:
             if self._error is None:
                 try:
                     self._write(*job)
-                except BaseException as error:  # noqa: BLE001
+                except BaseException as error:
                     self._error = error
         if self._error is None:
             try:
                 self._container.mux(self._video.encode(None))
                 if self._audio is not None and not self._copied:
                     self._container.mux(self._audio.encode(None))
-            except BaseException as error:  # noqa: BLE001
+            except BaseException as error:
                 self._error = error
 
     def _write(self, frame: VideoFrame, sound: Sequence[Packet[AudioStream]]) -> None:
@@ -193,7 +193,8 @@ def _video_stream(container: OutputContainer, size: tuple[int, int], rate: Fract
     try:
         codec = av.Codec(encoding.codec, "w")
     except (av.FFmpegError, ValueError):
-        raise VideoFault(f"--codec: there is no encoder {encoding.codec}; libx264, libx265 and prores_ks are some") from None
+        some = "libx264, libx265 and prores_ks are some"
+        raise VideoFault(f"--codec: there is no encoder {encoding.codec}; {some}") from None
     formats = [each.name for each in codec.video_formats or ()]
     stream: Any = container.add_stream(encoding.codec, rate=rate, options=encoding.options)
     stream.width, stream.height = size
