@@ -176,13 +176,9 @@ class Clip:
         except av.EOFError:
             return
         except (av.FFmpegError, OSError) as error:
-            # What was cut off in the middle ends here.
-            if not self.live and isinstance(error, av.InvalidDataError):
-                self.broken += 1
-                return
-            raise VideoFault(
-                f"camera {self.camera}: {without_login(self.address)} broke off: {_words(error)}"
-            ) from None
+            # A stream that breaks off and a file that is cut off end here: what there was is kept.
+            if not self.live and not isinstance(error, av.InvalidDataError):
+                raise VideoFault(f"camera {self.camera}: {self.address} cannot be read: {_words(error)}") from None
 
     def _check(self, frame: av.VideoFrame, at_s: float) -> None:
         if (frame.width, frame.height) != self.facts.size:

@@ -272,12 +272,8 @@ class Moments:
         return {camera: shot.picture for camera, shot in shots.items() if shot is not None}
 
     def early(self, ends: Mapping[str, float]) -> dict[str, float]:
-        """Who ended while others went on, by when clips should end."""
-        return {
-            camera: at
-            for camera, at in self.ended.items()
-            if any(end > at + EARLY_S for other, end in ends.items() if other not in self.ended)
-        }
+        """Who ended while others went on, by when clips should end; a stream that ends does so early."""
+        return {camera: at for camera, at in self.ended.items() if max(ends.values()) > at + EARLY_S}
 
 
 def _check_cameras(scene: Scene, addresses: Mapping[str, str], plan: Plan) -> None:

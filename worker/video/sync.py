@@ -29,7 +29,7 @@ NOISE = 3.0
 # Fewer cells or seconds than this that both have say nothing.
 LEAST_CELLS, LEAST_S = 4, 2.0
 # How alike the signals are at least, 1 being the same; and how much of that no other lag may reach.
-LEAST_STRENGTH, SECOND_BEST = 0.3, 0.6
+LEAST_STRENGTH, SECOND_BEST = 0.4, 0.6
 # Lags this near belong to the same peak, in steps.
 PEAK_STEPS = 2
 

@@ -75,7 +75,6 @@ class Track:
     sound: list[Packet[AudioStream]] = field(default_factory=list, init=False)
     _now: Shot | None = field(default=None, init=False)
     _next: Shot | None = field(default=None, init=False)
-    _shown: Shot | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         self._now = next(self.shots, None)
@@ -98,23 +97,22 @@ class Track:
             return None
         if self._next is None and own > self._now.time_s + LAST_SHOWN * self.interval_s:
             return None
-        self._bridge()
+        self._bridge(own, self._now)
         return self._now
 
-    def _bridge(self) -> None:
-        """Count and limit the pictures that stand in for broken ones between this one and the next."""
-        if self._now is None or self._next is None or not self._next.broken:
-            return
-        gap = self._next.time_s - self._now.time_s
-        if gap > LONGEST_GAP_S + self.interval_s:
-            raise VideoFault(
-                f"camera {self.camera}: {self._next.broken} frames from {self._now.time_s:.2f} s on cannot be decoded, "
-                f"and the next good one is {gap:.2f} s later; more than {LONGEST_GAP_S:g} s is not bridged. "
-                "Cut the clip there, or copy it again"
-            )
-        if self._now is self._shown:
+    def _bridge(self, own: float, shown: Shot) -> None:
+        """Count and limit the pictures that stand in for broken ones."""
+        if self._next is not None and self._next.broken:
+            gap = self._next.time_s - shown.time_s
+            if gap > LONGEST_GAP_S + self.interval_s:
+                raise VideoFault(
+                    f"camera {self.camera}: {self._next.broken} frames from {shown.time_s:.2f} s on cannot be decoded, "
+                    f"and the next good one is {gap:.2f} s later; more than {LONGEST_GAP_S:g} s is not bridged. "
+                    "Cut the clip there, or copy it again"
+                )
+        beside = shown.broken or (self._next is not None and self._next.broken)
+        if beside and abs(own - shown.time_s) > LAST_SHOWN * self.interval_s:
             self.repeated += 1
-        self._shown = self._now
 
     def _heard(self, shot: Shot | None) -> None:
         if shot is not None:

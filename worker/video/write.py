@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
+from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 WAITING = 3
 FILES = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska", ".ts": "mpegts"}
 STREAMS = {"rtsp": "rtsp", "udp": "mpegts", "srt": "mpegts", "rtmp": "flv"}
+# Whoever joins a stream sees it after so long.
+JOINED_S = 1
 # Encoders whose quality is a constant rate factor, from 0 (no loss) on, and whose presets go from fast to small.
 FACTORED = ("libx264", "libx265")
 
@@ -72,18 +76,28 @@ class Writer:
         self._part, self._container = _opened(address)
         try:
             self._video = _video_stream(self._container, size, rate, encoding)
+            if self._part is None:
+                self._video.codec_context.gop_size = round(JOINED_S * rate)
             self._audio, self._copied = _audio_stream(self._container, sound.clip.sound if sound else None)
         except BaseException:
             self._discard()
             raise
         self._queue: queue.Queue[tuple[VideoFrame, Sequence[Packet[AudioStream]]] | None] = queue.Queue(WAITING)
+        self._heard: deque[Packet[AudioStream]] = deque()
+        self._written = 0
         self._error: BaseException | None = None
+        self._began = time.monotonic()
         self._thread = threading.Thread(target=self._work, name="write", daemon=True)
         self._thread.start()
 
     def put(self, frame: VideoFrame, sound: Sequence[Packet[AudioStream]] = ()) -> None:
-        """Write the next picture; waits while the encoder is behind. `VideoFault` where writing failed before."""
+        """Write the next picture; waits while the encoder is behind. `VideoFault` where writing failed before.
+
+        Whoever receives a stream shows it as it comes: it leaves no faster than it is to be seen.
+        """
         self._fail_if_failed()
+        if self._part is None:
+            time.sleep(max(0.0, self._began + float(self._count / self._rate) - time.monotonic()))
         frame.pts, frame.time_base = self._count, 1 / self._rate
         frame.colorspace, frame.color_range = BT709, RANGE_LIMITED
         self._count += 1
@@ -128,14 +142,17 @@ class Writer:
 
     def _write(self, frame: VideoFrame, sound: Sequence[Packet[AudioStream]]) -> None:
         self._container.mux(self._video.encode(frame))
-        for packet in sound:
-            self._write_sound(packet)
+        self._written += 1
+        self._heard.extend(sound)
+        # Clips have sound written some way ahead of pictures, and of pictures that follow no more there is to be none.
+        while self._heard and (begins_s := self._begins_s(self._heard[0])) < self._written / self._rate:
+            self._write_sound(self._heard.popleft(), begins_s)
 
-    def _write_sound(self, packet: Packet[AudioStream]) -> None:
-        if self._audio is None or self._sound is None:
-            return
-        begins_s = self._sound.clip.sound_time(packet) - self._sound.begin_s
-        if begins_s < 0:
+    def _begins_s(self, packet: Packet[AudioStream]) -> float:
+        return 0.0 if self._sound is None else self._sound.clip.sound_time(packet) - self._sound.begin_s
+
+    def _write_sound(self, packet: Packet[AudioStream], begins_s: float) -> None:
+        if self._audio is None or begins_s < 0:
             return
         if self._copied:
             shift = (packet.pts or 0) - round(begins_s / packet.time_base)
