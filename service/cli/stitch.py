@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +20,7 @@ from service.wire.names import ID_PATTERN
 
 if TYPE_CHECKING:
     from service.wire.venue import Venue
+    from worker.calibration.stitch.views import ViewChoice
     from worker.video.stitch import Offset, Scene, Stitched
 
 PROJECTIONS = ("pannini", "cylinder", "rectilinear", "birds-eye")
@@ -213,14 +215,25 @@ def _venue(venue: str, url: str, api_key: str | None) -> Venue:
 
 
 def _scene(venue: Venue, chosen: Mapping[str, Any]) -> Scene:
-    from worker.calibration.stitch.views import ViewChoice
     from worker.jobs.reading import camera_of, light_of, pitch_of
     from worker.video.stitch import Scene
 
     given = {name: value for name, value in chosen.items() if value is not None}
     lights = {camera.id: light_of(camera.light) for camera in venue.cameras if camera.light is not None}
     cameras = [camera_of(camera) for camera in venue.cameras]
-    return Scene(pitch_of(venue.field), cameras, ViewChoice(**given), lights or None)
+    return Scene(pitch_of(venue.field), cameras, replace(_stored_choice(venue), **given), lights or None)
+
+
+def _stored_choice(venue: Venue) -> ViewChoice:
+    """What the venue itself wants to show."""
+    from worker.calibration.stitch.views import ViewChoice
+
+    kept = getattr(venue, "view", None)
+    if kept is None:
+        return ViewChoice()
+    return ViewChoice(
+        kept.projection, kept.width_px, kept.height_px, kept.field_of_view_deg, kept.pan_deg, kept.horizon
+    )
 
 
 def _tell(made: Stitched) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import threading
 import time
@@ -27,6 +28,13 @@ SCENE = Scene(PITCH, cameras, CHOICE, {one.id: NEUTRAL for one in cameras})
 VIEW = chosen_view(PITCH, cameras, CHOICE)
 TOGETHER = {"right": Offset(0)}
 FINE = Encoding(crf=10, preset="ultrafast")
+
+
+@pytest.fixture(autouse=True)
+def ffmpeg(missing):
+    """What the clips are looked at with, and what sends and receives streams."""
+    if shutil.which("ffmpeg") is None:
+        missing("ffmpeg")
 
 
 def told(*_):
