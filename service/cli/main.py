@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from service import lifeline
-from service.cli import calibrate, first, jobs, keys, serve, venues
+from service.cli import calibrate, first, jobs, keys, serve, stitch, venues
 from service.cli.printing import FAILED, fail
 
 COMMANDS = (
@@ -24,6 +24,7 @@ COMMANDS = (
     calibrate.run,
     first.intrinsics,
     first.pose,
+    stitch.stitch,
 )
 NOUNS = {"venue": venues.app, "field": first.field_app, "job": jobs.app, "key": keys.app}
 

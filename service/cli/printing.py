@@ -167,19 +167,21 @@ def followed(client: Client, job: Job) -> Job:
 @contextmanager
 def bar() -> Iterator[Callable[[Step | None, str], None]]:
     """A line that shows how far a calibration is, where somebody looks at the terminal."""
+    with progress() as show:
+        yield lambda step, otherwise: show(*((step.stage, step.fraction) if step else (otherwise, 0.0)))
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, float], None]]:
+    """A line that shows what is done and which part of it is, where somebody looks at the terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     columns = (TextColumn("{task.description:<14}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-    with Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal) as progress:
-        line = progress.add_task("waiting", total=1.0)
-
-        def show(step: Step | None, otherwise: str) -> None:
-            fraction, name = (step.fraction, step.stage) if step else (0.0, otherwise)
-            progress.update(line, completed=fraction, description=name)
-
-        yield show
+    with Progress(*columns, TimeElapsedColumn(), console=console, disable=not console.is_terminal) as shown:
+        line = shown.add_task("waiting", total=1.0)
+        yield lambda name, part: shown.update(line, completed=part, description=name)
 
 
 def _waiting(job: Job) -> str:

@@ -1,0 +1,282 @@
+"""`esc stitch`: clips of a venue's cameras become one clip of the stitched view, on this machine."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.arguments import LOCAL, ApiKey, AsJson, Url, checked
+from service.cli.calling import called
+from service.cli.printing import FAILED, USAGE, fail, progress, tell
+from service.wire.names import ID_PATTERN
+
+if TYPE_CHECKING:
+    from service.wire.venue import Venue
+    from worker.calibration.stitch.views import ViewChoice
+    from worker.video.stitch import Offset, Scene, Stitched
+
+PROJECTIONS = ("pannini", "cylinder", "rectilinear", "birds-eye")
+
+
+def stitch(
+    venue: Annotated[
+        str,
+        typer.Argument(metavar="VENUE", help="Id of a venue of the service, or the JSON file of one."),
+    ],
+    clips: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="CAMERA=CLIP...",
+            help="A clip of each camera, such as left=left.mp4: a file, or the address of a stream (rtsp://...). Times "
+            "are those of the first one.",
+        ),
+    ],
+    output: Annotated[
+        str,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="CLIP",
+            help="File to write (.mp4, .mov, .mkv, .ts), or where to send it: udp://, rtsp://, rtmp://.",
+        ),
+    ],
+    offset: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--offset",
+            metavar="CAMERA=SECONDS",
+            help="How much later a camera's clip began than the first one: right=0.120, or in frames of its own, "
+            "right=3f. Otherwise found by what moves where both see.",
+        ),
+    ] = None,
+    audio: Annotated[
+        str | None,
+        typer.Option(
+            "--audio", metavar="CAMERA|none", help="Whose sound is kept [default: the first clip's that has one]"
+        ),
+    ] = None,
+    rate: Annotated[
+        str | None,
+        typer.Option("--rate", metavar="FPS", help="Pictures a second, 25 or 30000/1001 [default: the first clip's]"),
+    ] = None,
+    begin: Annotated[
+        str | None, typer.Option("--from", metavar="TIME", help="Where to begin: seconds, or hours:minutes:seconds.")
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", metavar="TIME", help="Where to end.")] = None,
+    allow_missing: Annotated[
+        bool,
+        typer.Option(
+            "--allow-missing", help="Without a camera whose clip is not given or has ended, go on with others."
+        ),
+    ] = False,
+    projection: Annotated[
+        str | None,
+        typer.Option("--projection", metavar="|".join(PROJECTIONS), help="[default: the venue's, or pannini]"),
+    ] = None,
+    width: Annotated[int | None, typer.Option("--width", min=64, max=8192, help="Pixels, even [default: 1920]")] = None,
+    height: Annotated[
+        int | None, typer.Option("--height", min=64, max=8192, help="Pixels, even [default: as the view needs]")
+    ] = None,
+    field_of_view: Annotated[
+        float | None, typer.Option("--field-of-view", min=5, max=340, metavar="DEG", help="From left to right.")
+    ] = None,
+    pan: Annotated[float | None, typer.Option("--pan", min=-180, max=180, metavar="DEG", help="To the right.")] = None,
+    horizon: Annotated[
+        float | None,
+        typer.Option(
+            "--horizon", min=-3, max=3, help="How far down the horizon lies, 0 top to 1 bottom of the picture."
+        ),
+    ] = None,
+    codec: Annotated[str, typer.Option("--codec", help="Encoder, any that PyAV has.")] = "libx264",
+    crf: Annotated[
+        int, typer.Option("--crf", min=0, max=51, help="Quality of libx264 and libx265, 0 loses nothing.")
+    ] = 20,
+    preset: Annotated[
+        str, typer.Option("--preset", help="Of libx264 and libx265, ultrafast to veryslow.")
+    ] = "veryfast",
+    as_json: AsJson = False,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Stitch clips into one, on this machine. Needs the extra `video`. Exit: 0 made, 1 failed, 2 usage."""
+    addresses = _by_camera(clips, "CAMERA=CLIP, for instance left=left.mp4")
+    begin_s, end_s = (None if time is None else _seconds(time) for time in (begin, end))
+    pictures = None if rate is None else _rate(rate)
+    if any(side is not None and side % 2 for side in (width, height)):
+        fail("--width and --height are even numbers: video takes no others", USAGE)
+    if projection not in (None, *PROJECTIONS):
+        fail(f"--projection is one of {', '.join(PROJECTIONS)}, not {projection!r}", USAGE)
+    stored = _venue(venue, url, api_key)
+    chosen = {
+        "projection": projection,
+        "width": width,
+        "height": height,
+        "field_of_view_deg": field_of_view,
+        "pan_deg": pan,
+        "horizon": horizon,
+    }
+
+    from service.cli.local import engine_settings
+
+    engine_settings()
+    from worker.video.faults import VideoFault
+    from worker.video.stitch import Plan
+    from worker.video.stitch import stitch as stitched
+    from worker.video.write import Encoding
+
+    plan = Plan(
+        output,
+        _offsets(offset or []),
+        pictures,
+        begin_s,
+        end_s,
+        audio,
+        allow_missing,
+        Encoding(codec, crf, preset),
+    )
+    try:
+        with progress() as show:
+            made = stitched(_scene(stored, chosen), addresses, plan, show)
+    except VideoFault as fault:
+        fail(str(fault), FAILED)
+    _tell(made)
+    if as_json:
+        print(json.dumps(_document(made, output), indent=2))
+
+
+def _by_camera(arguments: Sequence[str], form: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for argument in arguments:
+        camera, equals, value = argument.partition("=")
+        if not (camera and equals and value):
+            fail(f"{argument!r} is not {form}", USAGE)
+        if camera in found:
+            fail(f"camera {camera} is given twice", USAGE)
+        found[camera] = value
+    return found
+
+
+def _offsets(given: Sequence[str]) -> dict[str, Offset]:
+    from worker.video.stitch import Offset
+
+    offsets = {}
+    for camera, text in _by_camera(given, "CAMERA=SECONDS, for instance right=0.120 or right=3f").items():
+        number = _number(text.removesuffix("f"), f"--offset {camera}={text}")
+        offsets[camera] = Offset(number, text.endswith("f"))
+    return offsets
+
+
+def _seconds(text: str) -> float:
+    """Of seconds, minutes:seconds or hours:minutes:seconds."""
+    total = 0.0
+    for part in text.split(":"):
+        total = 60 * total + _number(part, f"the time {text!r}")
+    return total
+
+
+def _rate(text: str) -> Fraction:
+    try:
+        rate = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        rate = Fraction(0)
+    if not 0 < rate <= 1000:
+        fail(f"--rate {text}: pictures a second, such as 25, 29.97 or 30000/1001", USAGE)
+    return rate
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        fail(f"{where}: {text!r} is no number", USAGE)
+    return number
+
+
+def _venue(venue: str, url: str, api_key: str | None) -> Venue:
+    """A venue of the service by its id, or of a file."""
+    if Path(venue).is_file():
+        from service.wire.venue import VenueIn
+
+        return checked(VenueIn, Path(venue).read_bytes(), venue).stored()
+    if not re.fullmatch(ID_PATTERN, venue):
+        fail(f"There is no file {venue}, and it is no id such as `esc venue list` prints", USAGE)
+    with called(url, api_key) as client:
+        return client.venue(venue)
+
+
+def _scene(venue: Venue, chosen: Mapping[str, Any]) -> Scene:
+    from worker.jobs.reading import camera_of, light_of, pitch_of
+    from worker.video.stitch import Scene
+
+    given = {name: value for name, value in chosen.items() if value is not None}
+    lights = {camera.id: light_of(camera.light) for camera in venue.cameras if camera.light is not None}
+    cameras = [camera_of(camera) for camera in venue.cameras]
+    return Scene(pitch_of(venue.field), cameras, replace(_stored_choice(venue), **given), lights or None)
+
+
+def _stored_choice(venue: Venue) -> ViewChoice:
+    """What the venue itself wants to show."""
+    from worker.calibration.stitch.views import ViewChoice
+
+    kept = getattr(venue, "view", None)
+    if kept is None:
+        return ViewChoice()
+    return ViewChoice(
+        kept.projection, kept.width_px, kept.height_px, kept.field_of_view_deg, kept.pan_deg, kept.horizon
+    )
+
+
+def _tell(made: Stitched) -> None:
+    """Lines for whoever looks."""
+    width, height = made.size
+    tell(
+        f"{made.frames} pictures of {width}x{height}, {made.seconds:.2f} s at {float(made.rate):.6g} a second, "
+        f"in {made.took_s:.1f} s ({made.frames / made.took_s:.1f} fps)"
+    )
+    for camera, found in made.found.items():
+        tell(
+            f"The clip of camera {camera} began {made.offsets[camera]:+.3f} s after the first: found by what moves, "
+            f"likeness {found.strength:.2f}, at the next best offset {found.rival:.2f}"
+        )
+    for camera, at in made.ended.items():
+        tell(f"The clip of camera {camera} ended early, at {at:.2f} s")
+    for camera, count in made.broken.items():
+        if count:
+            tell(
+                f"{count} frames of camera {camera} could not be decoded; {made.repeated[camera]} pictures show the "
+                "nearest good one in their place"
+            )
+
+
+def _document(made: Stitched, output: str) -> dict[str, Any]:
+    return {
+        "output": output,
+        "width_px": made.size[0],
+        "height_px": made.size[1],
+        "rate": str(made.rate),
+        "frames": made.frames,
+        "seconds": round(made.seconds, 6),
+        "took_s": round(made.took_s, 3),
+        "fps": round(made.frames / made.took_s, 3),
+        "cameras": {
+            camera: {
+                "offset_s": round(offset, 6),
+                "offset_found": camera in made.found,
+                "likeness": round(made.found[camera].strength, 4) if camera in made.found else None,
+                "ended_s": made.ended.get(camera),
+                "broken_frames": made.broken[camera],
+                "repeated": made.repeated[camera],
+            }
+            for camera, offset in made.offsets.items()
+        },
+    }

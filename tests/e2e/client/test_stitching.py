@@ -1,0 +1,131 @@
+"""`esc stitch`, as somebody calls it who has clips of a venue."""
+
+import json
+
+import av
+import pytest
+
+from service.wire.venue import VenueIn
+from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
+from worker.video import clips as clips_of
+
+SHOWN = ("--width", "320", "--preset", "ultrafast")
+
+
+def document(name):
+    """The venue that is filmed."""
+    return {
+        "id": name,
+        "field": {"length_m": 105.0, "width_m": 68.0, "line_width_m": 0.12, "ridge": PITCH.ridge.tolist()},
+        "cameras": [
+            {
+                "id": camera.id,
+                "image_size": list(camera.intrinsics.size),
+                "intrinsics": {"matrix": camera.intrinsics.matrix.tolist(), "distortion": [0, 0, 0, 0]},
+                "pose": {"rotation": camera.pose.rotation.tolist(), "position": camera.pose.position.tolist()},
+            }
+            for camera in cameras
+        ],
+    }
+
+
+@pytest.fixture(scope="module")
+def clips(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("clips")
+    return f"left={film(folder / 'l.mp4', LEFT, 4.0)}", f"right={film(folder / 'r.mp4', RIGHT, 4.0, begun_s=0.2)}"
+
+
+@pytest.fixture
+def venue_file(tmp_path, name):
+    (tmp_path / "venue.json").write_text(json.dumps(document(name)))
+    return "venue.json"
+
+
+def test_clips_of_a_venue_file_become_one_clip(esc, venue_file, clips, tmp_path):
+    answer = esc("stitch", venue_file, *clips, "-o", "pano.mp4", *SHOWN)
+    assert (answer.returncode, answer.stdout) == (0, "")
+    assert "95 pictures of 320x" in answer.stderr
+    assert "The clip of camera right began +0.20" in answer.stderr
+    with av.open(str(tmp_path / "pano.mp4")) as clip:
+        assert clip.streams.video[0].width == 320
+
+
+def test_the_result_is_told_as_json(esc, venue_file, clips):
+    answer = esc("stitch", venue_file, *clips, "-o", "pano.mkv", "--from", "0:01", "--to", "2.5", "--json", *SHOWN)
+    made = json.loads(answer.stdout)
+    assert (made["output"], made["width_px"], made["rate"]) == ("pano.mkv", 320, "25")
+    assert made["seconds"] == pytest.approx(1.5, abs=0.05)
+    right = made["cameras"]["right"]
+    assert right["offset_s"] == pytest.approx(0.2, abs=0.01)
+    assert right["offset_found"]
+    assert right["likeness"] > 0.7
+    assert made["cameras"]["left"] == {
+        "offset_s": 0.0,
+        "offset_found": False,
+        "likeness": None,
+        "ended_s": None,
+        "broken_frames": 0,
+        "repeated": 0,
+    }
+
+
+def test_a_venue_of_the_service_is_stitched_by_its_id(service, esc, name, clips, tmp_path):
+    service.http.put(f"/venues/{name}", json=document(name)).raise_for_status()
+    options = ("--offset", "right=5f", "--projection", "birds-eye", "--rate", "12.5", "--to", "1.2")
+    answer = esc("stitch", name, *clips, "-o", "above.mov", *options, *SHOWN)
+    assert answer.returncode == 0, answer.stderr
+    assert "13 pictures of 320x214" in answer.stderr
+    assert (tmp_path / "above.mov").is_file()
+    missing = esc("stitch", "no-such-venue", *clips, "-o", "pano.mp4")
+    assert missing.returncode == 1
+    assert "There is no such venue" in missing.stderr
+
+
+def test_the_light_that_a_venue_keeps_is_used(esc, name, clips, tmp_path):
+    stored = document(name)
+    stored["cameras"][0]["light"] = {"gain": [0.5, 0.5, 0.5]}
+    (tmp_path / "venue.json").write_text(VenueIn.model_validate(stored).model_dump_json())
+    answer = esc("stitch", "venue.json", *clips, "-o", "pano.mkv", "--offset", "right=0.2", "--to", "0.4", *SHOWN)
+    assert answer.returncode == 0, answer.stderr
+    with av.open(str(tmp_path / "pano.mkv")) as clip:
+        picture = next(clip.decode(video=0)).to_ndarray(format="gray")
+    bottom = picture[-20:].mean(axis=0)
+    assert bottom[80:140].mean() < 0.75 * bottom[180:240].mean()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("left=l.mp4", "left=l.mp4"), 2, "camera left is given twice"),
+        (("l.mp4",), 2, "'l.mp4' is not CAMERA=CLIP"),
+        (("left=l.mp4", "--width", "321"), 2, "are even numbers"),
+        (
+            ("left=l.mp4", "--projection", "fisheye"),
+            2,
+            "--projection is one of pannini, cylinder, rectilinear, birds-eye",
+        ),
+        (("left=l.mp4", "--rate", "0"), 2, "--rate 0: pictures a second"),
+        (("left=l.mp4", "--from", "1:xx"), 2, "'xx' is no number"),
+        (("left=l.mp4", "--offset", "right=soon"), 2, "--offset right=soon: 'soon' is no number"),
+        (("left=l.mp4",), 1, "No clip of camera right. --allow-missing"),
+        (("left=l.mp4", "middle=m.mp4"), 1, "clip: the venue has no camera middle; it has left, right"),
+        (("left=l.mp4", "right=r.mp4"), 1, "camera left: there is no file l.mp4"),
+    ],
+)
+def test_what_is_wrong_is_said(esc, venue_file, arguments, code, words):
+    answer = esc("stitch", venue_file, *arguments, "-o", "pano.mp4")
+    assert answer.returncode == code
+    assert words in answer.stderr
+
+
+def test_a_venue_that_is_neither_file_nor_id_is_named(esc):
+    answer = esc("stitch", "Venue.json", "left=l.mp4", "-o", "pano.mp4")
+    assert answer.returncode == 2
+    assert "There is no file Venue.json" in answer.stderr
+
+
+def test_without_pyav_it_says_how_to_get_it(esc, venue_file, clips, monkeypatch):
+    monkeypatch.setattr(clips_of, "find_spec", lambda name: None)
+    answer = esc("stitch", venue_file, *clips, "-o", "pano.mp4")
+    assert answer.returncode == 1
+    assert "pip install 'esc-calibration[video]'" in answer.stderr

@@ -1,0 +1,224 @@
+"""Clips of one camera each, files or live streams: opened, looked over, and read as pictures at rising times.
+
+A clip's time is in seconds and 0 at its first picture; that of a live stream counts from `since`, by when its first
+picture arrives.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from importlib.util import find_spec
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from worker.video.faults import VideoFault
+from worker.video.planes import Picture, picture_of
+
+if TYPE_CHECKING:
+    import av
+    from av.audio.stream import AudioStream
+    from av.container import InputContainer
+    from av.packet import Packet
+    from av.video.stream import VideoStream
+
+# Seconds until a live stream is opened, and between two of its packets.
+OPENING_S, WAITING_S = 10.0, 10.0
+# Where a clip is entered before the time that is wanted: a frame's own time may lie after that of its packet.
+EARLIER_S = 1.0
+USUAL_RATE = Fraction(25)
+LIVE = ("rtsp://", "rtsps://", "rtmp://", "srt://", "udp://", "rtp://", "http://", "https://")
+NO_PYAV = "Video needs PyAV: pip install 'esc-calibration[video]'"
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A picture of a clip at its time.
+
+    `sound`: packets of the sound that came since the shot before; `broken`: frames since then that could not be
+    decoded.
+    """
+
+    time_s: float
+    picture: Picture
+    sound: Sequence[Packet[AudioStream]] = ()
+    broken: int = 0
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known of a clip before it is read. `seconds`: how long it is, None for a live stream."""
+
+    size: tuple[int, int]
+    rate: Fraction
+    seconds: float | None
+
+
+@dataclass
+class Clip:
+    """An opened clip of a camera: close it, or use it as a context."""
+
+    camera: str
+    address: str
+    container: InputContainer
+    video: VideoStream
+    facts: Facts
+    since: float
+    broken: int = field(default=0, init=False)
+    sound: AudioStream | None = field(default=None, init=False)
+
+    @classmethod
+    def open(cls, camera: str, address: str, since: float = 0.0) -> Self:
+        """A clip as it is; `since`, of `time.monotonic`, is for live streams. `VideoFault` where none can be read."""
+        if find_spec("av") is None:
+            raise VideoFault(NO_PYAV)
+        import av
+
+        live = is_live(address)
+        if not live and not Path(address).is_file():
+            raise VideoFault(f"camera {camera}: there is no file {address}")
+        options = {"rtsp_transport": "tcp"} if address.startswith("rtsp") else {}
+        try:
+            container = av.open(address, "r", options=options, timeout=(OPENING_S, WAITING_S) if live else None)
+        except (av.FFmpegError, OSError) as error:
+            raise VideoFault(f"camera {camera}: {without_login(address)} is no clip: {_words(error)}") from None
+        if not container.streams.video:
+            container.close()
+            raise VideoFault(f"camera {camera}: there is no video in {without_login(address)}")
+        video = container.streams.video[0]
+        video.thread_type = "AUTO"
+        rate = video.average_rate or video.guessed_rate or USUAL_RATE
+        seconds = None if live or container.duration is None else container.duration / av.time_base
+        size = video.codec_context.width, video.codec_context.height
+        return cls(camera, address, container, video, Facts(size, Fraction(rate), seconds), since)
+
+    @property
+    def live(self) -> bool:
+        """Whether it cannot be read a second time."""
+        return is_live(self.address)
+
+    @property
+    def has_sound(self) -> bool:
+        """Whether it can be listened to."""
+        return bool(self.container.streams.audio)
+
+    def listen(self) -> None:
+        """Read the sound along with the pictures."""
+        self.sound = self.container.streams.audio[0]
+
+    def shots(self, begin_s: float = 0.0) -> Iterator[Shot]:
+        """The pictures from about a time on, to the end; `VideoFault` where a picture is not as the first one."""
+        zero = self._enter(begin_s)
+        sound: list[Packet[AudioStream]] = []
+        broken = 0
+        for packet in self._packets():
+            if packet.stream.type == "audio":
+                if packet.pts is not None:
+                    sound.append(packet)
+                continue
+            frames, lost = _decoded(packet)
+            broken += lost
+            for frame in frames:
+                if frame.is_corrupt or frame.pts is None or frame.time_base is None:
+                    broken += 1
+                    continue
+                at = float(frame.pts * frame.time_base)
+                if zero is None:
+                    zero = at - self._lateness()
+                self._check(frame, at - zero)
+                self.broken += broken
+                yield Shot(at - zero, picture_of(frame), sound, broken)
+                sound, broken = [], 0
+        self.broken += broken
+
+    def sound_time(self, packet: Packet[AudioStream]) -> float:
+        """When a packet of sound begins, in the clip's time."""
+        start = self._start()
+        return float((packet.pts or 0) * packet.time_base) - (0.0 if start is None else start)
+
+    def close(self) -> None:
+        """Let go of the file or stream."""
+        self.container.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _enter(self, begin_s: float) -> float | None:
+        """Go to a time of a file; when it begins in its own time, None where only its first picture tells."""
+        start = self._start()
+        if not self.live and start is not None and begin_s > EARLIER_S and self.video.time_base:
+            self.container.seek(int((start + begin_s - EARLIER_S) / self.video.time_base), stream=self.video)
+        return start
+
+    def _start(self) -> float | None:
+        if self.live or self.video.start_time is None or self.video.time_base is None:
+            return None
+        return float(self.video.start_time * self.video.time_base)
+
+    def _lateness(self) -> float:
+        """Live streams that are opened one after the other are in time by when their pictures arrive."""
+        return time.monotonic() - self.since if self.live else 0.0
+
+    def _packets(self) -> Iterator[Packet[AudioStream] | Packet[VideoStream]]:
+        import av
+
+        streams = (self.video,) if self.sound is None else (self.video, self.sound)
+        try:
+            yield from self.container.demux(*streams)  # type: ignore[misc]
+        except av.EOFError:
+            return
+        except (av.FFmpegError, OSError) as error:
+            # A stream that breaks off and a file that is cut off end here: what there was is kept.
+            if not self.live and not isinstance(error, av.InvalidDataError):
+                raise VideoFault(f"camera {self.camera}: {self.address} cannot be read: {_words(error)}") from None
+
+    def _check(self, frame: av.VideoFrame, at_s: float) -> None:
+        if (frame.width, frame.height) != self.facts.size:
+            width, height = self.facts.size
+            raise VideoFault(
+                f"camera {self.camera}: at {at_s:.2f} s its picture changes from {width}x{height} to "
+                f"{frame.width}x{frame.height} pixels; cut the clip there"
+            )
+        if frame.rotation:
+            raise VideoFault(
+                f"camera {self.camera}: the clip says that players are to turn it by {frame.rotation} degrees, and its "
+                "lens was measured in frames that may have been turned or not. Store it as it was calibrated: "
+                "ffmpeg -i CLIP -c copy -metadata:s:v rotate=0 OTHER leaves the frames as they are, "
+                "ffmpeg -i CLIP OTHER turns them"
+            )
+
+
+def is_live(address: str) -> bool:
+    """Whether an address is a stream's rather than a file's."""
+    return address.startswith(LIVE)
+
+
+def without_login(address: str) -> str:
+    """An address as it may be shown: user and password of a stream are nobody's business."""
+    scheme, separator, rest = address.partition("://")
+    if not separator:
+        return address
+    host, slash, path = rest.partition("/")
+    return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
+
+
+def _decoded(packet: Packet[VideoStream]) -> tuple[list[av.VideoFrame], int]:
+    """The pictures that a packet completes, and how many it broke."""
+    import av
+
+    try:
+        return packet.decode(), 0
+    except av.FFmpegError:
+        return [], 1
+
+
+def _words(error: BaseException) -> str:
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__

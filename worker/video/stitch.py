@@ -1,0 +1,381 @@
+"""From a clip of each camera to one clip of the view: the whole way, in bounded memory.
+
+Decoders, the making of views and the encoder run beside each other. At any moment each camera holds five pictures
+beside what its decoder keeps, and three views wait for the encoder.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import takewhile
+from math import inf
+from typing import TYPE_CHECKING, Protocol
+
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.field import Field
+from worker.calibration.stitch.light import Light, lights
+from worker.calibration.stitch.panorama import Panorama, panorama
+from worker.calibration.stitch.views import View, ViewChoice, chosen_view
+from worker.video.clips import Clip, Shot
+from worker.video.faults import VideoFault
+from worker.video.planes import Picture, planes_of
+from worker.video.render import Renderer
+from worker.video.sync import FARTHEST_S, LOOKED_AT_S, Found, Places, chained
+from worker.video.timing import Reading, Track
+from worker.video.write import Encoding, Sound, Writer
+
+if TYPE_CHECKING:
+    from av.audio.stream import AudioStream
+    from av.packet import Packet
+
+# Frames whose sides are to each other as those of the lens to this part have its aspect ratio.
+SAME_ASPECT = 0.005
+SILENT = "none"
+# A clip that ends this much before the others has ended early.
+EARLY_S = 0.25
+ROUNDING_S = 1e-6
+Told = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is filmed and what is to be seen of it. `lights`: of all cameras, None: as their first pictures say."""
+
+    pitch: Field
+    cameras: Sequence[Camera]
+    choice: ViewChoice
+    lights: Mapping[str, Light] | None = None
+
+
+class Geometry(Protocol):
+    """Where the pixels of the view lie in the pictures of a moment; what it shows does not change its size."""
+
+    def at(self, number: int, pictures: Mapping[str, Picture]) -> Panorama:
+        """The panorama of the `number`th picture of the view, of the cameras that have one.
+
+        The same object as before as long as nothing moves. Where sources alone have moved, and the weights are the
+        objects they were, tables of the renderer are kept; for other panoramas all are made anew.
+        """
+        ...
+
+
+@dataclass
+class Standing:
+    """Cameras that do not move: a panorama for each set of cameras that have pictures."""
+
+    pitch: Field
+    view: View
+    cameras: Sequence[Camera]
+    lights: Mapping[str, Light]
+    _made: dict[frozenset[str], Panorama] = field(default_factory=dict, init=False)
+
+    def at(self, number: int, pictures: Mapping[str, Picture]) -> Panorama:  # noqa: ARG002
+        """The same one as long as the same cameras have pictures."""
+        shown = frozenset(pictures)
+        if shown not in self._made:
+            cameras = [camera for camera in self.cameras if camera.id in shown]
+            self._made[shown] = panorama(self.pitch, self.view, cameras, self.lights)
+        return self._made[shown]
+
+
+Follow = Callable[[Field, View, Sequence[Camera], Mapping[str, Light]], Geometry]
+"""Makes the geometry of a pitch, a view, the cameras of the clips (lenses for their frames) and their lights."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """How much later a clip began: a number of seconds, or of frames."""
+
+    number: float
+    in_frames: bool = False
+
+    def seconds(self, rate: Fraction) -> float:
+        """For a clip of so many frames a second."""
+        return self.number / float(rate) if self.in_frames else self.number
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is made of the clips.
+
+    `offsets`: when a camera's clip began in the time of the first one's; found where there is none. `begin_s` and
+    `end_s`: in the time of the first clip. `sound`: the camera whose sound is kept, `SILENT`: none, None: the first
+    that has any.
+    """
+
+    output: str
+    offsets: Mapping[str, Offset] = field(default_factory=dict)
+    rate: Fraction | None = None
+    begin_s: float | None = None
+    end_s: float | None = None
+    sound: str | None = None
+    allow_missing: bool = False
+    encoding: Encoding = field(default_factory=Encoding)
+    threads: int = field(default_factory=lambda: len(os.sched_getaffinity(0)))
+
+
+@dataclass(frozen=True)
+class Stitched:
+    """What was made. `seconds`: of video; `took_s`: until it was whole.
+
+    `found`: what the clips said of offsets that were not given; `ended`: when clips ended before the others did, in the
+    time of the first; `broken`: frames that could not be decoded, `repeated`: how many pictures of the view hold
+    another frame in place of such.
+    """
+
+    size: tuple[int, int]
+    rate: Fraction
+    frames: int
+    took_s: float
+    offsets: Mapping[str, float]
+    found: Mapping[str, Found]
+    ended: Mapping[str, float]
+    broken: Mapping[str, int]
+    repeated: Mapping[str, int]
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return float(self.frames / self.rate)
+
+
+def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, follow: Follow = Standing) -> Stitched:
+    """Make the clip; `VideoFault` says why there is none. `told`: what is done, and which part of it is."""
+    started = time.monotonic()
+    _check_cameras(scene, addresses, plan)
+    with ExitStack() as stack:
+        clips = {
+            camera: stack.enter_context(Clip.open(camera, address, started)) for camera, address in addresses.items()
+        }
+        heard = _heard(clips, plan.sound)
+        if heard is not None:
+            heard.listen()
+        fitted = {camera.id: _fitted(camera, clips.get(camera.id)) for camera in scene.cameras}
+        offsets, found = _offsets(scene, clips, fitted, plan, told)
+        rate = plan.rate or next(iter(clips.values())).facts.rate
+        tracks = {camera: _track(stack, clip, offsets[camera], plan.begin_s, rate) for camera, clip in clips.items()}
+        moments = Moments(tracks, rate, plan.begin_s, plan.end_s, plan.allow_missing)
+        first = moments.first()
+        view = chosen_view(scene.pitch, list(fitted.values()), scene.choice)
+        shown = [fitted[camera] for camera in clips]
+        light = scene.lights
+        if light is None:
+            light = lights(
+                scene.pitch,
+                [fitted[camera] for camera in first],
+                {camera: picture.colours for camera, picture in first.items()},
+            )
+        geometry = follow(scene.pitch, view, shown, light)
+        ends = _ends(clips, offsets)
+        expected = _expected(ends, moments.begin_s, rate, plan)
+        sound = None if heard is None else Sound(heard, moments.begin_s - offsets[heard.camera])
+        with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
+            for count in _rendered(moments, geometry, view.size, writer, plan.threads):
+                told(f"{count / (time.monotonic() - started):.1f} fps", min(1.0, count / expected))
+    return Stitched(
+        view.size,
+        rate,
+        moments.count,
+        time.monotonic() - started,
+        offsets,
+        found,
+        moments.early(ends),
+        {camera: clip.broken for camera, clip in clips.items()},
+        {camera: track.repeated for camera, track in tracks.items()},
+    )
+
+
+def _rendered(
+    moments: Moments, geometry: Geometry, size: tuple[int, int], writer: Writer, threads: int
+) -> Iterator[int]:
+    """Make and write the view of each moment; how many there are so far."""
+    import av
+
+    renderer: Renderer | None = None
+    before: Panorama | None = None
+    try:
+        for pictures in moments:
+            now = geometry.at(moments.count, pictures)
+            if renderer is not None and renderer.fits(now):
+                if now is not before:
+                    renderer.move(now)
+            else:
+                if renderer is not None:
+                    renderer.close()
+                renderer = Renderer(now, threads)
+            before = now
+            frame = av.VideoFrame(*size, "yuv420p")
+            renderer.render(pictures, planes_of(frame))
+            moments.count += 1
+            writer.put(frame, moments.sound())
+            yield moments.count
+    finally:
+        if renderer is not None:
+            renderer.close()
+
+
+@dataclass
+class Moments:
+    """The pictures of one moment after the other, by camera: `count`ed so far; `ended`: when clips did."""
+
+    tracks: Mapping[str, Track]
+    rate: Fraction
+    from_s: float | None
+    end_s: float | None
+    allow_missing: bool
+    begin_s: float = field(init=False)
+    count: int = field(default=0, init=False)
+    ended: dict[str, float] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        """It begins when all have begun."""
+        begins = [track.begin_s for track in self.tracks.values()]
+        self.begin_s = max(begins + ([] if self.from_s is None else [self.from_s]))
+
+    def __iter__(self) -> Iterator[Mapping[str, Picture]]:
+        while pictures := self._now():
+            yield pictures
+
+    def first(self) -> Mapping[str, Picture]:
+        """The pictures of the first moment; `VideoFault` if there is none."""
+        if not (pictures := self._now()):
+            raise VideoFault(
+                "The clips have no moment in common, of what --from and --to leave of them: "
+                + ", ".join(f"{camera} begins at {track.begin_s:.2f} s" for camera, track in self.tracks.items())
+            )
+        return pictures
+
+    def sound(self) -> list[Packet[AudioStream]]:
+        """What has been heard since the last time."""
+        heard = []
+        for track in self.tracks.values():
+            heard += track.sound
+            track.sound = []
+        return heard
+
+    def _now(self) -> dict[str, Picture]:
+        """Nothing once it is over."""
+        now_s = self.begin_s + float(self.count / self.rate)
+        if self.end_s is not None and now_s >= self.end_s - ROUNDING_S:
+            return {}
+        shots = {camera: track.at(now_s) for camera, track in self.tracks.items()}
+        for camera, shot in shots.items():
+            if shot is None:
+                self.ended.setdefault(camera, now_s)
+        if self.ended and not self.allow_missing:
+            return {}
+        return {camera: shot.picture for camera, shot in shots.items() if shot is not None}
+
+    def early(self, ends: Mapping[str, float]) -> dict[str, float]:
+        """Who ended while others went on, by when clips should end; a stream that ends does so early."""
+        return {camera: at for camera, at in self.ended.items() if max(ends.values()) > at + EARLY_S}
+
+
+def _check_cameras(scene: Scene, addresses: Mapping[str, str], plan: Plan) -> None:
+    known = [camera.id for camera in scene.cameras]
+    for what, cameras in (
+        ("clip", addresses),
+        ("--offset", plan.offsets),
+        ("--audio", [] if plan.sound in (None, SILENT) else [plan.sound]),
+    ):
+        for camera in cameras:
+            if camera not in known:
+                raise VideoFault(f"{what}: the venue has no camera {camera}; it has {', '.join(known)}")
+            if camera not in addresses:
+                raise VideoFault(f"{what}: there is no clip of camera {camera}")
+    missing = [camera for camera in known if camera not in addresses]
+    if missing and not plan.allow_missing:
+        raise VideoFault(
+            f"No clip of camera {', '.join(missing)}. --allow-missing makes the view of what the others see."
+        )
+
+
+def _heard(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
+    """The clip whose sound is kept."""
+    if wanted == SILENT:
+        return None
+    if wanted is None:
+        return next((clip for clip in clips.values() if clip.has_sound), None)
+    if not clips[wanted].has_sound:
+        raise VideoFault(f"--audio: the clip of camera {wanted} has no sound; --audio none makes a silent one")
+    return clips[wanted]
+
+
+def _fitted(camera: Camera, clip: Clip | None) -> Camera:
+    """The camera with a lens for the frames of its clip."""
+    if clip is None or clip.facts.size == camera.intrinsics.size:
+        return camera
+    (width, height), (expected_width, expected_height) = clip.facts.size, camera.intrinsics.size
+    if not width or abs(width * expected_height / (height * expected_width) - 1) > SAME_ASPECT:
+        raise VideoFault(
+            f"camera {camera.id}: its clip has {width}x{height} pixels, its lens was measured for "
+            f"{expected_width}x{expected_height}. The same picture at another size would do; this one is of another "
+            "shape: cut, or from another mode of the camera. Record in the mode in which the lens was measured"
+        )
+    lens = camera.intrinsics.scaled(width / expected_width)
+    return camera.with_lens(lens if lens.size == clip.facts.size else replace(lens, size=clip.facts.size))
+
+
+def _offsets(
+    scene: Scene, clips: Mapping[str, Clip], fitted: Mapping[str, Camera], plan: Plan, told: Told
+) -> tuple[dict[str, float], dict[str, Found]]:
+    """When each clip began in the time of the first one, and what was found of it."""
+    first = next(iter(clips))
+    offsets = {first: 0.0} | {
+        camera: offset.seconds(clips[camera].facts.rate) for camera, offset in plan.offsets.items()
+    }
+    wanting = [camera for camera in clips if camera not in offsets]
+    if not wanting:
+        return offsets, {}
+    live = [camera for camera, clip in clips.items() if clip.live]
+    if live:
+        raise VideoFault(
+            f"camera {live[0]} is a live stream, which cannot be read twice: say with --offset how much later "
+            f"{' and '.join(wanting)} comes; --offset {wanting[0]}=0 takes pictures as they arrive"
+        )
+    places = Places(scene.pitch, [fitted[camera] for camera in clips])
+    motions = {}
+    for number, (camera, clip) in enumerate(clips.items()):
+        told(f"sync {camera}", number / len(clips))
+        begin_s = max(0.0, (plan.begin_s or 0.0) - offsets.get(camera, 0.0))
+        with Clip.open(camera, clip.address) as again:
+            motions[camera] = places.motion(camera, _until(begin_s + LOOKED_AT_S, again.shots(begin_s)))
+    offsets, found = chained(places, motions, offsets)
+    for camera, answer in found.items():
+        if answer.second_s is None:
+            raise VideoFault(
+                f"The offset of camera {camera} was not found within {FARTHEST_S:g} s: {answer.why} (likeness "
+                f"{answer.strength:.2f}, at the next best offset {answer.rival:.2f}). Say how much later its clip "
+                f"began: --offset {camera}=0.120, or --offset {camera}=0 if they began together; without --offset none "
+                "is assumed"
+            )
+    return offsets, found
+
+
+def _until(end_s: float, shots: Iterator[Shot]) -> Iterator[Shot]:
+    return takewhile(lambda shot: shot.time_s < end_s, shots)
+
+
+def _track(stack: ExitStack, clip: Clip, offset_s: float, begin_s: float | None, rate: Fraction) -> Track:
+    reading = Reading(clip, max(0.0, (begin_s or 0.0) - offset_s))
+    stack.callback(reading.close)
+    return Track(clip.camera, iter(reading), offset_s, max(float(1 / clip.facts.rate), float(1 / rate)), clip.live)
+
+
+def _ends(clips: Mapping[str, Clip], offsets: Mapping[str, float]) -> dict[str, float]:
+    """When clips end, in the time of the first one, of those of which it is known; streams go on."""
+    return {
+        camera: offsets[camera] + (inf if clip.facts.seconds is None else clip.facts.seconds)
+        for camera, clip in clips.items()
+    }
+
+
+def _expected(ends: Mapping[str, float], begin_s: float, rate: Fraction, plan: Plan) -> float:
+    """How many pictures it will be, as far as one can tell; infinitely many of live streams."""
+    end = (max if plan.allow_missing else min)(ends.values())
+    return max(1.0, (min(end, inf if plan.end_s is None else plan.end_s) - begin_s) * float(rate))
