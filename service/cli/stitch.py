@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -15,12 +16,14 @@ import typer
 
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Url, checked
 from service.cli.calling import called
+from service.cli.following import document_of, following, tell_motions
 from service.cli.printing import FAILED, USAGE, fail, progress, tell
 from service.wire.names import ID_PATTERN
 
 if TYPE_CHECKING:
     from service.wire.venue import Venue
     from worker.calibration.stitch.views import ViewChoice
+    from worker.video.follow import Motion
     from worker.video.stitch import Offset, Scene, Stitched
 
 PROJECTIONS = ("pannini", "cylinder", "rectilinear", "birds-eye")
@@ -102,6 +105,21 @@ def stitch(
     preset: Annotated[
         str, typer.Option("--preset", help="Of libx264 and libx265, ultrafast to veryslow.")
     ] = "veryfast",
+    follow: Annotated[
+        bool,
+        typer.Option("--follow", help="Cameras shake: find where each is in every picture, by its lines."),
+    ] = False,
+    follow_every: Annotated[
+        int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
+    ] = 1,
+    poses_out: Annotated[
+        Path | None,
+        typer.Option(
+            "--poses-out",
+            metavar="STEM",
+            help="With --follow: the poses of every picture, as STEM.jsonl (OpenTrackIO), STEM.d1 (FreeD), STEM.csv.",
+        ),
+    ] = None,
     as_json: AsJson = False,
     url: Url = LOCAL,
     api_key: ApiKey = None,
@@ -114,6 +132,8 @@ def stitch(
         fail("--width and --height are even numbers: video takes no others", USAGE)
     if projection not in (None, *PROJECTIONS):
         fail(f"--projection is one of {', '.join(PROJECTIONS)}, not {projection!r}", USAGE)
+    if (poses_out is not None or follow_every > 1) and not follow:
+        fail("--poses-out and --follow-every go with --follow", USAGE)
     stored = _venue(venue, url, api_key)
     chosen = {
         "projection": projection,
@@ -126,9 +146,9 @@ def stitch(
 
     from service.cli.local import engine_settings
 
-    engine_settings()
+    settings = engine_settings()
     from worker.video.faults import VideoFault
-    from worker.video.stitch import Plan
+    from worker.video.stitch import Plan, Standing
     from worker.video.stitch import stitch as stitched
     from worker.video.write import Encoding
 
@@ -143,13 +163,17 @@ def stitch(
         Encoding(codec, crf, preset),
     )
     try:
-        with progress() as show:
-            made = stitched(_scene(stored, chosen), addresses, plan, show)
+        with ExitStack() as stack:
+            follows = stack.enter_context(following(stored, follow_every, poses_out, settings.freed_axes))
+            show = stack.enter_context(progress())
+            geometry = follows if follow else Standing
+            made = stitched(_scene(stored, chosen), addresses, plan, show, geometry)
     except VideoFault as fault:
         fail(str(fault), FAILED)
     _tell(made)
+    tell_motions(follows.motions)
     if as_json:
-        print(json.dumps(_document(made, output), indent=2))
+        print(json.dumps(_document(made, output, follows.motions), indent=2))
 
 
 def _by_camera(arguments: Sequence[str], form: str) -> dict[str, str]:
@@ -258,7 +282,7 @@ def _tell(made: Stitched) -> None:
             )
 
 
-def _document(made: Stitched, output: str) -> dict[str, Any]:
+def _document(made: Stitched, output: str, motions: Mapping[str, Motion]) -> dict[str, Any]:
     return {
         "output": output,
         "width_px": made.size[0],
@@ -276,6 +300,7 @@ def _document(made: Stitched, output: str) -> dict[str, Any]:
                 "ended_s": made.ended.get(camera),
                 "broken_frames": made.broken[camera],
                 "repeated": made.repeated[camera],
+                "followed": document_of(motions[camera]) if camera in motions else None,
             }
             for camera, offset in made.offsets.items()
         },

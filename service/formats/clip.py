@@ -45,11 +45,15 @@ class ClipPoses:
     """Three files, `stem` with `.jsonl`, `.d1` and `.csv`: open while the clip runs, a frame after the other.
 
     A line of JSON, a packet and a row per camera and frame, the cameras of a frame one after the other. Raises
-    `Problem` (`format-cannot-hold`) for a lens or place that a format has no room for.
+    `Problem` (`format-cannot-hold`) for a lens or place that a format has no room for: where the stored cameras have
+    it, before there are any files.
     """
 
-    def __init__(self, stem: Path, rate: Fraction, freed_axes: str) -> None:
-        self._rate = rate
+    def __init__(self, stem: Path, shots: Sequence[Shot], freed_axes: str) -> None:
+        """`shots`: the cameras as they are stored."""
+        for shot in shots:
+            opentrackio.write(shot)
+        freed.write(shots, freed_axes)
         self._axes = freed_axes
         self._number = 0
         with ExitStack() as opening:
@@ -61,10 +65,10 @@ class ClipPoses:
         self._rows = csv.writer(self._table)
         self._rows.writerow(COLUMNS)
 
-    def add(self, cameras: Sequence[FollowedShot]) -> None:
-        """The next frame, its cameras in the order of the venue."""
+    def add(self, cameras: Sequence[FollowedShot], rate: Fraction) -> None:
+        """The next frame of a clip of so many a second, its cameras in the order of the venue."""
         for camera in cameras:
-            frame = opentrackio.Frame(self._number, self._rate, camera.status)
+            frame = opentrackio.Frame(self._number, rate, camera.status)
             self._samples.write(opentrackio.write_frame(camera.shot, frame))
             self._rows.writerow(self._row(camera))
         self._packets.write(freed.write([camera.shot for camera in cameras], self._axes))

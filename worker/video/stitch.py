@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.stitch.light import Light, lights
+from worker.calibration.stitch.evening import evened_out
+from worker.calibration.stitch.light import Light
 from worker.calibration.stitch.panorama import Panorama, panorama
 from worker.calibration.stitch.views import View, ViewChoice, chosen_view
 from worker.video.clips import Clip, Shot
@@ -66,12 +67,13 @@ class Geometry(Protocol):
 
 @dataclass
 class Standing:
-    """Cameras that do not move: a panorama for each set of cameras that have pictures."""
+    """Cameras that do not move: a panorama for each set of cameras that have pictures. `rate`: of moments, a second."""
 
     pitch: Field
     view: View
     cameras: Sequence[Camera]
     lights: Mapping[str, Light]
+    rate: Fraction
     _made: dict[frozenset[str], Panorama] = field(default_factory=dict, init=False)
 
     def at(self, number: int, pictures: Mapping[str, Picture]) -> Panorama:  # noqa: ARG002
@@ -83,8 +85,9 @@ class Standing:
         return self._made[shown]
 
 
-Follow = Callable[[Field, View, Sequence[Camera], Mapping[str, Light]], Geometry]
-"""Makes the geometry of a pitch, a view, the cameras of the clips (lenses for their frames) and their lights."""
+Follow = Callable[[Field, View, Sequence[Camera], Mapping[str, Light], Fraction], Geometry]
+"""Makes the geometry of a pitch, a view, the cameras of the clips (lenses for their frames), their lights, and the rate
+of moments."""
 
 
 @dataclass(frozen=True)
@@ -165,12 +168,12 @@ def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, f
         shown = [fitted[camera] for camera in clips]
         light = scene.lights
         if light is None:
-            light = lights(
+            light = evened_out(
                 scene.pitch,
                 [fitted[camera] for camera in first],
                 {camera: picture.colours for camera, picture in first.items()},
             )
-        geometry = follow(scene.pitch, view, shown, light)
+        geometry = follow(scene.pitch, view, shown, light, rate)
         ends = _ends(clips, offsets)
         expected = _expected(ends, moments.begin_s, rate, plan)
         sound = None if heard is None else Sound(heard, moments.begin_s - offsets[heard.camera])

@@ -30,10 +30,11 @@ def turning(number, frame):
 
 @pytest.fixture
 def written(tmp_path):
-    with ClipPoses(tmp_path / "final.cut", Fraction(30000, 1001), AXES) as poses:
+    with ClipPoses(tmp_path / "final.cut", [shot(), shot(number=2)], AXES) as poses:
         for frame in range(FRAMES):
             status = "coasted" if frame == 7 else "measured"
-            poses.add([FollowedShot(turning(n, frame), status, (0.02, 0.03), (0.002, 0.004)) for n in (1, 2)])
+            cameras = [FollowedShot(turning(n, frame), status, (0.02, 0.03), (0.002, 0.004)) for n in (1, 2)]
+            poses.add(cameras, Fraction(30000, 1001))
     return tmp_path
 
 
@@ -90,6 +91,7 @@ def test_the_table_has_poses_and_how_sure_they_are(written):
     assert float(rows[0]["motion_sigma_position_m"]) == 0.004
 
 
-def test_a_lens_that_opentrackio_cannot_hold_is_refused(tmp_path):
-    with ClipPoses(tmp_path / "poses", Fraction(25), AXES) as poses, pytest.raises(Problem, match="no place for s1"):
-        poses.add([FollowedShot(shot([*ALL_OF_OPENCV_8, 0.001, 0, 0, 0]), "measured", (0.1, 0.1), (0.1, 0.1))])
+def test_a_lens_that_opentrackio_cannot_hold_is_refused_before_there_are_files(tmp_path):
+    with pytest.raises(Problem, match="no place for s1"):
+        ClipPoses(tmp_path / "poses", [shot([*ALL_OF_OPENCV_8, 0.001, 0, 0, 0])], AXES)
+    assert not list(tmp_path.iterdir())

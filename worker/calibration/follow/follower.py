@@ -94,12 +94,21 @@ class Follower:
         """The cameras where the first frame shows them: the ones that motion is counted from."""
         return [track.lines.reference for track in self._tracks]
 
+    @property
+    def looks(self) -> bool:
+        """Whether lines are measured in the frames that are next."""
+        return self._taken % self._every == 0
+
     def see(self, frames: Mapping[str, Frame]) -> Moment:
-        """Take the next frames; a camera that has none coasts."""
-        looked = self._taken % self._every == 0
+        """Take the next frames; a camera that has none coasts, and so do all where nobody `looks`."""
         for track in self._tracks:
-            track.see(frames.get(track.lines.reference.id) if looked else None, self._seconds)
+            track.see(frames.get(track.lines.reference.id) if self.looks else None, self._seconds)
         self._taken += 1
+        return self.now
+
+    @property
+    def now(self) -> Moment:
+        """The moment of the last frames, by all frames up to it."""
         return Moment(self._taken - 1, [track.newest() for track in self._tracks])
 
     def settled(self) -> list[Moment]:
@@ -138,7 +147,7 @@ class _Track:
         self._how.append(how)
 
     def newest(self) -> Followed:
-        """The moment of the last frame, by all frames up to it."""
+        """Where it is now."""
         return self._followed(self._last, self._how[-1])
 
     def oldest(self) -> Followed:
