@@ -6,6 +6,8 @@ A file has its name only once it is whole.
 from __future__ import annotations
 
 import queue
+import shutil
+import subprocess
 import threading
 import time
 from collections import deque
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 WAITING = 3
 FILES = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska", ".ts": "mpegts"}
 STREAMS = {"rtsp": "rtsp", "udp": "mpegts", "srt": "mpegts", "rtmp": "flv"}
+SRT = "srt://"
 # Whoever joins a stream sees it after so long.
 JOINED_S = 1
 # Encoders whose quality is a constant rate factor, from 0 (no loss) on, and whose presets go from fast to small.
@@ -73,7 +76,9 @@ class Writer:
         self._address = address
         self._rate, self._count = rate, 0
         self._sound = sound
-        self._part, self._container = _opened(address)
+        self._part = _part(address)
+        self._sender = _srt_sender(address) if address.startswith(SRT) else None
+        self._container = _opened(address, self._part, self._sender)
         try:
             self._video = _video_stream(self._container, size, rate, encoding)
             if self._part is None:
@@ -118,6 +123,8 @@ class Writer:
             return
         try:
             self._container.close()
+            if self._sender is not None and self._sent() != 0:
+                raise VideoFault(f"{without_login(self._address)}: ffmpeg could not send it, see above")
         except Exception as failure:
             self._error = failure
             self._discard()
@@ -178,30 +185,58 @@ class Writer:
         hint = " Free some space or write elsewhere." if number == 28 else ""
         raise VideoFault(f"{without_login(self._address)} cannot be written: {said}{left}.{hint}") from self._error
 
+    def _sent(self) -> int:
+        """How the sender ended."""
+        if self._sender is None or self._sender.stdin is None:
+            return 0
+        with suppress(OSError):
+            self._sender.stdin.close()
+        return self._sender.wait()
+
     def _discard(self) -> None:
         with suppress(Exception):
             self._container.close()
+        if self._sender is not None:
+            self._sender.kill()
+            self._sent()
         if self._part is not None:
             self._part.unlink(missing_ok=True)
 
 
-def _opened(address: str) -> tuple[Path | None, OutputContainer]:
-    """The name under which a file is written, and what is written into."""
-    import av
-
+def _part(address: str) -> Path | None:
+    """The name under which a file is written; `VideoFault` for what is no place to write to."""
     scheme, separator, _ = address.partition("://")
     if separator:
         if scheme not in STREAMS:
             raise VideoFault(f"{address}: known are files, and {', '.join(f'{name}://' for name in STREAMS)}")
-        options = {"rtsp_transport": "tcp"} if scheme == "rtsp" else {}
-        return None, av.open(address, "w", format=STREAMS[scheme], options=options)
+        return None
     path = Path(address)
     if path.suffix.lower() not in FILES:
         raise VideoFault(f"{address}: the name of the clip ends in {', '.join(FILES)}")
     if not path.parent.is_dir():
         raise VideoFault(f"There is no folder {path.parent}")
-    part = path.with_name(f"{path.name}.part")
-    return part, av.open(str(part), "w", format=FILES[path.suffix.lower()])
+    return path.with_name(f"{path.name}.part")
+
+
+def _opened(address: str, part: Path | None, sender: subprocess.Popen[bytes] | None) -> OutputContainer:
+    import av
+
+    if part is not None:
+        return av.open(str(part), "w", format=FILES[Path(address).suffix.lower()])
+    if sender is not None:
+        return av.open(sender.stdin, "w", format="mpegts")
+    scheme = address.partition("://")[0]
+    options = {"rtsp_transport": "tcp"} if scheme == "rtsp" else {}
+    return av.open(address, "w", format=STREAMS[scheme], options=options)
+
+
+def _srt_sender(address: str) -> subprocess.Popen[bytes]:
+    """ffmpeg, which sends by SRT what it is given: the FFmpeg within PyAV cannot."""
+    if shutil.which("ffmpeg") is None:
+        raise VideoFault("srt:// is sent by ffmpeg, which is not on this machine (Debian: apt-get install ffmpeg)")
+    given = "-analyzeduration", "100000", "-f", "mpegts", "-i", "pipe:0"
+    sent = "-c", "copy", "-f", "mpegts", address
+    return subprocess.Popen(["ffmpeg", "-v", "error", *given, *sent], stdin=subprocess.PIPE)
 
 
 def _video_stream(container: OutputContainer, size: tuple[int, int], rate: Fraction, encoding: Encoding) -> Any:
