@@ -3,19 +3,20 @@
 The two cameras of the demo on a mast in wind: each turns by 0.3 degrees at 0.5 Hz about each of its axes, in phases
 of its own, trembles by 0.03 degrees at 3 Hz, and sways by 2 cm, as a mast does that bends. Each frame is the demo's
 picture as the camera would take it from where it then is: what is on the ground moves as the ground does, what is far
-away turns only. Players walk through it, and each frame has noise of its own and a JPEG's losses.
+away turns only. Players walk through it, each frame has noise of its own, and H.264 leaves of it what a camera sends.
 """
 
 from __future__ import annotations
 
 import argparse
-import pickle
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 
@@ -31,14 +32,14 @@ SWING_DEG, SWING_HZ = 0.3, 0.5
 TREMBLE_DEG, TREMBLE_HZ = 0.03, 3.0
 SWAY_M = 0.02
 FRAMES_PER_SECOND = 25.0
-# Grey levels of a camera's noise, quality of its compression.
-NOISE, JPEG_QUALITY = 2.5, 85
+# Grey levels of a camera's noise.
+NOISE = 2.5
 PLAYERS, PLAYER_M, PLAYER_M_S = 16, (0.6, 1.85), 3.0
 # The map from a shaken frame to the still picture is computed at every n-th pixel.
 STEP_PX = 8
 FAR_M = 300.0
-# Frames relative to 4K, and columns of the panorama.
-SIZES = {"1080p": (0.5, 1920), "4k": (1.0, 3840)}
+# Frames relative to 4K, columns of the panorama, bits a second of a clip.
+SIZES = {"1080p": (0.5, 1920, 12_000_000), "4k": (1.0, 3840, 40_000_000)}
 FOLDER = Path("build/shaking")
 # Where a camera counts this much in the view, the far line is its alone; how it is read across itself.
 SURE = 0.98
@@ -83,8 +84,8 @@ class Clip:
         """Where it is when a frame is taken."""
         return moved(self.still, self._swing.change(number / FRAMES_PER_SECOND))
 
-    def packed(self, number: int) -> bytes:
-        """What it shows then, a JPEG."""
+    def frame(self, number: int) -> Frame:
+        """What it shows then, as its sensor has it."""
         now = self.camera(number)
         behind = self._behind(now)
         source = self.still.project(behind).astype(np.float32)
@@ -94,10 +95,8 @@ class Clip:
         shaken = cv2.remap(self._picture, place, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
         self._walk(shaken, now, number)
         down, right = self._rng.integers(0, 64, 2)
-        noisy = np.clip(shaken + self._noise[down : down + height, right : right + width, None], 0, 255).astype(
-            np.uint8
-        )
-        return cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
+        noise = self._noise[down : down + height, right : right + width, None]
+        return np.clip(shaken + noise, 0, 255).astype(np.uint8)
 
     def _behind(self, now: Camera) -> Array:
         """What of the world is behind the pixels of the grid: the ground, or what is far away."""
@@ -216,36 +215,65 @@ def clips(scale: float, seed: int = 19) -> list[Clip]:
     return made
 
 
-def packed_frames(made: list[Clip], count: int, path: Path) -> list[dict[str, bytes]]:
-    """JPEGs of the frames, rendered before or now: they take longer to render than to follow."""
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(
-            pickle.dumps([{clip.still.id: clip.packed(number) for clip in made} for number in range(count)])
-        )
-    return pickle.loads(path.read_bytes())
+@dataclass(frozen=True)
+class Film:
+    """The clips of all cameras as files, filmed if they are not there yet: that takes longer than following."""
+
+    clips: list[Clip]
+    count: int
+    paths: list[Path]
+
+    @classmethod
+    def of(cls, size: str, count: int) -> Film:
+        """So many frames, at one of `SIZES`."""
+        scale, _, bits = SIZES[size]
+        made = clips(scale)
+        film = cls(made, count, [FOLDER / f"{clip.still.id}-{size}-{count}.mp4" for clip in made])
+        for clip, path in zip(made, film.paths, strict=True):
+            if not path.exists():
+                path.parent.mkdir(parents=True, exist_ok=True)
+                unfinished = path.with_suffix(".part.mp4")
+                encode(clip, count, unfinished, bits)
+                unfinished.rename(path)
+        return film
+
+    def frames(self) -> Iterator[dict[str, Frame]]:
+        """The frames of one moment after the other, by camera."""
+        with ExitStack() as stack:
+            files = [stack.enter_context(av.open(str(path))) for path in self.paths]
+            for moment in zip(*(file.decode(video=0) for file in files), strict=True):
+                yield {
+                    clip.still.id: frame.to_ndarray(format="bgr24")
+                    for clip, frame in zip(self.clips, moment, strict=True)
+                }
 
 
-def unpacked(packed: dict[str, bytes]) -> dict[str, Frame]:
-    """The frames of a moment."""
-    return {
-        name: np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), np.uint8)
-        for name, jpeg in packed.items()
-    }
+def encode(clip: Clip, count: int, path: Path, bits: int) -> None:
+    """Film it: H.264 of so many bits a second."""
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream("libx264", rate=round(FRAMES_PER_SECOND), options={"preset": "veryfast"})
+        stream.width, stream.height = clip.still.intrinsics.size
+        stream.pix_fmt, stream.bit_rate, stream.thread_count = "yuv420p", bits, 1
+        for number in range(count):
+            out.mux(stream.encode(av.VideoFrame.from_ndarray(clip.frame(number), format="bgr24")))
+        out.mux(stream.encode(None))
 
 
-def followed(made: list[Clip], packed: list[dict[str, bytes]], run: Run, lens: str) -> Told:
+def followed(film: Film, run: Run, lens: str) -> Told:
     """The clip from its first frame to its last."""
-    stored = [stored_camera(clip.still, number, lens) for number, clip in enumerate(made)]
-    follower = Follower(FIELD, stored, unpacked(packed[0]), FRAMES_PER_SECOND, run.every, run.look_ahead)
+    stored = [stored_camera(clip.still, number, lens) for number, clip in enumerate(film.clips)]
     moments, spent = [], 0.0
-    for each in packed[1:]:
-        frames = unpacked(each)
+    follower = None
+    for frames in film.frames():
+        if follower is None:
+            follower = Follower(FIELD, stored, frames, FRAMES_PER_SECOND, run.every, run.look_ahead)
+            continue
         begun = time.process_time()
         follower.see(frames)
         moments += follower.settled()
         spent += time.process_time() - begun
-    return Told(run, moments + follower.rest(), follower, 1000 * spent / (len(packed) - 1) / len(made))
+    assert follower is not None
+    return Told(run, moments + follower.rest(), follower, 1000 * spent / (film.count - 1) / len(stored))
 
 
 def stored_camera(camera: Camera, number: int, lens: str) -> Camera:
@@ -255,20 +283,22 @@ def stored_camera(camera: Camera, number: int, lens: str) -> Camera:
     return known.with_pose(outdated(camera.pose, 0.05, 0.1, rng))
 
 
-def report(made: list[Clip], packed: list[dict[str, bytes]], told: Told, width: int) -> None:
+def report(film: Film, told: Told, width: int) -> None:
     """Print the row of one run."""
-    count = len(packed)
+    count, made = film.count, film.clips
     references = told.follower.references
     view = chosen_view(FIELD, references, ViewChoice(width=width))
     line = FarLine(view, MovingPanorama(FIELD, view, references), references)
     true = [[clip.camera(number) for clip in made] for number in range(count)]
     found = [[one.camera for one in moment.cameras] for moment in told.moments]
-    some = range(0, count, max(1, count // 50))
     still, followed_ = (
         rms_about_mean(np.array([line.by_truth(true[n], there[n]) for n in range(count)]))
         for there in (count * [references], found)
     )
-    shown = moves(np.array([line.profiles(unpacked(packed[n]), found[n]) for n in some]))
+    some = max(1, count // 50)
+    shown = moves(
+        np.array([line.profiles(frames, found[n]) for n, frames in enumerate(film.frames()) if n % some == 0])
+    )
     error = np.array(
         [[change_between(a, b) for a, b in zip(*both, strict=True)] for both in zip(true, found, strict=True)]
     )
@@ -332,11 +362,9 @@ def main() -> None:
         "--lens", choices=("exact", "usual"), default="exact", help="whether the lenses are known exactly"
     )
     arguments = parser.parse_args()
-    scale, width = SIZES[arguments.size]
-    made, count = clips(scale), round(arguments.seconds * FRAMES_PER_SECOND)
-    packed = packed_frames(made, count, FOLDER / f"{arguments.size}-{count}.pickle")
+    film = Film.of(arguments.size, round(arguments.seconds * FRAMES_PER_SECOND))
     for run in RUNS:
-        report(made, packed, followed(made, packed, run, arguments.lens), width)
+        report(film, followed(film, run, arguments.lens), SIZES[arguments.size][1])
 
 
 if __name__ == "__main__":

@@ -129,7 +129,7 @@ class _Track:
     """One camera on its way."""
 
     def __init__(self, pitch: Field, reference: Camera, covariance: Array, first: Frame) -> None:
-        self.lines = FollowedLines(pitch, reference)
+        self.lines = FollowedLines(pitch, reference, first)
         self._covariance = covariance
         seen = self.lines.sighted(first, reference, SEARCH_PX[-1:])
         if seen is None:

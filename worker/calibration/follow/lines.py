@@ -16,11 +16,11 @@ from worker.calibration.finish.normal_equations import CLUSTER_POINTS
 from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.follow.motion_filter import Observed
 from worker.calibration.scene.camera import Array, Camera, Frame
-from worker.calibration.scene.field import Field
+from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved, pixel_slopes
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import Channels
-from worker.calibration.see.line_measurement import measure_lines
+from worker.calibration.see.line_measurement import Measurements, measure_lines
 
 APART_PX = 12.0
 """Pieces of line are looked at about so far apart, in pixels of a 4K frame."""
@@ -28,13 +28,15 @@ COARSELY = 3
 """All rounds but the last look at every so many-th piece."""
 FEWEST_PIECES, FEWEST_SHARE = 20, 0.3
 """With fewer pieces of line, or with less than this share of those that are usually found, a frame says nothing."""
+SHOWN, AT_REFERENCE_PX = 0.5, 3.0
+"""Of a marking so much has to be found near the reference, in pixels of a 4K frame, for it to be followed."""
 NOVELTY = 0.05
 """By so much of the difference a frame changes how many are usual."""
 BESIDE_PX = 1.0
 """How far a piece of line may lie beside its place for good, one standard deviation, in pixels of a 4K frame."""
-NOISE_PX = 0.06
+NOISE_PX = 0.1
 """Least error of the measurement of a piece, in pixels of the frame."""
-PICTURE_PX = 0.02
+PICTURE_PX = 0.04
 """Error that all pieces of a frame have in common: what a codec and the grid of pixels do to every line alike."""
 PRIOR_RAD, PRIOR_M = 0.03, 1.0
 """Holds the directions of which lines say nothing; much wider than anything that is followed."""
@@ -56,23 +58,30 @@ class Sighting:
 
 
 class FollowedLines:
-    """The lines that one camera is followed by; `reference`: the camera that changes are counted from."""
+    """The lines that one camera is followed by; `reference`: the camera that changes are counted from.
 
-    def __init__(self, pitch: Field, reference: Camera) -> None:
+    `first`: the frame that the reference was found in. Markings that it hardly shows are not looked for: they would
+    be, in every frame, in every colour.
+    """
+
+    def __init__(self, pitch: Field, reference: Camera, first: Frame) -> None:
         self.reference = reference
+        self._scale = reference.intrinsics.relative_size
+        self._no_network = np.zeros(first.shape[:2], np.float32)
         lines = pitch.line_points()
-        scale = reference.intrinsics.relative_size
-        chosen = SeenLines.from_camera(lines, reference).thinned(APART_PX * scale).index
+        expected = SeenLines.from_camera(lines, reference).thinned(APART_PX * self._scale).index
+        found = self._measured(lines[expected], reference, Channels([first]), AT_REFERENCE_PX).index
+        of_marking = lines.marking[expected]
+        shown = np.bincount(of_marking[found], minlength=len(of_marking)) >= SHOWN * np.bincount(
+            of_marking, minlength=len(of_marking)
+        )
+        chosen = expected[shown[of_marking]]
         self._pieces = lines[chosen]
         self._some = np.arange(0, len(chosen), COARSELY)
         self._patch = chosen // CLUSTER_POINTS
-        self._scale = scale
-        self._beside_before = (BESIDE_PX * scale) ** -2
-        self._beside_weight = np.full(len(chosen), self._beside_before)
-        self._beside_sum = np.zeros(len(chosen))
-        width, height = reference.intrinsics.size
         self._usual = 0.0
-        self._no_network = np.zeros((height, width), np.float32)
+        self._beside_weight = np.full(len(chosen), (BESIDE_PX * self._scale) ** -2)
+        self._beside_sum = np.zeros(len(chosen))
 
     def sighted(self, frame: Frame, expected: Camera, searches_px: Sequence[float]) -> Sighting | None:
         """The pieces that a frame shows near where a camera expects them; None where they are too few.
@@ -91,7 +100,7 @@ class FollowedLines:
     def _within(
         self, search_px: float, channels: Channels, expected: Camera, pieces: NDArray[np.intp]
     ) -> Sighting | None:
-        found = measure_lines(self._pieces[pieces], expected, channels, self._no_network, search_px * self._scale)
+        found = self._measured(self._pieces[pieces], expected, channels, search_px)
         points = found.points.position
         offset = np.sum((found.pixel - expected.project(points)) * found.normal, axis=1)
         slope = np.einsum("mij,mi->mj", pixel_slopes(expected, points), found.normal)
@@ -99,6 +108,9 @@ class FollowedLines:
         if good.sum() < max(FEWEST_PIECES, FEWEST_SHARE * self._usual * len(pieces) / len(self._pieces)):
             return None
         return Sighting(expected, pieces[found.index[good]], offset[good], slope[good])
+
+    def _measured(self, lines: LinePoints, expected: Camera, channels: Channels, search_px: float) -> Measurements:
+        return measure_lines(lines, expected, channels, self._no_network, search_px * self._scale)
 
     def observed(self, seen: Sighting) -> Observed:
         """What they say of the pose: robust least squares, with what pieces of one patch err together."""

@@ -21,7 +21,7 @@ from worker.calibration.stitch.views import View
 
 MOTION_COLUMNS = 320
 """The motion is computed at about so many places across the view; the tests hold it below 0.05 px for a degree."""
-STILL_BORDER = 0.01
+STILL_BORDER = 0.02
 """Of the width of a frame: what lies nearer to its border comes and goes with the shaking, and is not shown."""
 FILLED = 3
 """So many rounds carry motion to places that the lens model does not cover, for the pixels beside them."""
