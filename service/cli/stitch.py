@@ -300,8 +300,8 @@ def _document(made: Stitched, output: str, motions: Mapping[str, Motion]) -> dic
                 "ended_s": made.ended.get(camera),
                 "broken_frames": made.broken[camera],
                 "repeated": made.repeated[camera],
-                "followed": document_of(motions[camera]) if camera in motions else None,
             }
+            | ({"followed": document_of(motions[camera])} if camera in motions else {})
             for camera, offset in made.offsets.items()
         },
     }

@@ -6,13 +6,15 @@ import av
 import pytest
 
 from service.wire.venue import VenueIn
+from tests.worker.calibration.synthetic import pair
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
+from tests.worker.video.shaking import COUNT, film_shaking
 from worker.video import clips as clips_of
 
 SHOWN = ("--width", "320", "--preset", "ultrafast")
 
 
-def document(name):
+def document(name, cameras=cameras):
     """The venue that is filmed."""
     return {
         "id": name,
@@ -21,7 +23,10 @@ def document(name):
             {
                 "id": camera.id,
                 "image_size": list(camera.intrinsics.size),
-                "intrinsics": {"matrix": camera.intrinsics.matrix.tolist(), "distortion": [0, 0, 0, 0]},
+                "intrinsics": {
+                    "matrix": camera.intrinsics.matrix.tolist(),
+                    "distortion": camera.intrinsics.distortion.tolist(),
+                },
                 "pose": {"rotation": camera.pose.rotation.tolist(), "position": camera.pose.position.tolist()},
             }
             for camera in cameras
@@ -129,3 +134,28 @@ def test_without_pyav_it_says_how_to_get_it(esc, venue_file, clips, monkeypatch)
     answer = esc("stitch", venue_file, *clips, "-o", "pano.mp4")
     assert answer.returncode == 1
     assert "pip install 'esc-calibration[video]'" in answer.stderr
+
+
+@pytest.fixture(scope="module")
+def shaking(tmp_path_factory):
+    return [f"{camera}={path}" for camera, path in film_shaking(tmp_path_factory.mktemp("shaking")).items()]
+
+
+def test_a_shaking_rig_is_followed_and_its_poses_lie_beside_the_clip(esc, tmp_path, shaking):
+    (tmp_path / "venue.json").write_text(json.dumps(document("windy", pair())))
+    options = ("--offset", "right=0", "--follow", "--poses-out", "poses", "--json")
+    answer = esc("stitch", "venue.json", *shaking, "-o", "pano.mp4", *options, *SHOWN)
+    assert answer.returncode == 0, answer.stderr
+    assert f"lines measured in {COUNT} of {COUNT} pictures" in answer.stderr
+    assert json.loads(answer.stdout)["cameras"]["left"]["followed"]["measured"] == COUNT
+    samples = [json.loads(line) for line in (tmp_path / "poses.jsonl").read_text().splitlines()]
+    assert [sample["static"]["camera"]["label"] for sample in samples] == COUNT * ["left", "right"]
+    assert samples[-1]["timing"]["timecode"]["frames"] == COUNT - 1
+    assert len((tmp_path / "poses.d1").read_bytes()) == 29 * 2 * COUNT
+    assert len((tmp_path / "poses.csv").read_text().splitlines()) == 1 + 2 * COUNT
+
+
+def test_poses_are_those_of_followed_cameras(esc, venue_file, clips):
+    answer = esc("stitch", venue_file, *clips, "-o", "pano.mp4", "--poses-out", "poses")
+    assert answer.returncode == 2
+    assert "--poses-out and --follow-every go with --follow" in answer.stderr

@@ -1,0 +1,42 @@
+"""Clips of two cameras on a mast that sways: the rendered pair, each of its pictures turned."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+
+from tests.worker.calibration.synthetic import pair, pair_frames
+from worker.calibration.scene.camera import Array
+from worker.calibration.see.steady import Sway
+
+RATE = 25
+COUNT = 24
+
+
+def turn(number: int, phase: float) -> Array:
+    """0.3 degrees at 0.5 Hz about each axis, from where the camera stands in its first picture on."""
+    phases = phase + np.array([0.0, 1.0, 2.0])
+    return np.radians(0.3) * (np.sin(np.pi * number / RATE + phases) - np.sin(phases))
+
+
+def film_shaking(folder: Path) -> dict[str, str]:
+    """A clip of each camera, by its name."""
+    paths = {}
+    for phase, camera, picture in zip((0.0, 1.5), pair(), pair_frames(), strict=True):
+        path = folder / f"{camera.id}.mp4"
+        with av.open(str(path), "w") as out:
+            stream = out.add_stream("libx264", rate=RATE, options={"crf": "14", "preset": "ultrafast"})
+            stream.width, stream.height = camera.intrinsics.size
+            stream.pix_fmt, stream.thread_count = "yuv420p", 1
+            stream.codec_context.time_base = Fraction(1, 12800)
+            for number in range(COUNT):
+                shaken = Sway.from_turn(-turn(number, phase), camera.intrinsics).rows(picture, 0, len(picture))
+                frame = av.VideoFrame.from_ndarray(shaken, format="bgr24")
+                frame.pts, frame.time_base = number * 12800 // RATE, Fraction(1, 12800)
+                out.mux(stream.encode(frame))
+            out.mux(stream.encode(None))
+        paths[camera.id] = str(path)
+    return paths
