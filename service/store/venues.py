@@ -174,14 +174,18 @@ def let_hold(
 
 
 def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = None) -> Venue:
-    """The same venue as a calibration found it: poses, and the lenses and the ridge they belong to.
+    """The same venue as a calibration found it: poses, the lenses and the ridge they belong to, and the cameras' light.
 
     `cameras`: only those are as it found them; None: all.
     """
     found = {camera.id: camera for camera in result.cameras if cameras is None or camera.id in cameras}
     standing = [
         camera.model_copy(
-            update={"pose": found[camera.id].pose, "intrinsics": found[camera.id].intrinsics or camera.intrinsics}
+            update={
+                "pose": found[camera.id].pose,
+                "intrinsics": found[camera.id].intrinsics or camera.intrinsics,
+                "light": found[camera.id].light or camera.light,
+            }
         )
         if camera.id in found
         else camera

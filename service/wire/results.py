@@ -8,7 +8,7 @@ from pydantic import Field
 
 from service.wire.base import Id, Wire
 from service.wire.field import FieldOfPlay
-from service.wire.geometry import Intrinsics, Moved, Pose, Row
+from service.wire.geometry import Intrinsics, Light, Moved, Pose, Row
 from service.wire.options import Coordinates, Landmark
 from service.wire.problems import refusal_of
 
@@ -97,6 +97,9 @@ class CameraResult(Wire):
     )
     by_chance: float | None = Field(None, description="Share 0..1 of that length that would be seen anywhere.")
     residual_px: float | None
+    light: Light | None = Field(
+        None, description="How it is evened out with the other accepted cameras in a stitched view; kept with the pose."
+    )
     view: View | None = None
     markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
 

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 from service.wire.addresses import HIDDEN, SourceUrl, without_credentials
 from service.wire.base import Id, Name, Number, Wire
 from service.wire.field import FieldOfPlay
-from service.wire.geometry import Pose, PosedCamera, PoseIn, UnposedCamera
+from service.wire.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
 from service.wire.health import Alarms
 from service.wire.schedule import Schedule
 from service.wire.told.events import WEBHOOK_EXAMPLE, Webhook
@@ -44,12 +44,15 @@ Ignore = Annotated[
     ),
 ]
 
+LIGHT = "How it is evened out with the others in a stitched view; accepted calibrations find it and keep it steady."
+
 
 class CameraIn(UnposedCamera):
     """A camera of a venue as it is sent."""
 
     pose: PoseIn
     ignore: Ignore = Field([])
+    light: Light | None = Field(None, description=LIGHT)
     source: SourceUrl | None = Field(
         None,
         description="Where its frames can be fetched: the address of a JPEG or PNG, or an RTSP stream. User and "
@@ -81,6 +84,7 @@ class Camera(PosedCamera):
     """A camera of a venue with its stored pose."""
 
     ignore: Ignore = Field([])
+    light: Light | None = Field(None, description=LIGHT)
     source: str | None = Field(None, description="Where its frames can be fetched.")
 
     @property

@@ -32,6 +32,7 @@ from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.steady import Sway, median, sways
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
 from worker.calibration.settle import CAPTURE_RAD, METHODS, Seen, Settled, Situation, ridges_of, settle, settle_without
+from worker.calibration.stitch.light import lights
 from worker.calibration.zoom import refit_zoomed
 
 FEWEST_VISIBLE_POINTS = 60
@@ -69,6 +70,9 @@ def calibrate(
         before = compared(pitch, [stored[n] for n in _comparable(answer.cameras)])
         loss = here.loss_of(answer.pitch, [one.camera for one in answer.cameras])
         journey.at("refinement", 1.0)
+    with journey.measuring("light"):
+        held = [one.camera for one in answer.cameras if one.accepted]
+        evened = lights(answer.pitch, held, {camera.id: frames[camera.id][0] for camera in held})
     journey.spent.name("evolution")
     return Calibration(
         **vars(answer),
@@ -77,6 +81,7 @@ def calibrate(
         generations=settled.generations,
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
         path="wide" if near is None else "near",
+        lights=evened,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -18,6 +18,7 @@ from worker.calibration.judge.seam import Seam
 from worker.calibration.scene.camera import Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Region
+from worker.calibration.stitch.light import Light
 
 Preset = Literal["esc", "paper", "scpr"]
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
@@ -125,7 +126,8 @@ class Answer:
 class Calibration(Answer):
     """The answer to frames: new poses. `suspicions`: what the lines contradict of what was given.
 
-    `path`: whether they were found `near` their stored poses, or by a search (`wide`).
+    `path`: whether they were found `near` their stored poses, or by a search (`wide`). `lights`: of accepted cameras
+    that overlap, by camera.
     """
 
     stitch_error_before_px: float | None
@@ -133,6 +135,7 @@ class Calibration(Answer):
     generations: int
     suspicions: Sequence[Suspicion]
     path: Path
+    lights: Mapping[str, Light]
 
 
 class CalibrationError(Exception):

@@ -14,10 +14,12 @@ from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
 from worker.calibration.judge.quality import Gate
 from worker.calibration.see.view import UsualView
+from worker.calibration.stitch.light import Light
 from worker.jobs import from_frames
 from worker.jobs.from_frames import Drawn, Given
 from worker.jobs.pictures import Scene, draw, masks
-from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens, wire_pair
+from worker.jobs.reading import light_of
+from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens, wire_light, wire_pair
 from worker.message import Means
 
 NO_VIEWS: Mapping[str, View] = MappingProxyType({})
@@ -43,23 +45,30 @@ def solve(
         lambda given, step: calibrate(
             given.pitch, given.cameras, given.frames, given.network, asked, step, usual=usual
         ),
-        lambda given, found: _drawn(given, found, options),
-        lambda found, spent, provenance: _allowed(venue, options, _result(found, options, spent, provenance)),
+        lambda given, found: _drawn(venue, given, found, options),
+        lambda found, spent, provenance: _allowed(venue, options, _result(venue, found, options, spent, provenance)),
     )
 
 
-def _drawn(given: Given, found: engine.Calibration, options: Options) -> Drawn:
+def _drawn(venue: Venue, given: Given, found: engine.Calibration, options: Options) -> Drawn:
     """What only this job can draw; and all the rest at once where somebody asks for it, or will want to see why."""
     scene = Scene(
         (given.pitch, given.cameras),
         (found.pitch, [result.camera for result in found.cameras]),
         {camera: several[0] for camera, several in given.frames.items()},
         {result.camera.id: result.markings for result in found.cameras},
+        _steadied(venue, found),
     )
     seen = masks(given.cameras, given.network.responses)
     if found.accepted and not options.pictures:
         return Drawn(seen, scene.names)
     return Drawn(draw(scene, scene.names) | seen)
+
+
+def _steadied(venue: Venue, found: engine.Calibration) -> dict[str, Light]:
+    """The light of the cameras that were evened out, steadied by what the venue keeps of it."""
+    kept = {camera.id: light_of(camera.light) for camera in venue.cameras if camera.light is not None}
+    return {camera: light.after(kept.get(camera)) for camera, light in found.lights.items()}
 
 
 def _engine_options(venue: Venue, options: Options) -> engine.Options:
@@ -69,15 +78,20 @@ def _engine_options(venue: Venue, options: Options) -> engine.Options:
     )
 
 
-def _result(found: engine.Calibration, options: Options, spent: engine.Spent, provenance: Provenance) -> Result:
+def _result(
+    venue: Venue, found: engine.Calibration, options: Options, spent: engine.Spent, provenance: Provenance
+) -> Result:
     ridge = found.pitch.ridge
+    lights = {camera: wire_light(light) for camera, light in _steadied(venue, found).items()}
     return Result(
         verdict=found.verdict,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
         cameras=[
             wire_camera(
-                camera, wire_lens(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None
+                camera,
+                wire_lens(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
+                lights.get(camera.camera.id),
             )
             for camera in found.cameras
         ],

@@ -18,6 +18,7 @@ from worker.calibration.draw.overlays import overlay
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
+from worker.calibration.stitch.light import Light
 from worker.calibration.stitch.views import ViewChoice, chosen_view
 from worker.jobs.reading import Picture, jpeg, png
 
@@ -31,13 +32,14 @@ log = logging.getLogger(__name__)
 class Scene:
     """What is drawn: a pitch and cameras as they were `stored` and as they were `found`, and a frame of each camera.
 
-    `markings`: what is said of them, by the camera that sees them.
+    `markings`: what is said of them, by the camera that sees them. `lights`: how cameras are evened out.
     """
 
     stored: tuple[Field, Sequence[Camera]]
     found: tuple[Field, Sequence[Camera]]
     frames: Mapping[str, Picture]
     markings: Mapping[str, Sequence[MarkingSeen]]
+    lights: Mapping[str, Light]
 
     @property
     def names(self) -> list[str]:
@@ -79,7 +81,8 @@ def _stitched(scene: Scene) -> dict[str, bytes]:
     # Somebody may wait, and each of them keeps a core busy.
     with ThreadPoolExecutor(2) as both:
         after, before = both.map(
-            lambda standing: mosaic.stitched(standing[0], view, standing[1], scene.frames), (scene.found, scene.stored)
+            lambda standing: mosaic.stitched(standing[0], view, standing[1], scene.frames, scene.lights),
+            (scene.found, scene.stored),
         )
     return {
         "preview": jpeg(after.picture),
@@ -89,7 +92,7 @@ def _stitched(scene: Scene) -> dict[str, bytes]:
 
 
 def _birdseye(scene: Scene) -> dict[str, bytes]:
-    return {"birdseye": jpeg(mosaic.birdseye(*scene.found, scene.frames))}
+    return {"birdseye": jpeg(mosaic.birdseye(*scene.found, scene.frames, evened=scene.lights))}
 
 
 def _of_camera(scene: Scene, number: int) -> dict[str, bytes]:

@@ -16,6 +16,7 @@ from service.wire.problems import KINDS, type_of
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ignored import Ignored
+from worker.calibration.stitch.light import Light
 
 if TYPE_CHECKING:
     from service.wire.job import JobError
@@ -95,6 +96,12 @@ def camera_of(camera: geometry.PosedCamera) -> Camera:
     """The engine's camera at its stored pose."""
     pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
     return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
+
+
+def light_of(light: geometry.Light) -> Light:
+    """How a camera's picture is evened out, for the engine: colours from blue to red."""
+    red, green, blue = light.gain
+    return Light((blue, green, red), light.contrast, light.falloff)
 
 
 def watching(camera: geometry.PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:

@@ -31,6 +31,7 @@ from worker.calibration.judge.pairs import Pair
 from worker.calibration.scene.camera import Intrinsics, Pose
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
 from worker.calibration.see.view import ViewCondition
+from worker.calibration.stitch.light import Light
 from worker.jobs.reading import Failure
 from worker.message import Means
 
@@ -81,6 +82,11 @@ def wire_lens(lens: Intrinsics) -> geometry.Intrinsics:
     )
 
 
+def wire_light(light: Light) -> geometry.Light:
+    """How a camera's picture is evened out, for the wire: colours from red to blue."""
+    return geometry.Light(gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff)
+
+
 def wire_pose(pose: Pose) -> geometry.Pose:
     """A pose of the engine for the wire."""
     return geometry.Pose(
@@ -113,8 +119,10 @@ def wire_progress(step: records.Progress) -> Progress:
     )
 
 
-def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = None) -> CameraResult:
-    """What a finish has to say of a camera; `lens` where it was found as well."""
+def wire_camera(
+    found: quality.CameraResult, lens: geometry.Intrinsics | None = None, light: geometry.Light | None = None
+) -> CameraResult:
+    """What a finish has to say of a camera; `lens` and `light` where they were found as well."""
     return CameraResult(
         id=found.camera.id,
         accepted=found.accepted,
@@ -136,6 +144,7 @@ def wire_camera(found: quality.CameraResult, lens: geometry.Intrinsics | None = 
         by_chance=number(found.evidence.by_chance),
         view=_view(found.view),
         residual_px=number(found.residual_px),
+        light=light,
         markings=[_marking(one) for one in found.markings],
     )
 

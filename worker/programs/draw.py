@@ -20,7 +20,7 @@ from worker.calibration.judge.markings import OPPOSITE, Direction, MarkingSeen
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.jobs.pictures import Scene, draw
-from worker.jobs.reading import decoded_frame, pitch_of, watching
+from worker.jobs.reading import decoded_frame, light_of, pitch_of, watching
 
 
 def main() -> None:
@@ -42,7 +42,8 @@ def scene_of(asked: Drawing, files: Mapping[str, bytes]) -> Scene:
         frames = each.map(lambda camera: decoded_frame(camera, sizes[camera], files[camera]), files)
         decoded = dict(zip(files, frames, strict=True))
     markings = {camera: [_seen(one) for one in seen] for camera, seen in asked.markings.items()}
-    return Scene(_standing(asked.stored, asked), _standing(asked.found, asked), decoded, markings)
+    lights = {camera: light_of(light) for camera, light in asked.lights.items()}
+    return Scene(_standing(asked.stored, asked), _standing(asked.found, asked), decoded, markings, lights)
 
 
 def _standing(standing: Standing, asked: Drawing) -> tuple[Field, list[Camera]]:

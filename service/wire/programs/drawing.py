@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pydantic import BaseModel
 
 from service.wire.field import FieldOfPlay
-from service.wire.geometry import PosedCamera
+from service.wire.geometry import Light, PosedCamera
 from service.wire.programs.files import files_in
 
 # Somebody waits for the program, and all that a venue and a result can be takes as long to load as NumPy.
@@ -41,13 +41,14 @@ class SeenMarking(BaseModel):
 class Drawing(BaseModel):
     """Pictures of a calibration: how all stood when the job began (`stored`) and as it was `found`.
 
-    `markings` and `ignore`, polygons of what is not looked at: by camera. `names`: of the pictures; `sizes`: bytes of
-    the frames that follow, one of each camera that is needed.
+    `markings`, `lights` and `ignore`, polygons of what is not looked at: by camera.
+    `names`: of the pictures; `sizes`: bytes of the frames that follow, one of each camera that is needed.
     """
 
     stored: Standing
     found: Standing
     markings: dict[str, list[SeenMarking]]
+    lights: dict[str, Light]
     ignore: dict[str, list[list[list[float]]]]
     names: list[str]
     threads: int
@@ -69,6 +70,7 @@ class Drawing(BaseModel):
             stored=stored,
             found=found,
             markings={camera.id: [_marking(one) for one in camera.markings] for camera in result.cameras},
+            lights={camera.id: camera.light for camera in result.cameras if camera.light is not None},
             ignore={camera.id: camera.ignore for camera in venue.cameras},
             names=list(names),
             threads=threads,

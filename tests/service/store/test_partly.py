@@ -4,6 +4,7 @@ import pytest
 
 from service.store.counts.figures import look
 from service.store.jobs.decisions import MovedOn
+from service.wire.geometry import Light
 from service.wire.results import View
 from tests.homes import in_both_homes
 from tests.service.store.test_alarms import failed, rings, told, watched
@@ -165,15 +166,25 @@ def test_it_is_a_verdict_of_its_own_where_jobs_are_counted_and_listed(stock):
 
 @in_both_homes
 def test_what_a_camera_usually_shows_is_what_it_showed_when_it_was_accepted(stock):
-    def calibrated(accepted, lines_found):
-        task = stock.attempts.begin(stock.submitted("v"))
-        found = result(task.venue, accepted)
-        view = View(usable=True, detail="", lines_found=lines_found)
-        cameras = [camera.model_copy(update={"view": view}) for camera in found.cameras]
-        stock.attempts.finish(task, found.model_copy(update={"cameras": cameras}), [])
-
     stock.venue("v")
-    calibrated(accepted=True, lines_found=0.9)
-    calibrated(accepted=["left"], lines_found=0.5)
+    calibrated(stock, True, view=View(usable=True, detail="", lines_found=0.9))
+    calibrated(stock, ["left"], view=View(usable=True, detail="", lines_found=0.5))
     views = stock.attempts.begin(stock.submitted("v")).last_views
     assert {camera: view.lines_found for camera, view in views.items()} == {"left": 0.5, "right": 0.9}
+
+
+@in_both_homes
+def test_the_light_of_a_camera_is_kept_with_its_pose_and_until_another_is_found(stock):
+    light = Light(gain=[1.1, 1.0, 0.9], contrast=0.05, falloff=0.1)
+    stock.venue("v")
+    calibrated(stock, ["left"], light=light)
+    calibrated(stock, True)
+    assert {camera.id: camera.light for camera in stock.venues.get("v").cameras} == {"left": light, "right": None}
+
+
+def calibrated(stock, accepted, **told):
+    """A calibration that says this of each camera."""
+    task = stock.attempts.begin(stock.submitted("v"))
+    found = result(task.venue, accepted)
+    cameras = [camera.model_copy(update=told) for camera in found.cameras]
+    stock.attempts.finish(task, found.model_copy(update={"cameras": cameras}), [])

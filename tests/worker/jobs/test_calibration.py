@@ -24,6 +24,7 @@ from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
 from worker.calibration.settle import METHODS
+from worker.calibration.stitch.light import Light
 from worker.jobs import calibration, pictures, reading, wire
 from worker.message import Means, Message
 
@@ -94,7 +95,9 @@ def asked(monkeypatch):
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
         found = pitch.flat() if options.flat else pitch.raised(asked.get("raised", 0.0))
-        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, [doubt], "near")
+        return engine.Calibration(
+            found, results, against, 0.2, spent, None, 0.1, 3, [doubt], "near", asked.get("lights", {})
+        )
 
     class Segmenter:
         sha256 = "f" * 64
@@ -259,6 +262,18 @@ def test_each_camera_has_its_verdict_and_the_job_the_sum_of_them(venue, files, a
     assert calibration.solve(venue, files, Options(), means, lambda _: None).result.verdict == "rejected"
     asked["against"] = {}
     assert calibration.solve(venue, files, Options(), means, lambda _: None).result.verdict == "accepted"
+
+
+def test_the_light_of_a_camera_is_told_from_red_to_blue_and_steadied_by_what_the_venue_keeps(
+    venue, files, asked, means
+):
+    asked["lights"] = {"left": Light((1.2, 1.0, 1.0), 0.1, 0.1)}
+    left, right = calibration.solve(venue, files, Options(), means, lambda _: None).result.cameras
+    assert (left.light.gain, left.light.contrast, right.light) == (pytest.approx([1.0, 1.0, 1.2]), 0.1, None)
+    kept = [venue.cameras[0].model_copy(update={"light": geometry.Light(gain=[1.0, 1.0, 1.0])}), venue.cameras[1]]
+    evened = venue.model_copy(update={"cameras": kept})
+    left, _ = calibration.solve(evened, files, Options(), means, lambda _: None).result.cameras
+    assert 1.0 < left.light.gain[2] < 1.1
 
 
 def test_a_venue_that_takes_all_or_nothing_refuses_what_is_accepted_in_part(venue, files, asked, means):

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
-from worker.calibration.stitch.light import lights
-from worker.calibration.stitch.panorama import panorama
+from worker.calibration.stitch.light import Light, lights
+from worker.calibration.stitch.panorama import Panorama, panorama
 from worker.calibration.stitch.views import View, ViewFromAbove
 
 # Least length of the pitch in the bird's-eye view, in pixels: courts are small.
 BIRDSEYE_LENGTH = 800
+NOT_KNOWN: Mapping[str, Light] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -26,12 +28,19 @@ class Stitched:
     owner: NDArray[np.int8]
 
 
-def stitched(pitch: Field, view: View, cameras: Sequence[Camera], frames: Mapping[str, Frame]) -> Stitched:
+def stitched(
+    pitch: Field,
+    view: View,
+    cameras: Sequence[Camera],
+    frames: Mapping[str, Frame],
+    evened: Mapping[str, Light] = NOT_KNOWN,
+) -> Stitched:
     """What the cameras see, from one place: pictures of two sets of poses from the same place can be compared.
 
-    `frames[camera.id]`: BGR (height, width, 3) of the size of the camera's intrinsics.
+    `frames[camera.id]`: BGR (height, width, 3) of the size of the camera's intrinsics. `evened`: how by camera; without
+    any, as these frames say.
     """
-    made = panorama(pitch, view, cameras, lights(pitch, cameras, frames))
+    made = _made(pitch, view, cameras, frames, evened)
     return Stitched(made.picture(frames), made.owner)
 
 
@@ -41,6 +50,7 @@ def birdseye(
     frames: Mapping[str, Frame],
     pixels_per_metre: float | None = None,
     margin_m: float = 3,
+    evened: Mapping[str, Light] = NOT_KNOWN,
 ) -> Frame:
     """The pitch from straight above, BGR: x to the right, y up, the pitch centre in the centre pixel.
 
@@ -51,4 +61,10 @@ def birdseye(
     columns = round((pitch.length / 2 + margin_m) * pixels_per_metre)
     rows = round((pitch.width / 2 + margin_m) * pixels_per_metre)
     view = ViewFromAbove(1 / pixels_per_metre, (2 * columns + 1, 2 * rows + 1))
-    return stitched(pitch, view, cameras, frames).picture
+    return _made(pitch, view, cameras, frames, evened).picture(frames)
+
+
+def _made(
+    pitch: Field, view: View, cameras: Sequence[Camera], frames: Mapping[str, Frame], evened: Mapping[str, Light]
+) -> Panorama:
+    return panorama(pitch, view, cameras, evened or lights(pitch, cameras, frames))

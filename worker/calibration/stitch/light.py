@@ -30,6 +30,8 @@ GAIN_SIGMA, CONTRAST_SIGMA, FALLOFF_SIGMA = 0.3, 0.1, 0.1
 LARGEST_GAIN, LARGEST_CONTRAST, LARGEST_FALLOFF = 1.5, 0.3, 0.4
 # The grey level that a contrast leaves as it is.
 MIDDLE = 100.0
+# How much of a new estimate counts beside what was kept.
+NEW_SHARE = 0.25
 ROUNDS = 12
 UNKNOWNS = 5
 # Residuals beyond so many of their own scales are players, and what else two cameras see differently.
@@ -60,6 +62,24 @@ class Light:
         """By what pixels (..., 2) of a frame of `size` (width, height) are multiplied beside."""
         return np.exp(np.float32(self.falloff) * squared_radius(pixels, size))
 
+    def after(self, before: Light | None) -> Light:
+        """This one, steadied by the `before`: a cloud moves a picture by a part of what it moved the light."""
+        if before is None:
+            return self
+        old, new = before.numbers, self.numbers
+        return Light.of(old + NEW_SHARE * (new - old))
+
+    @property
+    def numbers(self) -> Array:
+        """Log gains of blue, green and red, contrast, falloff (5,)."""
+        return np.array([*np.log(self.gain), self.contrast, self.falloff])
+
+    @classmethod
+    def of(cls, numbers: Array) -> Light:
+        """From its `numbers`."""
+        blue, green, red = np.exp(numbers[:3]).tolist()
+        return cls((blue, green, red), float(numbers[3]), float(numbers[4]))
+
 
 NEUTRAL = Light()
 
@@ -73,42 +93,26 @@ def squared_radius(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArra
 
 
 def lights(pitch: Field, cameras: Sequence[Camera], frames: Mapping[str, Frame]) -> dict[str, Light]:
-    """What makes the cameras agree where they overlap, by camera; `NEUTRAL` for one that overlaps no other.
+    """What makes the cameras agree where they overlap, by camera; none of one that overlaps no other.
 
     Least squares of the logarithms of what two cameras show of the same places, robust to players and to whatever
     stands off the ground; held near no correction at all, so that only differences follow the pictures.
     """
+    if len(cameras) < 2:
+        return {}
     view = chosen_view(pitch, cameras, ViewChoice(width=COMPARED_WIDTH))
     width, height = view.size
     points = view.behind(pitch, np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float))
     seen = [_seen(camera, frames[camera.id], points) for camera in cameras]
-    pairs = [both for i, j in combinations(range(len(cameras)), 2) if (both := _equations(i, j, seen)) is not None]
-    solution = _solved(pairs, len(cameras))
-    limits = np.array([*3 * [np.log(LARGEST_GAIN)], LARGEST_CONTRAST, LARGEST_FALLOFF])
-    bounded = np.clip(solution, -limits, limits).tolist()
-    return {camera.id: _light(numbers) for camera, numbers in zip(cameras, bounded, strict=True)}
-
-
-def _light(numbers: list[float]) -> Light:
-    blue, green, red, contrast, falloff = numbers
-    return Light((math.exp(blue), math.exp(green), math.exp(red)), contrast, falloff)
-
-
-def _solved(pairs: Sequence[tuple[Array, Array]], count: int) -> Array:
-    """Log gains of blue, green and red, contrast and falloff of each camera, (count, 5)."""
-    sigma = np.tile([*3 * [GAIN_SIGMA], CONTRAST_SIGMA, FALLOFF_SIGMA], count)
-    solution: Array = np.zeros(UNKNOWNS * count)
-    for _ in range(ROUNDS):
-        normal, right = np.diag(1 / np.square(sigma)).astype(float), np.zeros(UNKNOWNS * count)
-        for design, difference in pairs:
-            residual = difference - design @ solution
-            scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-3)
-            weight = 1 / np.maximum(1, np.abs(residual) / (ROBUST * scale)) ** 2
-            weight *= INDEPENDENT / NOISE**2 / weight.sum()
-            normal += design.T @ (weight[:, None] * design)
-            right += design.T @ (weight * difference)
-        solution = np.asarray(np.linalg.solve(normal, right), float)
-    return solution.reshape(count, UNKNOWNS)
+    overlaps = [
+        _Overlap.of(i, j, seen)
+        for i, j in combinations(range(len(cameras)), 2)
+        if np.count_nonzero(seen[i].valid & seen[j].valid) >= LEAST_PLACES
+    ]
+    limits = np.array([*3 * [math.log(LARGEST_GAIN)], LARGEST_CONTRAST, LARGEST_FALLOFF])
+    found = np.clip(_solved(overlaps, len(cameras)), -limits, limits)
+    overlapping = sorted({n for overlap in overlaps for n in overlap.cameras})
+    return {cameras[n].id: Light.of(found[n]) for n in overlapping}
 
 
 @dataclass(frozen=True)
@@ -130,28 +134,55 @@ def _seen(camera: Camera, frame: Frame, points: Array) -> _Seen:
         cv2.GaussianBlur(part, (0, 0), SMOOTHED_PX)
         for part in (exposed.astype(np.float32), np.where(exposed[..., None], np.log(np.maximum(values, 1)), 0))
     )
-    share, total = np.asarray(share, np.float32), np.asarray(total, np.float32)
-    return _Seen(
-        total / np.maximum(share, 1e-6)[..., None],
-        exposed & (share > 0.5),
-        squared_radius(np.nan_to_num(pixels).astype(np.float32), size),
-    )
+    logs: NDArray[np.float32] = (np.asarray(total) / np.maximum(np.asarray(share), 1e-6)[..., None]).astype(np.float32)
+    radius = squared_radius(np.nan_to_num(pixels).astype(np.float32), size)
+    every = slice(None, None, round(SMOOTHED_PX))
+    return _Seen(logs[every, every], (exposed & (np.asarray(share) > 0.5))[every, every], radius[every, every])
 
 
-def _equations(i: int, j: int, seen: Sequence[_Seen]) -> tuple[Array, Array] | None:
-    """Design (n, unknowns) and differences (n,) of two cameras, a row for each colour of each place both see.
+@dataclass(frozen=True)
+class _Overlap:
+    """What two cameras say of each other: `design` (n, 10) times the numbers of both should be `difference` (n,).
 
-    Unknowns of each camera: log gains of blue, green and red, contrast, falloff.
+    A row for each colour of each place; log gains of blue, green and red, contrast and falloff of either.
     """
-    both = seen[i].valid & seen[j].valid
-    places = int(both.sum())
-    if places < LEAST_PLACES:
-        return None
-    design = np.zeros((places, 3, len(seen), UNKNOWNS))
-    for camera, sign in ((i, 1), (j, -1)):
-        for colour in range(3):
-            design[:, colour, camera, colour] = sign
-        design[:, :, camera, 3] = sign * (seen[camera].logs[both] - math.log(MIDDLE))
-        design[:, :, camera, 4] = sign * seen[camera].radius[both][:, None]
-    difference = (seen[j].logs - seen[i].logs)[both].astype(float)
-    return design.reshape(3 * places, -1), difference.reshape(-1)
+
+    cameras: tuple[int, int]
+    design: Array
+    difference: Array
+
+    @classmethod
+    def of(cls, i: int, j: int, seen: Sequence[_Seen]) -> _Overlap:
+        """Of cameras number i and j."""
+        both = seen[i].valid & seen[j].valid
+        design = np.zeros((np.count_nonzero(both), 3, 2, UNKNOWNS))
+        for side, (camera, sign) in enumerate(((i, 1), (j, -1))):
+            for colour in range(3):
+                design[:, colour, side, colour] = sign
+            design[:, :, side, 3] = sign * (seen[camera].logs[both] - math.log(MIDDLE))
+            design[:, :, side, 4] = sign * seen[camera].radius[both][:, None]
+        difference = (seen[j].logs - seen[i].logs)[both].astype(float)
+        return cls((i, j), design.reshape(-1, 2 * UNKNOWNS), difference.reshape(-1))
+
+    @property
+    def columns(self) -> NDArray[np.intp]:
+        """Where its unknowns are among those of all cameras."""
+        return np.concatenate([UNKNOWNS * n + np.arange(UNKNOWNS) for n in self.cameras])
+
+
+def _solved(overlaps: Sequence[_Overlap], count: int) -> Array:
+    """Log gains of blue, green and red, contrast and falloff of each camera, (count, 5)."""
+    sigma = np.tile([*3 * [GAIN_SIGMA], CONTRAST_SIGMA, FALLOFF_SIGMA], count)
+    solution: Array = np.zeros(UNKNOWNS * count)
+    for _ in range(ROUNDS):
+        normal, right = np.diag(1 / np.square(sigma)).astype(float), np.zeros(UNKNOWNS * count)
+        for overlap in overlaps:
+            columns, design = overlap.columns, overlap.design
+            residual = overlap.difference - design @ solution[columns]
+            scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-3)
+            weight = 1 / np.maximum(1, np.abs(residual) / (ROBUST * scale)) ** 2
+            weight *= INDEPENDENT / NOISE**2 / weight.sum()
+            normal[np.ix_(columns, columns)] += design.T @ (weight[:, None] * design)
+            right[columns] += design.T @ (weight * overlap.difference)
+        solution = np.asarray(np.linalg.solve(normal, right), float)
+    return solution.reshape(count, UNKNOWNS)
