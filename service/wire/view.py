@@ -29,9 +29,7 @@ class ViewChoice(Wire):
         "still. `rectilinear`: as a camera without distortion. `birds-eye`: the pitch from above, of which nothing but "
         "the size can be chosen.",
     )
-    width_px: Annotated[Width, Strict] = Field(
-        1920, description="Width in pixels, even."
-    )
+    width_px: Annotated[Width, Strict] = Field(1920, description="Width in pixels, even.")
     height_px: Annotated[Height, Strict] | None = Field(
         None, description="Height in pixels, even; null: as much as what is shown needs."
     )
