@@ -135,10 +135,11 @@ def patch_venue(
         if before is None:
             raise no_such_venue(venue_id)
         _require_match(if_match, before)
+        document = merged(_patchable(before, patch), patch)
         try:
-            venue = VenueIn.model_validate(merged(_patchable(before, patch), patch))
+            venue = VenueIn.model_validate(document)
         except ValidationError as error:
-            raise _misnamed_camera(before, patch) or invalid(error, "body") from None
+            raise _misnamed_camera(before, patch) or invalid(error, VenueIn, document, "body") from None
         stored = _checked(venue, venue_id, context.settings)
         return stored, sources.credentials_of(stored, venue.credentials, before, known)
 

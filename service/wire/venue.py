@@ -12,7 +12,7 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
 from service.wire.health import Alarms
 from service.wire.schedule import Schedule
-from service.wire.told.events import WEBHOOK_EXAMPLE, Webhook
+from service.wire.told.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.wire.view import VIEW_EXAMPLE, ViewChoice
 
 Accept = Annotated[

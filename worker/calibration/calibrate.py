@@ -14,6 +14,7 @@ from worker.calibration.judge.pairs import (
     Pair,
     Seeing,
     compared,
+    compared_before,
     contradictions,
     refusal_by_pairs,
     stitch_error_px,
@@ -32,7 +33,7 @@ from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.steady import Sway, median, sways
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
 from worker.calibration.settle import CAPTURE_RAD, METHODS, Seen, Settled, Situation, ridges_of, settle, settle_without
-from worker.calibration.stitch.light import lights
+from worker.calibration.stitch.evening import evened_out
 from worker.calibration.zoom import refit_zoomed
 
 FEWEST_VISIBLE_POINTS = 60
@@ -65,14 +66,12 @@ def calibrate(
     near = look_nearby(here) if options.search == "auto" else None
     settled, answer = near or agree(here, refit_zoomed(here, settle(here)))
     with journey.measuring("quality"):
-        evidence_before = [one.evidence_before for one in answer.cameras]
-        stored = [Seeing(*each) for each in zip(cameras, seen.sight.responses, evidence_before, strict=True)]
-        before = compared(pitch, [stored[n] for n in _comparable(answer.cameras)])
+        before = _compared_before(pitch, cameras, seen.sight, answer)
         loss = here.loss_of(answer.pitch, [one.camera for one in answer.cameras])
         journey.at("refinement", 1.0)
     with journey.measuring("light"):
         held = [one.camera for one in answer.cameras if one.accepted]
-        evened = lights(answer.pitch, held, {camera.id: frames[camera.id][0] for camera in held})
+        evened = evened_out(answer.pitch, held, {camera.id: frames[camera.id][0] for camera in held})
     journey.spent.name("evolution")
     return Calibration(
         **vars(answer),
@@ -161,6 +160,18 @@ def _compared(pitch: Field, results: Sequence[CameraResult], sight: Sight) -> li
     ridges = [ridges_of(pitch, results[n].camera, sight.channels[n]) for n in chosen]
     by_ridges = compared(pitch, [replace(one, response=its) for one, its in zip(seeing, ridges, strict=True)])
     return [again if pair.error_px is None else pair for pair, again in zip(pairs, by_ridges, strict=True)]
+
+
+def _compared_before(pitch: Field, cameras: Sequence[Camera], sight: Sight, answer: Answer) -> list[Pair]:
+    """What pairs said by their stored poses: of poses that are accepted, seen from where those put the views."""
+    stored = {
+        one.id: Seeing(one, response, result.evidence_before)
+        for one, response, result in zip(cameras, sight.responses, answer.cameras, strict=True)
+    }
+    if any(result.accepted for result in answer.cameras):
+        found = {result.camera.id: result.camera for result in answer.cameras}
+        return compared_before(pitch, stored, found, [pair for pair, _ in answer.pairs])
+    return compared(pitch, [stored[cameras[n].id] for n in _comparable(answer.cameras)])
 
 
 def require_markings_in_view(pitch: Field, cameras: Sequence[Camera]) -> None:

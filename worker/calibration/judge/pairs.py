@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from worker.calibration.judge.quality import Gate, Reason, Refusal
-from worker.calibration.judge.registration import Response, pairs_in_common, register_pair, shares_plenty
+from worker.calibration.judge.registration import (
+    Registration,
+    Response,
+    error_by,
+    pairs_in_common,
+    register_pair,
+    shares_plenty,
+)
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.see.evidence import Evidence
@@ -30,9 +37,9 @@ class Seeing:
 class Pair:
     """Two cameras, by their ids, that should show some of the same markings.
 
-    `error_px`: how far apart they put them, 1 px = 10 cm; None where their views cannot be brought together.
-    `plenty`: they share so much that this tells something; `confirmed`: whether it registers or not, both see what they
-    share where their poses put it.
+    `error_px`: how far apart they put them, 1 px = 10 cm; None where their views cannot be brought together, and then
+    there is no `registration`. `plenty`: they share so much that this tells something; `confirmed`: whether it
+    registers or not, both see what they share where their poses put it.
     """
 
     first: str
@@ -40,6 +47,7 @@ class Pair:
     error_px: float | None
     plenty: bool
     confirmed: bool
+    registration: Registration | None = None
 
     @property
     def cameras(self) -> tuple[str, str]:
@@ -94,8 +102,25 @@ def compared(pitch: Field, cameras: Sequence[Seeing]) -> list[Pair]:
         registered = register_pair(pitch, *pair, first.response, second.response)
         error_px = None if registered is None else registered.error_px
         confirmed = _both_see(first.evidence, second.evidence)
-        found.append(Pair(pair[0].id, pair[1].id, error_px, shares_plenty(pitch, *pair), confirmed))
+        found.append(Pair(pair[0].id, pair[1].id, error_px, shares_plenty(pitch, *pair), confirmed, registered))
     return found
+
+
+def compared_before(
+    pitch: Field, stored: Mapping[str, Seeing], found: Mapping[str, Camera], pairs: Sequence[Pair]
+) -> list[Pair]:
+    """What the same pairs said by the poses that were `stored`, by those that were `found` where these register."""
+    before = []
+    for pair in pairs:
+        seeing = [stored[camera] for camera in pair.cameras]
+        if pair.registration is None:
+            before += compared(pitch, seeing)
+        else:
+            now = (found[pair.first], found[pair.second])
+            error_px = error_by(pitch, pair.registration, now, (seeing[0].camera, seeing[1].camera))
+            confirmed = _both_see(seeing[0].evidence, seeing[1].evidence)
+            before.append(Pair(pair.first, pair.second, error_px, pair.plenty, confirmed))
+    return before
 
 
 def _both_see(first: Evidence, second: Evidence) -> bool:

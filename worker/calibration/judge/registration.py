@@ -37,8 +37,8 @@ REACH_M = 8.0
 LEAST_COMMON = 0.3
 # Among shifts that explain the views alike (along a lone halfway line) the smallest is taken.
 SHIFT_PENALTY = 0.05
-# Views that are nearer than this where they should be need no other guess.
-NEAR_M = 0.5
+# Views that are nearer than this where they should be, and so alike there, need no other guess.
+NEAR_M, ALIKE = 0.5, 0.7
 
 # Sampled finely, so that no edge of a line falls between two samples; once blurred, fewer will do.
 FINE_STEP_M, FINE_HALF_M = 0.05, 12.0
@@ -48,8 +48,10 @@ EXPECTED = np.array([0.02, 0.02, 0.02, 0.16, 0.16, 0.16])
 # each step. Coarse to fine; the last blur is about what a far camera smears: with less, the smear of two cameras that
 # face each other would show as a displacement. What is expected shrinks with the displacement found: cameras that agree
 # at the centre are not suspected of turns and moves that happen to cancel there.
-FINE_STAGES = ((0.8, 8, 5 * (1.0,)), (0.4, 4, 5 * (0.3,)), (0.2, 2, (*4 * (0.1,), *4 * (0.01,))))
+FINE_STAGES = ((0.8, 8, (1.0,)), (0.4, 4, (0.3,)), (0.2, 2, (0.1, 0.01)))
 FINEST_STRIDE = min(stride for _, stride, _ in FINE_STAGES)
+# Rounds end when one moves the views by less than this part of the blur, and after so many at the latest.
+SETTLED, MOST_ROUNDS = 0.002, 5
 # A difference of this part of a line's response counts as half an outlier.
 OUTLIER = 0.5
 # Grass, where neither view shows more than this, is left out.
@@ -73,13 +75,16 @@ class Registration:
     """The second camera's markings relative to the first's: `dx_px`, `dy_px` along the world's axes, pixels of 10 cm.
 
     Where the common markings are all parallel, only the displacement across them. `support`: metres of marking that
-    both views show on top of each other once registered. `pair`: the ids of the cameras.
+    both views show on top of each other once registered. `pair`: the ids of the cameras. Measured `at` a point (2,) of
+    the pitch, in the directions `told` (2, 1 or 2).
     """
 
     dx_px: float
     dy_px: float
     support: float
     pair: tuple[str, str]
+    at: Array
+    told: Array
 
     @property
     def error_px(self) -> float:
@@ -116,15 +121,38 @@ def register_pair(
         return None
     segmented = ((first, first_response), (second, second_response))
     held = _directions_in_common(pitch, first, second, centre)
-    fits = [_fit(pitch, segmented, middle, shift, held) for middle, shift in _guesses(pitch, segmented, centre)]
-    best = max(fits, key=lambda fit: fit.support * fit.correlation, default=None)
+    best = _best_fit(pitch, segmented, centre, held)
     if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
         return None
     # A halfway line fits itself wherever it is slid to. Where a circle should have held it, that is no registration.
-    if best.told < held:
+    if best.held < held:
         return None
     dx, dy = best.displacement / PIXEL_M
-    return Registration(float(dx), float(dy), best.support, (first.id, second.id))
+    return Registration(float(dx), float(dy), best.support, (first.id, second.id), best.middle, best.told)
+
+
+def error_by(
+    pitch: Field, registration: Registration, found: tuple[Camera, Camera], others: tuple[Camera, Camera]
+) -> float:
+    """How far apart, in pixels of 10 cm, two cameras would put the same markings by `others`' poses and lenses.
+
+    They were registered as they are `found`: what they see at the registered point is put elsewhere by other poses.
+    """
+    point = pitch.lift(registration.at)
+    first, second = (_put(pitch, other, one.project(point)) for one, other in zip(found, others, strict=True))
+    moved = registration.told @ registration.told.T @ (second - first)[:2] / PIXEL_M
+    return float(np.hypot(registration.dx_px + moved[0], registration.dy_px + moved[1]))
+
+
+def _put(pitch: Field, camera: Camera, pixel: Array) -> Array:
+    """The point (3,) of the pitch that a camera sees in a pixel (2,)."""
+    ray = camera.rays(pixel)
+    height = np.zeros(())
+    # The roof is so flat that a few steps from the height last found reach it.
+    for _ in range(4):
+        point = camera.pose.position + ray * (height - camera.pose.position[2]) / ray[2]
+        height = pitch.height(point[:2])
+    return np.asarray(point)
 
 
 def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
@@ -161,8 +189,37 @@ def _directions_in_common(pitch: Field, first: Camera, second: Camera, centre: A
     return int(min(np.count_nonzero(enough), np.count_nonzero(held)))
 
 
+@dataclass(frozen=True)
+class _Fit:
+    """`displacement` (2,) m in the `middle` (2,) in the directions `told` (2, n).
+
+    `support`: metres of marking in common; `correlation`: how alike they are.
+    """
+
+    middle: Array
+    displacement: Array
+    told: Array
+    support: float
+    correlation: float
+
+    @property
+    def held(self) -> int:
+        """In how many directions the markings hold the views."""
+        return self.told.shape[1]
+
+
+def _best_fit(pitch: Field, segmented: Sequence[Segmented], centre: Array, held: int) -> _Fit | None:
+    """Where the views should be alike, or, unless they are there, where they look most alike."""
+    expected = _fit(pitch, segmented, centre, np.zeros(2), held)
+    if expected.correlation > ALIKE and expected.held == held and np.hypot(*expected.displacement) < NEAR_M:
+        return expected
+    guesses = _guesses(pitch, segmented, centre)
+    fits = [expected, *(_fit(pitch, segmented, middle, shift, held) for middle, shift in guesses)]
+    return max(fits, key=lambda fit: fit.support * fit.correlation)
+
+
 def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> list[tuple[Array, Array]]:
-    """Where to measure (2,), and how far apart (2,) the views may be there: as they should be, and as they look."""
+    """Where to measure (2,), and how far apart (2,) the views look there; nothing where that is next to none."""
     grid = _square(centre, COARSE_HALF_M, COARSE_STEP_M)
     views = [ground_view(pitch, camera, response, grid) for camera, response in segmented]
     shift = _coarse_shift(views[0], views[1], pitch.line_width)
@@ -172,18 +229,7 @@ def _guesses(pitch: Field, segmented: Sequence[Segmented], centre: Array) -> lis
     template = _template(pitch, centre)
     placed = [put for put in (_coarse_shift(template, view, pitch.line_width) for view in views) if put is not None]
     middle = centre + np.mean(placed or [np.zeros(2)], axis=0)
-    guesses = [(centre, np.zeros(2)), (middle, shift)]
-    return guesses if np.hypot(*(middle - centre)) + np.hypot(*shift) > NEAR_M else guesses[:1]
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """`displacement` (2,) m in the directions that are told, metres of marking in common, and how alike they are."""
-
-    displacement: Array
-    told: int
-    support: float
-    correlation: float
+    return [(middle, shift)] if np.hypot(*(middle - centre)) + np.hypot(*shift) > NEAR_M else []
 
 
 def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Array, held: int) -> _Fit:
@@ -207,7 +253,7 @@ def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Arr
     variance, directions = np.linalg.eigh(at_middle @ fine.covariance @ at_middle.T)
     told = directions[:, variance < LOOSE_M**2][:, :held]
     displacement = told @ told.T @ at_middle @ fine.moves
-    return _Fit(displacement, told.shape[1], fine.common_area_m2 / pitch.line_width, fine.correlation)
+    return _Fit(middle, displacement, told, fine.common_area_m2 / pitch.line_width, fine.correlation)
 
 
 def _square(middle: Array, half_m: float, step_m: float) -> Array:
@@ -295,28 +341,40 @@ def _fine_moves(
     `forms` (n, n, 2, 12): what they do to every `FINEST_STRIDE`th point of each view; `at_middle` (2, 12): what they do
     to the displacement in the middle. The views are sampled where `start` puts them.
     """
-    a_seen, b_seen = first[1].astype(np.float32), second[1].astype(np.float32)
+    seen = (first[1].astype(np.float32), second[1].astype(np.float32))
     expected = np.linalg.inv(at_middle @ at_middle.T)
     moves = start
     for blur, stride, leasts in FINE_STAGES:
-        smooth_a, smooth_b = (_smooth(view, blur, FINE_STEP_M, line_width) for view in (first, second))
+        smooth = [_smooth(view, blur, FINE_STEP_M, line_width) for view in (first, second)]
         step_m = stride * FINE_STEP_M
         every = stride // FINEST_STRIDE
         coarser = np.ascontiguousarray(forms[::every, ::every])
-        # As plain matrices, which multiply ten times faster.
-        forms_a, forms_b = (coarser[..., its].reshape(-1, 6) for its in (slice(6), slice(6, 12)))
         for least in leasts:
-            offset_a = (forms_a @ (moves - start)[:6]).reshape(coarser.shape[:3])
-            offset_b = (forms_b @ (moves - start)[6:]).reshape(coarser.shape[:3])
-            warped_a, warped_b = _warp(smooth_a, offset_a, stride), _warp(smooth_b, offset_b, stride)
-            valid = (_warp(a_seen, offset_a, stride) == 1) & (_warp(b_seen, offset_b, stride) == 1)
-            pull, information = _normal_equations(warped_a, warped_b, valid, coarser, step_m, blur)
-            found = at_middle @ moves
-            prior = 1 / max(float(found @ expected @ found), least**2)
-            moves = moves + np.linalg.solve(information + prior * np.eye(len(moves)), pull - prior * moves)
+            for _ in range(MOST_ROUNDS):
+                warped, valid = _moved(smooth, seen, coarser, moves - start, stride)
+                pull, information = _normal_equations(warped[0], warped[1], valid, coarser, step_m, blur)
+                found = at_middle @ moves
+                prior = 1 / max(float(found @ expected @ found), least**2)
+                step = np.linalg.solve(information + prior * np.eye(len(moves)), pull - prior * moves)
+                moves = moves + step
+                if np.hypot(*(at_middle @ step)) < SETTLED * blur:
+                    break
     covariance = np.asarray(np.linalg.inv(information + np.eye(len(moves))), float)
-    common = np.minimum(warped_a, warped_b)[valid].sum(dtype=float) * step_m**2
-    return _Fine(moves, covariance, float(common), _correlation(warped_a[valid], warped_b[valid]))
+    common = np.minimum(*warped)[valid].sum(dtype=float) * step_m**2
+    return _Fine(moves, covariance, float(common), _correlation(*(view[valid] for view in warped)))
+
+
+def _moved(
+    views: Sequence[Response], seen: Sequence[Response], forms: Array, moves: Array, stride: int
+) -> tuple[list[Response], Mask]:
+    """Both views at every `stride`th point after some moves (12,) of their cameras, and where both are seen."""
+    # As plain matrices, which multiply ten times faster.
+    offsets = [
+        (forms[..., its].reshape(-1, 6) @ moves[its]).reshape(forms.shape[:3]) for its in (slice(6), slice(6, 12))
+    ]
+    warped = [_warp(view, offset, stride) for view, offset in zip(views, offsets, strict=True)]
+    valid = [_warp(each, offset, stride) == 1 for each, offset in zip(seen, offsets, strict=True)]
+    return warped, valid[0] & valid[1]
 
 
 def _normal_equations(

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from fields.template import load
 from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings, pair
-from worker.calibration.judge.registration import PIXEL_M, Registration, pairs_in_common, register_pair, shares_plenty
+from worker.calibration.judge.registration import (
+    PIXEL_M,
+    Registration,
+    error_by,
+    pairs_in_common,
+    register_pair,
+    shares_plenty,
+)
 from worker.calibration.scene.camera import Array, Camera, Pose, rotation_matrices, rotation_vectors
 from worker.calibration.scene.field import Field
 
@@ -71,6 +78,16 @@ def test_wrong_poses_show_how_far_apart_they_put_the_centre(seed: int, turn_rad:
     true = (placed(RIGHT, believed[1]) - placed(LEFT, believed[0])) / PIXEL_M
     found = register(*believed)
     assert (found.dx_px, found.dy_px) == pytest.approx(tuple(true), abs=tolerance)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_other_poses_make_of_the_same_views_is_told_without_looking_again(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    others = [moved(one, random.normal(0, 0.004, 3), random.normal(0, 0.1, 3)) for one in (LEFT, RIGHT)]
+    true = np.linalg.norm(placed(RIGHT, others[1], CROWNED) - placed(LEFT, others[0], CROWNED)) / PIXEL_M
+    registered = register(LEFT, RIGHT, CROWNED, crowned=True)
+    assert error_by(CROWNED, registered, (LEFT, RIGHT), (others[0], others[1])) == pytest.approx(true, abs=0.03)
+    assert error_by(CROWNED, registered, (LEFT, RIGHT), (LEFT, RIGHT)) == pytest.approx(registered.error_px, abs=1e-3)
 
 
 def test_four_metres_apart_is_within_reach() -> None:
