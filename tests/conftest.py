@@ -38,6 +38,7 @@ PARTS = {
     "browser": "install Chromium (Debian: apt-get install chromium)",
     "nginx": "install nginx (Debian: apt-get install nginx)",
     "caddy": "install Caddy (Debian: apt-get install caddy)",
+    "ffmpeg": "install FFmpeg (Debian: apt-get install ffmpeg)",
 }
 
 
