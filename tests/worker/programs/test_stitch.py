@@ -238,7 +238,10 @@ def test_maps_lie_where_the_view_takes_its_pixels_from(tmp_path):
             assert (pixel[~counts] == none).all()
             place = pixel + beside / (largest + 1)
             source = (place + 0.5) * part.frame_size[axis] / scaled[number][axis] - 0.5
-            assert np.abs(source - part.source[seen][..., axis])[counts].max() < 0.01
+            wanted = part.source[seen][..., axis]
+            # What lies between the middle of the frame's last pixel and its border has no other beside it.
+            inner = counts & (wanted >= 1) & (wanted <= part.frame_size[axis] - 2)
+            assert np.abs(source - wanted)[inner].max() < 0.01
 
 
 @pytest.mark.parametrize(("form", "from_below"), [("st-map", True), ("st-map-unreal", False)])
