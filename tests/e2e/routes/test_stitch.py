@@ -60,7 +60,9 @@ def test_a_package_holds_until_a_pose_or_the_view_changes(service, name):
     service.http.patch(f"/venues/{name}", json=patch, headers={"Content-Type": "application/merge-patch+json"})
     brighter = stitch(service, name, moved.headers["etag"])
     about = json.loads(files_of(brighter)["view.json"])
-    assert [camera["light"] for camera in about["cameras"]] == [light | {"contrast": 0.0}, None]
+    left, right = (camera["light"] for camera in about["cameras"])
+    assert light.items() <= left.items()
+    assert right is None
 
 
 def test_the_view_is_the_venues_unless_a_request_has_it_otherwise(service, name):
