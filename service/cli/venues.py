@@ -138,7 +138,9 @@ def venue_poses(
 def venue_stitch(
     venue: VenueId,
     form: Annotated[StitchFormat, typer.Option("--format", help="What stitches with it.")] = "ffmpeg",
-    projection: Annotated[Projection | None, typer.Option("--projection")] = None,
+    projection: Annotated[
+        Projection | None, typer.Option("--projection", help="How the picture is spread out; birds-eye: from above.")
+    ] = None,
     width: Annotated[int | None, typer.Option("--width", help="In pixels, even.")] = None,
     height: Annotated[str | None, typer.Option("--height", help="In pixels, even, or auto.")] = None,
     field_of_view: Annotated[str | None, typer.Option("--field-of-view", help="In degrees, or auto.")] = None,
