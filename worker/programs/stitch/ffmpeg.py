@@ -22,8 +22,6 @@ from worker.programs.stitch.scaled import in_scaled, scaled_size
 
 # What `remap` fills in for.
 NOWHERE = 65535
-# While a falloff is evened out, values have ten bits, two steps to a grey level: nothing is clipped before it is done.
-STEPS, TEN_BITS = 2, 1023
 # Less than a grey level.
 LEAST_FALLOFF = 0.002
 # Of stills, as cameras save them, and of video; what a file says of its own range is obeyed.
@@ -87,17 +85,17 @@ def _of_camera(part: Part, mask: NDArray[np.float32]) -> _Camera:
     first[~counts[rows, columns]] = NOWHERE
     for number, axis in enumerate("xy"):
         camera.maps[axis] = _pgm(first[..., number], NOWHERE)
-        camera.maps[f"d{axis}"] = _mask(beside[..., number], 255)
+        camera.maps[f"d{axis}"] = _mask(beside[..., number])
     if abs(part.light.falloff) >= LEAST_FALLOFF:
         least, largest = camera.rises
-        camera.maps["falloff"] = _mask((part.rise[rows, columns] - least) / (largest - least), TEN_BITS)
-    camera.maps["mask"] = _mask(mask, 255)
+        camera.maps["falloff"] = _mask((part.rise[rows, columns] - least) / (largest - least))
+    camera.maps["mask"] = _mask(mask)
     return camera
 
 
-def _mask(shares: NDArray[np.float32], largest: int) -> bytes:
-    """Shares 0 to 1 (H, W) as `maskedmerge` takes them: it divides by one more than the largest."""
-    return _pgm(np.clip(shares * np.float32(largest + 1), 0, largest), largest)
+def _mask(shares: NDArray[np.float32]) -> bytes:
+    """Shares 0 to 1 (H, W) as `maskedmerge` takes them: in 256ths."""
+    return _pgm(np.clip(256 * shares, 0, 255), 255)
 
 
 def _pgm(values: NDArray[Any], largest: int) -> bytes:
@@ -155,22 +153,24 @@ def _sampled(camera: _Camera, video: str, maps: Mapping[str, str]) -> list[str]:
 def _evened_out(camera: _Camera, maps: Mapping[str, str]) -> list[str]:
     """What a camera sees, as bright as the others see it."""
     if "falloff" not in maps:
-        return [f"[{camera.id} seen]{_tones(camera.light, 'val', 1)}[{camera.id} even]"]
+        return [f"[{camera.id} seen]{_tones(camera.light, 1)}[{camera.id} even]"]
     least, largest = camera.rises
+    # Darker meanwhile, so that nothing is clipped before it is done: a step is then a little more than a grey level.
+    headroom = largest * max(1.0, *camera.light.gain)
     return [
-        f"[{camera.id} seen]format=gbrp10,split[{camera.id} one][{camera.id} other]",
-        f"[{camera.id} one]{_tones(camera.light, 'trunc(val/4)', STEPS * least)}[{camera.id} least]",
-        f"[{camera.id} other]{_tones(camera.light, 'trunc(val/4)', STEPS * largest)}[{camera.id} most]",
-        f"{maps['falloff']}mergeplanes=0x000000:gbrp10[{camera.id} falloff]",
+        f"[{camera.id} seen]split[{camera.id} one][{camera.id} other]",
+        f"[{camera.id} one]{_tones(camera.light, least / headroom)}[{camera.id} least]",
+        f"[{camera.id} other]{_tones(camera.light, largest / headroom)}[{camera.id} most]",
+        f"{maps['falloff']}mergeplanes=0x000000:gbrp[{camera.id} falloff]",
         f"[{camera.id} least][{camera.id} most][{camera.id} falloff]maskedmerge,"
-        f"{_each(f'min({TEN_BITS},val*{4 / STEPS:g})')},scale=sws_dither=none,format=gbrp[{camera.id} even]",
+        f"{_each(f'val*{headroom:.6f}+0.5')}[{camera.id} even]",
     ]
 
 
-def _tones(light: Light, level: str, times: float) -> str:
-    """What becomes of a grey level, `times` a number: `Light.tones` as an expression of ffmpeg's."""
+def _tones(light: Light, times: float) -> str:
+    """What becomes of grey levels, `times` a number: `Light.tones` as expressions of ffmpeg's."""
     blue, green, red = (
-        f"{MIDDLE * gain * times:.6f}*pow({level}/{MIDDLE:g},{1 + light.contrast:.6f})+0.5" for gain in light.gain
+        f"{MIDDLE * gain * times:.6f}*pow(val/{MIDDLE:g},{1 + light.contrast:.6f})+0.5" for gain in light.gain
     )
     return f"lutrgb=r='{red}':g='{green}':b='{blue}'"
 
