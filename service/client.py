@@ -22,7 +22,9 @@ import time
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import aclosing
 from functools import cache
+from http import HTTPStatus
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 import httpx
@@ -34,7 +36,7 @@ from service.refused import passing, pause_s_of, refusal
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
 from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
-from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, Status
+from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, Status, StitchFormat
 from service.wire.venue import Venue, VenueIn, Venues
 
 if TYPE_CHECKING:
@@ -49,6 +51,9 @@ PATIENCE_S = 60.0
 SILENCE_S = 45.0
 # Until a stream that has ended, or could not begin, is asked for again.
 AGAIN_S = 2.0
+# A view of 8192 pixels and many cameras takes minutes.
+PACKAGE_S = 180.0
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class AsyncClient:
@@ -127,6 +132,22 @@ class AsyncClient:
     async def venue_poses(self, venue_id: str, form: FormatName, camera: str | None = None) -> bytes:
         """The poses that hold now, of one camera or all, as a file of another tool's format."""
         return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera))
+
+    async def venue_stitch(
+        self, venue_id: str, form: StitchFormat, view: Mapping[str, Any] = NOTHING, known: str | None = None
+    ) -> bytes | None:
+        """The zip with which other tools stitch; None: that with the tag `known` still holds.
+
+        `view`: what is wanted otherwise than the venue's view has it, such as `width_px`. The tag is in `view.json`.
+        """
+        headers = {"If-None-Match": known} if known else {}
+        path, params = f"/venues/{venue_id}/stitch", {"format": form, **view}
+        response = await self._send("GET", path, params=params, headers=headers, timeout=PACKAGE_S)
+        if response.status_code == HTTPStatus.NOT_MODIFIED:
+            return None
+        if not response.is_success:
+            raise refusal(response)
+        return response.content
 
     async def venue_events(
         self,
@@ -351,6 +372,7 @@ class Client:
     history = Call(AsyncClient.history)
     restore = Call(AsyncClient.restore)
     venue_poses = Call(AsyncClient.venue_poses)
+    venue_stitch = Call(AsyncClient.venue_stitch)
     venue_events = Stream(AsyncClient.venue_events)
     snapshot = Call(AsyncClient.snapshot)
     calibrate = Call(AsyncClient.calibrate)
