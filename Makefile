@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-rate train lock clean
+.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-rate bench-video train lock clean
 
 setup: $(VENV)/.installed
 
@@ -66,6 +66,9 @@ bench-cost: setup
 
 bench-rate: setup
 	$(BIN)/python -m tests.benchmarks.rate
+
+bench-video: setup
+	$(BIN)/python -m tests.benchmarks.stitch_video
 
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'
