@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-rate bench-follow train lock clean
+.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-rate bench-video bench-follow train lock clean
 
 setup: $(VENV)/.installed
 
@@ -73,6 +73,9 @@ bench-follow: setup
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking --lens usual
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking --size 4k --seconds 4
+
+bench-video: setup
+	$(BIN)/python -m tests.benchmarks.stitch_video
 
 $(VENV)/.train: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[train]'

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 OPENING_S, WAITING_S = 10.0, 10.0
 # Where a clip is entered before the time that is wanted: a frame's own time may lie after that of its packet.
 EARLIER_S = 1.0
-USUAL_RATE = Fraction(25)
+# Streams that do not know their rate name that of their clock.
+USUAL_RATE, HIGHEST_RATE = Fraction(25), 1000
 LIVE = ("rtsp://", "rtsps://", "rtmp://", "srt://", "udp://", "rtp://", "http://", "https://")
 NO_PYAV = "Video needs PyAV: pip install 'esc-calibration[video]'"
 
@@ -90,7 +91,8 @@ class Clip:
             raise VideoFault(f"camera {camera}: there is no video in {without_login(address)}")
         video = container.streams.video[0]
         video.thread_type = "AUTO"
-        rate = video.average_rate or video.guessed_rate or USUAL_RATE
+        told = (rate for rate in (video.average_rate, video.guessed_rate) if rate and rate <= HIGHEST_RATE)
+        rate = next(told, USUAL_RATE)
         seconds = None if live or container.duration is None else container.duration / av.time_base
         size = video.codec_context.width, video.codec_context.height
         return cls(camera, address, container, video, Facts(size, Fraction(rate), seconds), since)
@@ -113,7 +115,7 @@ class Clip:
         """The pictures from about a time on, to the end; `VideoFault` where a picture is not as the first one."""
         zero = self._enter(begin_s)
         sound: list[Packet[AudioStream]] = []
-        broken = 0
+        broken, at = 0, 0.0
         for packet in self._packets():
             if packet.stream.type == "audio":
                 if packet.pts is not None:
@@ -122,10 +124,13 @@ class Clip:
             frames, lost = _decoded(packet)
             broken += lost
             for frame in frames:
-                if frame.is_corrupt or frame.pts is None or frame.time_base is None:
+                # What has no times comes evenly.
+                at += float(1 / self.facts.rate)
+                if frame.pts is not None and frame.time_base is not None:
+                    at = float(frame.pts * frame.time_base)
+                if frame.is_corrupt:
                     broken += 1
                     continue
-                at = float(frame.pts * frame.time_base)
                 if zero is None:
                     zero = at - self._lateness()
                 self._check(frame, at - zero)

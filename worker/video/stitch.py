@@ -276,7 +276,7 @@ class Moments:
 
     def early(self, ends: Mapping[str, float]) -> dict[str, float]:
         """Who ended while others went on, by when clips should end; a stream that ends does so early."""
-        return {camera: at for camera, at in self.ended.items() if max(ends.values()) > at + EARLY_S}
+        return {camera: at for camera, at in self.ended.items() if max(ends.values(), default=0.0) > at + EARLY_S}
 
 
 def _check_cameras(scene: Scene, addresses: Mapping[str, str], plan: Plan) -> None:
@@ -371,14 +371,15 @@ def _track(stack: ExitStack, clip: Clip, offset_s: float, begin_s: float | None,
 
 
 def _ends(clips: Mapping[str, Clip], offsets: Mapping[str, float]) -> dict[str, float]:
-    """When clips end, in the time of the first one, of those of which it is known; streams go on."""
+    """When clips end, in the time of the first one; streams go on, and of some files nobody knows it."""
     return {
-        camera: offsets[camera] + (inf if clip.facts.seconds is None else clip.facts.seconds)
+        camera: inf if clip.facts.seconds is None else offsets[camera] + clip.facts.seconds
         for camera, clip in clips.items()
+        if clip.live or clip.facts.seconds is not None
     }
 
 
 def _expected(ends: Mapping[str, float], begin_s: float, rate: Fraction, plan: Plan) -> float:
     """How many pictures it will be, as far as one can tell; infinitely many of live streams."""
-    end = (max if plan.allow_missing else min)(ends.values())
+    end = (max if plan.allow_missing else min)(ends.values(), default=inf)
     return max(1.0, (min(end, inf if plan.end_s is None else plan.end_s) - begin_s) * float(rate))

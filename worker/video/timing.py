@@ -78,6 +78,8 @@ class Track:
 
     def __post_init__(self) -> None:
         self._now = next(self.shots, None)
+        if self._now is None:
+            raise VideoFault(f"camera {self.camera}: no picture of its clip can be decoded, from where it is to begin")
         self._next = next(self.shots, None)
         self._heard(self._now)
 
