@@ -22,8 +22,10 @@ import numpy as np
 
 from tests.benchmarks.scenes import as_built
 from tests.demo.render import FIELD, HERE, cameras, outdated
+from tests.real.pair import RealPair, picture
 from worker.calibration.follow.follower import Follower, Moment
 from worker.calibration.scene.camera import Array, Camera, Frame, inside
+from worker.calibration.scene.field import Field
 from worker.calibration.scene.motion import change_between, moved
 from worker.calibration.stitch.moving import MovingPanorama
 from worker.calibration.stitch.views import View, ViewChoice, chosen_view
@@ -39,7 +41,7 @@ PLAYERS, PLAYER_M, PLAYER_M_S = 16, (0.6, 1.85), 3.0
 STEP_PX = 8
 FAR_M = 300.0
 # Frames relative to 4K, columns of the panorama, bits a second of a clip.
-SIZES = {"1080p": (0.5, 1920, 12_000_000), "4k": (1.0, 3840, 40_000_000)}
+SIZES = {"1080p": (0.5, 1920, 12_000_000), "4k": (1.0, 3840, 40_000_000), "real": (1.0, 3072, 30_000_000)}
 FOLDER = Path("build/shaking")
 # Where a camera counts this much in the view, the far line is its alone; how it is read across itself.
 SURE = 0.98
@@ -65,8 +67,9 @@ class Swing:
 class Clip:
     """Frames of a shaking camera, and where it really was."""
 
-    def __init__(self, still: Camera, picture: Frame, rng: np.random.Generator) -> None:
+    def __init__(self, pitch: Field, still: Camera, picture: Frame, rng: np.random.Generator) -> None:
         self.still = still
+        self._pitch = pitch
         self._picture = picture
         self._swing = Swing(rng.uniform(0, 2 * np.pi, (6, 2)))
         self._noise = rng.normal(0, NOISE, (picture.shape[0] + 64, picture.shape[1] + 64)).astype(np.float32)
@@ -105,7 +108,7 @@ class Clip:
         for _ in range(4):
             nearness = np.maximum(-rays[..., 2] / (now.pose.position[2] - height), 1 / FAR_M)
             points = now.pose.position + rays / nearness[..., None]
-            height = FIELD.height(points[..., :2])
+            height = self._pitch.height(points[..., :2])
         return points
 
     def _walk(self, frame: Frame, now: Camera, number: int) -> None:
@@ -113,7 +116,7 @@ class Clip:
         gone = PLAYER_M_S * number / FRAMES_PER_SECOND
         along = np.stack([np.cos(self._heading), np.sin(self._heading)], axis=1)
         feet = (self._players + gone * along + [50, 32]) % [100, 64] - [50, 32]
-        for place, shirt in zip(FIELD.lift(feet), self._shirt, strict=True):
+        for place, shirt in zip(self._pitch.lift(feet), self._shirt, strict=True):
             corners = now.project(place + np.array([[0, 0, 0], [0, 0, PLAYER_M[1]]]))
             if np.isfinite(corners).all():
                 (x0, y0), (x1, y1) = corners
@@ -149,9 +152,9 @@ class FarLine:
     Cameras that are followed are told; None: as if they stood still.
     """
 
-    def __init__(self, view: View, panorama: MovingPanorama, references: list[Camera]) -> None:
+    def __init__(self, pitch: Field, view: View, panorama: MovingPanorama, references: list[Camera]) -> None:
         self._view, self._panorama, self._references = view, panorama, references
-        points = FIELD.lift(np.stack([np.linspace(-48, 48, 97), np.full(97, FIELD.width / 2)], axis=1))
+        points = pitch.lift(np.stack([np.linspace(-48, 48, 97), np.full(97, pitch.width / 2)], axis=1))
         self._weights = [part.weight for part in panorama.at(references).parts]
         place = view.project(points)
         column, row = np.rint(place).astype(int).T
@@ -204,21 +207,26 @@ def moves(profiles: Array) -> Array:
     )
 
 
-def clips(scale: float, seed: int = 19) -> list[Clip]:
-    """Those of the demo's cameras, in frames `scale` times as large as 4K."""
+def clips(size: str, seed: int = 19) -> tuple[Field, list[Clip]]:
+    """Those of the cameras of the demo, or of the real pair, whose lenses and lines are as lenses and lines are."""
     rng = np.random.default_rng(seed)
+    if size == "real":
+        pair = RealPair.load()
+        return pair.pitch, [Clip(pair.pitch, one, picture(pair.files()[one.id]).copy(), rng) for one in pair.cameras]
     made = []
     for camera in cameras():
-        lens = camera.intrinsics.scaled(scale)
-        picture = np.asarray(cv2.imread(str(HERE / f"{camera.id}.jpg")), np.uint8)
-        made.append(Clip(camera.with_lens(lens), cv2.resize(picture, lens.size, interpolation=cv2.INTER_AREA), rng))
-    return made
+        lens = camera.intrinsics.scaled(SIZES[size][0])
+        still = np.asarray(cv2.imread(str(HERE / f"{camera.id}.jpg")), np.uint8)
+        small = np.asarray(cv2.resize(still, lens.size, interpolation=cv2.INTER_AREA), np.uint8)
+        made.append(Clip(FIELD, camera.with_lens(lens), small, rng))
+    return FIELD, made
 
 
 @dataclass(frozen=True)
 class Film:
     """The clips of all cameras as files, filmed if they are not there yet: that takes longer than following."""
 
+    pitch: Field
     clips: list[Clip]
     count: int
     paths: list[Path]
@@ -226,14 +234,13 @@ class Film:
     @classmethod
     def of(cls, size: str, count: int) -> Film:
         """So many frames, at one of `SIZES`."""
-        scale, _, bits = SIZES[size]
-        made = clips(scale)
-        film = cls(made, count, [FOLDER / f"{clip.still.id}-{size}-{count}.mp4" for clip in made])
+        pitch, made = clips(size)
+        film = cls(pitch, made, count, [FOLDER / f"{clip.still.id}-{size}-{count}.mp4" for clip in made])
         for clip, path in zip(made, film.paths, strict=True):
             if not path.exists():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 unfinished = path.with_suffix(".part.mp4")
-                encode(clip, count, unfinished, bits)
+                encode(clip, count, unfinished, SIZES[size][2])
                 unfinished.rename(path)
         return film
 
@@ -266,7 +273,7 @@ def followed(film: Film, run: Run, lens: str) -> Told:
     follower = None
     for frames in film.frames():
         if follower is None:
-            follower = Follower(FIELD, stored, frames, FRAMES_PER_SECOND, run.every, run.look_ahead)
+            follower = Follower(film.pitch, stored, frames, FRAMES_PER_SECOND, run.every, run.look_ahead)
             continue
         begun = time.process_time()
         follower.see(frames)
@@ -287,8 +294,8 @@ def report(film: Film, told: Told, width: int) -> None:
     """Print the row of one run."""
     count, made = film.count, film.clips
     references = told.follower.references
-    view = chosen_view(FIELD, references, ViewChoice(width=width))
-    line = FarLine(view, MovingPanorama(FIELD, view, references), references)
+    view = chosen_view(film.pitch, references, ViewChoice(width=width))
+    line = FarLine(film.pitch, view, MovingPanorama(film.pitch, view, references), references)
     true = [[clip.camera(number) for clip in made] for number in range(count)]
     found = [[one.camera for one in moment.cameras] for moment in told.moments]
     still, followed_ = (
@@ -310,8 +317,8 @@ def report(film: Film, told: Told, width: int) -> None:
     print(
         f"every {told.run.every}, look ahead {told.run.look_ahead}: {dict(how)}; "
         f"{told.milliseconds:.0f} core ms a frame and camera\n"
-        f"  in the frames: {in_frames(made, true, unfollowed):.2f} px rms unfollowed, "
-        f"{in_frames(made, true, found):.3f} followed\n"
+        f"  in the frames: {in_frames(film, true, unfollowed):.2f} px rms unfollowed, "
+        f"{in_frames(film, true, found):.3f} followed\n"
         f"  far line in {width} columns: {still:.2f} px rms unfollowed, {followed_:.3f} followed by truth, "
         f"{rms_about_mean(shown):.3f} as the picture shows it\n"
         f"  pose: {pose_rms(error)}, error/sigma {ratio(error, sigma):.2f}\n"
@@ -320,11 +327,11 @@ def report(film: Film, told: Told, width: int) -> None:
     )
 
 
-def in_frames(made: list[Clip], true: list[list[Camera]], told: list[list[Camera]]) -> float:
+def in_frames(film: Film, true: list[list[Camera]], told: list[list[Camera]]) -> float:
     """How far lines lie from where cameras that are told expect them, about the mean of each place, px rms."""
     squares = []
-    for number, clip in enumerate(made):
-        points = FIELD.line_points(2.0).position
+    for number, clip in enumerate(film.clips):
+        points = film.pitch.line_points(2.0).position
         points = points[inside(clip.still.project(points), clip.still.intrinsics.size, 40)]
         off = np.array(
             [

@@ -69,19 +69,24 @@ class FollowedLines:
         self._scale = reference.intrinsics.relative_size
         self._no_network = np.zeros(first.shape[:2], np.float32)
         lines = pitch.line_points()
-        expected = SeenLines.from_camera(lines, reference).thinned(APART_PX * self._scale).index
-        found = self._measured(lines[expected], reference, Channels([first]), AT_REFERENCE_PX).index
-        of_marking = lines.marking[expected]
-        shown = np.bincount(of_marking[found], minlength=len(of_marking)) >= SHOWN * np.bincount(
-            of_marking, minlength=len(of_marking)
-        )
-        chosen = expected[shown[of_marking]]
+        chosen = self._shown(lines, first)
         self._pieces = lines[chosen]
         self._some = np.arange(0, len(chosen), COARSELY)
         self._patch = chosen // CLUSTER_POINTS
         self._usual = 0.0
         self._beside_weight = np.full(len(chosen), (BESIDE_PX * self._scale) ** -2)
         self._beside_sum = np.zeros(len(chosen))
+
+    def _shown(self, lines: LinePoints, first: Frame) -> NDArray[np.intp]:
+        """Which of the line points: some of each marking that the first frame shows."""
+        expected = SeenLines.from_camera(lines, self.reference).thinned(APART_PX * self._scale).index
+        found = self._measured(lines[expected], self.reference, Channels([first]), AT_REFERENCE_PX).index
+        marking = lines.marking[expected]
+        known, looked_for = (
+            np.bincount(marking[found], minlength=len(lines)),
+            np.bincount(marking, minlength=len(lines)),
+        )
+        return expected[(known >= SHOWN * looked_for)[marking]]
 
     def sighted(self, frame: Frame, expected: Camera, searches_px: Sequence[float]) -> Sighting | None:
         """The pieces that a frame shows near where a camera expects them; None where they are too few.
@@ -114,8 +119,8 @@ class FollowedLines:
 
     def observed(self, seen: Sighting) -> Observed:
         """What they say of the pose: robust least squares, with what pieces of one patch err together."""
-        variance = NOISE_PX**2 + 1 / self._beside_weight[seen.piece]
-        rows, values = seen.slope / np.sqrt(variance)[:, None], self._left(seen) / np.sqrt(variance)
+        sigma = self._sigma(seen)
+        rows, values = seen.slope / sigma[:, None], (seen.offset - self._beside[seen.piece]) / sigma
         prior = np.diag(np.repeat([PRIOR_RAD, PRIOR_M], 3) ** -2.0)
         change = np.zeros(POSE_NUMBERS)
         for weigh in (*STEPS * [huber_weights], *STEPS * [tukey_weights]):
@@ -134,8 +139,7 @@ class FollowedLines:
     def learn(self, seen: Sighting, now: Camera) -> None:
         """Keep how far beside their places the pieces lie when the camera is where it is `now` known to be."""
         left = seen.offset - seen.slope @ change_between(seen.expected, now)
-        known = left - self._beside[seen.piece]
-        counted = tukey_weights(known / np.sqrt(NOISE_PX**2 + 1 / self._beside_weight[seen.piece])) > 0
+        counted = tukey_weights((left - self._beside[seen.piece]) / self._sigma(seen)) > 0
         which = seen.piece[counted]
         self._usual += (len(seen.piece) - self._usual) * (NOVELTY if self._usual else 1.0)
         self._beside_weight[which] += NOISE_PX**-2
@@ -146,8 +150,9 @@ class FollowedLines:
         """How far, in px along its normal, each piece lies beside its place."""
         return self._beside_sum / self._beside_weight
 
-    def _left(self, seen: Sighting) -> Array:
-        return seen.offset - self._beside[seen.piece]
+    def _sigma(self, seen: Sighting) -> Array:
+        """Expected error (M,) in px of where the pieces are seen, and of what is known of where they lie."""
+        return np.sqrt(NOISE_PX**2 + 1 / self._beside_weight[seen.piece])
 
     def _spread(self, seen: Sighting, pulls: Array) -> Array:
         """How the sum of pulls (M, 6) varies, (6, 6), those of a patch taken as one."""

@@ -1,6 +1,7 @@
 """A camera that shakes is followed by its lines; what is not seen is said, and it is found again afterwards."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -130,6 +131,20 @@ def test_a_frame_that_cannot_be_is_refused():
     moments = followed({15: elsewhere})
     assert how(moments)[14:17] == ["measured", "refused", "measured"]
     assert residual_px(moments) < 0.15
+
+
+def test_a_pose_does_not_jump_when_lines_are_hidden_that_a_wrong_lens_puts_beside_their_places():
+    lens = LEFT.intrinsics
+    wrong = LEFT.with_lens(replace(lens, distortion=lens.distortion + [0.01, 0, 0, 0, 0]))
+    still = [np.clip(PICTURE + np.random.default_rng(n).normal(0, 2, PICTURE.shape), 0, 255) for n in range(16)]
+    frames = [each.astype(np.uint8) for each in still]
+    for hidden in frames[8:]:
+        hidden[:, :400] = (60, 130, 70)
+    follower = Follower(CROWNED, [wrong], {"left": frames[0]}, FRAMES_PER_SECOND, look_ahead=0)
+    told = [follower.see({"left": each}).cameras[0] for each in frames[1:]]
+    assert {one.how for one in told} == {"measured"}
+    before, after = (np.mean([one.camera.pose.rotation for one in part], axis=0) for part in (told[2:7], told[8:]))
+    assert np.degrees(np.linalg.norm(after - before)) < 0.01
 
 
 def test_a_first_frame_without_lines_is_said():
