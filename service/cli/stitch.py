@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from worker.video.follow import Motion
     from worker.video.stitch import Offset, Scene, Stitched
 
+# In place of a number: as it suits the cameras, whatever the venue keeps.
+AUTO = "auto"
 PROJECTIONS = ("pannini", "cylinder", "rectilinear", "birds-eye")
 
 
@@ -84,20 +86,11 @@ def stitch(
         str | None,
         typer.Option("--projection", metavar="|".join(PROJECTIONS), help="[default: the venue's, or pannini]"),
     ] = None,
-    width: Annotated[int | None, typer.Option("--width", min=64, max=8192, help="Pixels, even [default: 1920]")] = None,
-    height: Annotated[
-        int | None, typer.Option("--height", min=64, max=8192, help="Pixels, even [default: as the view needs]")
-    ] = None,
-    field_of_view: Annotated[
-        float | None, typer.Option("--field-of-view", min=5, max=340, metavar="DEG", help="From left to right.")
-    ] = None,
-    pan: Annotated[float | None, typer.Option("--pan", min=-180, max=180, metavar="DEG", help="To the right.")] = None,
-    horizon: Annotated[
-        float | None,
-        typer.Option(
-            "--horizon", min=-3, max=3, help="How far down the horizon lies, 0 top to 1 bottom of the picture."
-        ),
-    ] = None,
+    width: Annotated[int | None, typer.Option("--width", min=64, max=8192, help="In pixels, even.")] = None,
+    height: Annotated[str | None, typer.Option("--height", help="In pixels, even, or auto.")] = None,
+    field_of_view: Annotated[str | None, typer.Option("--field-of-view", help="In degrees, or auto.")] = None,
+    pan: Annotated[float | None, typer.Option("--pan", min=-180, max=180, help="To the right, in degrees.")] = None,
+    horizon: Annotated[str | None, typer.Option("--horizon", help="0: at the top, 1: at the bottom, or auto.")] = None,
     codec: Annotated[str, typer.Option("--codec", help="Encoder, any that PyAV has.")] = "libx264",
     crf: Annotated[
         int, typer.Option("--crf", min=0, max=51, help="Quality of libx264 and libx265, 0 loses nothing.")
@@ -128,21 +121,21 @@ def stitch(
     addresses = _by_camera(clips, "CAMERA=CLIP, for instance left=left.mp4")
     begin_s, end_s = (None if time is None else _seconds(time) for time in (begin, end))
     pictures = None if rate is None else _rate(rate)
-    if any(side is not None and side % 2 for side in (width, height)):
-        fail("--width and --height are even numbers: video takes no others", USAGE)
     if projection not in (None, *PROJECTIONS):
         fail(f"--projection is one of {', '.join(PROJECTIONS)}, not {projection!r}", USAGE)
     if (poses_out is not None or follow_every > 1) and not follow:
         fail("--poses-out and --follow-every go with --follow", USAGE)
-    stored = _venue(venue, url, api_key)
-    chosen = {
+    chosen: dict[str, Any] = {
         "projection": projection,
         "width": width,
-        "height": height,
-        "field_of_view_deg": field_of_view,
+        "height": _or_auto(height, "--height", 64, 8192),
+        "field_of_view_deg": _or_auto(field_of_view, "--field-of-view", 5, 340),
         "pan_deg": pan,
-        "horizon": horizon,
+        "horizon": _or_auto(horizon, "--horizon", -3, 3),
     }
+    if any(isinstance(chosen[side], float | int) and chosen[side] % 2 for side in ("width", "height")):
+        fail("--width and --height are even numbers: video takes no others", USAGE)
+    stored = _venue(venue, url, api_key)
 
     from service.cli.local import engine_settings
 
@@ -226,6 +219,15 @@ def _number(text: str, where: str) -> float:
     return number
 
 
+def _or_auto(text: str | None, option: str, least: float, most: float) -> float | str | None:
+    if text is None or text == AUTO:
+        return text
+    number = _number(text, option)
+    if not least <= number <= most:
+        fail(f"{option} {text}: from {least:g} to {most:g}, or {AUTO}", USAGE)
+    return int(number) if number.is_integer() else number
+
+
 def _venue(venue: str, url: str, api_key: str | None) -> Venue:
     """A venue of the service by its id, or of a file."""
     if Path(venue).is_file():
@@ -242,7 +244,9 @@ def _scene(venue: Venue, chosen: Mapping[str, Any]) -> Scene:
     from worker.jobs.reading import camera_of, light_of, pitch_of
     from worker.video.stitch import Scene
 
-    given = {name: value for name, value in chosen.items() if value is not None}
+    given: dict[str, Any] = {
+        name: None if value == AUTO else value for name, value in chosen.items() if value is not None
+    }
     lights = {camera.id: light_of(camera.light) for camera in venue.cameras if camera.light is not None}
     cameras = [camera_of(camera) for camera in venue.cameras]
     return Scene(pitch_of(venue.field), cameras, replace(_stored_choice(venue), **given), lights or None)

@@ -31,7 +31,6 @@ OPENING_S, WAITING_S = 10.0, 10.0
 EARLIER_S = 1.0
 # Streams that do not know their rate name that of their clock.
 USUAL_RATE, HIGHEST_RATE = Fraction(25), 1000
-LIVE = ("rtsp://", "rtsps://", "rtmp://", "srt://", "udp://", "rtp://", "http://", "https://")
 NO_PYAV = "Video needs PyAV: pip install 'esc-calibration[video]'"
 
 
@@ -70,6 +69,7 @@ class Clip:
     since: float
     broken: int = field(default=0, init=False)
     sound: AudioStream | None = field(default=None, init=False)
+    _zero: float | None = field(default=None, init=False)
 
     @classmethod
     def open(cls, camera: str, address: str, since: float = 0.0) -> Self:
@@ -113,7 +113,7 @@ class Clip:
 
     def shots(self, begin_s: float = 0.0) -> Iterator[Shot]:
         """The pictures from about a time on, to the end; `VideoFault` where a picture is not as the first one."""
-        zero = self._enter(begin_s)
+        self._zero = self._enter(begin_s)
         sound: list[Packet[AudioStream]] = []
         broken, at = 0, 0.0
         for packet in self._packets():
@@ -131,18 +131,17 @@ class Clip:
                 if frame.is_corrupt:
                     broken += 1
                     continue
-                if zero is None:
-                    zero = at - self._lateness()
-                self._check(frame, at - zero)
+                if self._zero is None:
+                    self._zero = at - self._lateness()
+                self._check(frame, at - self._zero)
                 self.broken += broken
-                yield Shot(at - zero, picture_of(frame), sound, broken)
+                yield Shot(at - self._zero, picture_of(frame), sound, broken)
                 sound, broken = [], 0
         self.broken += broken
 
     def sound_time(self, packet: Packet[AudioStream]) -> float:
-        """When a packet of sound begins, in the clip's time."""
-        start = self._start()
-        return float((packet.pts or 0) * packet.time_base) - (0.0 if start is None else start)
+        """When a packet of sound that came with a picture begins, in the clip's time."""
+        return float((packet.pts or 0) * packet.time_base) - (self._zero or 0.0)
 
     def close(self) -> None:
         """Let go of the file or stream."""
@@ -158,15 +157,12 @@ class Clip:
 
     def _enter(self, begin_s: float) -> float | None:
         """Go to a time of a file; when it begins in its own time, None where only its first picture tells."""
-        start = self._start()
-        if not self.live and start is not None and begin_s > EARLIER_S and self.video.time_base:
-            self.container.seek(int((start + begin_s - EARLIER_S) / self.video.time_base), stream=self.video)
-        return start
-
-    def _start(self) -> float | None:
         if self.live or self.video.start_time is None or self.video.time_base is None:
             return None
-        return float(self.video.start_time * self.video.time_base)
+        start = float(self.video.start_time * self.video.time_base)
+        if begin_s > EARLIER_S:
+            self.container.seek(int((start + begin_s - EARLIER_S) / self.video.time_base), stream=self.video)
+        return start
 
     def _lateness(self) -> float:
         """Live streams that are opened one after the other are in time by when their pictures arrive."""
@@ -196,14 +192,14 @@ class Clip:
             raise VideoFault(
                 f"camera {self.camera}: the clip says that players are to turn it by {frame.rotation} degrees, and its "
                 "lens was measured in frames that may have been turned or not. Store it as it was calibrated: "
-                "ffmpeg -i CLIP -c copy -metadata:s:v rotate=0 OTHER leaves the frames as they are, "
-                "ffmpeg -i CLIP OTHER turns them"
+                "ffmpeg -display_rotation 0 -i CLIP -c copy OTHER leaves the frames as they are (before version 6: "
+                "-metadata:s:v rotate=0), ffmpeg -i CLIP OTHER turns them"
             )
 
 
 def is_live(address: str) -> bool:
     """Whether an address is a stream's rather than a file's."""
-    return address.startswith(LIVE)
+    return "://" in address
 
 
 def without_login(address: str) -> str:

@@ -55,7 +55,7 @@ class Renderer:
         )
 
     def move(self, panorama: Panorama) -> None:
-        """Sample frames where a panorama says that `fits`: a tenth of the work of a new renderer."""
+        """Sample frames where a panorama says that `fits`; the corners of a lens stay where they were in the view."""
         self._maps = list(
             self._pool.map(
                 lambda strip: [
@@ -98,7 +98,7 @@ class Renderer:
             made: Sequence[Any] = [np.empty(plane.shape, np.uint8) for plane in target]
             _sample(source, at, made)
             if view.lit:
-                made = _evened(view, at, made)
+                made = _evened(view, stretch, made)
             for plane, new, share in zip(target, made, stretch.share or 3 * (None,), strict=True):
                 plane[:] = new if share is None else cv2.blendLinear(new, plane, share, 1 - share)
 
@@ -127,13 +127,17 @@ class _View:
 class _Stretch:
     """Columns of a strip that show one camera at one level of detail.
 
-    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone.
+    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone. `rise`: what its
+    lens takes from the corners: of luma (h, w), of luma at the resolution of chroma (h/2, w/2) and of colours
+    (h/2, w/2, 3), in 255ths of `steepest`.
     """
 
     camera: int
     level: int
     columns: slice
     share: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]] | None
+    rise: tuple[Plane, Plane, Plane] | None
+    steepest: float
 
 
 @dataclass(frozen=True)
@@ -145,16 +149,10 @@ class _Strip:
 
 @dataclass(frozen=True)
 class _Maps:
-    """Where a stretch is sampled.
-
-    `rise`: what its lens takes from the corners: of luma (h, w), of luma at the resolution of chroma (h/2, w/2) and of
-    colours (h/2, w/2, 3), in 255ths of `steepest`.
-    """
+    """Where a stretch is sampled, its luma and its chroma."""
 
     luma: Map
     chroma: Map
-    rise: tuple[Plane, Plane, Plane] | None
-    steepest: float
 
 
 # In advance
@@ -190,7 +188,8 @@ def _stretches(number: int, part: Part, rows: slice, share: NDArray[np.float32])
             together = [block for block, *_ in blocks]
             columns = slice(together[0].start, together[-1].stop)
             own = None if alone else _shares(share[:, columns])
-            found.append(_Stretch(number, level, columns, own))
+            here = source[:, columns]
+            found.append(_Stretch(number, level, columns, own, *_rise(part, here, _between(here, own))))
     return found
 
 
@@ -203,20 +202,26 @@ def _level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
 
 def _maps(part: Part, rows: slice, stretch: _Stretch) -> _Maps:
     source = part.source[rows, stretch.columns]
-    between = (source[::2, ::2] + source[1::2, ::2]) / 2
-    if stretch.share is not None:
-        # Between two rows of which only one is seen there is nothing.
-        upper, lower = (stretch.share[0][row::2, ::2, None] > 0 for row in (0, 1))
-        between = np.where(upper & ~lower, source[::2, ::2], np.where(lower & ~upper, source[1::2, ::2], between))
-    chroma = ((between - np.array([0, CHROMA_ROW])) / 2).astype(np.float32)
-    return _Maps(
-        _map(source, stretch.level), _map(chroma, stretch.level), *_rise(part, source, between.astype(np.float32))
-    )
+    chroma = (_between(source, stretch.share) - np.array([0, CHROMA_ROW], np.float32)) / np.float32(2)
+    return _Maps(_map(source, stretch.level), _map(chroma, stretch.level))
+
+
+def _between(source: NDArray[np.float32], share: Sequence[NDArray[np.float32]] | None) -> NDArray[np.float32]:
+    """Where chroma of two by two pixels is looked for: beside the left ones of them, between those that are seen."""
+    upper, lower = source[::2, ::2], source[1::2, ::2]
+    between = (upper + lower) / np.float32(2)
+    if share is None:
+        return between
+    seen = share[0][::2, ::2, None] > 0, share[0][1::2, ::2, None] > 0
+    return np.where(seen[0] & ~seen[1], upper, np.where(seen[1] & ~seen[0], lower, between))
 
 
 def _map(source: NDArray[np.float32], level: int) -> Map:
-    at = ((source + 0.5) / (1 << level) - 0.5).astype(np.float32)
-    places, parts = cv2.convertMaps(at[..., 0], at[..., 1], cv2.CV_16SC2)
+    at: Any = np.ascontiguousarray(source)
+    if level:
+        at = (at + np.float32(0.5)) / np.float32(1 << level) - np.float32(0.5)
+    nothing: Any = None
+    places, parts = cv2.convertMaps(at, nothing, cv2.CV_16SC2)
     return np.asarray(places, np.int16), np.asarray(parts, np.uint16)
 
 
@@ -279,17 +284,17 @@ def _sample(source: Planes, maps: _Maps, target: Sequence[Plane]) -> None:
         cv2.remap(plane, *at, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)
 
 
-def _evened(view: _View, maps: _Maps, planes: Sequence[Any]) -> Sequence[Any]:
+def _evened(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[Any]:
     """The planes in the light of the other cameras."""
     luma, blue, red = planes
     coarse: Any = cv2.resize(luma, (blue.shape[1], blue.shape[0]), interpolation=cv2.INTER_AREA)
     colours: Any = cv2.LUT(cv2.transform(cv2.merge((coarse, blue, red)), FROM_PLANES), view.tones)
     luma, coarse = cv2.LUT(luma, view.luma), cv2.LUT(coarse, view.luma)
-    if maps.rise is not None:
-        of_luma, of_coarse, of_colours = maps.rise
-        colours = _raised(colours, of_colours, maps.steepest, 0)
-        luma = _raised(luma, of_luma, maps.steepest, BLACK)
-        coarse = _raised(coarse, of_coarse, maps.steepest, BLACK)
+    if stretch.rise is not None:
+        of_luma, of_coarse, of_colours = stretch.rise
+        colours = _raised(colours, of_colours, stretch.steepest, 0)
+        luma = _raised(luma, of_luma, stretch.steepest, BLACK)
+        coarse = _raised(coarse, of_coarse, stretch.steepest, BLACK)
     evened, blue, red = cv2.split(cv2.transform(colours, TO_PLANES))
     # What its colour adds to the luma of a pixel, around 128 so that it fits into a byte.
     added = cv2.addWeighted(evened, 1, coarse, -1, NO_COLOUR)

@@ -76,7 +76,7 @@ def test_the_result_is_told_as_json(esc, venue_file, clips):
 
 def test_a_venue_of_the_service_is_stitched_by_its_id(service, esc, name, clips, tmp_path):
     service.http.put(f"/venues/{name}", json=document(name)).raise_for_status()
-    options = ("--offset", "right=5f", "--projection", "birds-eye", "--rate", "12.5", "--to", "1.2")
+    options = ("--offset", "right=5f", "--projection", "birds-eye", "--height", "auto", "--rate", "12.5", "--to", "1.2")
     answer = esc("stitch", name, *clips, "-o", "above.mov", *options, *SHOWN)
     assert answer.returncode == 0, answer.stderr
     assert "13 pictures of 320x214" in answer.stderr
@@ -104,6 +104,9 @@ def test_the_light_that_a_venue_keeps_is_used(esc, name, clips, tmp_path):
         (("left=l.mp4", "left=l.mp4"), 2, "camera left is given twice"),
         (("l.mp4",), 2, "'l.mp4' is not CAMERA=CLIP"),
         (("left=l.mp4", "--width", "321"), 2, "are even numbers"),
+        (("left=l.mp4", "--height", "99"), 2, "are even numbers"),
+        (("left=l.mp4", "--height", "high"), 2, "--height: 'high' is no number"),
+        (("left=l.mp4", "--field-of-view", "400"), 2, "--field-of-view 400: from 5 to 340, or auto"),
         (
             ("left=l.mp4", "--projection", "fisheye"),
             2,
