@@ -43,6 +43,8 @@ FAR_M = 300.0
 # Frames relative to 4K, columns of the panorama, bits a second of a clip.
 SIZES = {"1080p": (0.5, 1920, 12_000_000), "4k": (1.0, 3840, 40_000_000), "real": (1.0, 3072, 30_000_000)}
 FOLDER = Path("build/shaking")
+# So many-th frames are rendered to be read: no multiple of those in which lines are measured.
+READ_EVERY = 3
 # Where a camera counts this much in the view, the far line is its alone; how it is read across itself.
 SURE = 0.98
 OFFSETS_PX, ALONG_PX = np.arange(-6, 6.25, 0.25), (-4.0, -2.0, 0.0, 2.0, 4.0)
@@ -302,9 +304,8 @@ def report(film: Film, told: Told, width: int) -> None:
         rms_about_mean(np.array([line.by_truth(true[n], there[n]) for n in range(count)]))
         for there in (count * [references], found)
     )
-    some = max(1, count // 50)
     shown = moves(
-        np.array([line.profiles(frames, found[n]) for n, frames in enumerate(film.frames()) if n % some == 0])
+        np.array([line.profiles(frames, found[n]) for n, frames in enumerate(film.frames()) if n % READ_EVERY == 0])
     )
     error = np.array(
         [[change_between(a, b) for a, b in zip(*both, strict=True)] for both in zip(true, found, strict=True)]
