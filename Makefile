@@ -35,6 +35,7 @@ wheel: setup
 
 bench-real: setup
 	$(BIN)/python -m tests.benchmarks.real_pair
+	$(BIN)/python -m tests.benchmarks.seam
 
 # One BLAS thread, as the worker sets it.
 bench-fields: setup

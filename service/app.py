@@ -18,7 +18,7 @@ from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
 from service.pages import ROUTERS as PAGES
-from service.routes import docs, following, health, jobs, pictures, snapshot, venues
+from service.routes import docs, following, health, jobs, pictures, snapshot, stitch, venues
 from service.routes.contract import documented
 from service.routes.submissions import again, frames, intrinsics, locate
 from service.settings import Settings
@@ -56,7 +56,20 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_events(app)
     problems.install(app)
     _answer_outages(app)
-    for routes in (venues, following, snapshot, frames, intrinsics, locate, jobs, again, pictures, health, docs):
+    for routes in (
+        venues,
+        following,
+        snapshot,
+        stitch,
+        frames,
+        intrinsics,
+        locate,
+        jobs,
+        again,
+        pictures,
+        health,
+        docs,
+    ):
         app.include_router(routes.router)
     for router in PAGES:
         app.include_router(router)

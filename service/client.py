@@ -10,31 +10,38 @@
         for seen, event in client.venue_events("demo", ["poses.changed"]):
             print(event.type, event.data)
 
-Both have the same methods. A service that refuses raises `Refused`.
+Both have the same methods. A service that refuses raises `Refused`. What only some methods need is imported there: a
+command that lists venues takes as long to load it as to be answered.
 """
 
 from __future__ import annotations
 
-import asyncio
 import json
 import math
 import time
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import aclosing
+from functools import cache
+from http import HTTPStatus
 from pathlib import Path
-from typing import Any, Self
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
 
 import httpx
 from pydantic import TypeAdapter
 
 from service.blocking import Call, Stream
+from service.refused import Refused as Refused
+from service.refused import passing, pause_s_of, refusal
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
-from service.wire.job import Job, Jobs
 from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
-from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, Status
-from service.wire.told.events import LAST, Event
+from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, Status, StitchFormat
 from service.wire.venue import Venue, VenueIn, Venues
+
+if TYPE_CHECKING:
+    from service.wire.job import Job
+    from service.wire.told.events import Event
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
@@ -44,27 +51,9 @@ PATIENCE_S = 60.0
 SILENCE_S = 45.0
 # Until a stream that has ended, or could not begin, is asked for again.
 AGAIN_S = 2.0
-NOT_INSTALLED = "/problems/extra-missing"
-EVENT: TypeAdapter[Event] = TypeAdapter(Event)
-
-
-class Refused(Exception):  # noqa: N818
-    """The service answered with a problem: `members` are its JSON object.
-
-    `busy`: trying the same again later can help. Of conflicts, those that the service gives a time for (Retry-After);
-    and what a proxy says that does not reach the service.
-    """
-
-    def __init__(self, status: int, members: Mapping[str, Any], retry_after: str | None = None) -> None:
-        super().__init__(f"{members.get('title', 'Refused')}: {members.get('detail', '')}")
-        self.status = status
-        self.members = members
-        self.busy = (
-            status == 429
-            or (status == 409 and retry_after is not None)
-            or (status == 503 and members.get("type") != NOT_INSTALLED)
-            or (status in (502, 504) and "type" not in members)
-        )
+# A view of 8192 pixels and many cameras takes minutes.
+PACKAGE_S = 180.0
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class AsyncClient:
@@ -144,6 +133,22 @@ class AsyncClient:
         """The poses that hold now, of one camera or all, as a file of another tool's format."""
         return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera))
 
+    async def venue_stitch(
+        self, venue_id: str, form: StitchFormat, view: Mapping[str, Any] = NOTHING, known: str | None = None
+    ) -> bytes | None:
+        """The zip with which other tools stitch; None: that with the tag `known` still holds.
+
+        `view`: what is wanted otherwise than the venue's view has it, such as `width_px`. The tag is in `view.json`.
+        """
+        headers = {"If-None-Match": known} if known else {}
+        path, params = f"/venues/{venue_id}/stitch", {"format": form, **view}
+        response = await self._send("GET", path, params=params, headers=headers, timeout=PACKAGE_S)
+        if response.status_code == HTTPStatus.NOT_MODIFIED:
+            return None
+        if not response.is_success:
+            raise refusal(response)
+        return response.content
+
     async def venue_events(
         self,
         venue_id: str,
@@ -154,12 +159,16 @@ class AsyncClient:
         """Whatever happens to a venue (of these kinds, absent: of any), each with the id by which to go on after it.
 
         First comes `poses.current`, or what was missed since the event `seen`. None is missed and none comes twice,
-        whatever breaks meanwhile: what is wrong is raised once the service was away for `patience_s`. Ends when the
+        whatever breaks meanwhile: what is wrong is raised once the service was away for `patience_s`. A busy service is
+        asked again when it says (Retry-After), at the latest after a minute. Ends when the
         venue is deleted; where that happened while nobody was connected, with `Refused` (404).
         """
+        from service.wire.told.events import LAST
+
         path, params = f"/venues/{venue_id}/events", {"events": list(kinds)}
         heard = time.monotonic()
         while True:
+            pause_s = AGAIN_S
             try:
                 headers = {"Last-Event-ID": seen} if seen else {}
                 told: dict[str, str] = {}
@@ -169,7 +178,7 @@ class AsyncClient:
                         if name:
                             told[name] = value
                         elif not line and "data" in told:
-                            seen, event = told["id"], EVENT.validate_json(told["data"])
+                            seen, event = told["id"], _event().validate_json(told["data"])
                             yield seen, event
                             if event.type == LAST:
                                 return
@@ -177,9 +186,10 @@ class AsyncClient:
                         # Also after whoever asked has taken its time over an event.
                         heard = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                if not _passing(error) or time.monotonic() - heard > patience_s:
+                if not passing(error) or time.monotonic() - heard > patience_s:
                     raise
-            await self._pause(AGAIN_S)
+                pause_s = pause_s_of(error, AGAIN_S)
+            await self._pause(pause_s)
 
     async def snapshot(self, venue_id: str, camera: str) -> bytes:
         """What a camera shows now, a JPEG or PNG from its source."""
@@ -199,7 +209,7 @@ class AsyncClient:
         The job may be an older one if the content is the same.
         """
         sent = _upload(files, options, idempotency_key)
-        return Job.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
+        return _job(await self._ask("POST", f"/venues/{venue_id}/calibrate", **sent))
 
     async def fit_field(
         self,
@@ -210,12 +220,12 @@ class AsyncClient:
     ) -> Job:
         """Submit frames by which to fit the measures of a venue's pitch; the venue stays as it is."""
         sent = _upload(files, options, idempotency_key)
-        return Job.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/field/fit", **sent))
+        return _job(await self._ask("POST", f"/venues/{venue_id}/field/fit", **sent))
 
     async def job(self, job_id: str, wait_s: float = 0) -> Job:
         """A job, at its end or after `wait_s`."""
         params = {"wait": wait_s} if wait_s else {}
-        return Job.model_validate_json(await self._ask("GET", f"/jobs/{job_id}", params=params))
+        return _job(await self._ask("GET", f"/jobs/{job_id}", params=params))
 
     async def jobs(
         self,
@@ -225,6 +235,8 @@ class AsyncClient:
         most: int | None = None,
     ) -> list[Job]:
         """Jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
+        from service.wire.job import Jobs
+
         chosen = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
         page = Jobs.model_validate_json(await self._ask("GET", "/jobs", params=chosen))
         found = page.jobs
@@ -236,7 +248,7 @@ class AsyncClient:
 
     async def again(self, job_id: str) -> Job:
         """Submit the frames of a job once more, from the poses that hold now: another job."""
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/again"))
+        return _job(await self._ask("POST", f"/jobs/{job_id}/again"))
 
     async def delete_job(self, job_id: str) -> None:
         """Forget a job that has ended, with its frames and pictures."""
@@ -244,16 +256,16 @@ class AsyncClient:
 
     async def cancel(self, job_id: str) -> Job:
         """End a job."""
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/cancel"))
+        return _job(await self._ask("POST", f"/jobs/{job_id}/cancel"))
 
     async def accept(self, job_id: str, camera: str | None = None) -> Job:
         """Let the poses that a calibration found hold, of one camera or all, whatever the gate said."""
         params = {"camera": camera} if camera else {}
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/accept", params=params))
+        return _job(await self._ask("POST", f"/jobs/{job_id}/accept", params=params))
 
     async def reject(self, job_id: str) -> Job:
         """Put back what was before the poses of a calibration."""
-        return Job.model_validate_json(await self._ask("POST", f"/jobs/{job_id}/reject"))
+        return _job(await self._ask("POST", f"/jobs/{job_id}/reject"))
 
     async def job_poses(self, job_id: str, form: FormatName, camera: str | None = None) -> bytes:
         """The poses that a job found, of one camera or all, as a file of another tool's format."""
@@ -272,9 +284,9 @@ class AsyncClient:
                 followed = await self.job(followed.id, wait_s=every_s)
                 heard = time.monotonic()
             except (httpx.TransportError, Refused) as error:
-                if not _passing(error) or time.monotonic() - heard > PATIENCE_S:
+                if not passing(error) or time.monotonic() - heard > PATIENCE_S:
                     raise
-                await self._pause(every_s)
+                await self._pause(pause_s_of(error, every_s))
         return followed
 
     # How it travels
@@ -286,7 +298,7 @@ class AsyncClient:
     async def _answer(self, method: str, path: str, **more: Any) -> httpx.Response:
         response = await self._send(method, path, **more)
         if not response.is_success:
-            raise _refusal(response)
+            raise refusal(response)
         return response
 
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
@@ -298,13 +310,15 @@ class AsyncClient:
         async with self._http.stream("GET", path, timeout=SILENCE_S, **more) as response:
             if not response.is_success:
                 await response.aread()
-                raise _refusal(response)
+                raise refusal(response)
             async for piece in response.aiter_bytes():
                 *lines, rest = _split(rest + piece)
                 for line in lines:
                     yield line.decode()
 
     async def _pause(self, seconds: float) -> None:
+        import asyncio
+
         await asyncio.sleep(seconds)
 
 
@@ -322,7 +336,7 @@ class _Blocking(AsyncClient):
         with self.http.stream("GET", path, timeout=SILENCE_S, **more) as response:
             if not response.is_success:
                 response.read()
-                raise _refusal(response)
+                raise refusal(response)
             for piece in response.iter_bytes():
                 *lines, rest = _split(rest + piece)
                 for line in lines:
@@ -358,6 +372,7 @@ class Client:
     history = Call(AsyncClient.history)
     restore = Call(AsyncClient.restore)
     venue_poses = Call(AsyncClient.venue_poses)
+    venue_stitch = Call(AsyncClient.venue_stitch)
     venue_events = Stream(AsyncClient.venue_events)
     snapshot = Call(AsyncClient.snapshot)
     calibrate = Call(AsyncClient.calibrate)
@@ -380,27 +395,25 @@ def _connection(url: str, api_key: str | None) -> dict[str, Any]:
     return {"base_url": url, "headers": headers, "timeout": TIMEOUT_S, "verify": not url.startswith("http://")}
 
 
+def _job(answer: bytes) -> Job:
+    from service.wire.job import Job
+
+    return Job.model_validate_json(answer)
+
+
+@cache
+def _event() -> TypeAdapter[Event]:
+    from service.wire.told.events import Event
+
+    return TypeAdapter(Event)
+
+
 def _split(stream: bytes) -> list[bytes]:
     """The lines of a stream of events, the last of them as far as it has come.
 
     Not what Python splits by, as httpx does: the names in an event may have separators of Unicode in them.
     """
     return stream.split(b"\n")
-
-
-def _refusal(response: httpx.Response) -> Refused:
-    """Of an answer that was read."""
-    try:
-        members = response.json()
-    except ValueError:
-        members = {"title": f"HTTP {response.status_code}", "detail": response.text[:500]}
-    retry_after = response.headers.get("retry-after")
-    return Refused(response.status_code, members if isinstance(members, dict) else {}, retry_after)
-
-
-def _passing(error: httpx.TransportError | Refused) -> bool:
-    """Whether the service may be back in a moment."""
-    return isinstance(error, httpx.TransportError) or error.busy
 
 
 def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:

@@ -104,6 +104,10 @@ class Settings(BaseSettings):
         [sys.executable, "-P", "-m", "worker.programs.draw"],
         description="What draws pictures that somebody looks at.",
     )
+    stitch_program: list[str] = Field(
+        [sys.executable, "-P", "-m", "worker.programs.stitch"],
+        description="What makes packages and previews of stitched views.",
+    )
     pictures_at_once: int = Field(2, ge=1, description="That one API process has drawn at the same time.")
 
     # The worker.

@@ -9,6 +9,7 @@ from fastapi import Depends, Path, Request
 from service.api.auth import Gate
 from service.api.programs.clicked_pose import ClickedPoses
 from service.api.programs.drawings import Drawings
+from service.api.programs.stitches import Stitches
 from service.api.shared_reads import SharedReads
 from service.api.uploads import Uploads
 from service.api.watch import Places, Watch
@@ -36,6 +37,7 @@ class Context(Home):
         self.uploads = Uploads(settings)
         self.clicked_poses = ClickedPoses(settings)
         self.drawings = Drawings(settings, self.jobs, self.blobs)
+        self.stitches = Stitches(settings)
 
     def let_go(self) -> None:
         """Let everybody go who waits for a job or follows a venue."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import structlog
 from fastapi import FastAPI, Request
@@ -14,6 +15,7 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.routing import compile_path
 
+from service.wire.findings import in_words
 from service.wire.problems import KINDS, MEDIA_TYPE, Problem
 
 log = structlog.get_logger()
@@ -25,14 +27,13 @@ def answer(problem: Problem) -> Response:
     return Response(content, KINDS[problem.kind].status, problem.headers, MEDIA_TYPE)
 
 
-def invalid(error: ValidationError | RequestValidationError, *inside: str) -> Problem:
-    """What a schema found, each finding with the place it was found at."""
-    findings = [
-        {"where": ".".join(str(step) for step in (*inside, *finding["loc"])), "message": finding["msg"]}
-        for finding in error.errors()
-    ]
-    first = findings[0]
-    return Problem("invalid-request", f"{first['where']}: {first['message']}", errors=findings)
+def invalid(error: ValidationError | RequestValidationError, model: Any, document: Any, *inside: str) -> Problem:
+    """What a schema found, each finding with the place it was found at. `model`, `document`: see `in_words`."""
+    found = error.errors()
+    places = [".".join(str(step) for step in (*inside, *finding["loc"])) for finding in found]
+    told = in_words(found, model, document)
+    findings = [{"where": where, "message": message} for where, message in zip(places, told, strict=True)]
+    return Problem("invalid-request", told[0], errors=findings)
 
 
 def not_json(request: Request) -> Problem:
@@ -54,7 +55,7 @@ def install(app: FastAPI) -> None:
             return answer(Problem("malformed-request", "The body is not JSON."))
         if isinstance(error.body, bytes):
             return answer(not_json(request))
-        return answer(invalid(error))
+        return answer(_invalid_request(request, error))
 
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> Response:
@@ -70,6 +71,12 @@ def install(app: FastAPI) -> None:
     async def unexpected(_: Request, error: Exception) -> Response:
         log.error("unexpected error", exc_info=error)
         return answer(Problem("internal-error", "This is a fault of the service; its log has the details."))
+
+
+def _invalid_request(request: Request, error: RequestValidationError) -> Problem:
+    """Of a body that is named as in the documents, not as what FastAPI calls it."""
+    field = getattr(request.scope.get("route"), "body_field", None)
+    return invalid(error, None if field is None else field.field_info.annotation, error.body)
 
 
 def _from_http(request: Request, error: HTTPException) -> Problem:

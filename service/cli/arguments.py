@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -161,5 +162,9 @@ def checked(model: type[M], document: str | bytes, source: str) -> M:
     try:
         return model.model_validate_json(document)
     except ValidationError as error:
-        lines = [" ".join(filter(None, (f"{source}:", ".".join(map(str, e["loc"])), e["msg"]))) for e in error.errors()]
-        fail("\n".join(lines), USAGE)
+        from service.wire.findings import in_words
+
+        found = error.errors()
+        is_json = all(finding["type"] != "json_invalid" for finding in found)
+        told = in_words(found, model, json.loads(document) if is_json else None)
+        fail("\n".join(f"{source}: {message}" for message in told), USAGE)

@@ -12,6 +12,7 @@ import typer
 from service.cli.arguments import LOCAL, ApiKey, Frames, Url, checked, files_of
 from service.cli.calling import called
 from service.cli.printing import (
+    FAILED,
     REJECTED,
     USAGE,
     bar,
@@ -113,8 +114,8 @@ def pose(
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
 ) -> None:
     """Find first poses of cameras from clicked points. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
-    from service.cli.local import engine_settings, failure_told
-    from service.wire.geometry import LensFile, PoseIn
+    from service.cli.local import engine_settings
+    from service.wire.geometry import LensFile, Pose, PoseIn
     from service.wire.options import ClickedPoints
     from service.wire.venue import CameraIn, Site, VenueIn
 
@@ -125,24 +126,28 @@ def pose(
     seen = {camera: path.read_bytes() for camera, (path, *_) in files_of(frame or []).items()}
     for camera in given.keys() - clicks.keys():
         fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
-    from worker.jobs import locate
-    from worker.jobs.reading import lens_of
+    from worker.jobs.reading import Failure, lens_of
+    from worker.jobs.together import locate_all
 
+    engine_lenses = {camera: lens_of(lens.intrinsics, lens.image_size) for camera, lens in given.items()}
+    stored = {camera.id: Pose.of(camera.pose) for camera in place.cameras}
     found = {camera.id: camera for camera in place.cameras}
-    results = []
-    for camera, lens in given.items():
-        engine_lens = lens_of(lens.intrinsics, lens.image_size)
-        with failure_told():
-            solution = locate.locate(camera, place.field, engine_lens, clicks[camera], seen.get(camera), lambda _: None)
-        result = solution.result
+    results, failures = [], []
+    for camera, end in locate_all(place.field, engine_lenses, clicks, seen, stored).items():
+        if isinstance(end, Failure):
+            failures.append(end.error.detail)
+            continue
+        result = end.result
         results.append(result)
         tell_pose(result)
         if pictures is not None:
             pictures.mkdir(parents=True, exist_ok=True)
-            (pictures / f"points_{camera}.jpg").write_bytes(solution.pictures["points"])
+            (pictures / f"points_{camera}.jpg").write_bytes(end.pictures["points"])
         stands = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
         if result.accepted:
             found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
+    if failures:
+        fail("\n".join(failures), FAILED)
     print(json.dumps([result.model_dump(mode="json") for result in results], indent=2))
     if not all(result.accepted for result in results):
         raise typer.Exit(REJECTED)

@@ -5,6 +5,8 @@ What a command needs is imported where it runs: the client's commands start in a
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -13,8 +15,7 @@ from service import lifeline
 from service.cli import calibrate, first, jobs, keys, serve, stitch, venues
 from service.cli.printing import FAILED, fail
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
-for command in (
+COMMANDS = (
     serve.up,
     serve.serve,
     serve.worker,
@@ -24,21 +25,33 @@ for command in (
     first.intrinsics,
     first.pose,
     stitch.stitch,
-):
-    app.command()(command)
-app.add_typer(venues.app, name="venue")
-app.add_typer(first.field_app, name="field")
-app.add_typer(jobs.app, name="job")
-app.add_typer(keys.app, name="key")
+)
+NOUNS = {"venue": venues.app, "field": first.field_app, "job": jobs.app, "key": keys.app}
 
 
 def main() -> None:
     """Run a command; what goes wrong is a line and an exit code, not a traceback."""
     lifeline.end_with_parent()
     try:
-        app()
+        app_of(sys.argv[1:])()
     except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError, FileExistsError) as error:
         fail(f"{error.filename}: {error.strerror}", FAILED)
+
+
+def app_of(arguments: Sequence[str]) -> typer.Typer:
+    """The command line as far as these arguments ask for it: to describe all commands takes longer than to run one."""
+    asked = arguments[0] if arguments else None
+    commands = [command for command in COMMANDS if command.__name__ == asked]
+    nouns = {name: noun for name, noun in NOUNS.items() if name == asked}
+    if not commands and not nouns:
+        commands, nouns = [*COMMANDS], NOUNS
+    app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
+    app.callback()(esc)
+    for command in commands:
+        app.command()(command)
+    for name, noun in nouns.items():
+        app.add_typer(noun, name=name)
+    return app
 
 
 def _say_version(asked: bool) -> None:
@@ -49,7 +62,6 @@ def _say_version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def esc(
     _: Annotated[
         bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print the version and end.")

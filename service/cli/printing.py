@@ -51,7 +51,7 @@ def in_words(headline: str, members: Mapping[str, Any]) -> str:
     """A problem with the parts of it that say what is wrong."""
     lines = [headline]
     lines += [f"  {part}: {json.dumps(members[part])}" for part in ("expected", "got") if part in members]
-    findings = [f"{finding.get('where')}: {finding.get('message')}" for finding in members.get("errors", [])]
+    findings = [str(finding.get("message")) for finding in members.get("errors", [])]
     # The first of them is often the headline's own end.
     lines += [f"  {finding}" for finding in findings if not headline.endswith(finding)]
     return "\n".join(lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from http import HTTPStatus
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +14,7 @@ from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, OneCamera, Output
 from service.cli.calling import called
 from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
 from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, outcome, say, tell
-from service.wire.names import EventKind
+from service.wire.names import EventKind, Projection, StitchFormat
 
 if TYPE_CHECKING:
     from service.client import Client
@@ -133,6 +134,49 @@ def venue_poses(
         hand_out(client.venue_poses(venue, form, camera), output)
 
 
+@app.command("stitch")
+def venue_stitch(
+    venue: VenueId,
+    form: Annotated[StitchFormat, typer.Option("--format", help="What stitches with it.")] = "ffmpeg",
+    projection: Annotated[
+        Projection | None, typer.Option("--projection", help="How the picture is spread out; birds-eye: from above.")
+    ] = None,
+    width: Annotated[int | None, typer.Option("--width", help="In pixels, even.")] = None,
+    height: Annotated[str | None, typer.Option("--height", help="In pixels, even, or auto.")] = None,
+    field_of_view: Annotated[str | None, typer.Option("--field-of-view", help="In degrees, or auto.")] = None,
+    pan: Annotated[float | None, typer.Option("--pan", help="To the right, in degrees.")] = None,
+    horizon: Annotated[str | None, typer.Option("--horizon", help="0: at the top, 1: at the bottom, or auto.")] = None,
+    output: Output = None,
+    if_changed: Annotated[
+        bool, typer.Option("--if-changed", help="Fetch it only if the file of -o is no longer what holds.")
+    ] = False,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Write the zip with which ffmpeg, compositors or OpenCV stitch: maps, weights and lights of each camera.
+
+    What is not said of the view is as the venue has it, see `view` of esc venue get.
+    """
+    if if_changed and output is None:
+        fail("--if-changed needs -o FILE, the zip that may still hold", USAGE)
+    known = tag_of(output) if if_changed and output is not None else None
+    parts = {
+        "projection": projection,
+        "width_px": width,
+        "height_px": height,
+        "field_of_view_deg": field_of_view,
+        "pan_deg": pan,
+        "horizon": horizon,
+    }
+    wanted = {name: value for name, value in parts.items() if value is not None}
+    with called(url, api_key) as client:
+        package = client.venue_stitch(venue, form, wanted, known)
+    if package is None:
+        tell(f"{output} still holds.")
+    else:
+        hand_out(package, output)
+
+
 @app.command("history")
 def venue_history(
     venue: VenueId,
@@ -212,6 +256,18 @@ def _happened(event: Event) -> str:
             return alarm.why
         case change:
             return " ".join(change.changed) or "-"
+
+
+def tag_of(package: Path) -> str | None:
+    """By which the service knows a package that it gave; None: there is none."""
+    try:
+        with zipfile.ZipFile(package) as files:
+            tag = json.loads(files.read("view.json"))["etag"]
+    except FileNotFoundError:
+        return None
+    except (zipfile.BadZipFile, KeyError, ValueError, TypeError):
+        fail(f"{package} is no package of a stitched view: remove it, or name another file", USAGE)
+    return tag if isinstance(tag, str) else None
 
 
 def _stored(client: Client, venue_id: str) -> tuple[Venue, str] | None:

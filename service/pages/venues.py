@@ -7,12 +7,13 @@ from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
+from service.api import etags
 from service.api.context import InContext, VenueIdPath
 from service.pages.shown import Page, page
 from service.pages.sparkline import Sparkline, sparkline
 from service.routes.contract.documented import needs
 from service.routes.contract.guarded import Guarded
-from service.routes.venues import ExistingVenue
+from service.routes.venues import ExistingVenue, tag_of
 from service.store.counts.glances import Glance
 from service.store.revisions import TAKEN
 from service.store.stores import Stores
@@ -21,6 +22,7 @@ from service.wire.history import Revision
 from service.wire.job import Job
 from service.wire.names import ID_PATTERN, FormatName
 from service.wire.venue import Venue
+from service.wire.view import ViewChoice
 
 PER_PAGE = 50
 # What a chart shows, and a table beside it.
@@ -89,6 +91,9 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         holds=job is not None and holds(job, revisions[0]),
         active=context.jobs.get(active) if active else None,
         formats=get_args(FormatName),
+        usual_view=ViewChoice(),
+        previewed=context.past_calibrations.last_taken(venue_id) is not None,
+        tag=etags.quoted(tag_of(stored)),
     )
 
 

@@ -101,7 +101,7 @@ def put_venue(
 
     def allow(before: Venue | None) -> None:
         _require_match(if_match, before)
-        tag = _tag(before) if before else None
+        tag = tag_of(before) if before else None
         if if_none_match is not None and etags.names(if_none_match, tag):
             raise Problem("venue-changed", "The venue is already there.", got=_shown(tag))
 
@@ -109,7 +109,7 @@ def put_venue(
         return sources.credentials_of(stored, venue.credentials, before, known)
 
     new = context.venues.put(stored, allow, credentials)
-    response.headers["ETag"] = etags.quoted(_tag(stored))
+    response.headers["ETag"] = etags.quoted(tag_of(stored))
     response.status_code = 201 if new else 200
     return stored
 
@@ -135,15 +135,16 @@ def patch_venue(
         if before is None:
             raise no_such_venue(venue_id)
         _require_match(if_match, before)
+        document = merged(_patchable(before, patch), patch)
         try:
-            venue = VenueIn.model_validate(merged(_patchable(before, patch), patch))
+            venue = VenueIn.model_validate(document)
         except ValidationError as error:
-            raise _misnamed_camera(before, patch) or invalid(error, "body") from None
+            raise _misnamed_camera(before, patch) or invalid(error, VenueIn, document, "body") from None
         stored = _checked(venue, venue_id, context.settings)
         return stored, sources.credentials_of(stored, venue.credentials, before, known)
 
     stored, _ = context.venues.change(venue_id, change)
-    response.headers["ETag"] = etags.quoted(_tag(stored))
+    response.headers["ETag"] = etags.quoted(tag_of(stored))
     return stored
 
 
@@ -242,7 +243,7 @@ def restore_venue(
         raise Problem("revision-not-found", f"GET /venues/{venue_id}/history lists those there are.") from None
     except RevisionUnfit as unfit:
         raise revision_unfit(unfit) from None
-    response.headers["ETag"] = etags.quoted(_tag(restored))
+    response.headers["ETag"] = etags.quoted(tag_of(restored))
     return restored
 
 
@@ -301,7 +302,7 @@ def _checked(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
 
 def _require_match(if_match: str | None, before: Venue | None) -> None:
     """Whoever changes a venue changes the one that he has seen."""
-    tag = _tag(before) if before else None
+    tag = tag_of(before) if before else None
     if if_match is not None and not etags.names(if_match, tag):
         raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=_shown(tag))
 
@@ -311,5 +312,6 @@ def _shown(tag: str | None) -> str | None:
     return None if tag is None else etags.quoted(tag)
 
 
-def _tag(venue: Venue) -> str:
+def tag_of(venue: Venue) -> str:
+    """By which it is known whether it changed."""
     return etags.of(venue.model_dump_json().encode())

@@ -146,7 +146,8 @@ class Light(Wire):
     """What is done to a camera's picture so that it agrees with the others' where they overlap in a stitched view.
 
     A tone t of 0 to 255 becomes `gain` * 100 * (t / 100) ** (1 + `contrast`), and that is multiplied by
-    exp(`falloff` * r²), r from 0 in the middle of the frame to 1 in its corners.
+    exp(`falloff` * r²), r from 0 in the middle of the frame to 1 in its corners. `reach`: the logarithm by which the
+    camera counts more than how finely it sees, which moves the seams between it and others.
     """
 
     gain: Annotated[list[Annotated[Number, Field(ge=0.25, le=4)]], Field(min_length=3, max_length=3)] = Field(
@@ -154,6 +155,7 @@ class Light(Wire):
     )
     contrast: Annotated[Number, Field(ge=-0.5, le=0.5)] = 0.0
     falloff: Annotated[Number, Field(ge=-1, le=1)] = 0.0
+    reach: Annotated[Number, Field(ge=-3, le=3)] = 0.0
 
 
 class UnposedCamera(Wire):

@@ -13,6 +13,9 @@ PHOTOS_PART = "photos"
 LensModel = Literal["opencv", "fisheye"]
 # Of files that poses leave in; `service.formats.table` has what is behind the names.
 FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
+# What a stitched view is projected by, and what its package is made for.
+Projection = Literal["pannini", "cylinder", "rectilinear", "birds-eye"]
+StitchFormat = Literal["ffmpeg", "st-map", "st-map-unreal", "opencv"]
 # What a key allows; each one includes those before it.
 Scope = Literal["read", "calibrate", "admin"]
 # Of what happens to venues; `venue.*`: whatever begins so.

@@ -73,6 +73,9 @@ KINDS: dict[str, Kind] = {
     # Formats of poses.
     "format-cannot-hold": Kind(422, "The format cannot hold this camera"),
     "camera-needed": Kind(422, "The format holds one camera"),
+    # Stitched views.
+    "view-too-large": Kind(422, "The view has too many pixels"),
+    "no-frames": Kind(404, "There are no frames to show the view with"),
     # Lenses and first poses.
     "too-many-photos": Kind(422, "Too many photos"),
     "missing-photos": Kind(422, "There are no photos"),

@@ -12,7 +12,8 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
 from service.wire.health import Alarms
 from service.wire.schedule import Schedule
-from service.wire.told.events import WEBHOOK_EXAMPLE, Webhook
+from service.wire.told.webhooks import WEBHOOK_EXAMPLE, Webhook
+from service.wire.view import VIEW_EXAMPLE, ViewChoice
 
 Accept = Annotated[
     Literal["each", "all"],
@@ -120,6 +121,7 @@ PATCH_EXAMPLES: dict[str, Any] = {
     "an alarm": {"value": {"alarms": {"rejected_in_a_row": 3}}},
     "who is told of new poses": {"value": {"webhooks": [WEBHOOK_EXAMPLE]}},
     "no schedule": {"value": {"schedule": None}},
+    "what its stitched view shows": {"value": {"view": VIEW_EXAMPLE}},
     "the source of a camera": {"value": {"cameras": {"left": {"source": "http://10.1.0.7/snapshot.jpg"}}}},
 }
 
@@ -147,6 +149,7 @@ class VenueIn(_Place):
     alarms: Alarms | None = None
     schedule: Schedule | None = None
     webhooks: Webhooks = Field([])
+    view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
 
     @model_validator(mode="after")
     def _can_be_fetched(self) -> Self:
@@ -186,6 +189,7 @@ class Venue(_Place):
     alarms: Alarms | None = None
     schedule: Schedule | None = None
     webhooks: Webhooks = Field([])
+    view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
 
     @property
     def poses(self) -> dict[str, Pose]:

@@ -33,7 +33,7 @@ from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.steady import Sway, median, sways
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
 from worker.calibration.settle import CAPTURE_RAD, METHODS, Seen, Settled, Situation, ridges_of, settle, settle_without
-from worker.calibration.stitch.light import lights
+from worker.calibration.stitch.evening import evened_out
 from worker.calibration.zoom import refit_zoomed
 
 FEWEST_VISIBLE_POINTS = 60
@@ -71,7 +71,7 @@ def calibrate(
         journey.at("refinement", 1.0)
     with journey.measuring("light"):
         held = [one.camera for one in answer.cameras if one.accepted]
-        evened = lights(answer.pitch, held, {camera.id: frames[camera.id][0] for camera in held})
+        evened = evened_out(answer.pitch, held, {camera.id: frames[camera.id][0] for camera in held})
     journey.spent.name("evolution")
     return Calibration(
         **vars(answer),

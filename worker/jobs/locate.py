@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
 
 from fields.landmarks import UnknownLandmark
-from service.wire import results
+from service.wire import geometry, results
 from service.wire.field import FieldOfPlay
 from service.wire.job import Progress
 from service.wire.options import ClickedPoint, LocateOptions
@@ -20,10 +21,13 @@ from worker.calibration.first.clicks import Clicks, NoPose
 from worker.calibration.first.first_pose import first_pose
 from worker.calibration.first.freed_lens import LensGain
 from worker.calibration.first.verdict import FirstPose
-from worker.calibration.scene.camera import Array, Intrinsics
+from worker.calibration.scene.camera import Array, Camera, Intrinsics, Pose, rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.jobs.reading import Failure, decoded_frame, jpeg, lens_of, pitch_of
 from worker.jobs.wire import Solution, number, to_the_millisecond, wire_lens, wire_pose
+
+SAME_STAND_M, SAME_VIEW_DEG = 2.0, 3.0
+"""What careless clicks and a camera that was knocked leave between two poses of one camera, and more."""
 
 
 def solve(
@@ -36,7 +40,7 @@ def solve(
     """The first pose of a camera of a venue. `frame`: the file that the points were clicked in, for the picture."""
     (stored,) = (one for one in venue.cameras if one.id == camera)
     lens = lens_of(stored.intrinsics, stored.image_size)
-    return locate(camera, venue.field, lens, options.points, frame, report)
+    return locate(camera, venue.field, lens, options.points, frame, report, venue.poses)
 
 
 def locate(
@@ -46,14 +50,16 @@ def locate(
     points: list[ClickedPoint],
     frame: bytes | None,
     report: Callable[[Progress], None],
+    stored: Mapping[str, geometry.Pose],
 ) -> Solution[LocateResult]:
-    """The first pose of a camera that may belong to no venue yet."""
+    """The first pose of a camera that may belong to no venue yet. `stored`: the poses that are known, by camera."""
     begun = time.perf_counter()
     pitch = pitch_of(field)
     picture = None if frame is None else decoded_frame(camera, list(lens.size), frame)
     clicks = clicks_of(camera, pitch, points)
     report(Progress(stage="fit", fraction=0.0))
     found = pose_of(camera, pitch, lens, clicks)
+    found = replace(found, warnings=[*found.warnings, *_stands_elsewhere(found.camera, stored)])
     fitted = time.perf_counter()
     drawn = jpeg(clicks_picture(pitch, clicks, found, picture))
     timings = {"fit": fitted - begun, "picture": time.perf_counter() - fitted}
@@ -66,6 +72,30 @@ def pose_of(camera: str, pitch: Field, lens: Intrinsics, clicks: Clicks) -> Firs
         return first_pose(clicks, lens, pitch.places(), camera)
     except NoPose as error:
         raise Failure("no-pose", f"Camera {camera}: {error}.", camera) from error
+
+
+def _stands_elsewhere(found: Camera, stored: Mapping[str, geometry.Pose]) -> list[str]:
+    """A warning where a camera stands as another one is stored, and not as it is itself."""
+    apart = {name: _apart(found.pose, pose) for name, pose in stored.items()}
+    if found.id not in apart or _same(*apart[found.id]):
+        return []
+    metres, degrees = apart[found.id]
+    return [
+        f"this is where camera {name} is stored ({apart[name][0]:.1f} m and {apart[name][1]:.1f}° away), and camera "
+        f"{found.id} is stored {metres:.1f} m and {degrees:.1f}° away: were the points clicked in a picture of {name}?"
+        for name in apart
+        if _same(*apart[name])
+    ]
+
+
+def _apart(pose: Pose, other: geometry.Pose) -> tuple[float, float]:
+    """Metres and degrees between two poses."""
+    metres = np.linalg.norm(pose.position - np.array(other.position))
+    return float(metres), float(rotation_angles_deg(pose.rotation, np.array(other.rotation)))
+
+
+def _same(metres: float, degrees: float) -> bool:
+    return metres < SAME_STAND_M and degrees < SAME_VIEW_DEG
 
 
 def clicks_of(camera: str, pitch: Field, points: list[ClickedPoint]) -> Clicks:

@@ -30,7 +30,7 @@ class Failure(Exception):  # noqa: N818
 
     def __init__(self, kind: str, detail: str, camera: str | None = None) -> None:
         super().__init__(detail)
-        self._kind, self._detail, self._camera = kind, detail, camera
+        self.kind, self._detail, self._camera = kind, detail, camera
 
     @property
     def error(self) -> JobError:
@@ -38,8 +38,12 @@ class Failure(Exception):  # noqa: N818
         # What a drawing needs would take twice as long to load with all that a job can be.
         from service.wire.job import JobError
 
-        told = {"type": type_of(self._kind), "title": KINDS[self._kind].title}
+        told = {"type": type_of(self.kind), "title": KINDS[self.kind].title}
         return JobError(**told, detail=self._detail, camera=self._camera)
+
+    def because(self, why: str) -> Failure:
+        """The same, with its likeliest cause."""
+        return Failure(self.kind, f"{self._detail} {why[0].upper()}{why[1:]}.", self._camera)
 
 
 def decoded(file: bytes, flags: int) -> Picture | None:
@@ -101,7 +105,7 @@ def camera_of(camera: geometry.PosedCamera) -> Camera:
 def light_of(light: geometry.Light) -> Light:
     """How a camera's picture is evened out, for the engine: colours from blue to red."""
     red, green, blue = light.gain
-    return Light((blue, green, red), light.contrast, light.falloff)
+    return Light((blue, green, red), light.contrast, light.falloff, light.reach)
 
 
 def watching(camera: geometry.PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:

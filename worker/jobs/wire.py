@@ -84,7 +84,9 @@ def wire_lens(lens: Intrinsics) -> geometry.Intrinsics:
 
 def wire_light(light: Light) -> geometry.Light:
     """How a camera's picture is evened out, for the wire: colours from red to blue."""
-    return geometry.Light(gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff)
+    return geometry.Light(
+        gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff, reach=light.reach
+    )
 
 
 def wire_pose(pose: Pose) -> geometry.Pose:

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.stitch.light import Light, lights
+from worker.calibration.stitch.evening import evened_out
+from worker.calibration.stitch.light import Light
 from worker.calibration.stitch.panorama import Panorama, panorama
 from worker.calibration.stitch.views import View, ViewChoice, chosen_view
 from worker.video.clips import Clip, Shot
@@ -165,7 +166,7 @@ def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, f
         shown = [fitted[camera] for camera in clips]
         light = scene.lights
         if light is None:
-            light = lights(
+            light = evened_out(
                 scene.pitch,
                 [fitted[camera] for camera in first],
                 {camera: picture.colours for camera, picture in first.items()},

@@ -44,11 +44,11 @@ class Drawings:
         if stored is not None or not together:
             return stored
         lock = self._drawing.setdefault(f"{job_id}/{together[0]}", asyncio.Lock())
-        async with _waited_for(lock):
+        async with waited_for(lock):
             stored = await run_in_threadpool(self._stored, pictures, name)
             if stored:
                 return stored
-            async with _waited_for(self._turns):
+            async with waited_for(self._turns):
                 return await run_in_threadpool(self._draw, job_id, pictures, name)
 
     def _draw(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
@@ -86,7 +86,7 @@ class Drawings:
 
 
 @asynccontextmanager
-async def _waited_for(turn: asyncio.Lock | asyncio.Semaphore) -> AsyncIterator[None]:
+async def waited_for(turn: asyncio.Lock | asyncio.Semaphore) -> AsyncIterator[None]:
     """In one's turn, if it comes soon; who has waited long is told to come again."""
     try:
         async with asyncio.timeout(PATIENCE_S):

@@ -13,6 +13,8 @@ from service import lifeline
 from service.wire.problems import Problem
 
 log = structlog.get_logger()
+# What a program ends with that cannot do what it was asked, and has said why on its standard error.
+REFUSALS = {os.EX_UNAVAILABLE: "extra-missing", os.EX_DATAERR: "view-too-large"}
 
 
 class OneAtATime:
@@ -40,7 +42,7 @@ class OneAtATime:
 def answer(what: str, command: Sequence[str], environment: Mapping[str, str], given: bytes, longest_s: float) -> bytes:
     """What a program writes to its standard output for what it is `given` on its input.
 
-    One that lacks a package says so on its standard error and ends with `os.EX_UNAVAILABLE`.
+    One that cannot do it says why on its standard error and ends with one of `REFUSALS`.
     """
     try:
         done = subprocess.run(
@@ -55,8 +57,8 @@ def answer(what: str, command: Sequence[str], environment: Mapping[str, str], gi
         raise Problem("unavailable", f"The {what} was not done after {longest_s:g} s.") from error
     except subprocess.CalledProcessError as error:
         said = error.stderr.decode(errors="replace")
-        if error.returncode == os.EX_UNAVAILABLE:
-            raise Problem("extra-missing", f"{said.strip()}.") from None
+        if error.returncode in REFUSALS:
+            raise Problem(REFUSALS[error.returncode], f"{said.strip()}.") from None
         log.error("a program failed", program=what, stderr=said[-2000:])
         raise
     return done.stdout

@@ -15,11 +15,11 @@ export class Refused extends Error {
 /** Headers that a page of a session sends with what it changes. */
 export const signed = token ? {"X-CSRF-Token": token} : {};
 
-/** Call the interface; returns the JSON of the answer, null without a body. */
-export async function call(method, address, content) {
+/** Call the interface; returns the JSON of the answer, null without a body. `more`: headers. */
+export async function call(method, address, content, more = {}) {
   const body = content === undefined || content instanceof FormData ? content : JSON.stringify(content);
   const type = method === "PATCH" ? "application/merge-patch+json" : "application/json";
-  const headers = {...signed, ...(typeof body === "string" ? {"Content-Type": type} : {})};
+  const headers = {...signed, ...(typeof body === "string" ? {"Content-Type": type} : {}), ...more};
   let answer;
   try {
     answer = await fetch(address, {method, headers, body});

@@ -87,11 +87,13 @@ def options_of(form: FormData, model: type[Chosen], settings: Settings) -> Chose
     part = parts[0] if parts else "{}"
     try:
         data: str | bytes = part.file.read(LONGEST_OPTIONS + 1) if isinstance(part, UploadFile) else part
-        options = model.model_validate(json.loads(data))
-    except ValidationError as error:
-        raise invalid(error, OPTIONS_PART) from None
+        document = json.loads(data)
     except (ValueError, RecursionError):
         raise Problem("invalid-request", "The options part is not JSON.", errors=[]) from None
+    try:
+        options = model.model_validate(document)
+    except ValidationError as error:
+        raise invalid(error, model, document, OPTIONS_PART) from None
     if options.callback_url is not None:
         callback_urls.check(options.callback_url, settings)
     return options

@@ -11,11 +11,13 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.engine import Repository, reading
+from service.store.revisions import TAKEN
 from service.wire.geometry import Moved
 from service.wire.names import OPEN, Status
 from service.wire.results import Verdict
 
 j = tables.jobs.c
+r = tables.revisions.c
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,12 @@ class PastCalibrations(Repository):
             .order_by(j.id.desc())
             .limit(1)
         )
+        with reading(self._engine) as connection:
+            return connection.scalar(query)
+
+    def last_taken(self, venue: str) -> str | None:
+        """The last job whose poses a venue took: of all its jobs, the one whose frames and pictures stay."""
+        query = sa.select(r.job).where(r.venue == venue, r.cause.in_(TAKEN)).order_by(r.number.desc()).limit(1)
         with reading(self._engine) as connection:
             return connection.scalar(query)
 

@@ -22,7 +22,7 @@ from service.wire.job import JobError
 from service.wire.names import OPEN, Status
 from service.wire.options import Options
 from service.wire.results import AnyResult
-from service.wire.told.events import Webhook
+from service.wire.told.webhooks import Webhook
 
 # What must still hold of a row when it is written.
 Still = list[sa.ColumnElement[bool]]

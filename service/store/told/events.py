@@ -16,7 +16,8 @@ from service.store import tables
 from service.store.engine import clock
 from service.store.told.deliveries import add_event_delivery
 from service.wire.base import Wire
-from service.wire.told.events import VenueChange, Webhook, is_of
+from service.wire.told.events import VenueChange, is_of
+from service.wire.told.webhooks import Webhook
 from service.wire.venue import Venue
 
 e = tables.events.c

@@ -1,14 +1,13 @@
-"""What happens to a venue, as those hear of it who follow it, and the webhooks that are told."""
+"""What happens to a venue, as those hear of it who follow it."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
-from service.wire.addresses import CallbackUrl
 from service.wire.base import Id, Wire
 from service.wire.geometry import PosedCamera, Row
 from service.wire.health import AlarmEvent
@@ -18,16 +17,6 @@ from service.wire.names import EventKind
 
 # Nothing comes after it.
 LAST = "venue.deleted"
-WEBHOOK_EXAMPLE: dict[str, Any] = {"url": "https://example.com/poses", "events": ["poses.changed"]}
-
-
-class Webhook(Wire):
-    """An address that is told of what happens to a venue, signed (Standard Webhooks), again for a day if need be."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [WEBHOOK_EXAMPLE]})
-
-    url: CallbackUrl
-    events: Annotated[list[EventKind], Field(min_length=1, max_length=4)] = Field(["poses.changed"])
 
 
 class Poses(Wire):

@@ -2,15 +2,18 @@
 
 import asyncio
 import inspect
+import threading
 import time
-from contextlib import aclosing
+from contextlib import aclosing, contextmanager
 from datetime import UTC, datetime
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import islice
 
 import httpx
 import pytest
 
 from service import client as client_module
+from service import refused as refused_module
 from service.client import AsyncClient, Client, Refused
 from service.wire.health import AlarmEvent, VenueAlarm
 from service.wire.told.events import VenueChange, VenueEvent
@@ -65,7 +68,7 @@ def test_the_same_without_blocking(service, frames, name):
 def test_both_clients_have_the_same_methods_with_the_same_signatures():
     clients = Client("http://127.0.0.1:9"), AsyncClient("http://127.0.0.1:9")
     names = [name for name in dir(Client) if not name.startswith("_") and name != "url_of"]
-    assert len(names) == 24
+    assert len(names) == 25
     for name in names:
         blocking, awaited = (getattr(client, name) for client in clients)
         assert inspect.signature(blocking) == inspect.signature(awaited)
@@ -202,3 +205,58 @@ def test_who_takes_time_over_an_event_does_not_take_the_service_for_away(monkeyp
             told.append(event)
             time.sleep(0.2)
     assert told == [created, DELETED]
+
+
+@contextmanager
+def busy_service(retry_after):
+    """A service that is busy once and then has one event; yields its address and when it was asked."""
+    asked = []
+
+    class Answers(BaseHTTPRequestHandler):
+        def do_GET(self):
+            asked.append(time.monotonic())
+            if len(asked) == 1:
+                self.send_response(503)
+                self.send_header("Retry-After", retry_after)
+            else:
+                self.send_response(200)
+            content = stream_of(DELETED) if len(asked) > 1 else b"{}"
+            self.send_header("Content-Length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content)
+
+        def log_message(self, *_):
+            """Not into the output of the tests."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Answers) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}", asked
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+@pytest.mark.parametrize(
+    ("retry_after", "least_s", "most_s"),
+    [("1", 1.0, 10.0), ("86400", 1.5, 10.0), ("0", 0.05, 1.0), ("Wed, 21 Oct 2026 07:28:00 GMT", 0.05, 1.0)],
+)
+@pytest.mark.parametrize("blocking", [True, False])
+def test_a_busy_service_is_asked_again_when_it_says(retry_after, least_s, most_s, blocking, monkeypatch):
+    monkeypatch.setattr(client_module, "AGAIN_S", 0.05)
+    monkeypatch.setattr(refused_module, "LONGEST_PAUSE_S", 1.5)
+
+    async def awaited(url):
+        async with AsyncClient(url) as client:
+            return [event async for _, event in client.venue_events("v")]
+
+    with busy_service(retry_after) as (url, asked):
+        if blocking:
+            with Client(url) as client:
+                told = [event for _, event in client.venue_events("v")]
+        else:
+            told = asyncio.run(awaited(url))
+    assert told == [DELETED]
+    first, second = asked
+    assert least_s <= second - first < most_s

@@ -183,9 +183,11 @@ def test_garbage_in_the_options_is_refused(service, stadium, options):
 
 
 def test_options_may_come_as_a_file_but_once(service, stadium):
-    options = ("options", ("o.json", b'{"surprise": 1}'))
+    options = ("options", ("o.json", b'{"generation": 1}'))
     answer = service.http.post(f"/venues/{stadium}/calibrate", files=[*upload(), options])
-    assert answer.json()["errors"][0]["where"] == "options.surprise"
+    assert answer.json()["errors"] == [
+        {"where": "options.generation", "message": "generation is not known; did you mean generations?"}
+    ]
     assert service.http.post(f"/venues/{stadium}/calibrate", files=[*upload(), options, options]).status_code == 422
 
 

@@ -3,11 +3,13 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
+from tests.e2e.commands import esc_here
 from tests.e2e.running import png
 from tests.worker.calibration.first.test_first_pose import CAMERA, LENS, SIZE, clicks
 from tests.worker.calibration.first.test_lens_calibration import BOARD, PINHOLE, corners_seen, photograph, places
@@ -201,3 +203,19 @@ def test_esc_goes_from_photos_and_clicks_to_a_venue(tmp_path, photos):
     (tmp_path / "few.json").write_text(json.dumps({"left": points()[:3]}))
     assert esc("pose", "site.json", "few.json", "left=left.json", "-o", "no.json").returncode == 2
     assert not (tmp_path / "no.json").exists()
+
+
+def test_esc_says_which_cameras_had_their_points_exchanged(tmp_path):
+    wide = replace(LENS, matrix=LENS.matrix * [[0.9], [0.9], [1]] + [[0, 0, 97], [0, 0, 53], [0, 0, 0]])
+    seen = {"left": LENS, "right": wide}
+    for name, lens in seen.items():
+        described = {"matrix": lens.matrix.tolist(), "distortion": lens.distortion.tolist()}
+        written = json.dumps({"image_size": list(SIZE), "intrinsics": described})
+        (tmp_path / f"{name}.json").write_text(written)
+    (tmp_path / "site.json").write_text(json.dumps({key: venue("v")[key] for key in ("id", "field")}))
+    exchanged = {"left": points(clicks(camera=CAMERA.with_lens(wide))), "right": points()}
+    (tmp_path / "clicks.json").write_text(json.dumps(exchanged))
+    posed = esc_here(tmp_path, "pose", "site.json", "clicks.json", "left=left.json", "right=right.json", "-o", "v.json")
+    assert posed.returncode == 3, posed.stderr
+    assert posed.stderr.count("the points of the two cameras are exchanged, or else their lenses") == 2
+    assert not (tmp_path / "v.json").exists()

@@ -183,7 +183,8 @@ def test_the_renderer_of_the_documents_has_the_poses_also_after_a_restart_of_the
     service = start("up").ready()
     service.venue("v")
     file = tmp_path / "poses.json"
-    command = [sys.executable, RENDERER, service.url, "v", file]
+    # With the standard library alone: whoever draws has copied the file.
+    command = [sys.executable, "-I", "-S", RENDERER, service.url, "v", file]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, text=True, env=os.environ | lifeline.for_child()
     ) as renderer:
@@ -205,3 +206,9 @@ def test_the_renderer_of_the_documents_has_the_poses_also_after_a_restart_of_the
             assert renderer.wait(DEADLINE_S) == 1
         finally:
             renderer.kill()
+
+
+def test_the_renderer_of_the_documents_ends_where_no_venue_is(service):
+    ended = subprocess.run([sys.executable, "-I", "-S", RENDERER, service.url, "nowhere", "x"], capture_output=True)
+    assert ended.returncode == 1
+    assert b"There is no such venue" in ended.stderr

@@ -191,6 +191,26 @@ def test_a_wrong_venue_is_refused_and_the_place_named(service, name, path, value
     assert f"body.{where}" in [error["where"] for error in answer.json()["errors"]]
 
 
+def test_a_part_that_is_misspelt_is_told_in_words(service, name):
+    document = venue(name)
+    document["cameras"][0]["image_sise"] = document["cameras"][0].pop("image_size")
+    answer = service.http.put(f"/venues/{name}", json=document).json()
+    assert answer["errors"] == [
+        {"where": "body.cameras.0.image_size", "message": "cameras.left.image_size is missing"},
+        {
+            "where": "body.cameras.0.image_sise",
+            "message": "cameras.left.image_sise is not known; did you mean image_size?",
+        },
+    ]
+    service.http.put(f"/venues/{name}", json=venue(name)).raise_for_status()
+    patched = service.http.patch(f"/venues/{name}", json={"cameras": {"left": {"image_sise": [64, 48]}}}).json()
+    assert patched["detail"] == "cameras.left.image_sise is not known; did you mean image_size?"
+    restored = service.http.post(f"/venues/{name}/restore", json={"revison": 1}).json()
+    assert "revison is not known; did you mean revision?" in [error["message"] for error in restored["errors"]]
+    asked = service.http.get("/venues", params={"limit": "many"}).json()
+    assert asked["detail"] == "query.limit: expected a whole number, came 'many'"
+
+
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", "9" * 400, "9" * 5000, '"\\ud800"'])
 def test_numbers_that_are_none_are_refused(service, number):
     text = json.dumps(venue("wrong")).replace("105", number)

@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.wire.job import JobError
-from service.wire.told.events import Webhook
+from service.wire.told.webhooks import Webhook
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock, anyway
 

@@ -3,6 +3,7 @@ from pydantic import ValidationError
 
 from service.wire.geometry import Pose
 from service.wire.venue import VENUE_EXAMPLE, VenueIn
+from service.wire.view import VIEW_EXAMPLE
 
 
 def test_the_documented_venue_is_one():
@@ -56,3 +57,29 @@ def test_areas_that_are_not_in_the_frame_are_refused():
         VenueIn.model_validate(ignoring([[0, 0], [4000, 10], [10, 10]]))
     with pytest.raises(ValidationError, match="at least 3"):
         VenueIn.model_validate(ignoring([[0, 0], [10, 10]]))
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        {"width_px": 1921},
+        {"width_px": 300},
+        {"width_px": 1920.5},
+        {"height_px": "1080"},
+        {"field_of_view_deg": 0},
+        {"pan_deg": 181},
+        {"horizon": float("nan")},
+        {"projection": "mercator"},
+        {"zoom": 2},
+    ],
+)
+def test_a_view_that_no_picture_can_have_is_refused(view):
+    with pytest.raises(ValidationError, match=f"view.{next(iter(view))}"):
+        VenueIn.model_validate(VENUE_EXAMPLE | {"view": view})
+
+
+def test_the_choice_of_a_view_is_kept_with_the_venue():
+    stored = VenueIn.model_validate(VENUE_EXAMPLE | {"view": VIEW_EXAMPLE}).stored()
+    assert stored.view.but({"pan_deg": 3}).model_dump() == VIEW_EXAMPLE | {"pan_deg": 3, "field_of_view_deg": None}
+    assert stored.sent().view == stored.view
+    assert VenueIn.model_validate(VENUE_EXAMPLE).stored().view is None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
-from worker.calibration.stitch.light import Light, lights
+from worker.calibration.stitch.evening import evened_out
+from worker.calibration.stitch.light import Light
 from worker.calibration.stitch.panorama import Panorama, panorama
 from worker.calibration.stitch.views import View, ViewFromAbove
 
@@ -67,4 +68,6 @@ def birdseye(
 def _made(
     pitch: Field, view: View, cameras: Sequence[Camera], frames: Mapping[str, Frame], evened: Mapping[str, Light]
 ) -> Panorama:
-    return panorama(pitch, view, cameras, evened or lights(pitch, cameras, frames))
+    """With seams in the middle between cameras, where wrong poses show, and not where they would be seen least."""
+    lights = evened or evened_out(pitch, cameras, frames)
+    return panorama(pitch, view, cameras, {camera: replace(light, reach=0.0) for camera, light in lights.items()})

@@ -27,7 +27,7 @@ def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask)
     Where the pixels lie wider than those of the image, means over about the area between them.
     """
     x, y = (np.array(pixels[..., axis], np.float32) for axis in (0, 1))
-    level = np.clip(np.floor(0.5 * np.log2(np.maximum(_footprint(x, y), 1.0))), 0, 5).astype(np.uint8)
+    level = level_of_detail(pixels)
     values = np.zeros((*valid.shape, *image.shape[2:]), image.dtype)
     x[~valid] = y[~valid] = 0
     for number in np.unique(level[valid]):
@@ -40,6 +40,12 @@ def sampled(image: NDArray[Any], pixels: NDArray[np.floating[Any]], valid: Mask)
         found = cv2.remap(small, *place, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         values[around][chosen[around]] = found[chosen[around]]
     return values
+
+
+def level_of_detail(pixels: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """How often (H, W) an image is halved before it is sampled at pixels (H, W, 2), neighbours in a picture."""
+    x, y = (np.array(pixels[..., axis], np.float32) for axis in (0, 1))
+    return np.clip(np.floor(0.5 * np.log2(np.maximum(_footprint(x, y), 1.0))), 0, 5).astype(np.uint8)
 
 
 def quality(size: tuple[int, int], pixels: Array) -> NDArray[np.float32]:

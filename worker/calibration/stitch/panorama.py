@@ -94,18 +94,18 @@ def panorama(
     pitch: Field, view: View, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
 ) -> Panorama:
     """How the cameras' frames become one view. `lights` by camera; a camera that has none is taken as it is."""
+    lights = lights or {}
     points = view.behind(pitch, _every_nth_pixel(view.size))
     pixels = [camera.project(points) for camera in cameras]
     qualities = np.stack(
         [
-            _every_pixel(quality(camera.intrinsics.size, at), view.size)
+            _every_pixel(quality(camera.intrinsics.size, at) * np.exp(lights.get(camera.id, NEUTRAL).reach), view.size)
             for camera, at in zip(cameras, pixels, strict=True)
         ]
     )
     sources = [_every_pixel(at, view.size) for at in pixels]
     valid = np.stack([inside(at, camera.intrinsics.size) for camera, at in zip(cameras, sources, strict=True)])
     weights = seam_weights(np.where(valid, np.maximum(qualities, 1e-9), np.float32(0)))
-    lights = lights or {}
     parts = [
         Part(
             camera.id,

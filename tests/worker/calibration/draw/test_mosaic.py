@@ -26,7 +26,7 @@ from worker.calibration.scene.camera import (
     rotation_vectors,
 )
 from worker.calibration.scene.field import Field
-from worker.calibration.stitch.light import LARGEST_GAIN, lights
+from worker.calibration.stitch.evening import LARGEST_GAIN, evened_out
 from worker.calibration.stitch.panorama import BACKDROP, panorama, seam_weights
 from worker.calibration.stitch.views import View, ViewChoice, chosen_view
 
@@ -109,7 +109,7 @@ def test_exposures_are_evened_out() -> None:
 
 def test_an_exposure_gain_is_bounded() -> None:
     pictures = {one.id: np.full((540, 960, 3), value, np.uint8) for one, value in zip(CAMERAS, (200, 40), strict=True)}
-    found = lights(CROWNED, CAMERAS, pictures)
+    found = evened_out(CROWNED, CAMERAS, pictures)
     assert all(1 / LARGEST_GAIN <= gain <= LARGEST_GAIN for light in found.values() for gain in light.gain)
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames
-from worker.calibration.stitch.light import NEUTRAL, Light, lights, squared_radius
+from worker.calibration.stitch.evening import evened_out
+from worker.calibration.stitch.light import NEUTRAL, Light, squared_radius
 from worker.calibration.stitch.panorama import panorama
 from worker.calibration.stitch.views import ViewChoice, chosen_view
 
@@ -64,14 +65,14 @@ def test_exposure_white_balance_contrast_and_dark_corners_are_evened_out(light):
     frames = textured()
     frames["right"] = seen_by(frames["right"], light)
     before = apart(frames, {})
-    after = apart(frames, lights(CROWNED, CAMERAS, frames))
+    after = apart(frames, evened_out(CROWNED, CAMERAS, frames))
     assert before > 0.02
     assert after < 0.015
     assert after < before / 3
 
 
 def test_cameras_that_agree_are_left_as_they_are():
-    for light in lights(CROWNED, CAMERAS, textured()).values():
+    for light in evened_out(CROWNED, CAMERAS, textured()).values():
         assert light.gain == pytest.approx((1, 1, 1), abs=0.01)
         assert abs(light.contrast) < 0.02
         assert abs(light.falloff) < 0.02
@@ -79,18 +80,18 @@ def test_cameras_that_agree_are_left_as_they_are():
 
 def test_players_who_stand_in_one_view_of_the_overlap_move_nothing():
     frames = textured()
-    empty = lights(CROWNED, CAMERAS, frames)
+    empty = evened_out(CROWNED, CAMERAS, frames)
     rng = np.random.default_rng(3)
     for _ in range(12):
         x, y = int(rng.uniform(0, 300)), int(rng.uniform(200, 450))
         frames["right"][y : y + 50, x : x + 20] = rng.integers(0, 255, 3)
-    crowded = lights(CROWNED, CAMERAS, frames)
+    crowded = evened_out(CROWNED, CAMERAS, frames)
     for camera, light in crowded.items():
         assert light.gain == pytest.approx(empty[camera].gain, abs=0.02)
 
 
 def test_a_camera_that_overlaps_no_other_has_no_light_to_be_evened_out():
-    assert lights(CROWNED, CAMERAS[:1], textured()) == {}
+    assert evened_out(CROWNED, CAMERAS[:1], textured()) == {}
 
 
 def test_a_new_light_counts_by_a_part_beside_the_one_that_was_kept():

@@ -1,0 +1,93 @@
+"""A stitched view's package or its picture, in a process of its own: `python -m worker.programs.stitch`.
+
+What comes is a `service.wire.programs.stitching.Stitching` and, for a picture, frames; what leaves is a zip or a JPEG.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import cv2
+
+from service import lifeline
+from service.wire.programs.files import files_in
+from service.wire.programs.stitching import Stitching
+from worker.calibration.draw.layers import seam_layer
+from worker.calibration.stitch.panorama import Panorama, Part, panorama
+from worker.calibration.stitch.views import ViewChoice, chosen_view
+from worker.jobs.reading import Picture, camera_of, decoded, decoded_frame, jpeg, light_of, pitch_of
+from worker.programs.stitch.package import package
+from worker.programs.stitch.scaled import in_scaled, scaled_size
+
+# Pixels of a view times cameras: about 50 bytes are needed for each.
+MOST_PLACES = 80_000_000
+
+
+def main() -> None:
+    """Read what is wanted, write it."""
+    lifeline.end_with_parent()
+    given = sys.stdin.buffer.read()
+    end = given.index(b"\n")
+    asked = Stitching.model_validate_json(given[:end])
+    cv2.setNumThreads(asked.threads)
+    made = stitched(asked)
+    if asked.wanted == "picture":
+        answer = jpeg(picture(asked, made, files_in(given[end + 1 :], asked.sizes)))
+    else:
+        answer = package(asked, made)
+    sys.stdout.buffer.write(answer)
+
+
+def stitched(asked: Stitching) -> Panorama:
+    """How frames become the view that was chosen."""
+    pitch, cameras, choice = pitch_of(asked.field), [camera_of(camera) for camera in asked.cameras], asked.view
+    view = chosen_view(
+        pitch,
+        cameras,
+        ViewChoice(
+            choice.projection,
+            choice.width_px,
+            choice.height_px,
+            choice.field_of_view_deg,
+            choice.pan_deg,
+            choice.horizon,
+        ),
+    )
+    width, height = view.size
+    if width * height * len(cameras) > MOST_PLACES:
+        print(f"{len(cameras)} cameras in {width}x{height} pixels are too much: ask for fewer pixels", file=sys.stderr)
+        sys.exit(os.EX_DATAERR)
+    return panorama(pitch, view, cameras, {camera: light_of(light) for camera, light in asked.lights.items()})
+
+
+def picture(asked: Stitching, made: Panorama, files: Mapping[str, bytes]) -> Picture:
+    """What the view makes of frames. Somebody waits for it: they are read no larger than it shows them."""
+    with ThreadPoolExecutor(asked.threads) as each:
+        read = [*each.map(lambda part: _read(part, files[part.camera]), made.parts)]
+    smaller = replace(made, parts=[part for part, _ in read])
+    drawn = smaller.picture({part.camera: frame for part, frame in read})
+    if asked.seam:
+        layer = seam_layer(made.owner)
+        painted = layer[..., 3] > 0
+        drawn[painted] = layer[painted, :3]
+    return drawn
+
+
+def _read(part: Part, file: bytes) -> tuple[Part, Picture]:
+    """A camera's frame, and what it gives to the view as it was read: of half the size where that is enough."""
+    width, height = part.frame_size
+    if width % 2 or height % 2 or scaled_size(part)[0] > width // 2:
+        return part, decoded_frame(part.camera, [width, height], file)
+    half = decoded(file, cv2.IMREAD_REDUCED_COLOR_2)
+    if half is None or half.shape[:2] != (height // 2, width // 2):
+        return part, decoded_frame(part.camera, [width, height], file)
+    size = width // 2, height // 2
+    return replace(part, frame_size=size, source=in_scaled(part, size)), half
+
+
+if __name__ == "__main__":
+    main()
