@@ -256,7 +256,7 @@ def _stored_choice(venue: Venue) -> ViewChoice:
     """What the venue itself wants to show."""
     from worker.calibration.stitch.views import ViewChoice
 
-    kept = getattr(venue, "view", None)
+    kept = venue.view
     if kept is None:
         return ViewChoice()
     return ViewChoice(

@@ -25,10 +25,12 @@ import cv2
 import numpy as np
 
 from service.wire.venue import VenueIn
-from worker.calibration.stitch.light import MIDDLE, lights
+from worker.calibration.stitch.evening import evened_out
+from worker.calibration.stitch.light import MIDDLE, NEUTRAL
 from worker.calibration.stitch.panorama import Panorama, panorama
 from worker.calibration.stitch.views import ViewChoice, chosen_view
 from worker.jobs.reading import camera_of, pitch_of
+from worker.jobs.wire import wire_light
 
 DEMO = Path(__file__).parents[1] / "demo"
 RATE, NOISE = 25, 2.0
@@ -113,11 +115,10 @@ def _panorama(home: Path, frames: dict[str, np.ndarray], lit: bool) -> Panorama:
         camera["pose"] = truth[camera["id"]]
     venue = VenueIn.model_validate(document).stored()
     pitch, cameras = pitch_of(venue.field), [camera_of(camera) for camera in venue.cameras]
-    found = lights(pitch, cameras, frames) if lit else {}
+    found = evened_out(pitch, cameras, frames) if lit else {}
     for camera in document["cameras"]:
         light = found.get(camera["id"])
-        gain, contrast, falloff = (light.gain[::-1], light.contrast, light.falloff) if light else ([1, 1, 1], 0, 0)
-        camera["light"] = {"gain": list(gain), "contrast": contrast, "falloff": falloff}
+        camera["light"] = wire_light(light or NEUTRAL).model_dump()
     (home / "venue.json").write_text(json.dumps(document))
     return panorama(pitch, chosen_view(pitch, cameras, CHOICE), cameras, found)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
 
@@ -120,7 +120,9 @@ class _View:
         grey = np.clip((np.arange(256) - BLACK) * 255 / 219, 0, 255)
         bent = np.stack([np.interp(grey, np.arange(256), tones[:, colour]) for colour in range(3)], axis=-1)
         luma = bent @ TO_PLANES[0, :3] + BLACK
-        return cls(part.camera, light != NEUTRAL, _rounded(tones)[:, None], _rounded(luma), light.falloff)
+        return cls(
+            part.camera, replace(light, reach=0.0) != NEUTRAL, _rounded(tones)[:, None], _rounded(luma), light.falloff
+        )
 
 
 @dataclass(frozen=True)
