@@ -16,7 +16,6 @@ import typer
 
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Url, checked
 from service.cli.calling import called
-from service.cli.following import document_of, following, tell_motions
 from service.cli.printing import FAILED, USAGE, fail, progress, tell
 from service.wire.names import ID_PATTERN
 
@@ -140,6 +139,7 @@ def stitch(
     from service.cli.local import engine_settings
 
     settings = engine_settings()
+    from service.cli.following import following, tell_motions
     from worker.video.faults import VideoFault
     from worker.video.stitch import Plan, Standing
     from worker.video.stitch import stitch as stitched
@@ -287,6 +287,8 @@ def _tell(made: Stitched) -> None:
 
 
 def _document(made: Stitched, output: str, motions: Mapping[str, Motion]) -> dict[str, Any]:
+    from service.cli.following import document_of
+
     return {
         "output": output,
         "width_px": made.size[0],

@@ -47,7 +47,8 @@ def test_what_is_shown_and_where_the_seam_is_does_not_move_with_the_cameras():
     before = moving.at(pair())
     now = moving.at([moved(camera, np.append(0.2 * TURN, np.zeros(3))) for camera in pair()])
     for a, b in zip(before.parts, now.parts, strict=True):
-        np.testing.assert_allclose(a.weight, b.weight, atol=1e-6)
+        # The very same: a renderer keeps what it has made of them.
+        assert a.weight is b.weight
     whole = panorama(CROWNED, view_of("pannini"), pair())
     assert before.seen.sum() > 0.95 * whole.seen.sum()
 
