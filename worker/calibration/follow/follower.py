@@ -135,7 +135,7 @@ class _Track:
         if seen is None:
             raise _not_seen(reference)
         self.lines.learn(seen, reference)
-        self._last = State.at_reference(np.asarray(np.linalg.inv(self.lines.observed(seen).information), float))
+        self._last = State.at_reference(self.lines.observed(seen).information)
         self._steps = [Step(0.0, self._last)]
         self._how: list[How] = ["measured"]
 

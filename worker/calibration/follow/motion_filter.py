@@ -42,10 +42,12 @@ class State:
     covariance: Array
 
     @classmethod
-    def at_reference(cls, covariance: Array) -> State:
-        """A camera that is where its reference is, as sure (6, 6) as that was seen, and moves nobody knows how."""
+    def at_reference(cls, information: Array) -> State:
+        """A camera that is where its reference is, as much as is known (6, 6) of that, and moves nobody knows how."""
+        place = np.linalg.inv(information + np.diag(np.repeat([BACK_RAD, BACK_M], 3) ** -2.0))
         speed = np.diag(np.repeat([FIRST_RAD_S, FIRST_M_S], 3) ** 2)
-        return cls(np.zeros(2 * POSE_NUMBERS), np.pad(covariance, (0, POSE_NUMBERS)) + np.pad(speed, (POSE_NUMBERS, 0)))
+        covariance = np.pad(place, (0, POSE_NUMBERS)) + np.pad(speed, (POSE_NUMBERS, 0))
+        return cls(np.zeros(2 * POSE_NUMBERS), np.asarray(covariance, float))
 
     @property
     def change(self) -> Array:

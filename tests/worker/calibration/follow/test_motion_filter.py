@@ -13,7 +13,7 @@ RATE = np.array([0.02, -0.01, 0.015, 0.05, -0.04, 0.02])
 
 def filtered(changes, rng=None):
     """The steps of a filter that sees changes (T, 6), with noise if there is an `rng`."""
-    last = State.at_reference(np.diag(NOISE**2))
+    last = State.at_reference(INFORMATION)
     steps = [Step(0.0, last)]
     for change in changes:
         seen = change if rng is None else change + rng.normal(0, NOISE)
@@ -91,6 +91,11 @@ def test_a_direction_of_which_nothing_is_seen_stays_as_it_was():
     assert known.mean[4] == pytest.approx(state.mean[4], abs=1e-15)
     assert known.covariance[4, 4] == pytest.approx(state.covariance[4, 4])
     assert known.covariance[3, 3] < state.covariance[3, 3]
+
+
+def test_a_reference_that_hardly_any_line_holds_is_known_as_little():
+    state = State.at_reference(np.zeros((6, 6)))
+    assert np.degrees(np.sqrt(state.covariance[0, 0])) == pytest.approx(0.3)
 
 
 def test_a_rig_that_is_not_seen_for_long_is_somewhere_about_its_reference():
