@@ -25,10 +25,12 @@ Cameras in this order: {cameras}
 
 {how}
 view.json has the view, the cameras in their order, and how each is evened out with the others ("light"; null: not at
-all): a tone t of 0 to 255 becomes gain * 100 * (t / 100) ** (1 + contrast), and that is multiplied by
-exp(falloff * r * r), r from 0 in the middle of the frame to 1 in its corners; gains are of red, green and blue.
+all): a tone t of 0 to 255, as the file has it and not as linear light, becomes
+gain * 100 * (t / 100) ** (1 + contrast), and that is multiplied by exp(falloff * r * r), r from 0 in the middle of the
+frame to 1 in its corners; gains are of red, green and blue.
 
-The files hold until a camera moves or the view is changed. To fetch them anew only then:
+The files hold until a camera moves or the view is changed. To fetch them anew only then (with the options of the view,
+where it is not the venue's):
   esc venue stitch {venue} --format {form} -o stitch.zip --if-changed
 The service tells it as the event poses.changed (esc venue follow {venue} --only poses.changed).
 """
@@ -36,6 +38,7 @@ OF_FFMPEG = """A file of each camera, or a stream, becomes one picture; frames t
   ./stitch.sh {each}panorama.mp4
 The same without the script, for streams and encoders of your own; -i of the maps in the order of stitch.sh:
   ffmpeg {inputs}... -filter_complex_script stitch.ffscript -map "[stitched]" panorama.mp4
+From ffmpeg 7 on, -/filter_complex takes the place of -filter_complex_script.
 stitch.ffscript  the filter graph; its output [stitched] is yuv420p, BT.709, limited range
 *_x.pgm, *_y.pgm  per camera, for each pixel of the view the pixel of the scaled frame; 65535: none
 *_mask.pgm        how much a camera counts beside those before it
