@@ -295,7 +295,7 @@ def _window(pitch: Field, aim: LevelView, cameras: Sequence[Camera], seen: Array
         if sides[worst] <= UNSEEN_AT_EDGE:
             break
         x0, x1, y0, y1 = np.array([x0, x1, y0, y1]) + np.eye(4, dtype=int)[worst] * [1, -1, 1, -1]
-    left, right, top, bottom = WINDOW_STEP * np.round(
-        np.array([columns[x0], columns[x1], rows[y0], rows[y1]]) / WINDOW_STEP
-    )
+    # Inwards: beyond, there is less to be seen.
+    left, top = WINDOW_STEP * np.ceil(np.array([columns[x0], rows[y0]]) / WINDOW_STEP)
+    right, bottom = WINDOW_STEP * np.floor(np.array([columns[x1], rows[y1]]) / WINDOW_STEP)
     return left, max(right, left + WINDOW_STEP), top, max(bottom, top + WINDOW_STEP)
