@@ -17,7 +17,7 @@ import typer
 from service.cli.arguments import LOCAL, ApiKey, AsJson, Url, checked
 from service.cli.calling import called
 from service.cli.printing import FAILED, USAGE, fail, progress, tell
-from service.wire.names import ID_PATTERN
+from service.wire.names import ID_PATTERN, Projection
 
 if TYPE_CHECKING:
     from service.wire.venue import Venue
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 # In place of a number: as it suits the cameras, whatever the venue keeps.
 AUTO = "auto"
-PROJECTIONS = ("pannini", "cylinder", "rectilinear", "birds-eye")
 
 
 def stitch(
@@ -49,7 +48,7 @@ def stitch(
             "-o",
             "--output",
             metavar="CLIP",
-            help="File to write (.mp4, .mov, .mkv, .ts), or where to send it: udp://, rtsp://, rtmp://.",
+            help="File to write (.mp4, .mov, .mkv, .ts), or where to send it: rtsp://, rtmp://, srt://, udp://.",
         ),
     ],
     offset: Annotated[
@@ -64,12 +63,14 @@ def stitch(
     audio: Annotated[
         str | None,
         typer.Option(
-            "--audio", metavar="CAMERA|none", help="Whose sound is kept [default: the first clip's that has one]"
+            "--audio", metavar="CAMERA|none", help="Whose sound is kept; otherwise that of the first clip that has any."
         ),
     ] = None,
     rate: Annotated[
         str | None,
-        typer.Option("--rate", metavar="FPS", help="Pictures a second, 25 or 30000/1001 [default: the first clip's]"),
+        typer.Option(
+            "--rate", metavar="FPS", help="Pictures a second, 25 or 30000/1001; otherwise those of the first clip."
+        ),
     ] = None,
     begin: Annotated[
         str | None, typer.Option("--from", metavar="TIME", help="Where to begin: seconds, or hours:minutes:seconds.")
@@ -82,8 +83,7 @@ def stitch(
         ),
     ] = False,
     projection: Annotated[
-        str | None,
-        typer.Option("--projection", metavar="|".join(PROJECTIONS), help="[default: the venue's, or pannini]"),
+        Projection | None, typer.Option("--projection", help="How the picture is spread out; birds-eye: from above.")
     ] = None,
     width: Annotated[int | None, typer.Option("--width", min=64, max=8192, help="In pixels, even.")] = None,
     height: Annotated[str | None, typer.Option("--height", help="In pixels, even, or auto.")] = None,
@@ -120,8 +120,6 @@ def stitch(
     addresses = _by_camera(clips, "CAMERA=CLIP, for instance left=left.mp4")
     begin_s, end_s = (None if time is None else _seconds(time) for time in (begin, end))
     pictures = None if rate is None else _rate(rate)
-    if projection not in (None, *PROJECTIONS):
-        fail(f"--projection is one of {', '.join(PROJECTIONS)}, not {projection!r}", USAGE)
     if (poses_out is not None or follow_every > 1) and not follow:
         fail("--poses-out and --follow-every go with --follow", USAGE)
     chosen: dict[str, Any] = {

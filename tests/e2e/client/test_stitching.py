@@ -110,7 +110,7 @@ def test_the_light_that_a_venue_keeps_is_used(esc, name, clips, tmp_path):
         (
             ("left=l.mp4", "--projection", "fisheye"),
             2,
-            "--projection is one of pannini, cylinder, rectilinear, birds-eye",
+            "Invalid value for '--projection'",
         ),
         (("left=l.mp4", "--rate", "0"), 2, "--rate 0: pictures a second"),
         (("left=l.mp4", "--from", "1:xx"), 2, "'xx' is no number"),
