@@ -22,6 +22,7 @@ import numpy as np
 
 from tests.benchmarks.scenes import as_built
 from tests.demo.render import FIELD, HERE, cameras, outdated
+from tests.real.pair import FOLDER as PAIR_FOLDER
 from tests.real.pair import RealPair, picture
 from worker.calibration.follow.follower import Follower, Moment
 from worker.calibration.scene.camera import Array, Camera, Frame, inside
@@ -370,6 +371,8 @@ def main() -> None:
         "--lens", choices=("exact", "usual"), default="exact", help="whether the lenses are known exactly"
     )
     arguments = parser.parse_args()
+    if arguments.size == "real" and not PAIR_FOLDER.is_dir():
+        parser.error(f"the real pair is not there: put it into {PAIR_FOLDER}")
     film = Film.of(arguments.size, round(arguments.seconds * FRAMES_PER_SECOND))
     for run in RUNS:
         report(film, followed(film, run, arguments.lens), SIZES[arguments.size][1])
