@@ -50,7 +50,7 @@ def _by_the_file(camera: Camera, wanted: Mapping[str, Pose]) -> str:
 
 
 def _settings_lost(venue: Venue, stored: Venue) -> list[str]:
-    parts = ("alarms", "schedule", "webhooks")
+    parts = ("alarms", "schedule", "webhooks", "view")
     lost = [f"{part}: the file has none" for part in parts if getattr(stored, part) and not getattr(venue, part)]
     fetched = {camera.id for camera in venue.cameras if camera.source}
     blind = [camera.id for camera in stored.cameras if camera.source and camera.id not in fetched]

@@ -75,10 +75,12 @@ def test_settings_that_a_file_has_not_are_not_lost_unless_one_insists(service, e
     document["cameras"][0]["source"] = "http://127.0.0.1/x"
     document["cameras"][1]["intrinsics"]["sigma"] = {"fx": 0.5}
     document["cameras"][1]["ignore"] = [[[0, 0], [20, 0], [20, 20]]]
-    service.http.put(f"/venues/{name}", json=document | {"alarms": {"rejected_in_a_row": 2}}).raise_for_status()
+    settings = {"alarms": {"rejected_in_a_row": 2}, "view": {"projection": "cylinder"}}
+    service.http.put(f"/venues/{name}", json=document | settings).raise_for_status()
     refused = esc("venue", "put", "old.json")
     assert refused.returncode == 1
     assert "alarms: the file has none" in refused.stderr
+    assert "view: the file has none" in refused.stderr
     assert "the source of camera left: the file has none" in refused.stderr
     assert "the sigma of the lens of camera right: the file has none" in refused.stderr
     assert "the ignored areas of camera right: the file has none" in refused.stderr

@@ -23,8 +23,8 @@ from worker.jobs.reading import Picture, camera_of, decoded, decoded_frame, jpeg
 from worker.programs.stitch.package import package
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
-# Pixels of a view times cameras: about 50 bytes are needed for each.
-MOST_PLACES = 80_000_000
+# Pixels of a view times cameras: 45 bytes are needed for each. Two cameras in 8192x2400 pixels, four in 3840x2160.
+MOST_PLACES = 40_000_000
 
 
 def main() -> None:

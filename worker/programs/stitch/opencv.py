@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from worker.calibration.scene.look import box
 from worker.calibration.stitch.panorama import BACKDROP, Panorama
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
@@ -23,14 +24,18 @@ def files(made: Panorama) -> dict[str, bytes]:
     }
     for part in made.parts:
         size = scaled_size(part)
-        place = in_scaled(part, size)
+        counts = part.weight > 0
+        around = box(counts) if counts.any() else (slice(0, 1), slice(0, 1))
+        place = in_scaled(part, size)[around]
+        rows, columns = around
         of_camera = {
             "size": np.array(size),
+            "corner": np.array([columns.start, rows.start]),
             "x": place[..., 0],
             "y": place[..., 1],
-            "weight": part.weight,
+            "weight": part.weight[around],
             "tones": part.light.tones,
-            "rise": part.rise if part.light.falloff else np.ones((1, 1), np.float32),
+            "rise": part.rise[around] if part.light.falloff else np.ones((1, 1), np.float32),
         }
         arrays |= {f"{part.camera}_{name}": values for name, values in of_camera.items()}
     buffer = io.BytesIO()

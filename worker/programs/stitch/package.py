@@ -25,10 +25,12 @@ Cameras in this order: {cameras}
 
 {how}
 view.json has the view, the cameras in their order, and how each is evened out with the others ("light"; null: not at
-all): a tone t of 0 to 255 becomes gain * 100 * (t / 100) ** (1 + contrast), and that is multiplied by
-exp(falloff * r * r), r from 0 in the middle of the frame to 1 in its corners; gains are of red, green and blue.
+all): a tone t of 0 to 255, as the file has it and not as linear light, becomes
+gain * 100 * (t / 100) ** (1 + contrast), and that is multiplied by exp(falloff * r * r), r from 0 in the middle of the
+frame to 1 in its corners; gains are of red, green and blue.
 
-The files hold until a camera moves or the view is changed. To fetch them anew only then:
+The files hold until a camera moves or the view is changed. To fetch them anew only then (with the options of the view,
+where it is not the venue's):
   esc venue stitch {venue} --format {form} -o stitch.zip --if-changed
 The service tells it as the event poses.changed (esc venue follow {venue} --only poses.changed).
 """
@@ -36,8 +38,10 @@ OF_FFMPEG = """A file of each camera, or a stream, becomes one picture; frames t
   ./stitch.sh {each}panorama.mp4
 The same without the script, for streams and encoders of your own; -i of the maps in the order of stitch.sh:
   ffmpeg {inputs}... -filter_complex_script stitch.ffscript -map "[stitched]" panorama.mp4
+From ffmpeg 7 on, -/filter_complex takes the place of -filter_complex_script.
 stitch.ffscript  the filter graph; its output [stitched] is yuv420p, BT.709, limited range
-*_x.pgm, *_y.pgm  per camera, for each pixel of the view the pixel of the scaled frame; 65535: none
+*_x.pgm, *_y.pgm  of the part of the view that a camera sees, for each pixel that of its scaled frame; 65535: none
+*_dx.pgm, *_dy.pgm  how far beyond that pixel the place lies, in 256ths
 *_mask.pgm        how much a camera counts beside those before it
 *_falloff.pgm     how far its pixels lie between the least and the largest multiple for the falloff of its lens
 """
@@ -50,9 +54,10 @@ OF_OPENCV = """A picture of each camera becomes one (needs opencv-python-headles
   python stitch.py {pictures}panorama.png
 For video, load the maps once and give its function `stitched` the frames of each moment:
   from stitch import stitched; maps = dict(numpy.load("maps.npz")); picture = stitched(maps, [left, right])
-maps.npz  per camera: size (width, height) to scale its frames to; x, y, for each pixel of the view that of the
-          scaled frame; weight; tones, what becomes of each grey level of blue, green and red; rise, by what pixels are
-          multiplied for the falloff of the lens. backdrop: what is seen where no camera sees.
+maps.npz  per camera: size (width, height) to scale its frames to; corner, the column and row of the view where what it
+          sees begins; of that, for each pixel, x and y in the scaled frame, weight, and rise, by what it is multiplied
+          for the falloff of the lens; tones, what becomes of each grey level of blue, green and red.
+          backdrop: what is seen where no camera sees.
 """
 
 

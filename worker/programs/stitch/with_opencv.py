@@ -16,7 +16,8 @@ def stitched(maps: Mapping[str, Any], frames: Iterable[Any]) -> Any:
         x, y, tones, weight, rise = (maps[f"{camera}_{name}"] for name in ("x", "y", "tones", "weight", "rise"))
         scaled = cv2.resize(frame, maps[f"{camera}_size"].tolist(), interpolation=cv2.INTER_AREA)
         seen = cv2.remap(scaled, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        total += (weight * rise)[..., None] * cv2.LUT(seen, tones[:, None])
+        (left, top), (height, width) = maps[f"{camera}_corner"], weight.shape
+        total[top : top + height, left : left + width] += (weight * rise)[..., None] * cv2.LUT(seen, tones[:, None])
     return np.clip(np.rint(total), 0, 255).astype(np.uint8)
 
 

@@ -1,0 +1,72 @@
+"""Packages and previews of stitched views, as the service has them made."""
+
+import asyncio
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from service.api.programs import drawings
+from service.api.programs.stitches import Stitches
+from service.settings import Settings
+from service.wire.problems import Problem
+from service.wire.venue import VenueIn
+from service.wire.view import ViewChoice
+from tests.e2e.running import venue, wait_for
+
+# Says that it has begun, waits, and answers with what it was asked.
+SLOW = """
+import pathlib, sys, time
+pathlib.Path({begun!r}).touch()
+time.sleep({pause})
+sys.stdout.buffer.write(sys.stdin.buffer.read())
+"""
+WITHOUT_OPENEXR = """
+import sys
+sys.modules["OpenEXR"] = None
+from worker.programs.stitch.__main__ import main
+main()
+"""
+
+
+def stitches(program):
+    return Stitches(Settings(stitch_program=[sys.executable, "-P", "-c", program]))
+
+
+def question(made_by, wanted, **view):
+    stored = VenueIn.model_validate(venue("v")).stored()
+    return made_by.asked(stored, 1, view=ViewChoice(**{"width_px": 320, **view}), wanted=wanted, tag="")
+
+
+def test_one_package_is_made_at_a_time(tmp_path):
+    slow = stitches(SLOW.format(begun=str(tmp_path / "begun"), pause=1))
+    asked = question(slow, "ffmpeg")
+    with ThreadPoolExecutor(1) as aside:
+        first = aside.submit(slow.package, asked)
+        wait_for((tmp_path / "begun").exists)
+        with pytest.raises(Problem) as busy:
+            slow.package(asked)
+        assert first.result() == asked.model_dump_json().encode() + b"\n"
+    assert (busy.value.kind, busy.value.headers) == ("unavailable", {"Retry-After": "5"})
+
+
+def test_st_maps_need_openexr_and_say_what_to_install():
+    made_by = stitches(WITHOUT_OPENEXR)
+    with pytest.raises(Problem, match=r"pip install 'esc-calibration\[exr\]'") as told:
+        made_by.package(question(made_by, "st-map"))
+    assert told.value.kind == "extra-missing"
+
+
+def test_previews_wait_for_each_other_and_not_for_ever(tmp_path, monkeypatch):
+    slow = stitches(SLOW.format(begun=str(tmp_path / "begun"), pause=0.5))
+    asked = question(slow, "picture", width_px=3840, height_px=1000)
+
+    async def both(slow):
+        return await asyncio.gather(slow.preview(asked, {"left": b"frame"}), slow.preview(asked, {}))
+
+    with_frame, without = asyncio.run(both(slow))
+    assert with_frame.endswith(b"\nframe")
+    assert b'"width_px":1280,"height_px":334' in without
+    monkeypatch.setattr(drawings, "PATIENCE_S", 0.1)
+    with pytest.raises(Problem, match="Other pictures are being drawn"):
+        asyncio.run(both(stitches(SLOW.format(begun=str(tmp_path / "begun"), pause=0.5))))
