@@ -252,14 +252,10 @@ def _scene(venue: Venue, chosen: Mapping[str, Any]) -> Scene:
 
 def _stored_choice(venue: Venue) -> ViewChoice:
     """What the venue itself wants to show."""
-    from worker.calibration.stitch.views import ViewChoice
+    from service.wire.view import ViewChoice as Kept
+    from worker.jobs.reading import choice_of
 
-    kept = venue.view
-    if kept is None:
-        return ViewChoice()
-    return ViewChoice(
-        kept.projection, kept.width_px, kept.height_px, kept.field_of_view_deg, kept.pan_deg, kept.horizon
-    )
+    return choice_of(venue.view or Kept())
 
 
 def _tell(made: Stitched) -> None:

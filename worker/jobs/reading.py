@@ -10,13 +10,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from service.wire import geometry
+from service.wire import geometry, view
 from service.wire.field import FieldOfPlay
 from service.wire.problems import KINDS, type_of
 from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ignored import Ignored
 from worker.calibration.stitch.light import Light
+from worker.calibration.stitch.views import ViewChoice
 
 if TYPE_CHECKING:
     from service.wire.job import JobError
@@ -100,6 +101,12 @@ def camera_of(camera: geometry.PosedCamera) -> Camera:
     """The engine's camera at its stored pose."""
     pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
     return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
+
+
+def choice_of(choice: view.ViewChoice) -> ViewChoice:
+    """What a stitched view shows, for the engine."""
+    size = choice.width_px, choice.height_px
+    return ViewChoice(choice.projection, *size, choice.field_of_view_deg, choice.pan_deg, choice.horizon)
 
 
 def light_of(light: geometry.Light) -> Light:

@@ -18,8 +18,8 @@ from service.wire.programs.files import files_in
 from service.wire.programs.stitching import Stitching
 from worker.calibration.draw.layers import seam_layer
 from worker.calibration.stitch.panorama import Panorama, Part, panorama
-from worker.calibration.stitch.views import ViewChoice, chosen_view
-from worker.jobs.reading import Picture, camera_of, decoded, decoded_frame, jpeg, light_of, pitch_of
+from worker.calibration.stitch.views import chosen_view
+from worker.jobs.reading import Picture, camera_of, choice_of, decoded, decoded_frame, jpeg, light_of, pitch_of
 from worker.programs.stitch.package import package
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
@@ -44,19 +44,8 @@ def main() -> None:
 
 def stitched(asked: Stitching) -> Panorama:
     """How frames become the view that was chosen."""
-    pitch, cameras, choice = pitch_of(asked.field), [camera_of(camera) for camera in asked.cameras], asked.view
-    view = chosen_view(
-        pitch,
-        cameras,
-        ViewChoice(
-            choice.projection,
-            choice.width_px,
-            choice.height_px,
-            choice.field_of_view_deg,
-            choice.pan_deg,
-            choice.horizon,
-        ),
-    )
+    pitch, cameras = pitch_of(asked.field), [camera_of(camera) for camera in asked.cameras]
+    view = chosen_view(pitch, cameras, choice_of(asked.view))
     width, height = view.size
     if width * height * len(cameras) > MOST_PLACES:
         print(f"{len(cameras)} cameras in {width}x{height} pixels are too much: ask for fewer pixels", file=sys.stderr)
