@@ -11,8 +11,6 @@ SURE = 3.0
 """A number is suspected when it is off by this many of the estimate's sigma..."""
 NOTABLE = 3.0
 """...and by this many times what is left after a good calibration."""
-BEYOND_DOUBT = 4.0
-"""Of the estimate's sigma, for a result to be rejected for it."""
 MORE_OR_LESS = {
     "focal_length_px": ("a focal length", "px longer", "px shorter"),
     "principal_point_x_px": ("a principal point", "px farther right", "px farther left"),
@@ -42,9 +40,9 @@ def suspicions(deviations: Sequence[Deviation]) -> list[Suspicion]:
     return [Suspicion(d.camera, d.name, d.value, d.sigma, _detail(d)) for d in deviations if is_sure(d)]
 
 
-def is_sure(deviation: Deviation, sigmas: float = SURE) -> bool:
+def is_sure(deviation: Deviation) -> bool:
     """Whether the lines contradict a number that was given."""
-    return abs(deviation.value) > max(sigmas * deviation.sigma, NOTABLE * deviation.expected)
+    return abs(deviation.value) > max(SURE * deviation.sigma, NOTABLE * deviation.expected)
 
 
 def _detail(found: Deviation) -> str:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from worker.calibration.finish.diagnosis import BEYOND_DOUBT, is_sure
+from worker.calibration.finish.diagnosis import is_sure
 from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS
 from worker.calibration.finish.uncertainty import Deviation, FinishedCamera
 from worker.calibration.judge.markings import MarkingSeen
@@ -209,8 +209,8 @@ def _other_lines(result: CameraResult) -> str:
 
 
 def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:
-    """Whether the lines contradict the focal length, and the pose with it."""
-    sure = result.zoom is not None and is_sure(result.zoom, BEYOND_DOUBT)
+    """Whether the lines contradict the focal length, and the pose with it: either alone may be chance."""
+    sure = result.zoom is not None and is_sure(result.zoom)
     return sure and result.elsewhere_m > gate.largest_zoomed_m
 
 
