@@ -19,10 +19,12 @@ export class Sighting {
     this.canvas = camera.one("[data-frame]");
     this.marks = camera.one("[data-marks]");
     this.loupe = camera.one("[data-loupe]");
-    this.box.addEventListener("pointermove", (event) => this.aim(this.pixel(event)));
-    this.box.addEventListener("pointerleave", () => { this.loupe.hidden = true; });
-    this.box.addEventListener("click", (event) => camera.set(this.pixel(event)));
-    this.box.addEventListener("keydown", (event) => this.onKey(event));
+    // Before the frame is there, nothing in it can be pointed at.
+    const onFrame = (kind, act) => this.box.addEventListener(kind, (event) => { if (this.bitmap) act(event); });
+    onFrame("pointermove", (event) => this.aim(this.pixel(event)));
+    onFrame("pointerleave", () => { this.loupe.hidden = true; });
+    onFrame("click", (event) => camera.set(this.pixel(event)));
+    onFrame("keydown", (event) => this.onKey(event));
   }
 
   async show(file, [width, height]) {
@@ -43,7 +45,6 @@ export class Sighting {
   }
 
   aim([x, y]) {
-    if (!this.bitmap) return;
     this.cross = [x, y];
     this.loupe.hidden = false;
     const context = this.loupe.getContext("2d");
