@@ -44,6 +44,18 @@ def test_how_well_photos_know_a_lens_goes_with_it_until_somebody_changes_its_num
     assert by_hand.value.post_data_json["intrinsics"]["sigma"] is None
 
 
+def test_a_frame_that_is_not_there_yet_cannot_be_pointed_at(stub, visit):
+    page = visit(stub.url, "/ui/new-venue")
+    newcomer.describe_the_pitch(page)
+    # What the script says to its console is looked at when the page is left.
+    page.locator(".sighting").first.evaluate(
+        """box => {
+            for (const kind of ["pointermove", "click"]) box.dispatchEvent(new PointerEvent(kind));
+            box.dispatchEvent(new KeyboardEvent("keydown", {key: "ArrowLeft"}));
+        }"""
+    )
+
+
 def poses(url):
     cameras = httpx.get(f"{url}/venues/newcomer").raise_for_status().json()["cameras"]
     return {camera["id"]: np.array(camera["pose"]["position"]) for camera in cameras}
