@@ -245,7 +245,7 @@ def _scene(venue: Venue, chosen: Mapping[str, Any]) -> Scene:
     given: dict[str, Any] = {
         name: None if value == AUTO else value for name, value in chosen.items() if value is not None
     }
-    lights = {camera.id: light_of(camera.light) for camera in venue.cameras if camera.light is not None}
+    lights = {camera: light_of(light) for camera, light in venue.lights.items()}
     cameras = [camera_of(camera) for camera in venue.cameras]
     return Scene(pitch_of(venue.field), cameras, replace(_stored_choice(venue), **given), lights or None)
 

@@ -197,6 +197,11 @@ class Venue(_Place):
         return {camera.id: camera.pose for camera in self.cameras}
 
     @property
+    def lights(self) -> dict[str, Light]:
+        """How cameras are evened out with the others, by the ids of those of which it is known."""
+        return {camera.id: camera.light for camera in self.cameras if camera.light is not None}
+
+    @property
     def standing(self) -> list[PosedCamera]:
         """Where the cameras stand and how they image: the same, however well their lenses are known."""
         return [camera.posed.standing for camera in self.cameras]

@@ -104,12 +104,9 @@ def seam_steps(made: Panorama, frames: Mapping[str, Frame]) -> NDArray[np.float6
         whole = replace(part, weight=within.astype(np.float32))
         values.append(whole.values(frames[part.camera], (slice(None), slice(None))))
         valid.append(within)
-    owner = made.owner
-    handed_over = np.zeros(owner.shape, np.uint8)
-    handed_over[:, 1:] = (owner[:, 1:] != owner[:, :-1]) & (owner[:, 1:] >= 0) & (owner[:, :-1] >= 0)
-    beside = (cv2.dilate(handed_over, np.ones((1, 2 * BESIDE + 1))) > 0) & valid[0] & valid[1]
+    beside = (cv2.dilate(_handed_over(made), np.ones((1, 2 * BESIDE + 1))) > 0) & valid[0] & valid[1]
     steps = []
-    for top in range(0, owner.shape[0], PIECE):
+    for top in range(0, made.size[1], PIECE):
         piece = beside[top : top + PIECE]
         if np.count_nonzero(piece) >= FEWEST:
             a, b = (np.median(each[top : top + PIECE][piece], axis=0) for each in values)
@@ -117,9 +114,16 @@ def seam_steps(made: Panorama, frames: Mapping[str, Frame]) -> NDArray[np.float6
     return np.array(steps)
 
 
-def _enlarged(made: Panorama, frames: Mapping[str, Frame]) -> Frame:
+def _handed_over(made: Panorama) -> NDArray[np.uint8]:
+    """1 at the first pixel of a row (H, W) that another camera than its left neighbour's counts most in."""
     owner = made.owner
-    columns = np.flatnonzero(((owner[:, 1:] != owner[:, :-1]) & (owner[:, 1:] >= 0) & (owner[:, :-1] >= 0)).any(axis=0))
+    found = np.zeros(owner.shape, np.uint8)
+    found[:, 1:] = (owner[:, 1:] != owner[:, :-1]) & (owner[:, 1:] >= 0) & (owner[:, :-1] >= 0)
+    return found
+
+
+def _enlarged(made: Panorama, frames: Mapping[str, Frame]) -> Frame:
+    columns = np.flatnonzero(_handed_over(made).any(axis=0))
     around = slice(max(int(np.median(columns)) - SHOWN, 0), int(np.median(columns)) + SHOWN)
     shown = made.picture(frames)[:, around]
     return np.asarray(cv2.resize(shown, None, fx=TIMES, fy=TIMES, interpolation=cv2.INTER_CUBIC), np.uint8)

@@ -67,7 +67,7 @@ def _drawn(venue: Venue, given: Given, found: engine.Calibration, options: Optio
 
 def _steadied(venue: Venue, found: engine.Calibration) -> dict[str, Light]:
     """The light of the cameras that were evened out, steadied by what the venue keeps of it."""
-    kept = {camera.id: light_of(camera.light) for camera in venue.cameras if camera.light is not None}
+    kept = {camera: light_of(light) for camera, light in venue.lights.items()}
     return {camera: light.after(kept.get(camera)) for camera, light in found.lights.items()}
 
 

@@ -10,7 +10,6 @@ from starlette.concurrency import run_in_threadpool
 from service.api.programs.drawings import waited_for
 from service.api.programs.running import OneAtATime, answer
 from service.settings import Settings
-from service.wire.geometry import Light
 from service.wire.programs.stitching import Stitching
 from service.wire.venue import Venue
 
@@ -36,7 +35,7 @@ class Stitches:
                 "venue": venue.id,
                 "field": venue.field,
                 "cameras": venue.standing,
-                "lights": lights_of(venue),
+                "lights": venue.lights,
                 "revision": revision,
                 "threads": self._settings.threads,
                 **wanted,
@@ -62,8 +61,3 @@ class Stitches:
         program, environment = self._settings.stitch_program, self._settings.native_environment
         async with waited_for(self._previews):
             return await run_in_threadpool(answer, "preview", program, environment, given, PREVIEW_S)
-
-
-def lights_of(venue: Venue) -> dict[str, Light]:
-    """How cameras are evened out with the others, of those of which it is known."""
-    return {camera.id: camera.light for camera in venue.cameras if camera.light is not None}
