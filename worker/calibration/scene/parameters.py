@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import hypot
 
 import numpy as np
 
@@ -14,8 +15,11 @@ FIELD_STEP_M = 1e-3
 BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
 """What the photos of a good board leave uncertain: part of the focal length, ratio of the two, k1 and k2; and of the
 principal point a pixel of a 4K frame."""
+HEAT_FOCAL = 3e-4
+"""What day and night do to a focal length since the photos of the board, part of it: metal grows by 23 millionths a
+kelvin, and summer noon and a winter's night are 13 K to either side of the mean."""
 FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
-"""How far off what is left free may be: heat changes a focal length by a thousandth, a crown is up to half a metre."""
+"""How far off what is left free may be: a focus ring that was touched, a crown of up to half a metre."""
 FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
 """Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
 
@@ -82,7 +86,8 @@ Parameter = LensParameter | FieldParameter
 
 
 def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
-    """The numbers of each lens, as uncertain as the lens says (`Intrinsics.sigma`), or as a good board leaves them."""
+    """The numbers of each lens, as uncertain as the lens says (`Intrinsics.sigma`), or as a good board leaves them, and
+    the focal length as heat moves it besides."""
     found: list[Parameter] = []
     for number, camera in enumerate(cameras):
         lens, known = camera.intrinsics, camera.intrinsics.sigma
@@ -103,12 +108,13 @@ def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
 
 
 def _focal_sigma(lens: Intrinsics) -> float:
-    """Of fx, with which fy changes: by what is known of either, the worse of both."""
+    """Of fx, with which fy changes: by what is known of either, the worse of both, and by what heat does to it."""
     fx, fy = float(lens.matrix[0, 0]), float(lens.matrix[1, 1])
     known = {"fx": 1.0, "fy": fx / fy}
-    return max(
+    measured = max(
         (lens.sigma[name] * scale for name, scale in known.items() if name in lens.sigma), default=BOARD_FOCAL * fx
     )
+    return hypot(measured, HEAT_FOCAL * fx)
 
 
 def field_parameters(pitch: Field) -> list[Parameter]:

@@ -11,6 +11,7 @@ from worker.calibration.finish.estimate import Estimate, step
 from worker.calibration.finish.residuals import Unknowns
 from worker.calibration.finish.robust import tukey_weights
 from worker.calibration.finish.uncertainty import judged
+from worker.calibration.scene import parameters
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import Ground
 from worker.calibration.scene.visibility import SeenLines
@@ -62,6 +63,20 @@ def said_of_a_corner(**sigma):
     return said.sigma.position_m
 
 
+@pytest.fixture
+def without_heat(monkeypatch):
+    """Focal lengths that stay as they were on the day of the photos."""
+    monkeypatch.setattr(parameters, "HEAT_FOCAL", 0.0)
+
+
+def test_however_well_a_focal_length_was_measured_heat_may_have_moved_it(monkeypatch):
+    warm = said_of_a_corner(fx=0.1)
+    assert said_of_a_corner(fx=0.01) == pytest.approx(warm, rel=0.01)
+    monkeypatch.setattr(parameters, "HEAT_FOCAL", 0.0)
+    assert warm > 2 * said_of_a_corner(fx=0.1)
+
+
+@pytest.mark.usefixtures("without_heat")
 def test_the_worse_the_focal_length_is_known_the_less_sure_is_where_a_camera_stands_that_sees_little():
     well, badly, hardly = (said_of_a_corner(fx=fx) for fx in (0.1, 30.0, 150.0))
     assert well < said_of_a_corner() < badly < hardly
@@ -69,6 +84,7 @@ def test_the_worse_the_focal_length_is_known_the_less_sure_is_where_a_camera_sta
     assert said_of_a_corner(fy=150.0) == hardly
 
 
+@pytest.mark.usefixtures("without_heat")
 @pytest.mark.parametrize("sigma", [{"aspect": 0.01}, {"cx": 30.0, "cy": 30.0}, {"k1": 0.1}])
 def test_what_else_of_a_lens_is_known_badly_makes_a_camera_less_sure_too(sigma):
     assert said_of_a_corner(fx=0.1, **sigma) > 1.1 * said_of_a_corner(fx=0.1)
