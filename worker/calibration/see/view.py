@@ -81,7 +81,9 @@ OTHER_TINT, OTHER_LIGHT, OTHER_STRUCTURE, OTHER_BLUR = 0.06, 3.5, 2.5, 1.5
 """What stands in front differs so from the ground that is seen: in a channel's share, in light, in structure, in
 sharpness. A hard shadow has the ground's tint and seldom less than a third of its light."""
 PLAIN, PATTERNED = 0.7, 5.0
-"""Structure below which nothing is a ground, and above which nothing is one that is smeared so."""
+"""Structure below which nothing is a ground, and above which nothing is one that is smeared so..."""
+MOST_PATTERNED = 0.05
+"""...or is fogged, where more than this share of what has no lines is above it."""
 
 
 @dataclass(frozen=True)
@@ -171,9 +173,13 @@ def _cause(
     pale = spoiled["veiled"] | spoiled["white"]
     if figures.blown_out >= BLIND and spoiled["blown_out"].sum() >= lost.sum() / 4:
         return "blinded", spoiled["blown_out"] | (pale & lost)
-    if pale.sum() >= max(enough, lost.sum() / 2):
-        return ("fogged" if spoiled["veiled"].sum() >= spoiled["white"].sum() else "snow"), pale
     smeared = sharpness.is_lost(usual)
+    if pale.sum() >= max(enough, lost.sum() / 2):
+        if spoiled["veiled"].sum() < spoiled["white"].sum():
+            return "snow", pale
+        # Fog takes the contrast of edges and leaves their width, and nothing stands out of it.
+        if not smeared and (cells.structure[lost] > PATTERNED).mean() < MOST_PATTERNED:
+            return "fogged", pale
     if figures.hidden >= LEAST_HIDDEN and _is_blocked(cells, field, lost, sharpness, smeared, figures, usual):
         return "blocked", lost
     return ("out-of-focus", field) if smeared else (None, lost)
@@ -193,17 +199,18 @@ def _is_blocked(
     if lost.sum() < FEWEST_CELLS:
         return False
     structure = np.median(cells.structure[lost])
+    before = usual.lines_found if usual is not None and usual.lines_found is not None else 0.0
+    gone = before > GOOD_LINES and figures.lines_found < OF_USUAL_LINES * before
     if clear.sum() >= FEWEST_CELLS:
-        # A shadow differs as well, but what lies in it is as sharp as the rest.
+        # A shadow differs as well, but what lies in it is as sharp as the rest, and most of its lines are still seen.
         near = sharpness.of_lost is None or structure < PLAIN or sharpness.differs
-        return near and _differ(cells, lost, clear)
+        return (near or gone) and _differ(cells, lost, clear)
     if sharpness.of_all is None or (structure < PLAIN and not smeared):
         return True
     # Right before the lens things are out of focus; of a field out of focus no such contrast is left.
     if structure > PATTERNED and sharpness.of_all > SOFT_PX * sharpness.size:
         return True
-    before = usual.lines_found if usual is not None and usual.lines_found is not None else 0.0
-    return before > GOOD_LINES and figures.lines_found < OF_USUAL_LINES * before and not smeared
+    return gone and not smeared
 
 
 def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:

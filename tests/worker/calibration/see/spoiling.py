@@ -55,3 +55,15 @@ def blocked(frame: Frame, colour, until: float) -> Frame:
     share = on_the_left(frame, until)[..., None]
     shading = 1 + 0.1 * _cloud(frame.shape[:2], frame.shape[1] / 4)[..., None]
     return _grainy(frame + share * (np.array(colour) * shading - frame))
+
+
+def lettered(frame: Frame, colour, share: float) -> Frame:
+    """A sharp board with large letters stands before the middle `share` of the picture, each way."""
+    height, width = frame.shape[:2]
+    across, down = round(share * width), round(share * height)
+    left, top = (width - across) // 2, (height - down) // 2
+    board = np.full((down, across, 3), colour, np.uint8)
+    cv2.putText(board, "CLOSED", (0, down // 2), cv2.FONT_HERSHEY_DUPLEX, across / 130, (255, 255, 255), 4)
+    seen = frame.copy()
+    seen[top : top + down, left : left + across] = board
+    return seen

@@ -114,3 +114,23 @@ def test_a_white_rink_with_lines_is_no_snow():
 def test_a_camera_that_sees_nothing_of_the_field_is_not_judged(fair):
     away = camera("away", (0.0, -48.0, 10.0), (0.0, -200.0), focal=675, size=(960, 540))
     assert look_at(fair, PITCH, away).usable
+
+
+def test_a_pale_ground_out_of_focus_is_not_fogged(fair):
+    grey = cv2.cvtColor(fair, cv2.COLOR_BGR2GRAY)
+    pale = cv2.merge([cv2.add(cv2.divide(grey, 2), 80)] * 3)
+    assert look_at(pale, PITCH, STORED).usable
+    seen = look_at(spoiling.defocused(pale, 6.0), PITCH, STORED)
+    assert seen.cause == "out-of-focus", seen
+
+
+def test_a_pale_board_with_letters_is_not_fog(fair):
+    usual = look_at(fair, PITCH, STORED).figures
+    seen = look_at(spoiling.lettered(fair, (190, 185, 180), 0.8), PITCH, STORED, usual=usual)
+    assert seen.cause == "blocked", seen
+
+
+def test_what_hides_lines_that_are_usually_seen_blocks_the_view_however_sharp_it_is(fair):
+    usual = look_at(fair, PITCH, STORED).figures
+    hidden = spoiling.lettered(fair, (60, 150, 160), 0.8)
+    assert look_at(hidden, PITCH, STORED, usual=usual).cause == "blocked"
