@@ -59,7 +59,7 @@ def convergence(curves: Sequence[Sequence[float]]) -> Path:
     axis.set_ylabel("loss of the best")
     axis.set_ylim(0, 1.15 * max(max(losses) for losses in curves))
     axis.set_title("levels of blur, coarse to fine", fontsize=10)
-    axis.legend(frameon=False, loc="upper left")
+    axis.legend(frameon=False, loc="lower left")
     axis.grid(alpha=0.3)
     return _saved(figure, "convergence")
 
