@@ -1,17 +1,19 @@
 """The paper's ablation: what LeakyReLU and the focal loss bring, each alone and together, same budget for all four.
 
-    python -m models.training.ablation --steps 2000
+    python -m models.training.ablation --steps 2000 --seeds 3
 
-Trains what is not trained yet into `runs/ablation`, all four on the same batches, then prints the table. Each variant's
-threshold is chosen on other crops than it is judged on.
+Trains what is not trained yet into `runs/ablation`, then prints the table: each variant with batch normalisation and
+without it, all on the same batches of a seed. It may be stopped and called again. Each variant's threshold is chosen on
+other crops than it is judged on.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from models.training.data.makers import Makers
@@ -26,7 +28,9 @@ from worker.calibration.see.segmentation import Segmenter
 FOLDER = Path("runs/ablation")
 STEPS, BATCH, SIZE_PX = 2000, 6, 224
 GAMMA = 1.0
-SEED, KEPT = 1, 4096
+SEEDS, SEED, KEPT = 3, 1, 4096
+DRAWN_APART = 1_000_000
+"""Between the crops of one training and those of the next: more than the steps that either may begin at."""
 # Seed of worlds that neither training nor the test draws.
 VALIDATION = 2**22
 
@@ -47,50 +51,80 @@ VARIANTS = (
     Variant("focal loss", Recipe(PAPER, leak=0.0, gamma=GAMMA), 55.3, 71.9),
     Variant("both", Recipe(PAPER, leak=LEAK, gamma=GAMMA), 57.3, 73.6),
 )
-
-
-def trained(steps: int, workers: int, threads: int, device: torch.device) -> list[Path]:
-    """A checkpoint of each variant, trained on pitches alone as far as it is not yet."""
-    torch.set_num_threads(threads)
-    run = FOLDER / f"{steps}"
-    run.mkdir(parents=True, exist_ok=True)
-    trainings = [Training(variant.recipe, device, Budget(0, steps), run) for variant in VARIANTS]
-    for training in trainings:
-        if training.checkpoint.exists():
-            training.load()
-    step = trainings[0].step
-    if step < steps:
-        makers = Makers(CROP_SIZE, pitches=1.0, seed=SEED + step, workers=workers)
-        train(trainings, Pool(makers, device, KEPT, SIZE_PX, repeats=3.0, seed=SEED + step), BATCH)
-    return [training.checkpoint for training in trainings]
-
-
-def judge(checkpoint: Path, crops: int, threads: int) -> dict[str, float]:
-    """Figures on the test crops, at the threshold with the best F1 on the validation crops."""
-    path = checkpoint.with_suffix(".onnx")
-    export(load(checkpoint), path)
-    segmenter = Segmenter(path, threads)
-    best = max(rendered(segmenter, crops // 2, VALIDATION), key=lambda row: row["f1"])["threshold"]
-    return next(row for row in rendered(segmenter, crops) if row["threshold"] == best)
+NORMALISED = {True: "with batch normalisation", False: "without"}
 
 
 def main() -> None:
     """Train and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--steps", type=int, default=STEPS)
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="trainings of each variant")
     parser.add_argument("--judged", type=int, default=200, help="rendered crops to judge on")
     parser.add_argument("--workers", type=int, default=1, help="processes that render")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
     options = parser.parse_args()
-    checkpoints = trained(options.steps, options.workers, options.threads, torch.device(options.device))
-    print(f"U-Net variants after {options.steps} steps, {options.judged} rendered crops of other venues, %\n")
-    print("| | IoU | F1 | precision | recall | paper: mIoU | F1 |")
-    print("|---|---|---|---|---|---|---|")
-    for variant, checkpoint in zip(VARIANTS, checkpoints, strict=True):
-        figures = judge(checkpoint, options.judged, options.threads)
-        shares = " | ".join(f"{100 * figures[name]:.1f}" for name in ("iou", "f1", "precision", "recall"))
-        print(f"| {variant.name} | {shares} | {variant.paper_miou} | {variant.paper_f1} |")
+    torch.set_num_threads(options.threads)
+    for seed in range(options.seeds):
+        train_variants(options.steps, seed, options.workers, torch.device(options.device))
+    print(*table(options.steps, options.seeds, options.judged, options.threads), sep="\n")
+
+
+def train_variants(steps: int, seed: int, workers: int, device: torch.device) -> None:
+    """All variants of a seed on the same batches of pitches alone, as far as they are not trained yet."""
+    trainings = [
+        Training(_recipe(variant, normalised), device, Budget(0, steps), _run(steps, seed), seed)
+        for normalised in NORMALISED
+        for variant in VARIANTS
+    ]
+    for training in trainings:
+        training.checkpoint.parent.mkdir(parents=True, exist_ok=True)
+        if training.checkpoint.exists():
+            training.load()
+    step = trainings[0].step
+    if step < steps:
+        drawn = SEED + seed * DRAWN_APART + step
+        makers = Makers(CROP_SIZE, pitches=1.0, seed=drawn, workers=workers)
+        train(trainings, Pool(makers, device, KEPT, SIZE_PX, repeats=3.0, seed=drawn), BATCH)
+
+
+def table(steps: int, seeds: int, judged: int, threads: int) -> list[str]:
+    """A row for each variant with and without normalisation: means over the seeds, and the spread of the F1."""
+    lines = [
+        f"U-Net variants after {steps} steps, {seeds} seeds, {judged} rendered crops of other venues, %; ± over seeds",
+        "",
+        "| | | IoU | F1 | precision | recall | paper: mIoU | F1 |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for normalised, words in NORMALISED.items():
+        for variant in VARIANTS:
+            recipe = _recipe(variant, normalised)
+            runs = [_figures(_run(steps, seed) / f"{recipe}.pt", judged, threads) for seed in range(seeds)]
+            iou, f1, precision, recall = (
+                100 * np.array([run[name] for run in runs]) for name in ("iou", "f1", "precision", "recall")
+            )
+            lines.append(
+                f"| {variant.name} | {words} | {iou.mean():.1f} ± {iou.std():.1f} | {f1.mean():.1f} ± {f1.std():.1f} "
+                f"| {precision.mean():.1f} | {recall.mean():.1f} | {variant.paper_miou} | {variant.paper_f1} |"
+            )
+    return lines
+
+
+def _recipe(variant: Variant, normalised: bool) -> Recipe:
+    return replace(variant.recipe, normalised=normalised)
+
+
+def _run(steps: int, seed: int) -> Path:
+    return FOLDER / f"{steps}-{seed}"
+
+
+def _figures(checkpoint: Path, crops: int, threads: int) -> dict[str, float]:
+    """Figures on the test crops, at the threshold with the best F1 on the validation crops."""
+    path = checkpoint.with_suffix(".onnx")
+    export(load(checkpoint), path)
+    segmenter = Segmenter(path, threads)
+    best = max(rendered(segmenter, crops // 2, VALIDATION), key=lambda row: row["f1"])["threshold"]
+    return next(row for row in rendered(segmenter, crops) if row["threshold"] == best)
 
 
 if __name__ == "__main__":

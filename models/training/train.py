@@ -91,27 +91,33 @@ class Budget:
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is trained, and how: slope of LeakyReLU below 0 (0 is ReLU), exponent of the focal loss, first rate."""
+    """What is trained, and how: slope of LeakyReLU below 0 (0 is ReLU), exponent of the focal loss, first rate.
+
+    `normalised`: with batch normalisation.
+    """
 
     shape: Shape = SERVED
     leak: float = LEAK
     gamma: float = 1.0
     rate: float = LEARNING_RATE
+    normalised: bool = True
 
     def __str__(self) -> str:
         """As a name of a file."""
-        return f"{self.shape}-leak-{self.leak:g}-gamma-{self.gamma:g}".replace("/", "by")
+        plain = "" if self.normalised else "-plain"
+        return f"{self.shape}-leak-{self.leak:g}-gamma-{self.gamma:g}{plain}".replace("/", "by")
 
 
 class Training:
     """Network, running average of its weights, optimiser and schedule; kept in the folder `run`."""
 
-    def __init__(self, recipe: Recipe, device: torch.device, budget: Budget, run: Path) -> None:
-        torch.manual_seed(0)
+    def __init__(self, recipe: Recipe, device: torch.device, budget: Budget, run: Path, seed: int = 0) -> None:
+        torch.manual_seed(seed)
         self.recipe, self.device, self.budget = recipe, device, budget
         self.checkpoint = run / f"{recipe}.pt"
         self.step, self.elapsed_s = 0, 0.0
-        self.network = UNet(recipe.shape, recipe.leak).to(device, memory_format=torch.channels_last)
+        network = UNet(recipe.shape, recipe.leak, normalised=recipe.normalised)
+        self.network = network.to(device, memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.network).eval()
         self.optimiser = torch.optim.AdamW(self.network.parameters(), lr=recipe.rate, weight_decay=WEIGHT_DECAY)
 
@@ -156,6 +162,7 @@ class Training:
         state = {
             "shape": str(self.recipe.shape),
             "leak": self.recipe.leak,
+            "normalised": self.recipe.normalised,
             "step": self.step,
             "elapsed_s": self.elapsed_s,
             "network": self.network.state_dict(),

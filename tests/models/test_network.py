@@ -45,6 +45,18 @@ def test_pytorch_and_onnx_runtime_agree(network, tmp_path):
         np.testing.assert_allclose(answer, expected, atol=1e-4)
 
 
+def test_without_normalisation_they_agree_too_and_what_comes_out_is_as_large_as_with_it(tmp_path):
+    torch.manual_seed(0)
+    plain = UNet(PAPER, normalised=False).eval()
+    export(plain, tmp_path / "plain.onnx")
+    picture = torch.rand(1, 3, 64, 64)
+    [answer] = onnxruntime.InferenceSession(str(tmp_path / "plain.onnx")).run(None, {"picture": picture.numpy()})
+    with torch.no_grad():
+        logits = plain(picture)
+    np.testing.assert_allclose(answer, torch.sigmoid(logits).numpy(), atol=1e-4)
+    assert 0.01 < logits.std() < 10
+
+
 def test_the_threshold_chosen_becomes_one_half(network, tmp_path):
     picture = {"picture": np.random.default_rng(0).random((1, 3, 64, 64), dtype=np.float32)}
     answers = []

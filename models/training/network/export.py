@@ -60,8 +60,10 @@ def export(network: UNet, path: Path, threshold: float = 0.5) -> dict[str, objec
 
 
 def fold(network: UNet) -> UNet:
-    """A copy whose batch normalisation is part of its convolutions."""
+    """A copy whose batch normalisation, if it has any, is part of its convolutions."""
     folded = copy.deepcopy(network).cpu().float().eval()
+    if not folded.normalised:
+        return folded
     for block in (*folded.down, *folded.up):
         for index in (0, 3):
             block[index] = nn.utils.fusion.fuse_conv_bn_eval(block[index], block[index + 1])
@@ -72,7 +74,7 @@ def fold(network: UNet) -> UNet:
 def load(checkpoint: Path) -> UNet:
     """The averaged weights of a checkpoint."""
     state = torch.load(checkpoint, map_location="cpu", weights_only=True)
-    network = UNet(Shape.parse(state["shape"]), state["leak"])
+    network = UNet(Shape.parse(state["shape"]), state["leak"], normalised=state.get("normalised", True))
     network.load_state_dict(state["average"])
     return network.eval()
 

@@ -44,20 +44,21 @@ SERVED = Shape((24, 48, 96, 192), block=2)
 class UNet(nn.Module):
     """RGB (N, 3, H, W) in 0..1 to logits (N, 1, H, W); H and W multiples of 32.
 
-    The paper names no normalisation. Batch normalisation is added: it trains faster, and folds into the convolutions.
+    The paper names no normalisation. Batch normalisation is added: it trains faster, and folds into the convolutions;
+    the ablation is made without it (`normalised` False) as well.
     """
 
-    def __init__(self, shape: Shape = SERVED, leak: float = LEAK) -> None:
+    def __init__(self, shape: Shape = SERVED, leak: float = LEAK, *, normalised: bool = True) -> None:
         super().__init__()
-        self.shape = shape
+        self.shape, self.normalised = shape, normalised
         filters, pixels = shape.filters, shape.block**2
         upward = list(zip(filters[-2::-1], filters[:0:-1], strict=True))
         self.register_buffer("mean", torch.tensor(MEAN).view(1, 3, 1, 1))
         self.register_buffer("spread", torch.tensor(SPREAD).view(1, 3, 1, 1))
         before = (3 * pixels, *filters[:-1])
-        self.down = nn.ModuleList(_block(a, b, leak) for a, b in zip(before, filters, strict=True))
+        self.down = nn.ModuleList(_block(a, b, leak, normalised) for a, b in zip(before, filters, strict=True))
         self.grow = nn.ModuleList(nn.ConvTranspose2d(b, a, 2, stride=2) for a, b in upward)
-        self.up = nn.ModuleList(_block(2 * a, a, leak) for a, _ in upward)
+        self.up = nn.ModuleList(_block(2 * a, a, leak, normalised) for a, _ in upward)
         self.head = nn.Conv2d(filters[0], pixels, 1)
         # Nearly every pixel is no marking: start by saying so.
         nn.init.constant_(self.head.bias, -4.0)
@@ -78,12 +79,16 @@ class UNet(nn.Module):
         return nn.functional.pixel_shuffle(x, self.shape.block) if self.shape.block > 1 else x
 
 
-def _block(before: int, after: int, leak: float) -> nn.Sequential:
+def _block(before: int, after: int, leak: float, normalised: bool) -> nn.Sequential:
     layers: list[nn.Module] = []
     for channels in (before, after):
+        convolution = nn.Conv2d(channels, after, 3, padding=1, bias=not normalised)
+        if not normalised:
+            # Nothing else keeps what passes through twenty layers as large as it was (He et al., 2015).
+            nn.init.kaiming_normal_(convolution.weight, leak)
         layers += [
-            nn.Conv2d(channels, after, 3, padding=1, bias=False),
-            nn.BatchNorm2d(after),
+            convolution,
+            nn.BatchNorm2d(after) if normalised else nn.Identity(),
             nn.LeakyReLU(leak, inplace=True),
         ]
     return nn.Sequential(*layers)
