@@ -116,7 +116,7 @@ def _features(seen: Seen, number: int) -> tuple[np.ndarray, np.ndarray]:
     lens = camera.intrinsics
     picture = cv2.undistort(seen.scene.frames[camera.id][0], lens.matrix, lens.distortion)
     grey = cv2.resize(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-    points, looks = cv2.SIFT_create(8000).detectAndCompute(grey, None)
+    points, looks = cv2.SIFT.create(8000).detectAndCompute(grey, None)
     return 2 * np.array([point.pt for point in points]) + 0.5, looks
 
 

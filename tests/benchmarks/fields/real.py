@@ -61,9 +61,9 @@ def _seeing(chosen: Sequence[Case], engine: Engine) -> Iterator[str]:
     yield "| source | marking | network: recall | evidence: found |"
     yield "|---|---|---|---|"
     for source, rows in sources.items():
-        recall, found = (_by_kind(row[name] for row in rows) for name in ("recall_by_marking", "found_by_marking"))
-        for kind in sorted(recall, key=recall.__getitem__):
-            yield f"| {source} | {kind} | {recall[kind]:.2f} | {found.get(kind, float('nan')):.2f} |"
+        by_network, by_both = (_by_kind(row[f"{name}_by_marking"] for row in rows) for name in ("recall", "found"))
+        for kind in sorted(by_network, key=by_network.__getitem__):
+            yield f"| {source} | {kind} | {by_network[kind]:.2f} | {by_both.get(kind, float('nan')):.2f} |"
     yield ""
 
 
@@ -120,7 +120,7 @@ def _started(venue: str, group: Sequence[Case], number: int, turn_deg: float, sh
     stored = started([case.camera for case in group], venue, number, turn_deg, shift_m)
     frames = {case.name: [case.frame()] for case in group}
     answer = engine(group[0].pitch, stored, frames, number)
-    found = {} if answer.said is None else {result.id: result for result in answer.said.cameras}
+    found = {} if answer.said is None else {result.camera.id: result for result in answer.said.cameras}
     rows = {}
     for case in group:
         rows[case.name] = {"rms_px": None, "near": False}
@@ -133,6 +133,8 @@ def _started(venue: str, group: Sequence[Case], number: int, turn_deg: float, sh
                 "near": near(rms, case.reference_px, case.tolerance_px),
                 "shift_m": metres,
                 "turn_deg": degrees,
+                "accepted": found[case.name].accepted,
+                "why": found[case.name].rejected_because or "",
                 **camera_row(found[case.name]),
             }
     return {**answer.row, "cameras": rows}
