@@ -27,12 +27,16 @@ from worker.calibration.see.line_profile import blurred_line
 from worker.calibration.see.sampling import bilinear
 
 PIXELS_PER_METRE = 10.0
-BLUR_PX = 1.0
+BLUR_PX = 1.5
 BLURS = 5
-"""Each of the blurs is twice as broad as the one before, from 20 cm to 3.2 m: `BLUR_PX` of a grid twice as coarse."""
+"""Each of the blurs is twice as broad as the one before, from 30 cm to 4.8 m: `BLUR_PX` of a grid twice as coarse."""
+COARSEST = 2**BLURS
+"""Pixels a side of what is one on the coarsest grid."""
 LINE_STEP_M, LINE_SAMPLES = 0.02, 6
 """How finely the template is drawn, along a line and across it."""
 MARGIN_M = 2.0
+LEAST_PX_PER_METRE = 8.0
+"""Ground counts where a metre of it, away from the camera, is at least so high in a 4K frame: a line about a pixel."""
 LARGEST_UNDISTORTED = 2.5
 """Undistorted frames are cut where they would be wider than this many times the frame."""
 
@@ -56,8 +60,9 @@ class GroundObjective:
         stitch_weight: float,
     ) -> None:
         """`cameras` carry the stored poses; `responses` are their segmentations (H, W) in 0..1."""
-        grid = _Grid.covering(pitch)
-        lines = grid.lines(pitch)
+        whole = _Grid.covering(pitch)
+        window = _window([whole.visible(camera) for camera in cameras])
+        grid, lines = whole.within(window), whole.lines(pitch)[window]
         domains = [grid.visible(camera) for camera in cameras]
         self.warps = [
             _Warp.build(grid, _PinholeView.build(camera, response), domain)
@@ -190,18 +195,26 @@ class _Grid:
     @classmethod
     def covering(cls, pitch: Field) -> _Grid:
         origin = -np.array([pitch.length / 2 + MARGIN_M, pitch.width / 2 + MARGIN_M])
-        coarsest = 2**BLURS
-        size = tuple(coarsest * ceil(-2 * side * PIXELS_PER_METRE / coarsest) for side in origin)
+        size = tuple(COARSEST * ceil(-2 * side * PIXELS_PER_METRE / COARSEST) for side in origin)
         columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
         surface = pitch.lift(origin + np.stack([columns, rows], axis=-1) / PIXELS_PER_METRE)
         planes, masks = _planes(surface)
         return cls(origin, size, planes, masks, surface)
 
+    def within(self, window: tuple[slice, slice]) -> _Grid:
+        """A part of it."""
+        rows, columns = window
+        size = (columns.stop - columns.start, rows.stop - rows.start)
+        origin = self.origin + np.array([columns.start, rows.start]) / PIXELS_PER_METRE
+        return _Grid(origin, size, self.planes, [mask[window] for mask in self.on_plane], self.surface[window])
+
     def visible(self, camera: Camera) -> Picture:
-        """255 where `camera` sees the ground."""
-        pixels = camera.project(self.surface.reshape(-1, 3))
-        seen = camera.sees(pixels)
-        return (255 * seen).astype(np.uint8).reshape(self.size[::-1])
+        """255 where `camera` sees the ground, and a line would be a line."""
+        seen = camera.sees(camera.project(self.surface))
+        away = self.surface - camera.pose.position
+        px_per_metre = camera.intrinsics.focal_length_px * -away[..., 2] / np.sum(away**2, axis=-1)
+        near = px_per_metre >= LEAST_PX_PER_METRE * camera.intrinsics.relative_size
+        return (255 * (seen & near)).astype(np.uint8)
 
     def lines(self, pitch: Field) -> Picture:
         """White lines on black (H, W); a pixel that a line covers in part is grey."""
@@ -213,6 +226,17 @@ class _Grid:
         width, height = self.size
         share = np.bincount(row * width + column, area, width * height).reshape(height, width)
         return np.rint(255 * np.minimum(share, 1)).astype(np.uint8)
+
+
+def _window(domains: Sequence[Picture]) -> tuple[slice, slice]:
+    """Rows and columns that hold what is seen of a grid (H, W), as many as the coarsest blur asks for."""
+    left, top, *extent = cv2.boundingRect(np.bitwise_or.reduce(domains))
+    slices = []
+    for start, length, whole in zip((top, left), extent[::-1], domains[0].shape, strict=True):
+        length = COARSEST * max(ceil(length / COARSEST), 1)
+        start = min(start, whole - length)
+        slices.append(slice(start, start + length))
+    return slices[0], slices[1]
 
 
 @dataclass(frozen=True)
@@ -252,7 +276,7 @@ class _Warp:
             seen = cv2.warpPerspective(
                 self.view.marked, projection @ lift, (width, height), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
             )
-            ground[top : top + height, left : left + width] |= np.asarray(seen, dtype=np.uint8) & mask
+            cv2.copyTo(seen, mask, ground[top : top + height, left : left + width])
         return ground
 
 
