@@ -221,10 +221,10 @@ class _Grid:
         points = pitch.line_points(LINE_STEP_M)
         across = (np.arange(LINE_SAMPLES) + 0.5) / LINE_SAMPLES - 0.5
         covered = points.position[:, :2] + (across[:, None] * points.width)[..., None] * points.normal[:, :2]
-        column, row = np.rint((covered - self.origin) * PIXELS_PER_METRE).astype(int).reshape(-1, 2).T
-        area = np.tile(points.spacing * points.width / LINE_SAMPLES * PIXELS_PER_METRE**2, LINE_SAMPLES)
-        width, height = self.size
-        share = np.bincount(row * width + column, area, width * height).reshape(height, width)
+        area = np.broadcast_to(points.spacing * points.width / LINE_SAMPLES, covered.shape[:2])
+        edges = [np.arange(side + 1) - 0.5 for side in self.size[::-1]]
+        column, row = ((covered - self.origin) * PIXELS_PER_METRE).reshape(-1, 2).T
+        share = PIXELS_PER_METRE**2 * np.histogram2d(row, column, edges, weights=area.ravel())[0]
         return np.rint(255 * np.minimum(share, 1)).astype(np.uint8)
 
 
