@@ -65,7 +65,7 @@ METHODS: Mapping[Preset, Method] = {
     "paper": Method(ON_THE_GROUND, flat=False, power=1, tries_again=False, finish=assess),
     "scpr": Method(ALONE_ON_THE_GROUND, flat=True, power=1, tries_again=False, finish=assess),
 }
-"""`esc`: the default. `paper`: the paper to the letter. `scpr`: its predecessor, flat and without a stitch term."""
+"""`esc`: the default. `paper`: the paper's own objective. `scpr`: its predecessor, flat and without a stitch term."""
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from tests.worker.calibration.synthetic import CROWNED, pair
-from worker.calibration.search.search import Level, Strategy, genome_of, search, with_genome
+from tests.demo.render import outdated
+from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
+from worker.calibration.scene.camera import rotation_angles_deg
+from worker.calibration.search.search import ON_THE_GROUND, Level, Strategy, genome_of, search, with_genome
 
 
 class Bowl:
@@ -65,3 +67,15 @@ def test_a_genome_is_the_poses_of_all_cameras():
     for before, after in zip(cameras, again, strict=True):
         np.testing.assert_array_equal(before.pose.rotation, after.pose.rotation)
         np.testing.assert_array_equal(before.pose.position, after.pose.position)
+
+
+def test_the_papers_objective_catches_a_camera_that_is_as_far_off_as_the_papers():
+    camera, markings = pair()[0], pair_markings()[0]
+    start = camera.with_pose(outdated(camera.pose, 0.162, 2.1, np.random.default_rng(3)))
+    strategy = Strategy(24, 48, 30, 0.5)
+
+    found = search(
+        CROWNED, [start], [markings], ON_THE_GROUND, strategy, np.random.default_rng(0), lambda *_: None
+    ).cameras[0]
+
+    assert rotation_angles_deg(found.pose.rotation, camera.pose.rotation) < 0.5
