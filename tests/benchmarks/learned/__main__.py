@@ -15,6 +15,7 @@ import torch
 
 from tests.benchmarks.learned.nets import NETS
 from tests.benchmarks.learned.training import trained
+from tests.benchmarks.learned.weights import missing
 
 
 def main() -> None:
@@ -23,6 +24,8 @@ def main() -> None:
     parser.add_argument("--nets", nargs="+", choices=NETS, default=list(NETS), help="all, unless said")
     parser.add_argument("--minutes", type=float, default=60.0, help="of one core, for each net")
     options = parser.parse_args()
+    if "otle" in options.nets and "dhn" not in options.nets and (why := missing(("dhn",))):
+        parser.error(f"otle begins where dhn guesses, and there are {why}")
     cv2.setNumThreads(1)
     torch.set_num_threads(1)
     for name in options.nets:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import torch
 
+from tests.benchmarks.learned.net import loaded
 from tests.benchmarks.learned.nets import NETS
 from tests.benchmarks.learned.pose import Displacement
-from tests.benchmarks.learned.training import loaded
 from tests.benchmarks.learned.window import Picture
 from worker.calibration.scene.camera import Array
 

@@ -13,6 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from tests.benchmarks.learned.net import Net
 from tests.benchmarks.learned.pool import Batch
 from tests.benchmarks.learned.window import SIZE
 
@@ -22,8 +23,10 @@ LARGEST_PX = 32.0
 """What an answer of 1 means: four points of two coordinates begin near 0 and end below it."""
 
 
-class Dhn(nn.Module):
+class Dhn(Net):
     """Two pictures (B, 1, height, width) to the displacements (B, 4, 2) of the four points, in pixels."""
+
+    tried_steps = (1,)
 
     def __init__(self) -> None:
         super().__init__()
@@ -42,7 +45,7 @@ class Dhn(nn.Module):
         """The mean distance of a coordinate, less strict below a pixel."""
         return functional.smooth_l1_loss(self(batch.seen, batch.template), batch.offsets)
 
-    def answer(self, seen: Tensor, template: Tensor) -> Tensor:
+    def answer(self, seen: Tensor, template: Tensor, steps: int | None = None) -> Tensor:
         """What it says when it is used."""
         with torch.no_grad():
             return self(seen, template)

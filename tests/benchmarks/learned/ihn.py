@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from tests.benchmarks.learned.net import Net
 from tests.benchmarks.learned.pool import Batch
 from tests.benchmarks.learned.warp import LARGEST_PX, homographies, moved, pixels
 from tests.benchmarks.learned.window import SIZE
@@ -29,8 +30,10 @@ OLDER = 0.8
 """How much less a step counts in the loss than the next one."""
 
 
-class Ihn(nn.Module):
+class Ihn(Net):
     """Two pictures (B, 1, height, width) to the displacements (B, 4, 2) of the four points after each step."""
+
+    tried_steps = (2, 4, 6, 8, 12)
 
     def __init__(self) -> None:
         super().__init__()
@@ -81,10 +84,10 @@ class Ihn(nn.Module):
         losses = [functional.smooth_l1_loss(offsets, batch.offsets, beta=0.5) for offsets in after]
         return sum((w * one for w, one in zip(weights, losses, strict=True)), torch.zeros(())) / sum(weights)
 
-    def answer(self, seen: Tensor, template: Tensor, steps: int = STEPS) -> Tensor:
+    def answer(self, seen: Tensor, template: Tensor, steps: int | None = None) -> Tensor:
         """What it says when it is used."""
         with torch.no_grad():
-            return self(seen, template, steps)[-1]
+            return self(seen, template, steps or STEPS)[-1]
 
 
 def likeness(asking: Tensor, answering: Tensor) -> list[Tensor]:

@@ -8,13 +8,15 @@ for a processor.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from tests.benchmarks.learned.dhn import Dhn, vgg
+from tests.benchmarks.learned.net import Net, loaded
 from tests.benchmarks.learned.pool import Batch
-from tests.benchmarks.learned.training import loaded
 from tests.benchmarks.learned.warp import homographies, warped
 
 CHANNELS = (24, 48, 64, 64)
@@ -23,8 +25,10 @@ SMALLEST_PX, LARGEST_PX = 0.05, 12.0
 STEPS, FIRST_STEP_PX, LAST_STEP_PX = 80, 0.6, 0.05
 
 
-class Otle(nn.Module):
+class Otle(Net):
     """A mask and the template, each (B, 1, height, width), to how far four points are off: log(1 + pixels), (B,)."""
+
+    tried_steps = (20, 40, 80, 160)
 
     def __init__(self) -> None:
         super().__init__()
@@ -45,9 +49,14 @@ class Otle(nn.Module):
         wrong = (offsets - batch.offsets).norm(dim=-1).mean(dim=1)
         return functional.smooth_l1_loss(self(batch.seen, batch.template, offsets), wrong.log1p(), beta=0.1)
 
-    def answer(self, seen: Tensor, template: Tensor, steps: int = STEPS) -> Tensor:
+    def answer(self, seen: Tensor, template: Tensor, steps: int | None = None) -> Tensor:
         """From DHN's guess down the slope; of all steps, the displacements of which the least error is said."""
-        return self.descended(seen, template, loaded("dhn", Dhn()).answer(seen, template), steps)
+        return self.descended(seen, template, self.first_guess.answer(seen, template), steps or STEPS)
+
+    @cached_property
+    def first_guess(self) -> Dhn:
+        """DHN as it was trained; no part of this net, and not kept with it."""
+        return loaded("dhn", Dhn())
 
     def descended(self, seen: Tensor, template: Tensor, first: Tensor, steps: int) -> Tensor:
         """The same from another first guess (B, 4, 2)."""

@@ -7,13 +7,13 @@ import math
 import time
 from itertools import islice
 from pathlib import Path
-from typing import Protocol, TypeVar
 
 import torch
 from torch import Tensor
 
+from tests.benchmarks.learned.net import Net
 from tests.benchmarks.learned.pairs import Pairs
-from tests.benchmarks.learned.pool import Batch, Pool, batch_of
+from tests.benchmarks.learned.pool import Pool, batch_of
 from tests.benchmarks.learned.weights import weights
 
 RATE, LAST_RATE, WARM_UP = 1e-3, 0.02, 0.02
@@ -22,20 +22,8 @@ BATCH = 32
 TOLD_EVERY, SAVED_EVERY_S = 100, 60.0
 VALIDATED_BY, VALIDATION_SEED = 256, 1_000_000
 
-N = TypeVar("N", bound=torch.nn.Module)
 
-
-class Net(Protocol):
-    """What can be trained and asked."""
-
-    def loss(self, batch: Batch) -> Tensor:
-        """What is descended, ()."""
-
-    def answer(self, seen: Tensor, template: Tensor) -> Tensor:
-        """The displacements (B, 4, 2) of the four points, in pixels."""
-
-
-def trained(name: str, net: torch.nn.Module, minutes: float) -> None:
+def trained(name: str, net: Net, minutes: float) -> None:
     """Train a net until it has used so many core-minutes, those of earlier calls included."""
     path = weights(name)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,14 +58,8 @@ def trained(name: str, net: torch.nn.Module, minutes: float) -> None:
             _save(path, net, optimiser, step, spent)
             saved = spent
     _save(path, net, optimiser, step, spent)
-    told = {"net": name, "weights": sum(p.numel() for p in net.parameters()), "steps": step, **validated(net)}
+    told = {"net": name, "weights": sum(p.numel() for p in net.parameters()), "trained": step, "off": validated(net)}
     print(json.dumps(told), flush=True)
-
-
-def loaded(name: str, net: N) -> N:
-    """A net with the weights that were trained."""
-    net.load_state_dict(torch.load(weights(name), weights_only=True)["net"])
-    return net.eval()
 
 
 def rate_at(share: float) -> float:
@@ -85,23 +67,29 @@ def rate_at(share: float) -> float:
     return min(1.0, share / WARM_UP) * (LAST_RATE + (1 - LAST_RATE) * (1 + math.cos(math.pi * min(1.0, share))) / 2)
 
 
-def validated(net: torch.nn.Module) -> dict[str, float]:
-    """How far the four points are off on pairs that were never learnt from, in pixels of the window."""
+def validated(net: Net) -> dict[str, dict[str, float]]:
+    """How far the four points are off on pairs that were never learnt from, in pixels of the window, by steps."""
     net.eval()
     batch = batch_of(list(islice(Pairs(VALIDATION_SEED), VALIDATED_BY)))
-    parts = zip(batch.seen.split(BATCH), batch.template.split(BATCH), strict=True)
-    off = torch.cat([net.answer(*part) for part in parts]) - batch.offsets
+    parts = list(zip(batch.seen.split(BATCH), batch.template.split(BATCH), strict=True))
+    told = {"start": _spread(batch.offsets)}
+    for steps in net.tried_steps:
+        off = torch.cat([net.answer(*part, steps) for part in parts]) - batch.offsets
+        told[f"{steps} steps"] = _spread(off)
+    return told
+
+
+def _spread(off: Tensor) -> dict[str, float]:
+    """Of distances (B, 4, 2): their mean, and what half and nine in ten of the pairs stay below."""
     distance = off.norm(dim=-1).mean(dim=1)
-    before = batch.offsets.norm(dim=-1).mean(dim=1)
     return {
-        "start_px": round(float(before.mean()), 3),
         "mean_px": round(float(distance.mean()), 3),
-        "median_px": round(float(distance.median()), 3),
+        "half_px": round(float(distance.median()), 3),
         "nine_in_ten_px": round(float(distance.quantile(0.9)), 3),
     }
 
 
-def _save(path: Path, net: torch.nn.Module, optimiser: torch.optim.Optimizer, step: int, core_s: float) -> None:
+def _save(path: Path, net: Net, optimiser: torch.optim.Optimizer, step: int, core_s: float) -> None:
     state = {"net": net.state_dict(), "optimiser": optimiser.state_dict(), "step": step, "core_s": core_s}
     partial = path.with_suffix(".partial")
     torch.save(state, partial)
