@@ -2,7 +2,7 @@
 
 A first guess of four points, then a network that looks at the picture and the template as it is laid by them, and says
 how wrong they are; the guess is moved down the slope of what it says, through the warp. Theirs are two ResNet-18 of 11
-million weights; here the first guess is DHN's, the error is told by a network in the same manner with 0.3 million,
+million weights; here the first guess is DHN's, the error is told by a network in the same manner with 0.2 million,
 for a processor.
 """
 
@@ -28,7 +28,7 @@ STEPS, FIRST_STEP_PX, LAST_STEP_PX = 80, 0.6, 0.05
 class Otle(Net):
     """A mask and the template, each (B, 1, height, width), to how far four points are off: log(1 + pixels), (B,)."""
 
-    tried_steps = (20, 40, 80, 160)
+    tried_steps = (20, 40, 80)
 
     def __init__(self) -> None:
         super().__init__()

@@ -87,7 +87,7 @@ def _finer_centres(length: int) -> Array:
 
 
 def strokes(at: Array, joined: NDArray[np.bool_], width: Array) -> NDArray[np.float32]:
-    """Lines between successive points (N, 2) of the window where `joined` (N - 1,), on a picture `FINER` than it.
+    """Lines between successive points (N, 2) of the window where `joined` (N - 1,), `FINER` times finer than it.
 
     `width` (N,): of the line at each point, in pixels of the window.
     """
