@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-rate bench-video bench-follow train lock clean
+.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-rate bench-video bench-follow bench-learned train lock clean
 
 setup: $(VENV)/.installed
 
@@ -55,6 +55,10 @@ $(VENV)/.bench: $(VENV)/.installed
 # One BLAS thread, as the worker sets it.
 bench: $(VENV)/.bench
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.accuracy
+
+# What `make bench` compares with and has to be trained, once: an hour of one core for each of three nets.
+bench-learned: $(VENV)/.bench
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 nice -n 19 $(BIN)/python -m tests.benchmarks.learned
 
 # One BLAS thread, as the worker sets it.
 bench-truth: $(VENV)/.train

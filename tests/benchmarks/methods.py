@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import cma
 import cv2
 import numpy as np
 
 from models import MODEL_PATH
+from tests.benchmarks.learned.ecc import aligned
+from tests.benchmarks.learned.pose import Displacement, corrected
+from tests.benchmarks.learned.weights import missing
 from tests.benchmarks.scenes import Scene
 from tests.benchmarks.truth import apart_by_homography_px, overlapping
 from worker.calibration.calibrate import calibrate
-from worker.calibration.records import Calibration, Options
+from worker.calibration.records import Calibration, Options, Spent
 from worker.calibration.scene.camera import Camera, Frame, Pose, inside
 from worker.calibration.search.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD, genome_of, with_genome
 from worker.calibration.see.segmentation import Region, Segmenter, whole_frame
@@ -37,6 +40,10 @@ class Seen:
             id(frames[0]): self.segmenter(frames[0], whole_frame(size)) for frames in self.scene.frames.values()
         }
 
+    def response(self, camera: Camera) -> np.ndarray:
+        """What the network said of a camera's frame, (H, W) in 0..1."""
+        return self.responses[id(self.scene.frames[camera.id][0])].astype(np.float32) / 255
+
     def segment(self, frame: Frame, regions: Sequence[Region]) -> np.ndarray:
         """What the network said, where it would have been asked."""
         response = np.zeros_like(self.responses[id(frame)])
@@ -50,13 +57,20 @@ class Seen:
 class Answer:
     """Poses, seconds they took from segmentations on, and what the engine said where it was the engine.
 
-    `stitch_px`: of a method that lays pictures onto each other and knows no poses.
+    `core_seconds`: of all threads together. `stitch_px`: of a method that lays pictures onto each other and knows no
+    poses.
     """
 
     cameras: list[Camera]
     seconds: float
+    core_seconds: float
     said: Calibration | None = None
     stitch_px: float | None = None
+
+    @classmethod
+    def of(cls, cameras: list[Camera], spent: Spent, **other: Any) -> Answer:
+        """An answer that took what was spent on all stages together."""
+        return cls(cameras, sum(spent.seconds.values()), sum(spent.core_seconds.values()), **other)
 
     @property
     def has_poses(self) -> bool:
@@ -69,31 +83,38 @@ Method = Callable[[Seen, list[Camera], int], Answer]
 
 def start(_seen: Seen, cameras: list[Camera], _seed: int) -> Answer:
     """Nothing at all: the outdated poses."""
-    return Answer(cameras, 0.0)
+    return Answer(cameras, 0.0, 0.0)
 
 
 def zhang(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
     """Corners of the markings clicked with 2 px of noise, each camera's pose by OpenCV."""
     rng = np.random.default_rng([seed, 3])
-    begin = time.perf_counter()
-    found = []
-    for camera, real in zip(cameras, seen.scene.real, strict=True):
-        points = seen.scene.pitch.lift(_corners(seen))
-        clicked = real.project(points)
-        known = inside(clicked, real.intrinsics.size)
-        clicked = clicked[known] + rng.normal(0, CLICK_NOISE_PX, (int(known.sum()), 2))
-        lens = camera.intrinsics
-        _, turn, move = cv2.solvePnP(
-            points[known],
-            clicked,
-            lens.matrix,
-            lens.distortion,
-            camera.pose.rotation.copy(),
-            camera.pose.translation.copy(),
-            useExtrinsicGuess=True,
-        )
-        found.append(camera.with_pose(Pose.from_translation(turn.ravel(), move.ravel())))
-    return Answer(found, time.perf_counter() - begin)
+    spent = Spent()
+    with spent.measuring("poses"):
+        pairs = zip(cameras, seen.scene.real, strict=True)
+        found = [_by_clicks(camera, _clicked(seen, real, rng)) for camera, real in pairs]
+    return Answer.of(found, spent)
+
+
+def _clicked(seen: Seen, real: Camera, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """The corners that are in a picture (K, 3), and where somebody clicks on them (K, 2)."""
+    points = seen.scene.pitch.lift(_corners(seen))
+    clicked = real.project(points)
+    known = inside(clicked, real.intrinsics.size)
+    return points[known], clicked[known] + rng.normal(0, CLICK_NOISE_PX, (int(known.sum()), 2))
+
+
+def _by_clicks(camera: Camera, clicked: tuple[np.ndarray, np.ndarray]) -> Camera:
+    lens = camera.intrinsics
+    _, turn, move = cv2.solvePnP(
+        *clicked,
+        lens.matrix,
+        lens.distortion,
+        camera.pose.rotation.copy(),
+        camera.pose.translation.copy(),
+        useExtrinsicGuess=True,
+    )
+    return camera.with_pose(Pose.from_translation(turn.ravel(), move.ravel()))
 
 
 def homography(seen: Seen, _cameras: list[Camera], _seed: int) -> Answer:
@@ -101,13 +122,14 @@ def homography(seen: Seen, _cameras: list[Camera], _seed: int) -> Answer:
 
     The worst pair that could be matched; nothing is said of those that could not.
     """
-    begin = time.perf_counter()
+    spent = Spent()
     errors = []
-    for i, j in overlapping(seen.scene):
-        found = _matched(*(_features(seen, k) for k in (i, j)))
-        if found is not None:
-            errors.append(apart_by_homography_px(seen.scene, i, j, found))
-    return Answer([], time.perf_counter() - begin, stitch_px=max(errors, default=None))
+    with spent.measuring("pairs"):
+        for i, j in overlapping(seen.scene):
+            found = _matched(*(_features(seen, k) for k in (i, j)))
+            if found is not None:
+                errors.append(apart_by_homography_px(seen.scene, i, j, found))
+    return Answer.of([], spent, stitch_px=max(errors, default=None))
 
 
 def _features(seen: Seen, number: int) -> tuple[np.ndarray, np.ndarray]:
@@ -153,21 +175,30 @@ def engine(**options: object) -> Method:
         asked = replace(Options(seed=seed), **options)
         said = calibrate(seen.scene.pitch, cameras, seen.scene.frames, seen.segment, asked)
         poses = [camera.with_pose(result.camera.pose) for camera, result in zip(cameras, said.cameras, strict=True)]
-        return Answer(poses, said.spent.seconds["evolution"] + said.spent.seconds["refinement"], said)
+        seconds, core_seconds = (
+            spent["evolution"] + spent["refinement"] for spent in (said.spent.seconds, said.spent.core_seconds)
+        )
+        return Answer(poses, seconds, core_seconds, said)
 
     return run
 
 
 def cma_es(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
     """CMA-ES (pycma) in place of the paper's strategy: our objective level by level, as many evaluations, no finish."""
-    scene, options = seen.scene, Options()
-    responses = [seen.responses[id(scene.frames[camera.id][0])].astype(np.float32) / 255 for camera in cameras]
-    begin = time.perf_counter()
+    options = Options()
+    spent = Spent()
+    with spent.measuring("evolution"):
+        here = _by_cma_es(seen, cameras, options, seed)
+    return Answer.of(here, spent)
+
+
+def _by_cma_es(seen: Seen, cameras: list[Camera], options: Options, seed: int) -> list[Camera]:
+    responses = [seen.response(camera) for camera in cameras]
     scale = np.tile([MUTATION_RAD] * 3 + [MUTATION_M] * 3, len(cameras))
     here = list(cameras)
     generations = options.generations // len(COARSE_TO_FINE)
     for number, level in enumerate(COARSE_TO_FINE):
-        objective = level.objective(scene.pitch, here, responses, options.stitch_weight)
+        objective = level.objective(seen.scene.pitch, here, responses, options.stitch_weight)
         centre = genome_of(here)
         strategy = cma.CMAEvolutionStrategy(
             np.zeros(len(centre)),
@@ -178,13 +209,45 @@ def cma_es(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
             asked = strategy.ask()
             strategy.tell(asked, objective.losses(centre + scale * np.array(asked)).tolist())
         here = with_genome(cameras, centre + scale * strategy.result.xbest)
-    return Answer(here, time.perf_counter() - begin)
+    return here
+
+
+def by_homography(find: Displacement) -> Method:
+    """Each camera for itself: its segmentation seen from above is laid onto the template, and the pose follows."""
+
+    def run(seen: Seen, cameras: list[Camera], _seed: int) -> Answer:
+        spent = Spent()
+        with spent.measuring("poses"):
+            found = [corrected(camera, seen.scene.pitch, seen.response(camera), find) for camera in cameras]
+        return Answer.of(found, spent)
+
+    return run
+
+
+def learned(name: str) -> Method:
+    """The same by a net of `tests.benchmarks.learned`; PyTorch is loaded by whoever asks it, and not in its time."""
+
+    def run(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
+        from tests.benchmarks.learned.answers import displacement_by
+
+        return by_homography(displacement_by(name))(seen, cameras, seed)
+
+    return run
+
+
+def cannot_run(method: str) -> str | None:
+    """Why a method cannot be run now, in words for its user; None where it can."""
+    return missing(WEIGHTS_OF[method]) if method in WEIGHTS_OF else None
 
 
 METHODS: dict[str, Method] = {
     "Start": start,
     "Zhang (clicked corners)": zhang,
     "SIFT and a homography": homography,
+    "ECC": by_homography(aligned),
+    "DHN": learned("dhn"),
+    "OTLE": learned("otle"),
+    "IHN": learned("ihn"),
     "CMA-ES on our objective": cma_es,
     "SCPR": engine(preset="scpr"),
     "ESC `paper`": engine(preset="paper"),
@@ -193,3 +256,4 @@ METHODS: dict[str, Method] = {
     "ESC `esc`, no stitch term": engine(stitch_weight=0.0),
 }
 SLOW = ("SCPR", "ESC `paper`")
+WEIGHTS_OF = {"DHN": ("dhn",), "OTLE": ("dhn", "otle"), "IHN": ("ihn",)}
