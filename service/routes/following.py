@@ -29,7 +29,8 @@ PAGE = 50
 LONGEST_S = 3600
 # Between two looks, should one that was waited for be missed; the stream itself says ": ping" every 15 s.
 LOOK_AT_LEAST_EVERY_S = 30
-AGAIN_S = 30
+# Whoever's connection broke finds the place that it had taken for a moment.
+AGAIN_S = 5
 # Of 64 bits.
 LONGEST_NUMBER = 19
 
