@@ -12,13 +12,13 @@ import numpy as np
 
 from models import MODEL_PATH
 from tests.benchmarks.learned.ecc import aligned
-from tests.benchmarks.learned.pose import Displacement, corrected
+from tests.benchmarks.learned.pose import Displacement, corrected, posed_by
 from tests.benchmarks.learned.weights import missing
 from tests.benchmarks.scenes import Scene
 from tests.benchmarks.truth import apart_by_homography_px, overlapping
 from worker.calibration.calibrate import calibrate
 from worker.calibration.records import Calibration, Options, Spent
-from worker.calibration.scene.camera import Camera, Frame, Pose, inside
+from worker.calibration.scene.camera import Camera, Frame, inside
 from worker.calibration.search.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD, genome_of, with_genome
 from worker.calibration.see.segmentation import Region, Segmenter, whole_frame
 
@@ -92,7 +92,7 @@ def zhang(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
     spent = Spent()
     with spent.measuring("poses"):
         pairs = zip(cameras, seen.scene.real, strict=True)
-        found = [_by_clicks(camera, _clicked(seen, real, rng)) for camera, real in pairs]
+        found = [posed_by(camera, *_clicked(seen, real, rng)) for camera, real in pairs]
     return Answer.of(found, spent)
 
 
@@ -102,19 +102,6 @@ def _clicked(seen: Seen, real: Camera, rng: np.random.Generator) -> tuple[np.nda
     clicked = real.project(points)
     known = inside(clicked, real.intrinsics.size)
     return points[known], clicked[known] + rng.normal(0, CLICK_NOISE_PX, (int(known.sum()), 2))
-
-
-def _by_clicks(camera: Camera, clicked: tuple[np.ndarray, np.ndarray]) -> Camera:
-    lens = camera.intrinsics
-    _, turn, move = cv2.solvePnP(
-        *clicked,
-        lens.matrix,
-        lens.distortion,
-        camera.pose.rotation.copy(),
-        camera.pose.translation.copy(),
-        useExtrinsicGuess=True,
-    )
-    return camera.with_pose(Pose.from_translation(turn.ravel(), move.ravel()))
 
 
 def homography(seen: Seen, _cameras: list[Camera], _seed: int) -> Answer:

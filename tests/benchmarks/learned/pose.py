@@ -29,9 +29,14 @@ def with_displaced(camera: Camera, pitch: Field, offsets: Array) -> Camera:
     """
     window = Window.of(camera.pose)
     pixels = camera.project(pitch.lift(window.ground(QUAD)))
+    return posed_by(camera, pitch.lift(window.ground(QUAD + offsets)), pixels)
+
+
+def posed_by(camera: Camera, points: Array, pixels: Array) -> Camera:
+    """The camera where OpenCV puts it, from its own pose on: it sees world points (N, 3) in its pixels (N, 2)."""
     lens = camera.intrinsics
     _, turn, move = cv2.solvePnP(
-        pitch.lift(window.ground(QUAD + offsets)),
+        points,
         pixels,
         lens.matrix,
         lens.distortion,
