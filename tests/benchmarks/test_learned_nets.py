@@ -13,12 +13,13 @@ from tests.benchmarks.learned.answers import displacement_by  # noqa: E402
 from tests.benchmarks.learned.nets import NETS  # noqa: E402
 from tests.benchmarks.learned.otle import candidate_errors  # noqa: E402
 from tests.benchmarks.learned.pairs import Pairs  # noqa: E402
-from tests.benchmarks.learned.pool import Pool, batch_of  # noqa: E402
-from tests.benchmarks.learned.training import rate_at, trained  # noqa: E402
+from tests.benchmarks.learned.pool import Drawn, Pool, batch_of  # noqa: E402
+from tests.benchmarks.learned.training import Training, rate_at, train  # noqa: E402
 from tests.benchmarks.learned.warp import homographies, moved, scaled, warped  # noqa: E402
 from tests.benchmarks.learned.window import QUAD, SIZE  # noqa: E402
 
 pytestmark = pytest.mark.train
+CPU = torch.device("cpu")
 
 
 @pytest.fixture(autouse=True)
@@ -56,29 +57,37 @@ def test_the_warp_says_which_way_its_points_should_move(pairs):
     assert scaled(torch.tensor(QUAD)).abs().max() < 1
 
 
-def test_a_mirrored_pair_is_a_pair(pairs):
-    pool = Pool(7)
-    pool.pairs = iter(pairs[:1] * 8)
-    batch = pool.batch(2)
-    while (batch.offsets[0] == batch.offsets[1]).all():
-        pool.pairs = iter(pairs[:1])
-        batch = pool.batch(2)
+def test_a_mirrored_pair_is_a_pair(pairs, monkeypatch):
+    monkeypatch.setattr("tests.benchmarks.learned.pool.Pairs", lambda *_: iter(pairs[:1] * 32))
+    monkeypatch.setattr("tests.benchmarks.learned.pool.FIRST", 1)
+    batch = Pool(7, CPU, kept=4).batch(16)
+    mirrored = (batch.offsets != batch.offsets[0]).any(dim=-1).any(dim=-1)
+    assert mirrored.any()
     laid = warped(batch.template, homographies(batch.offsets))
-    assert laid[0].flip(-1).numpy() == pytest.approx(laid[1].numpy(), abs=0.02)
+    assert laid[0].flip(-1).numpy() == pytest.approx(laid[mirrored][0].numpy(), abs=0.02)
+
+
+def test_workers_draw_pairs_of_their_own():
+    drawn = [next(iter(Drawn(7)))[1], *(next(iter(Pairs(7, worker))).offsets for worker in range(2))]
+    assert drawn[0] == pytest.approx(drawn[1])
+    assert drawn[0] != pytest.approx(drawn[2])
+    assert Pool(7, CPU, kept=64, workers=2).batch(2).offsets.abs().max() < 60
 
 
 @pytest.mark.parametrize("name", NETS)
 def test_every_net_learns_and_goes_on_where_it_stopped(name, tmp_path, monkeypatch, pairs, capsys):
     monkeypatch.setattr(weights, "WEIGHTS", tmp_path)
     monkeypatch.setattr("tests.benchmarks.learned.training.VALIDATED_BY", 2)
-    monkeypatch.setattr("tests.benchmarks.learned.training.BATCH", 4)
+    monkeypatch.setattr("tests.benchmarks.learned.pool.FIRST", 1)
     monkeypatch.setattr(NETS[name], "tried_steps", (1,))
     torch.save({"net": NETS["dhn"]().state_dict()}, weights.weights("dhn"))
     if name == "dhn":
         weights.weights("dhn").unlink()
-    for _ in range(2):
-        trained(name, NETS[name](), 0.003)
-    assert capsys.readouterr().out.count('"trained"') == 2
+    for steps in (1, 2):
+        training = Training(name, NETS[name](), steps, CPU)
+        assert training.step == steps - 1
+        train([training], Pool(training.step, CPU, kept=16), batch_size=4)
+        assert f'"steps": {steps}' in capsys.readouterr().out
     found = displacement_by(name)(pairs[0].seen, pairs[0].template)
     assert found.shape == (4, 2)
     assert np.isfinite(found).all()

@@ -1,9 +1,9 @@
 """Train what `make bench` compares with: `python -m tests.benchmarks.learned`.
 
-An hour of one core for each net by default; called again, it goes on where it stopped. The weights are kept in
-`runs/bench/learned`.
+All nets learn from the same batches; called again, it goes on where it stopped. The weights are kept in
+`runs/bench/learned`. Hours of one core, or ten minutes of a machine with a GPU:
 
-    nice -n 19 python -m tests.benchmarks.learned --nets dhn --minutes 20
+    python -m tests.benchmarks.learned --device cuda --workers 14
 """
 
 from __future__ import annotations
@@ -14,23 +14,30 @@ import cv2
 import torch
 
 from tests.benchmarks.learned.nets import NETS
-from tests.benchmarks.learned.training import trained
+from tests.benchmarks.learned.pool import Pool
+from tests.benchmarks.learned.training import Training, train
 from tests.benchmarks.learned.weights import missing
 
 
 def main() -> None:
-    """Train what is asked for, one after the other."""
+    """Train what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--nets", nargs="+", choices=NETS, default=list(NETS), help="all, unless said")
-    parser.add_argument("--minutes", type=float, default=60.0, help="of one core, for each net")
+    parser.add_argument("--steps", type=int, default=10_000, help="of the whole schedule")
+    parser.add_argument("--batch", type=int, default=64)
+    parser.add_argument("--device", default="cpu", help="cpu or cuda")
+    parser.add_argument("--workers", type=int, default=0, help="processes that draw pairs; none: drawn in between")
+    parser.add_argument("--kept", type=int, default=8192, help="pairs that are kept and shown again, 41 kB each")
     options = parser.parse_args()
     if "otle" in options.nets and "dhn" not in options.nets and (why := missing(("dhn",))):
         parser.error(f"otle begins where dhn guesses, and there are {why}")
+    device = torch.device(options.device)
     cv2.setNumThreads(1)
     torch.set_num_threads(1)
-    for name in options.nets:
-        torch.manual_seed(0)
-        trained(name, NETS[name](), options.minutes)
+    torch.manual_seed(0)
+    trainings = [Training(name, NETS[name](), options.steps, device) for name in options.nets]
+    begun = min(training.step for training in trainings)
+    train(trainings, Pool(begun, device, options.kept, options.workers), options.batch)
 
 
 if __name__ == "__main__":

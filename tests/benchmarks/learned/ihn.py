@@ -63,7 +63,7 @@ class Ihn(Net):
         asking = functional.avg_pool2d(asking, ASKED_EVERY // ANSWERED_EVERY)
         levels = likeness(asking, answering)
         places = pixels(ASKED_EVERY).to(seen)
-        offsets = torch.zeros(len(seen), 4, 2)
+        offsets = seen.new_zeros(len(seen), 4, 2)
         after = []
         for _ in range(steps):
             with torch.no_grad():
@@ -82,7 +82,7 @@ class Ihn(Net):
         after = self(batch.seen, batch.template, LEARNT_STEPS)
         weights = [OLDER ** (len(after) - 1 - step) for step in range(len(after))]
         losses = [functional.smooth_l1_loss(offsets, batch.offsets, beta=0.5) for offsets in after]
-        return sum((w * one for w, one in zip(weights, losses, strict=True)), torch.zeros(())) / sum(weights)
+        return sum((w * one for w, one in zip(weights, losses, strict=True)), batch.offsets.new_zeros(())) / sum(weights)
 
     def answer(self, seen: Tensor, template: Tensor, steps: int | None = None) -> Tensor:
         """What it says when it is used."""
@@ -104,10 +104,10 @@ def looked_up(level: Tensor, at: Tensor, every: int) -> Tensor:
     """The likeness (B, Q, h, w) around places (B, Q, 2) in pixels, (B, Q, (2 radius + 1)²); `every`: pixels a cell."""
     batch, asked, height, width = level.shape
     cells = (at - (every - 1) / 2) / every
-    steps = torch.arange(-RADIUS, RADIUS + 1, dtype=at.dtype)
+    steps = torch.arange(-RADIUS, RADIUS + 1).to(at)
     beside = torch.cartesian_prod(steps, steps).flip(-1)
     around = cells.reshape(-1, 1, 2) + beside
-    grid = 2 * around / torch.tensor([width - 1, height - 1]) - 1
+    grid = 2 * around / at.new_tensor([width - 1, height - 1]) - 1
     sampled = functional.grid_sample(
         level.reshape(-1, 1, height, width), grid.reshape(len(around), 2 * RADIUS + 1, -1, 2), align_corners=True
     )

@@ -30,5 +30,5 @@ class Net(nn.Module, ABC):
 
 def loaded(name: str, net: N) -> N:
     """A net with the weights that were trained."""
-    net.load_state_dict(torch.load(weights(name), weights_only=True)["net"])
+    net.load_state_dict(torch.load(weights(name), map_location="cpu", weights_only=True)["net"])
     return net.eval()

@@ -56,13 +56,13 @@ class Otle(Net):
     @cached_property
     def first_guess(self) -> Dhn:
         """DHN as it was trained; no part of this net, and not kept with it."""
-        return loaded("dhn", Dhn())
+        return loaded("dhn", Dhn()).to(next(self.parameters()).device)
 
     def descended(self, seen: Tensor, template: Tensor, first: Tensor, steps: int) -> Tensor:
         """The same from another first guess (B, 4, 2)."""
         offsets = first.clone().requires_grad_()
         optimiser = torch.optim.Adam([offsets], lr=FIRST_STEP_PX, betas=(0.8, 0.95))
-        best, least = first.clone(), torch.full((len(first),), torch.inf)
+        best, least = first.clone(), first.new_full((len(first),), torch.inf)
         for step in range(steps + 1):
             for group in optimiser.param_groups:
                 group["lr"] = FIRST_STEP_PX * (LAST_STEP_PX / FIRST_STEP_PX) ** (step / max(steps, 1))
@@ -77,10 +77,10 @@ class Otle(Net):
 
 def candidate_errors(offsets: Tensor) -> Tensor:
     """Errors (B, 4, 2) of any size: what wrong poses do to the four points, and what they do not."""
-    batch = len(offsets)
-    size = SMALLEST_PX * (LARGEST_PX / SMALLEST_PX) ** torch.rand(batch, 1, 1)
-    of_a_pose = offsets[torch.randperm(batch)] * (torch.randint(0, 2, (batch, 1, 1)) * 2 - 1)
+    batch, device = len(offsets), offsets.device
+    size = SMALLEST_PX * (LARGEST_PX / SMALLEST_PX) ** torch.rand(batch, 1, 1, device=device)
+    of_a_pose = offsets[torch.randperm(batch, device=device)] * (torch.randint(0, 2, (batch, 1, 1), device=device) * 2 - 1)
     of_a_pose = of_a_pose / of_a_pose.norm(dim=-1).mean(dim=1).clamp(min=0.1)[:, None, None]
-    of_none = torch.randn(batch, 4, 2)
-    mixed = of_a_pose + torch.rand(batch, 1, 1) * of_none
+    of_none = torch.randn(batch, 4, 2, device=device)
+    mixed = of_a_pose + torch.rand(batch, 1, 1, device=device) * of_none
     return size * mixed / mixed.norm(dim=-1).mean(dim=1)[:, None, None]

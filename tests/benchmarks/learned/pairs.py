@@ -48,8 +48,8 @@ class Ground:
 class Pairs:
     """Random pairs without end; the same of the same seed."""
 
-    def __init__(self, seed: int) -> None:
-        self.rng = np.random.default_rng([20, seed])
+    def __init__(self, *seed: int) -> None:
+        self.rng = np.random.default_rng([20, *seed])
         self.grounds = [random_ground(self.rng) for _ in range(PITCHES)]
 
     def __iter__(self) -> Iterator[Pair]:

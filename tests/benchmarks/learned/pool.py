@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import torch
 from torch import Tensor
+from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from tests.benchmarks.learned.pairs import Pair, Pairs
 from tests.benchmarks.learned.window import SIZE
 
-KEPT = 4096
-SHOWN = 4
+SHOWN = 6
 """How often a pair is shown, on average."""
+FIRST = 512
+"""Pairs that are drawn before any is shown."""
+PACK = 16
+"""Pairs that are handed over at once."""
 MIRRORED_POINTS = [1, 0, 3, 2]
 
 
@@ -26,35 +32,54 @@ class Batch:
     offsets: Tensor
 
 
-class Pool:
-    """The last `KEPT` random pairs of a seed; every batch brings a few new ones."""
+class Drawn(IterableDataset[tuple[np.ndarray, np.ndarray]]):
+    """Random pairs without end, packed: pictures (2, height, width) of bytes, offsets (4, 2). Workers draw apart."""
 
     def __init__(self, seed: int) -> None:
-        self.pairs = iter(Pairs(seed))
-        self.rng = np.random.default_rng([21, seed])
-        self.kept: list[tuple[np.ndarray, np.ndarray]] = []
-        self.drawn = 0
+        super().__init__()
+        self.seed = seed
+
+    def __iter__(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        worker = get_worker_info()
+        cv2.setNumThreads(1)
+        for pair in Pairs(self.seed, worker.id if worker else 0):
+            pictures = np.rint(255 * np.stack([pair.seen, pair.template])).astype(np.uint8)
+            yield pictures, pair.offsets.astype(np.float32)
+
+
+class Pool:
+    """The last `kept` random pairs of a seed on `device`; every batch brings a few new ones, drawn by `workers`.
+
+    Without workers they are drawn by the process itself, as they are needed.
+    """
+
+    def __init__(self, seed: int, device: torch.device, kept: int, workers: int = 0) -> None:
+        self._fresh = iter(DataLoader(Drawn(seed), batch_size=PACK, num_workers=workers))
+        self._random = torch.Generator(device).manual_seed(seed)
+        self._pictures = torch.empty((kept, 2, SIZE[1], SIZE[0]), dtype=torch.uint8, device=device)
+        self._offsets = torch.empty((kept, 4, 2), device=device)
+        self.drawn, self.shown = 0, 0
 
     def batch(self, count: int) -> Batch:
-        """Some of the pairs, every other one mirrored."""
-        for _ in range(max(1, count // SHOWN) if self.kept else 4 * count):
-            self._draw()
-        chosen = [self.kept[i] for i in self.rng.integers(len(self.kept), size=count)]
-        pictures, offsets = (np.stack(part) for part in zip(*chosen, strict=True))
-        mirrored = self.rng.random(count) < 0.5
-        pictures[mirrored] = pictures[mirrored, :, :, ::-1]
-        offsets[mirrored] = offsets[mirrored][:, MIRRORED_POINTS] * [-1, 1]
-        both = torch.from_numpy(pictures).float() / 255
-        return Batch(both[:, :1], both[:, 1:], torch.from_numpy(offsets))
+        """Some of the pairs, about every other one mirrored."""
+        while self.shown + count > SHOWN * (self.drawn - FIRST):
+            self._keep(*next(self._fresh))
+        self.shown += count
+        device = self._offsets.device
+        chosen = torch.randint(min(self.drawn, len(self._offsets)), (count,), generator=self._random, device=device)
+        mirrored = torch.rand((count, 1, 1, 1), generator=self._random, device=device) < 0.5
+        pictures = self._pictures[chosen].float() / 255
+        pictures = torch.where(mirrored, pictures.flip(-1), pictures)
+        offsets = self._offsets[chosen]
+        offsets = torch.where(mirrored[..., 0], _mirrored(offsets), offsets)
+        return Batch(pictures[:, :1], pictures[:, 1:], offsets)
 
-    def _draw(self) -> None:
-        pair = next(self.pairs)
-        packed = np.stack([_packed(pair.seen), _packed(pair.template)])
-        if len(self.kept) < KEPT:
-            self.kept.append((packed, pair.offsets.astype(np.float32)))
-        else:
-            self.kept[self.drawn % KEPT] = (packed, pair.offsets.astype(np.float32))
-        self.drawn += 1
+    def _keep(self, pictures: Tensor, offsets: Tensor) -> None:
+        places = (self.drawn + torch.arange(len(offsets))) % len(self._offsets)
+        places = places.to(self._offsets.device)
+        self._pictures[places] = pictures.to(places.device)
+        self._offsets[places] = offsets.to(places.device)
+        self.drawn += len(offsets)
 
 
 def batch_of(pairs: list[Pair]) -> Batch:
@@ -66,6 +91,6 @@ def batch_of(pairs: list[Pair]) -> Batch:
     )
 
 
-def _packed(picture: np.ndarray) -> np.ndarray:
-    assert picture.shape == SIZE[::-1]
-    return np.rint(255 * picture).astype(np.uint8)
+def _mirrored(offsets: Tensor) -> Tensor:
+    """Displacements (B, 4, 2) of pictures whose left is their right: the points of `QUAD` swap sides as well."""
+    return offsets[:, MIRRORED_POINTS] * offsets.new_tensor([-1, 1])
