@@ -56,7 +56,7 @@ $(VENV)/.bench: $(VENV)/.installed
 bench: $(VENV)/.bench
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.accuracy
 
-# What `make bench` compares with and has to be trained, once: an hour of one core for each of three nets.
+# What `make bench` compares with and has to be trained, once: six hours of one core, less with a GPU (see --help).
 bench-learned: $(VENV)/.bench
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 nice -n 19 $(BIN)/python -m tests.benchmarks.learned
 

@@ -1,6 +1,6 @@
 """The paper's ablation: what LeakyReLU and the focal loss bring, each alone and together, same budget for all four.
 
-    python -m models.training.ablation --steps 2000 --seeds 3
+    python -m models.training.ablation --device cuda --workers 12
 
 Trains what is not trained yet into `runs/ablation`, then prints the table: each variant with batch normalisation and
 without it, all on the same batches of a seed. It may be stopped and called again. Each variant's threshold is chosen on
@@ -10,6 +10,7 @@ other crops than it is judged on.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,15 +19,16 @@ import torch
 
 from models.training.data.makers import Makers
 from models.training.data.pool import Pool
-from models.training.evaluate import rendered
+from models.training.evaluate import rendered, unseen_crops
 from models.training.network.export import export, load
 from models.training.network.unet import LEAK, PAPER
 from models.training.pitches.crops import CROP_SIZE
+from models.training.pitches.render import Rendering
 from models.training.train import Budget, Recipe, Training, train
 from worker.calibration.see.segmentation import Segmenter
 
 FOLDER = Path("runs/ablation")
-STEPS, BATCH, SIZE_PX = 2000, 6, 224
+STEPS, BATCH, SIZE_PX = 4000, 6, 224
 GAMMA = 1.0
 SEEDS, SEED, KEPT = 3, 1, 4096
 DRAWN_APART = 1_000_000
@@ -90,6 +92,7 @@ def train_variants(steps: int, seed: int, workers: int, device: torch.device) ->
 
 def table(steps: int, seeds: int, judged: int, threads: int) -> list[str]:
     """A row for each variant with and without normalisation: means over the seeds, and the spread of the F1."""
+    tuned_on, judged_on = unseen_crops(judged // 2, VALIDATION), unseen_crops(judged)
     lines = [
         f"U-Net variants after {steps} steps, {seeds} seeds, {judged} rendered crops of other venues, %; ± over seeds",
         "",
@@ -99,7 +102,7 @@ def table(steps: int, seeds: int, judged: int, threads: int) -> list[str]:
     for normalised, words in NORMALISED.items():
         for variant in VARIANTS:
             recipe = _recipe(variant, normalised)
-            runs = [_figures(_run(steps, seed) / f"{recipe}.pt", judged, threads) for seed in range(seeds)]
+            runs = [_figures(_run(steps, seed) / f"{recipe}.pt", tuned_on, judged_on, threads) for seed in range(seeds)]
             iou, f1, precision, recall = (
                 100 * np.array([run[name] for run in runs]) for name in ("iou", "f1", "precision", "recall")
             )
@@ -118,13 +121,15 @@ def _run(steps: int, seed: int) -> Path:
     return FOLDER / f"{steps}-{seed}"
 
 
-def _figures(checkpoint: Path, crops: int, threads: int) -> dict[str, float]:
-    """Figures on the test crops, at the threshold with the best F1 on the validation crops."""
+def _figures(
+    checkpoint: Path, tuned_on: Sequence[Rendering], judged_on: Sequence[Rendering], threads: int
+) -> dict[str, float]:
+    """Figures on some crops, at the threshold that has the best F1 on others."""
     path = checkpoint.with_suffix(".onnx")
     export(load(checkpoint), path)
     segmenter = Segmenter(path, threads)
-    best = max(rendered(segmenter, crops // 2, VALIDATION), key=lambda row: row["f1"])["threshold"]
-    return next(row for row in rendered(segmenter, crops) if row["threshold"] == best)
+    best = max(rendered(segmenter, tuned_on), key=lambda row: row["f1"])["threshold"]
+    return next(row for row in rendered(segmenter, judged_on) if row["threshold"] == best)
 
 
 if __name__ == "__main__":

@@ -117,12 +117,14 @@ def real(segmenter: Segmenter, folder: Path, out: Path | None) -> dict[str, Figu
     return figures
 
 
-def rendered(segmenter: Segmenter, crops: int, seed: int = UNSEEN) -> list[dict[str, float]]:
-    """Figures per pixel over rendered crops of venues that training never draws, one row per threshold."""
-    counts = sum(
-        (_count(segmenter, random_crop(np.random.default_rng([seed, index])), THRESHOLDS) for index in range(crops)),
-        start=np.zeros((len(THRESHOLDS), 5)),
-    )
+def unseen_crops(count: int, seed: int = UNSEEN) -> list[Rendering]:
+    """Rendered crops of venues that training never draws."""
+    return [random_crop(np.random.default_rng([seed, index])) for index in range(count)]
+
+
+def rendered(segmenter: Segmenter, crops: Sequence[Rendering]) -> list[dict[str, float]]:
+    """Figures per pixel over rendered crops, one row per threshold."""
+    counts = sum((_count(segmenter, crop, THRESHOLDS) for crop in crops), start=np.zeros((len(THRESHOLDS), 5)))
     return [{"threshold": threshold, **_shares(*row)} for threshold, row in zip(THRESHOLDS, counts, strict=True)]
 
 
@@ -172,7 +174,7 @@ def main() -> None:
     options = parser.parse_args()
     segmenter = Segmenter(options.model, threads=2)
     if options.rendered:
-        for row in rendered(segmenter, options.rendered):
+        for row in rendered(segmenter, unseen_crops(options.rendered)):
             print("  ".join(f"{name} {value:.4f}" for name, value in row.items()))
     if options.real:
         for name, figures in real(segmenter, options.real, options.write).items():

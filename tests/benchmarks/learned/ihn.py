@@ -82,7 +82,8 @@ class Ihn(Net):
         after = self(batch.seen, batch.template, LEARNT_STEPS)
         weights = [OLDER ** (len(after) - 1 - step) for step in range(len(after))]
         losses = [functional.smooth_l1_loss(offsets, batch.offsets, beta=0.5) for offsets in after]
-        return sum((w * one for w, one in zip(weights, losses, strict=True)), batch.offsets.new_zeros(())) / sum(weights)
+        weighted = torch.stack([weight * loss for weight, loss in zip(weights, losses, strict=True)])
+        return weighted.sum() / sum(weights)
 
     def answer(self, seen: Tensor, template: Tensor, steps: int | None = None) -> Tensor:
         """What it says when it is used."""

@@ -79,7 +79,8 @@ def candidate_errors(offsets: Tensor) -> Tensor:
     """Errors (B, 4, 2) of any size: what wrong poses do to the four points, and what they do not."""
     batch, device = len(offsets), offsets.device
     size = SMALLEST_PX * (LARGEST_PX / SMALLEST_PX) ** torch.rand(batch, 1, 1, device=device)
-    of_a_pose = offsets[torch.randperm(batch, device=device)] * (torch.randint(0, 2, (batch, 1, 1), device=device) * 2 - 1)
+    either_way = torch.randint(0, 2, (batch, 1, 1), device=device) * 2 - 1
+    of_a_pose = offsets[torch.randperm(batch, device=device)] * either_way
     of_a_pose = of_a_pose / of_a_pose.norm(dim=-1).mean(dim=1).clamp(min=0.1)[:, None, None]
     of_none = torch.randn(batch, 4, 2, device=device)
     mixed = of_a_pose + torch.rand(batch, 1, 1, device=device) * of_none

@@ -20,4 +20,4 @@ def missing(names: tuple[str, ...]) -> str | None:
     if not absent:
         return None
     command = f"python -m tests.benchmarks.learned --nets {' '.join(absent)}"
-    return f"no weights in {WEIGHTS}; to train them, an hour of one core each: {command}"
+    return f"no weights in {WEIGHTS}; to train them, hours of a core or minutes of a GPU: {command}"
