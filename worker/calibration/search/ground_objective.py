@@ -5,6 +5,9 @@ that the loss is smooth; it says neither which nor how. Blurs summed to one temp
 nothing pulls from beyond it, and nothing within says where its middle is. Here each blur has an IoU of its own, of
 template and segmentation blurred alike, and the loss is their mean: broad lines pull from afar, narrow ones are exact.
 
+What is segmented far from any line of the template, other pitches' lines above all, is in no union: it would be there
+whatever the pose, and drown what the pose changes. Cameras with each other are compared wherever both see.
+
 Kept for comparison: the far half of the pitch, mostly noise there, counts as much as the near one. `objective` says
 what the preset `esc` does instead.
 """
@@ -27,22 +30,37 @@ from worker.calibration.see.line_profile import blurred_line
 from worker.calibration.see.sampling import bilinear
 
 PIXELS_PER_METRE = 10.0
-BLUR_PX = 1.5
-BLURS = 5
-"""Each of the blurs is twice as broad as the one before, from 30 cm to 4.8 m: `BLUR_PX` of a grid twice as coarse."""
-COARSEST = 2**BLURS
-"""Pixels a side of what is one on the coarsest grid."""
+COARSEST = 32
+"""Pixels a side of what may be one on the coarsest grid."""
+MARKED = 0.5
+"""Where a segmentation says this or more there is a line."""
+REACH_PX = 4
+"""How far beside a blurred line of the template a union reaches, in pixels of the grid of that blur."""
 LINE_STEP_M, LINE_SAMPLES = 0.02, 6
 """How finely the template is drawn, along a line and across it."""
 MARGIN_M = 2.0
-LEAST_PX_PER_METRE = 8.0
-"""Ground counts where a metre of it, away from the camera, is at least so high in a 4K frame: a line about a pixel."""
+LEAST_PX_PER_METRE = 6.0
+"""Ground counts where a metre of it, away from the camera, is at least so high in a 4K frame: a line three quarters of a pixel."""
 LARGEST_UNDISTORTED = 2.5
 """Undistorted frames are cut where they would be wider than this many times the frame."""
 
 Picture = NDArray[np.uint8]
 """Grey, or a mask that is 0 where it is not."""
 Grey = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Blurs:
+    """Gaussians, each twice as broad as the one before: `sigma_px` of grids that are 2, 4, 8 ... times as coarse."""
+
+    sigma_px: float
+    count: int
+
+
+BROAD = Blurs(1.5, 5)
+"""From 30 cm to 4.8 m: what pulls from two degrees away."""
+NARROW = Blurs(0.7, 2)
+"""14 and 28 cm, about a line: what is exact."""
 
 
 class GroundObjective:
@@ -58,8 +76,10 @@ class GroundObjective:
         cameras: Sequence[Camera],
         responses: Sequence[NDArray[np.float32]],
         stitch_weight: float,
+        blurs: Blurs,
     ) -> None:
         """`cameras` carry the stored poses; `responses` are their segmentations (H, W) in 0..1."""
+        self.blurs = blurs
         whole = _Grid.covering(pitch)
         window = _window([whole.visible(camera) for camera in cameras])
         grid, lines = whole.within(window), whole.lines(pitch)[window]
@@ -68,10 +88,11 @@ class GroundObjective:
             _Warp.build(grid, _PinholeView.build(camera, response), domain)
             for camera, response, domain in zip(cameras, responses, domains, strict=True)
         ]
-        self.half_heights = _half_heights(pitch.line_width)
+        self.half_heights = _half_heights(pitch.line_width, blurs)
         self.templates = [self._thickened(lines & domain) for domain in domains]
+        self.around = [_widened(template) for template in self.templates]
         self.pairs = {
-            (i, j): _coarsened(domains[i] & domains[j])
+            (i, j): _coarsened(domains[i] & domains[j], blurs.count)
             for i, j in combinations(range(len(cameras)), 2)
             if (domains[i] & domains[j] & lines).any()
         }
@@ -89,7 +110,12 @@ class GroundObjective:
 
     def _loss(self, rotations: Array, positions: Array) -> float:
         seen = [self._thickened(warp(r, p)) for warp, r, p in zip(self.warps, rotations, positions, strict=True)]
-        single = np.mean([_unlike(its, template) for its, template in zip(seen, self.templates, strict=True)])
+        single = np.mean(
+            [
+                _unlike(_within(its, around), template)
+                for its, template, around in zip(seen, self.templates, self.around, strict=True)
+            ]
+        )
         if self.stitch_weight == 0:
             return float(single)
         stitch = np.mean(
@@ -100,8 +126,8 @@ class GroundObjective:
     def _thickened(self, lines: Picture) -> list[Picture]:
         """Of a picture (H, W) of lines, for each blur, 1 where it makes them at least half as high as it should."""
         return [
-            _above(cv2.GaussianBlur(coarse, (0, 0), BLUR_PX, borderType=cv2.BORDER_CONSTANT), half)
-            for coarse, half in zip(_pyramid(lines), self.half_heights, strict=True)
+            _above(cv2.GaussianBlur(coarse, (0, 0), self.blurs.sigma_px, borderType=cv2.BORDER_CONSTANT), half)
+            for coarse, half in zip(_pyramid(lines, self.blurs.count), self.half_heights, strict=True)
         ]
 
 
@@ -109,12 +135,12 @@ def _above(picture: Any, threshold: float) -> Picture:
     return np.greater(picture, threshold).view(np.uint8)
 
 
-def _pyramid(picture: Picture) -> Iterator[Grey]:
-    """A picture (H, W) averaged over squares of 2, 4, 8 ... pixels a side, one for each blur."""
+def _pyramid(picture: Picture, count: int) -> Iterator[Grey]:
+    """A picture (H, W) averaged over squares of 2, 4, 8 ... pixels a side."""
     # Once in bytes, which is fast; averages of broader squares would be rounded to nothing.
     coarse = _halved(picture).astype(np.float32)
     yield coarse
-    for _ in range(BLURS - 1):
+    for _ in range(count - 1):
         coarse = _halved(coarse)
         yield coarse
 
@@ -124,15 +150,21 @@ def _halved(picture: Any) -> Any:
     return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
-def _half_heights(line_width: float) -> list[float]:
+def _half_heights(line_width: float, blurs: Blurs) -> list[float]:
     """Half of how bright, of 255, a line that is `line_width` metres broad is after each blur."""
-    widths = np.array([line_width * PIXELS_PER_METRE / 2**number for number in range(1, BLURS + 1)])
-    return [255 * height / 2 for height in blurred_line(widths, BLUR_PX)]
+    widths = np.array([line_width * PIXELS_PER_METRE / 2**number for number in range(1, blurs.count + 1)])
+    return [255 * height / 2 for height in blurred_line(widths, blurs.sigma_px)]
 
 
-def _coarsened(domain: Picture) -> list[Picture]:
-    """A mask (H, W) on the grid of each blur."""
-    return [_above(coarse, 255 / 2) for coarse in _pyramid(domain)]
+def _coarsened(domain: Picture, count: int) -> list[Picture]:
+    """A mask (H, W) on the grids of `count` blurs."""
+    return [_above(coarse, 255 / 2) for coarse in _pyramid(domain, count)]
+
+
+def _widened(template: Sequence[Picture]) -> list[Picture]:
+    """A template's blurred lines and what is beside them."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * REACH_PX + 1, 2 * REACH_PX + 1))
+    return [np.asarray(cv2.dilate(lines, disc), dtype=np.uint8) for lines in template]
 
 
 def _unlike(a: Sequence[Picture], b: Sequence[Picture]) -> float:
@@ -151,7 +183,7 @@ def _within(pictures: Sequence[Picture], domain: Sequence[Picture]) -> list[Pict
 
 @dataclass(frozen=True)
 class _PinholeView:
-    """An undistorted segmentation and the matrix (3, 3) of its pinhole camera."""
+    """What an undistorted segmentation calls a line, 255, and the matrix (3, 3) of its pinhole camera."""
 
     marked: Picture
     matrix: Array
@@ -175,7 +207,7 @@ class _PinholeView:
         x, y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
         plane = (np.stack([x, y], axis=-1) + left_top) / lens.matrix[0, 0]
         undistorted = bilinear(response, lens.distort(plane))
-        return cls(np.rint(undistorted * 255).astype(np.uint8), matrix)
+        return cls((255 * (undistorted >= MARKED)).astype(np.uint8), matrix)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from worker.calibration.scene.camera import Array, Camera, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.search.evolution import EvolutionStrategy, exponential_decay
-from worker.calibration.search.ground_objective import GroundObjective
+from worker.calibration.search.ground_objective import BROAD, NARROW, GroundObjective
 from worker.calibration.search.objective import GENES, Objective
 
 MUTATION_RAD = 0.005
@@ -58,9 +58,15 @@ COARSE_TO_FINE = (
 Cameras are searched for one by one until they are near: six numbers are found faster than 6 N, and two cameras that are
 both far off agree best about the wrong lines.
 """
-ON_THE_GROUND = (Level(3.0, GroundObjective),)
-"""Preset `paper`, with three times its mutation: with its own, two cameras get half of the way from 2.1 degrees."""
-ALONE_ON_THE_GROUND = (Level(1.0, GroundObjective, alone=True),)
+ON_THE_GROUND = (
+    Level(3.0, partial(GroundObjective, blurs=BROAD), alone=True),
+    Level(1.0, partial(GroundObjective, blurs=NARROW)),
+)
+"""Preset `paper`, with three times its mutation at first: with its own, cameras get half of the way from 2.1 degrees.
+
+Each camera finds its lines before all of them are fitted to each other, as in `COARSE_TO_FINE`.
+"""
+ALONE_ON_THE_GROUND = tuple(replace(level, alone=True) for level in ON_THE_GROUND)
 """Preset `scpr`."""
 
 

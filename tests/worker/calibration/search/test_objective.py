@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair, pair_markings
-from worker.calibration.search.ground_objective import GroundObjective
+from worker.calibration.search.ground_objective import BROAD, NARROW, GroundObjective
 from worker.calibration.search.objective import BlurredResponse, Objective
 from worker.calibration.search.search import genome_of
 from worker.calibration.see.line_profile import blurred_line
@@ -97,9 +97,10 @@ def test_outside_the_picture_there_is_nothing():
     np.testing.assert_array_equal(blurred.at(column, row), 0)
 
 
-def test_the_papers_objective_prefers_the_truth_too():
+@pytest.mark.parametrize("blurs", [BROAD, NARROW])
+def test_the_papers_objective_prefers_the_truth_too(blurs):
     cameras, responses = scene()
-    objective = GroundObjective(CROWNED, cameras, responses, 0.5)
+    objective = GroundObjective(CROWNED, cameras, responses, 0.5, blurs)
     truth = loss(objective, cameras)
     assert truth < loss(objective, [moved(c, (0.005, 0, 0)) for c in cameras])
     assert truth < 0.7
@@ -107,8 +108,8 @@ def test_the_papers_objective_prefers_the_truth_too():
 
 def test_the_papers_objective_sees_a_crown_through_its_planes():
     cameras, responses = scene()
-    with_roof = GroundObjective(CROWNED, cameras, responses, 0.5)
-    without = GroundObjective(CROWNED.flat(), cameras, responses, 0.5)
+    with_roof = GroundObjective(CROWNED, cameras, responses, 0.5, BROAD)
+    without = GroundObjective(CROWNED.flat(), cameras, responses, 0.5, BROAD)
     assert loss(with_roof, cameras) < loss(without, cameras)
 
 
