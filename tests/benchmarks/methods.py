@@ -19,7 +19,8 @@ from tests.benchmarks.truth import apart_by_homography_px, overlapping
 from worker.calibration.calibrate import calibrate
 from worker.calibration.records import Calibration, Options, Spent
 from worker.calibration.scene.camera import Camera, Frame, inside
-from worker.calibration.search.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD, genome_of, with_genome
+from worker.calibration.search.genome import genome_of, with_genome
+from worker.calibration.search.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD
 from worker.calibration.see.segmentation import Region, Segmenter, whole_frame
 
 THREADS = 2

@@ -24,6 +24,7 @@ from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.search.genome import genome_of
 from worker.calibration.search.search import (
     ALONE_ON_THE_GROUND,
     COARSE_TO_FINE,
@@ -31,7 +32,6 @@ from worker.calibration.search.search import (
     Found,
     Level,
     Strategy,
-    genome_of,
     search,
 )
 from worker.calibration.see.contrast import Channels

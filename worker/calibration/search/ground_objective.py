@@ -34,13 +34,13 @@ COARSEST = 32
 """Pixels a side of what may be one on the coarsest grid."""
 MARKED = 0.5
 """Where a segmentation says this or more there is a line."""
-REACH_PX = 4
+REACH_PX = 8
 """How far beside a blurred line of the template a union reaches, in pixels of the grid of that blur."""
 LINE_STEP_M, LINE_SAMPLES = 0.02, 6
 """How finely the template is drawn, along a line and across it."""
 MARGIN_M = 2.0
 LEAST_PX_PER_METRE = 6.0
-"""Ground counts where a metre of it, away from the camera, is at least so high in a 4K frame: a line three quarters of a pixel."""
+"""Ground counts where a metre of it, away from the camera, is at least so high in a 4K frame."""
 LARGEST_UNDISTORTED = 2.5
 """Undistorted frames are cut where they would be wider than this many times the frame."""
 

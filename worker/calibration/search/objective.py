@@ -28,8 +28,6 @@ from worker.calibration.see.sampling import bilinear_planes
 
 Response = NDArray[np.float32]
 
-GENES = 6
-"""Per camera: rotation vector, position."""
 SURROUND = 3.0
 """Width of the surround that is taken off a blurred response, in units of the blur."""
 STITCH_OFFSETS = (-1.0, 0.0, 1.0)

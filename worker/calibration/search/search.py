@@ -10,11 +10,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, Pose
+from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.search.evolution import EvolutionStrategy, exponential_decay
+from worker.calibration.search.genome import GENES, from_swinging, genome_of, looked_at, swinging, with_genome
 from worker.calibration.search.ground_objective import BROAD, NARROW, GroundObjective
-from worker.calibration.search.objective import GENES, Objective
+from worker.calibration.search.objective import Objective
 
 MUTATION_RAD = 0.005
 MUTATION_M = 0.1
@@ -35,13 +36,15 @@ class Level:
     """A stretch of generations with one objective, and the strength of mutation at its start.
 
     `patience`: generations without progress after which it ends before its time; None: it never does. `alone`: each
-    camera has a population of its own, and nothing is stitched.
+    camera has a population of its own, and nothing is stitched. `swings`: a turn swings the camera about the ground
+    that it looks at, and does not turn it where it stands.
     """
 
     mutation: float
     objective: Callable[[Field, Sequence[Camera], Sequence[NDArray[np.float32]], float], Losses]
     patience: int | None = None
     alone: bool = False
+    swings: bool = False
 
 
 def _blurred(blur_px: float, mutation: float, alone: bool) -> Level:
@@ -60,7 +63,7 @@ both far off agree best about the wrong lines.
 """
 ON_THE_GROUND = (
     Level(3.0, partial(GroundObjective, blurs=BROAD), alone=True),
-    Level(1.0, partial(GroundObjective, blurs=NARROW)),
+    Level(1.0, partial(GroundObjective, blurs=NARROW), swings=True),
 )
 """Preset `paper`, with three times its mutation at first: with its own, cameras get half of the way from 2.1 degrees.
 
@@ -119,21 +122,41 @@ def search(
             on_generation(done, best[-1])
             if _nothing_moves(best, level.patience):
                 break
-        population = np.concatenate([group.evolution.population for group in groups], axis=1)
-        here = with_genome(cameras, np.concatenate([group.evolution.best for group in groups]))
+        population = np.concatenate([group.population for group in groups], axis=1)
+        here = with_genome(cameras, np.concatenate([group.best for group in groups]))
     return Found(here, best[-1], done)
 
 
 @dataclass(frozen=True)
 class _Group:
-    """Cameras that are searched for together."""
+    """Cameras that are searched for together; `pivots` (N, 3): points that they swing about, None where they do not."""
 
     evolution: EvolutionStrategy
     objective: Losses
+    pivots: Array | None
+
+    @property
+    def population(self) -> Array:
+        """Genomes (parents, 6 N)."""
+        return self._placed(self.evolution.population)
+
+    @property
+    def best(self) -> Array:
+        """The best genome (6 N,)."""
+        return self._placed(self.evolution.best)
+
+    def begin_with(self, genomes: Array) -> None:
+        """Judge the first parents (parents, 6 N)."""
+        genes = genomes if self.pivots is None else swinging(genomes, self.pivots)
+        self.evolution.tell(genes, self.objective.losses(genomes))
 
     def next_generation(self, strength: float) -> None:
+        """Children of the parents, and the best of both."""
         children = self.evolution.ask(strength)
-        self.evolution.tell(children, self.objective.losses(children))
+        self.evolution.tell(children, self.objective.losses(self._placed(children)))
+
+    def _placed(self, genes: Array) -> Array:
+        return genes if self.pivots is None else from_swinging(genes, self.pivots)
 
 
 def _groups(
@@ -148,12 +171,14 @@ def _groups(
     """One group per camera or one of all, each with its genes of the `population` (parents, 6 N), judged."""
     groups = []
     for members in [[i] for i in range(len(here))] if level.alone else [list(range(len(here)))]:
-        seen = [responses[i] for i in members]
-        objective = level.objective(pitch, [here[i] for i in members], seen, strategy.stitch_weight)
-        evolution = EvolutionStrategy(strategy.parents, strategy.offspring, _mutation(len(members)), rng)
-        genomes = population[:, GENES * members[0] : GENES * (members[-1] + 1)]
-        evolution.tell(genomes, objective.losses(genomes))
-        groups.append(_Group(evolution, objective))
+        cameras, seen = [here[i] for i in members], [responses[i] for i in members]
+        group = _Group(
+            EvolutionStrategy(strategy.parents, strategy.offspring, _mutation(len(members)), rng),
+            level.objective(pitch, cameras, seen, strategy.stitch_weight),
+            np.array([looked_at(camera) for camera in cameras]) if level.swings else None,
+        )
+        group.begin_with(population[:, GENES * members[0] : GENES * (members[-1] + 1)])
+        groups.append(group)
     return groups
 
 
@@ -168,17 +193,6 @@ def _mean_loss(groups: Sequence[_Group]) -> float:
 def _nothing_moves(best: Sequence[float], patience: int | None) -> bool:
     """Whether the last of the best losses is hardly below that of `patience` generations before."""
     return patience is not None and len(best) > patience and best[-1 - patience] - best[-1] < STALLED_BY
-
-
-def genome_of(cameras: Sequence[Camera]) -> Array:
-    """Poses as one vector (6 N,): per camera rotation vector, position."""
-    return np.concatenate([[*camera.pose.rotation, *camera.pose.position] for camera in cameras])
-
-
-def with_genome(cameras: Sequence[Camera], genome: Array) -> list[Camera]:
-    """The cameras at the poses of a genome (6 N,)."""
-    poses = genome.reshape(-1, GENES)
-    return [camera.with_pose(Pose(pose[:3], pose[3:])) for camera, pose in zip(cameras, poses, strict=True)]
 
 
 def _shares(total: int, parts: int) -> list[int]:

@@ -5,7 +5,8 @@ import numpy as np
 from tests.demo.render import outdated
 from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
 from worker.calibration.scene.camera import rotation_angles_deg
-from worker.calibration.search.search import ON_THE_GROUND, Level, Strategy, genome_of, search, with_genome
+from worker.calibration.search.genome import genome_of
+from worker.calibration.search.search import ON_THE_GROUND, Level, Strategy, search
 
 
 class Bowl:
@@ -59,14 +60,6 @@ def test_the_best_never_gets_worse_within_a_level():
 def test_generations_are_shared_among_the_levels():
     found, _ = searched([level(1e-6), level(1e-6), level(1e-6)], 10)
     assert found.generations == 10
-
-
-def test_a_genome_is_the_poses_of_all_cameras():
-    cameras = pair()
-    again = with_genome(cameras, genome_of(cameras))
-    for before, after in zip(cameras, again, strict=True):
-        np.testing.assert_array_equal(before.pose.rotation, after.pose.rotation)
-        np.testing.assert_array_equal(before.pose.position, after.pose.position)
 
 
 def test_the_papers_objective_catches_a_camera_that_is_as_far_off_as_the_papers():
