@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
@@ -61,16 +61,13 @@ COARSE_TO_FINE = (
 Cameras are searched for one by one until they are near: six numbers are found faster than 6 N, and two cameras that are
 both far off agree best about the wrong lines.
 """
-ON_THE_GROUND = (
+ALONE_ON_THE_GROUND = (
     Level(3.0, partial(GroundObjective, blurs=BROAD), alone=True),
-    Level(1.0, partial(GroundObjective, blurs=NARROW), swings=True),
+    Level(1.0, partial(GroundObjective, blurs=NARROW), alone=True, swings=True),
 )
-"""Preset `paper`, with three times its mutation at first: with its own, cameras get half of the way from 2.1 degrees.
-
-Each camera finds its lines before all of them are fitted to each other, as in `COARSE_TO_FINE`.
-"""
-ALONE_ON_THE_GROUND = tuple(replace(level, alone=True) for level in ON_THE_GROUND)
-"""Preset `scpr`."""
+"""Preset `scpr`, with three times the mutation at first: with the paper's, cameras get half of the way from 2.1°."""
+ON_THE_GROUND = (*ALONE_ON_THE_GROUND, Level(0.5, partial(GroundObjective, blurs=NARROW), swings=True))
+"""Preset `paper`: the same, and then all cameras together."""
 
 
 @dataclass(frozen=True)
