@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from tests.benchmarks import plots
-from tests.benchmarks.methods import METHODS, SLOW, THREADS, Seen, cannot_run, engine
+from tests.benchmarks.methods import CLICKED, METHODS, SLOW, THREADS, Seen, cannot_run, engine
 from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, VENUES, Scene, scene, started
 from tests.benchmarks.truth import Errors, apart, errors
@@ -171,23 +171,25 @@ def _caught(venue: str, number: int, size: float) -> dict:
 
 
 def presets(options: argparse.Namespace) -> Iterator[str]:
-    """How many starts the paper's presets bring near the truth: every camera within `PULLED_IN_DEG`."""
-    yield f"| from 2.1° | within {PULLED_IN_DEG}° | worst camera, median ° | largest ° |"
-    yield "|---|---|---|---|"
-    for method in SLOW:
-        turns = [
+    """How many starts the paper's presets bring near the truth, every camera within `PULLED_IN_DEG`; beside clicks."""
+    yield f"| from 2.1° | within {PULLED_IN_DEG}° | worst camera, median cm | ° | largest ° |"
+    yield "|---|---|---|---|---|"
+    for method in (*SLOW, CLICKED):
+        rows = [
             _remembered(
                 {"venue": venue, "start": number, "preset": method}, lambda v=venue, n=number, m=method: _left(v, n, m)
-            )["turn_deg"]
+            )
             for number in range(options.slow_starts)
             for venue in [SLOW_VENUES[number % len(SLOW_VENUES)]]
         ]
+        turns = [row["turn_deg"] for row in rows]
         near = sum(turn <= PULLED_IN_DEG for turn in turns)
-        yield f"| {method} | {near} of {len(turns)} | {np.median(turns):.2f} | {max(turns):.2f} |"
+        shift = 100 * np.median([row["shift_m"] for row in rows])
+        yield f"| {method} | {near} of {len(rows)} | {shift:.1f} | {np.median(turns):.3f} | {max(turns):.3f} |"
 
 
 def _left(venue: str, number: int, method: str) -> dict:
-    """How far off the worst camera is where a preset ends."""
+    """How far off the worst camera is where a method ends."""
     seen = _seen(venue)
     true = seen.scene.cameras
     found = METHODS[method](seen, started(true, np.random.default_rng([number, 2])), number).cameras

@@ -228,9 +228,10 @@ def cannot_run(method: str) -> str | None:
     return missing(WEIGHTS_OF[method]) if method in WEIGHTS_OF else None
 
 
+CLICKED = "Zhang (clicked corners)"
 METHODS: dict[str, Method] = {
     "Start": start,
-    "Zhang (clicked corners)": zhang,
+    CLICKED: zhang,
     "SIFT and a homography": homography,
     "ECC": by_homography(aligned),
     "DHN": learned("dhn"),
