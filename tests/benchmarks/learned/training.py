@@ -102,12 +102,11 @@ def validated(net: Net) -> dict[str, dict[str, float]]:
     net.eval()
     device = next(net.parameters()).device
     batch = batch_of(list(islice(Pairs(VALIDATION_SEED), VALIDATED_BY)))
-    pictures = (batch.seen.to(device), batch.template.to(device))
-    parts = list(zip(*(picture.split(VALIDATED_AT_ONCE) for picture in pictures), strict=True))
+    seen, template = (picture.to(device).split(VALIDATED_AT_ONCE) for picture in (batch.seen, batch.template))
     told = {"start": _spread(batch.offsets)}
     for steps in net.tried_steps:
-        off = torch.cat([net.answer(*part, steps) for part in parts]).cpu() - batch.offsets
-        told[f"{steps} steps"] = _spread(off)
+        answers = [net.answer(*pictures, steps=steps) for pictures in zip(seen, template, strict=True)]
+        told[f"{steps} steps"] = _spread(torch.cat(answers).cpu() - batch.offsets)
     return told
 
 
