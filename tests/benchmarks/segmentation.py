@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--crops", type=int, default=200, help="rendered crops to judge on")
     parser.add_argument("--views", type=int, default=80, help="rendered views per condition")
     parser.add_argument(
-        "--only", nargs="+", choices=SECTIONS, default=list(SECTIONS), help="the ablation takes six hours"
+        "--only", nargs="+", choices=SECTIONS, default=list(SECTIONS), help="the ablation takes half a day"
     )
     parser.add_argument("--measure", choices=PASSES, help=argparse.SUPPRESS)  # this program, calling itself
     options = parser.parse_args()
