@@ -88,8 +88,7 @@ def train(trainings: Sequence[Training], pool: Pool, batch_size: int) -> None:
 
 def rate_at(share: float) -> float:
     """The learning rate, relative to the largest, when this share of the schedule is behind."""
-    warm = min(1.0, (share + 1e-4) / WARM_UP)
-    return warm * (LAST_RATE + (1 - LAST_RATE) * (1 + math.cos(math.pi * min(1.0, share))) / 2)
+    return min(1.0, share / WARM_UP) * (LAST_RATE + (1 - LAST_RATE) * (1 + math.cos(math.pi * min(1.0, share))) / 2)
 
 
 def _summary(training: Training) -> dict[str, object]:
