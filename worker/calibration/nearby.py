@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from worker.calibration.finish.diagnosis import is_sure
-from worker.calibration.finish.refinement import SEARCH_PX, measure_all
+from worker.calibration.finish.refinement import SEARCH_PX, LineReader
 from worker.calibration.judge.quality import CameraResult
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import LinePoints
@@ -31,10 +31,10 @@ def settle_nearby(here: Situation) -> Settled | None:
     if not here.method.tries_again or here.usable != everyone:
         return None
     lines = here.pitch.line_points()
-    caught = measure_all(lines, here.cameras, here.seen.sight, SEARCH_PX[0])
-    if not _all_caught(lines, here.cameras, caught):
+    reader = LineReader(here.seen.sight)
+    if not _all_caught(lines, here.cameras, reader.measure(lines, here.cameras, SEARCH_PX[0])):
         return None
-    finished = here.finished_nearby(caught)
+    finished = here.finished_nearby(reader)
     results = here.judged(finished)
     if not all(_stayed(result, here.options.lens_may_drift) for result in results):
         return None

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 
-from worker.calibration.finish.refinement import Sight, assess, refine
+from worker.calibration.finish.refinement import LineReader, Sight, assess, refine
 from worker.calibration.finish.uncertainty import Deviation, Finished
 from worker.calibration.judge.markings import markings_seen
 from worker.calibration.judge.overlap import overlap_of
@@ -37,7 +37,6 @@ from worker.calibration.search.search import (
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import evidence_of
 from worker.calibration.see.left_out import left_out, of_use
-from worker.calibration.see.line_measurement import Measurements
 from worker.calibration.see.ridge_response import ridge_response
 from worker.calibration.see.view import ViewCondition
 
@@ -134,12 +133,12 @@ class Situation:
                 self.pitch, begun, self.seen.sight, asked.stitch_weight, self._free(), stored=self.cameras
             )
 
-    def finished_nearby(self, caught: Sequence[Measurements]) -> Finished:
-        """Where the finish leaves cameras that begin at their stored poses, from which it has `caught` the lines."""
+    def finished_nearby(self, reader: LineReader) -> Finished:
+        """Where the finish leaves cameras that begin at their stored poses, around which the `reader` has measured."""
         with self.journey.measuring("refinement"):
             self.journey.at("refinement", 0.0)
             weight = self.options.stitch_weight
-            return refine(self.pitch, self.cameras, self.seen.sight, weight, self._free(), caught=caught)
+            return refine(self.pitch, self.cameras, self.seen.sight, weight, self._free(), reader=reader)
 
     def loss_of(self, pitch: Field, answered: Sequence[Camera]) -> float:
         """The loss of the search's middle level where the cameras are answered to stand, inf without any of use.

@@ -11,24 +11,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from worker.calibration.finish.normal_equations import normal_equations
-from worker.calibration.finish.residuals import Unknowns, residuals
-from worker.calibration.finish.robust import Weigh, tukey_weights
+from worker.calibration.finish.least_squares import Rows, normal_equations, rows_of, weighted
+from worker.calibration.finish.robust import Weigh
+from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.ground import UNEVEN_M, Belief
+from worker.calibration.scene.ground import Belief
 from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved
 from worker.calibration.see.line_measurement import Measurements
 
 PRIOR_RAD, PRIOR_M = 0.03, 1.0
 """Standard deviation, per axis, of where a camera is before any line is measured."""
+TURN_M = 30.0
+"""A turn counts as the shift of what the camera sees at this distance."""
 
 
 @dataclass(frozen=True)
 class Estimate:
     """Where the finish stands: cameras and pitch, with `values` (E,) in them, and `heights` (K,) of the ground.
 
-    `lines`: the pitch's line points, as many as it had in the beginning.
+    `lines`: the pitch's line points, as many as it had in the beginning; `uneven_m`: a standard deviation of the
+    heights.
     """
 
     pitch: Field
@@ -36,7 +39,7 @@ class Estimate:
     cameras: list[Camera]
     values: Array
     heights: Array
-    uneven_m: float = UNEVEN_M
+    uneven_m: float
 
     @classmethod
     def at(cls, pitch: Field, cameras: Sequence[Camera], unknowns: Unknowns) -> Estimate:
@@ -47,6 +50,7 @@ class Estimate:
             list(cameras),
             np.zeros(len(unknowns.parameters)),
             np.zeros(len(unknowns.ground)),
+            unknowns.ground.usual_m,
         )
 
     def on_ground(self, unknowns: Unknowns) -> LinePoints:
@@ -56,7 +60,7 @@ class Estimate:
 
     def moved(self, move: Array, unknowns: Unknowns) -> Estimate:
         """After a step (U,)."""
-        poses, values, heights = np.split(move, [POSE_NUMBERS * unknowns.cameras, unknowns.dense])
+        poses, values, heights = np.split(move, [POSE_NUMBERS * unknowns.views, unknowns.dense])
         pitch, cameras = self.pitch, self.cameras
         for parameter, by in zip(unknowns.parameters, values.tolist(), strict=True):
             cameras, pitch = parameter.applied(cameras, pitch, by)
@@ -68,16 +72,16 @@ class Estimate:
         return replace(self, pitch=pitch, lines=lines, cameras=cameras, values=values, heights=heights)
 
     def farthest_from(self, other: Estimate) -> float:
-        """How far, in metres, the camera that moved most is from where it was in another estimate."""
-        shifts = [a.pose.position - b.pose.position for a, b in zip(self.cameras, other.cameras, strict=True)]
-        return float(np.linalg.norm(shifts, axis=1).max())
+        """How far, in metres, the view that moved most is from where it was in another estimate; turns as `TURN_M`."""
+        changes = [change_between(a, b) for a, b in zip(self.cameras, other.cameras, strict=True)]
+        return max(float(np.linalg.norm(c[3:]) + TURN_M * np.linalg.norm(c[:3])) for c in changes)
 
     def prior(self, unknowns: Unknowns) -> Array:
         """Information (U, U) on every unknown before any line is measured."""
         known = np.zeros((len(unknowns), len(unknowns)))
         poses = [PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3
         expected = [parameter.expected**-2 for parameter in unknowns.parameters]
-        known[: unknowns.dense, : unknowns.dense] = np.diag([*(poses * unknowns.cameras), *expected])
+        known[: unknowns.dense, : unknowns.dense] = np.diag([*(poses * unknowns.views), *expected])
         known[unknowns.dense :, unknowns.dense :] = unknowns.ground.precision / self.uneven_m**2
         return known
 
@@ -86,29 +90,30 @@ class Estimate:
         changes = [change_between(before, now) for before, now in zip(found, self.cameras, strict=True)]
         return np.concatenate([*changes, self.values, self.heights])
 
+    def rows(self, measured: Sequence[Measurements], unknowns: Unknowns) -> list[Rows]:
+        """The measurements of every view against its pose."""
+        return rows_of(self.lines.position, self.cameras, measured, unknowns)
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where a Gauss-Newton step leads, and the `covariance` (U, U) of everything unknown before it."""
+
+    to: Estimate
+    covariance: Array
+
+    def unevenness(self, unknowns: Unknowns, before: Belief) -> float:
+        """How uneven a ground the heights speak for, a standard deviation in metres; `before`: what was thought."""
+        of_heights = self.covariance[unknowns.dense :, unknowns.dense :]
+        return unknowns.ground.unevenness(self.to.heights, of_heights, self.to.uneven_m, before)
+
 
 def step(
-    here: Estimate,
-    found: Sequence[Camera],
-    measured: Sequence[Measurements],
-    unknowns: Unknowns,
-    stitch_weight: float,
-    weigh: Weigh,
-) -> Estimate:
+    here: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns, weigh: Weigh
+) -> Step:
     """One Gauss-Newton step for everything together; `found`: where the search left the cameras."""
-    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, weigh)
-    equations = normal_equations(rows, unknowns)
+    equations = normal_equations(weighted(here.rows(measured, unknowns), here.heights, unknowns, weigh))
     prior = here.prior(unknowns)
     pull = equations.gradient + prior @ here.away(found)
-    move = np.asarray(np.linalg.solve(equations.information + prior, -pull), dtype=float)
-    return here.moved(move, unknowns)
-
-
-def unevenness(
-    here: Estimate, measured: Sequence[Measurements], unknowns: Unknowns, stitch_weight: float, before: Belief
-) -> float:
-    """How uneven a ground the heights speak for, a standard deviation in metres; `before`: what was thought of it."""
-    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
-    information = normal_equations(rows, unknowns).information + here.prior(unknowns)
-    covariance = np.asarray(np.linalg.inv(information)[unknowns.dense :, unknowns.dense :], dtype=float)
-    return unknowns.ground.unevenness(here.heights, covariance, here.uneven_m, before)
+    covariance = np.asarray(np.linalg.inv(equations.information + prior), dtype=float)
+    return Step(here.moved(-covariance @ pull, unknowns), covariance)

@@ -11,33 +11,37 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.estimate import Estimate, step, unevenness
-from worker.calibration.finish.residuals import Unknowns, misfit_px
+from worker.calibration.finish.estimate import Estimate, Step, step
+from worker.calibration.finish.least_squares import misfit_px
 from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.finish.uncertainty import Finished, judged
+from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.ground import EVEN, MOST_UNEVEN_M, ORDINARY, UNEVEN_M, Ground
+from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
 from worker.calibration.scene.parameters import Parameter
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
 from worker.calibration.see.left_out import left_out
-from worker.calibration.see.line_measurement import Measurements, measure_lines
+from worker.calibration.see.line_measurement import LineProfiles, Measurements, measure_lines
 
-SEARCH_PX = (14.0, 8.0, 5.0, 4.0, 3.0, 3.0, 3.0, 3.0)
-"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame.
-
-The last rounds are there for measurements that change with the pose, and end as soon as they do not.
-"""
+SEARCH_PX = (14.0, 8.0, 5.0)
+"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
+LAST_SEARCH_PX = 3.0
+"""In the last rounds, which go on until the cameras stand still."""
+SPARE_PX = 3.0
+"""So much farther than it is asked to look a reading of a frame reaches, so that it is good for more than one pose."""
 ASSESSING_SEARCH_PX = 8.0
 MOST_STEPS = 4
-"""Per round."""
+"""Of a coarse round."""
+MOST_READINGS, MOST_LAST_STEPS = 6, 12
+"""How often the frames are read again in the last rounds, and how many steps each reading is good for."""
 MISFIT_FLATTENS_PX = 0.3
 """Error that nothing explains at which the ground is taken for half as uneven as its heights say."""
-SETTLED_M = 5e-5
+SETTLED_M = 2e-4
 """Cameras that a step moves less than this are where these measurements lead."""
-ARRIVED_M = 1e-4
-"""Cameras that a whole round moves less than this have arrived."""
+ARRIVED_M = 5e-5
+"""Cameras that a whole reading of the frames moves less than this have arrived."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,31 @@ class Sight:
         return Sight([self.channels[n] for n in numbers], [self.responses[n] for n in numbers])
 
 
+class LineReader:
+    """Measures the lines of several cameras around any poses; reads a frame again only where it has to."""
+
+    def __init__(self, sight: Sight) -> None:
+        self._sight = sight
+        self._read: dict[int, LineProfiles] = {}
+
+    def measure(self, lines: LinePoints, cameras: Sequence[Camera], search_px: float) -> list[Measurements]:
+        """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
+        measured = []
+        for number, camera in enumerate(cameras):
+            search = search_px * camera.intrinsics.relative_size
+            profiles = self._read.get(number)
+            if profiles is None or not profiles.cover(camera, lines, search):
+                channels, response = self._sight.channels[number], self._sight.responses[number]
+                profiles = LineProfiles(lines, camera, channels, response, search + SPARE_PX)
+                self._read[number] = profiles
+            measured.append(profiles.measure(camera, lines, search))
+        return measured
+
+    def read_anew(self) -> None:
+        """Read every frame again when it is measured next."""
+        self._read.clear()
+
+
 def refine(
     pitch: Field,
     cameras: Sequence[Camera],
@@ -60,52 +89,78 @@ def refine(
     free: Sequence[Parameter] = (),
     searches_px: Sequence[float] = SEARCH_PX,
     stored: Sequence[Camera] | None = None,
-    caught: Sequence[Measurements] | None = None,
+    reader: LineReader | None = None,
 ) -> Finished:
     """Measure the lines and move the cameras onto them, round by round with a narrower search.
 
     `stored`: where the cameras stood when that was last known, if not where they begin. `free`: numbers of lenses and
-    field to be found along with the poses; pitch and cameras come back with them. `caught`: what the first round
-    measures, if that is known.
+    field to be found along with the poses; pitch and cameras come back with them. `reader`: of the `sight`, if it has
+    been measured before. `stitch_weight` 0: each camera on a ground of its own; any other has no effect, since
+    what cameras know of each other is weighed by its errors alone.
     """
     if stitch_weight == 0 and len(cameras) > 1 and not free:
-        return _each_alone(pitch, cameras, sight, stored or cameras, caught)
+        return _each_alone(pitch, cameras, sight, stored or cameras)
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     here = Estimate.at(pitch, cameras, unknowns)
+    reader = reader or LineReader(sight)
     for search in searches_px:
         unknowns = unknowns.around(here.pitch, here.lines)
-        measured = caught or measure_all(here.on_ground(unknowns), here.cameras, sight, search)
-        caught, before = None, here
+        measured = reader.measure(here.on_ground(unknowns), here.cameras, search)
         # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
         # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
-        here = _down_huber(here, cameras, measured, unknowns, stitch_weight)
-        measured = doubted(here, measured)
-        here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
-        uneven = unevenness(here, measured, unknowns, stitch_weight, EVEN)
-        # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
-        uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
-        here = replace(here, uneven_m=min(uneven, MOST_UNEVEN_M))
-        if here.farthest_from(before) < ARRIVED_M:
-            break
-    here = replace(here, uneven_m=unevenness(here, measured, unknowns, stitch_weight, ORDINARY))
+        here = _down_huber(here, cameras, measured, unknowns)
+        here = _towards_tukey(here, cameras, measured, unknowns).to
+    last, unknowns = _settled(here, cameras, reader, unknowns)
+    uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _assessed(here, stored or cameras, sight, unknowns.around(here.pitch, here.lines), stitch_weight)
+    return _assessed(replace(last.to, uneven_m=uneven), stored or cameras, sight, unknowns)
+
+
+def _settled(
+    here: Estimate, found: Sequence[Camera], reader: LineReader, unknowns: Unknowns
+) -> tuple[Step, Unknowns]:
+    """The step that leads to where the cameras stand still.
+
+    What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew at
+    the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
+    """
+    for _ in range(MOST_READINGS):
+        read_at = here
+        unknowns = unknowns.around(here.pitch, here.lines)
+        reader.read_anew()
+        for _ in range(MOST_LAST_STEPS):
+            before = here
+            measured = reader.measure(here.on_ground(unknowns), here.cameras, LAST_SEARCH_PX)
+            last = _towards_tukey(here, found, measured, unknowns)
+            here = last.to
+            if here.farthest_from(before) < ARRIVED_M:
+                break
+        if here.farthest_from(read_at) < ARRIVED_M:
+            break
+    return last, unknowns
 
 
 def _down_huber(
-    here: Estimate,
-    found: Sequence[Camera],
-    measured: Sequence[Measurements],
-    unknowns: Unknowns,
-    stitch_weight: float,
+    here: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns
 ) -> Estimate:
     """Where Huber's loss of the same measurements is least."""
     for _ in range(MOST_STEPS):
-        measured = doubted(here, measured)
-        before, here = here, step(here, found, measured, unknowns, stitch_weight, huber_weights)
+        before, here = here, step(here, found, doubted(here, measured), unknowns, huber_weights).to
         if here.farthest_from(before) < SETTLED_M:
             break
     return here
+
+
+def _towards_tukey(
+    here: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns
+) -> Step:
+    """One step towards the least of Tukey's loss, and how uneven the ground is there."""
+    measured = doubted(here, measured)
+    made = step(here, found, measured, unknowns, tukey_weights)
+    uneven = made.unevenness(unknowns, unknowns.ground.even)
+    # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
+    uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
+    return replace(made, to=replace(made.to, uneven_m=min(uneven, MOST_UNEVEN_M)))
 
 
 def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
@@ -124,13 +179,13 @@ def assess(
     pitch: Field,
     cameras: Sequence[Camera],
     sight: Sight,
-    stitch_weight: float,
+    stitch_weight: float,  # noqa: ARG001  (every finish of a preset is asked alike)
     free: Sequence[Parameter] = (),
     stored: Sequence[Camera] | None = None,
 ) -> Finished:
     """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    return _assessed(Estimate.at(pitch, cameras, unknowns), stored or cameras, sight, unknowns, stitch_weight)
+    return _assessed(Estimate.at(pitch, cameras, unknowns), stored or cameras, sight, unknowns)
 
 
 def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
@@ -141,29 +196,15 @@ def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, sear
     ]
 
 
-def _each_alone(
-    pitch: Field,
-    cameras: Sequence[Camera],
-    sight: Sight,
-    stored: Sequence[Camera],
-    caught: Sequence[Measurements] | None,
-) -> Finished:
+def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight, stored: Sequence[Camera]) -> Finished:
     """Cameras that need not agree, each on a ground of its own."""
-    ends = [
-        refine(pitch, [camera], sight.of([n]), 0.0, stored=[stored[n]], caught=caught and [caught[n]])
-        for n, camera in enumerate(cameras)
-    ]
+    ends = [refine(pitch, [camera], sight.of([n]), 0.0, stored=[stored[n]]) for n, camera in enumerate(cameras)]
     deviations = [deviation for end in ends for deviation in end.deviations if deviation.camera is not None]
     return Finished(pitch, [end.each[0] for end in ends], deviations, [])
 
 
-def _assessed(
-    here: Estimate,
-    stored: Sequence[Camera],
-    sight: Sight,
-    unknowns: Unknowns,
-    stitch_weight: float,
-) -> Finished:
+def _assessed(here: Estimate, stored: Sequence[Camera], sight: Sight, unknowns: Unknowns) -> Finished:
+    unknowns = unknowns.around(here.pitch, here.lines)
     lines = here.on_ground(unknowns)
     evidence = [
         evidence_of(lines, camera, channels, response, left_out(here.pitch, camera))
@@ -172,7 +213,7 @@ def _assessed(
     measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
-    finished = judged(ordinary, stored, measured, evidence, unknowns, stitch_weight)
+    finished = judged(ordinary, stored, measured, evidence, unknowns)
     each = [
         replace(one, measured=its, uneven_m=ordinary.uneven_m) for one, its in zip(finished.each, measured, strict=True)
     ]

@@ -11,13 +11,16 @@ from worker.calibration.scene.camera import Array
 HUBER, TUKEY = 1.345, 4.685
 """Residuals, in standard deviations, where each begins to doubt: 95 % of the efficiency of least squares."""
 
+USUAL = 1 / 1.4826
+"""Half of normal errors are smaller than so many standard deviations."""
+
 Weigh = Callable[[Array], Array]
 """How much each of M residuals, in units of its expected error, is believed."""
 
 
 def robust_scale(values: Array) -> float:
     """Standard deviation by the median absolute value, at least 1: expected errors are not doubted downwards."""
-    return max(1.0, 1.4826 * float(np.median(np.abs(values)))) if len(values) else 1.0
+    return max(1.0, float(np.median(np.abs(values))) / USUAL) if len(values) else 1.0
 
 
 def huber_weights(values: Array) -> Array:

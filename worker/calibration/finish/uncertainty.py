@@ -14,10 +14,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from worker.calibration.finish.estimate import Estimate
-from worker.calibration.finish.normal_equations import error_of_measurement, normal_equations
-from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS, Unknowns, residuals, rms_px
+from worker.calibration.finish.least_squares import (
+    FEWEST_MEASUREMENTS,
+    error_of_measurement,
+    normal_equations,
+    rms_px,
+    weighted,
+)
 from worker.calibration.finish.robust import tukey_slopes, tukey_weights
 from worker.calibration.finish.scales import Group, posterior
+from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import UNEVEN_M
@@ -140,7 +146,6 @@ def judged(
     measured: Sequence[Measurements],
     evidence: Sequence[Evidence],
     solved: Unknowns,
-    stitch_weight: float,
 ) -> Finished:
     """The answer `here` and what it is worth, found with `solved` unknown.
 
@@ -148,8 +153,8 @@ def judged(
     """
     lines, cameras = here.lines, here.cameras
     suspects = _suspects(here.pitch, cameras, solved)
-    unknowns = Unknowns(solved.cameras, [*solved.parameters, *suspects], solved.ground).around(here.pitch, lines)
-    told = _told(here, measured, unknowns, solved.dense, stitch_weight)
+    unknowns = Unknowns(solved.views, [*solved.parameters, *suspects], solved.ground).around(here.pitch, lines)
+    told = _told(here, measured, unknowns, solved.dense)
     found = posterior(told.information, told.pull, _blocks(here, stored, unknowns, len(solved.parameters)))
     # How far a camera moved helps to tell a zoom from a move. That it has not is no measurement of where it is: if the
     # lenses are what they are said to be, lines alone have to determine it.
@@ -211,24 +216,24 @@ class _Told:
     repeated: Array
 
 
-def _told(
-    here: Estimate, measured: Sequence[Measurements], unknowns: Unknowns, solved: int, stitch_weight: float
-) -> _Told:
+def _told(here: Estimate, measured: Sequence[Measurements], unknowns: Unknowns, solved: int) -> _Told:
     """By how the pull of the residuals varies, between how the pull changes with the unknowns: Huber's sandwich."""
-    position, dense = here.lines.position, unknowns.dense
-    rows = residuals(position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
-    slopes = residuals(position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_slopes)
-    bread, gradient = normal_equations(slopes, unknowns).information, normal_equations(rows, unknowns).gradient
-    spread = error_of_measurement(rows, unknowns)
+    dense = unknowns.dense
+    rows = here.rows(measured, unknowns)
+    steep = weighted(rows, here.heights, unknowns, tukey_slopes)
+    level = weighted(rows, here.heights, unknowns, tukey_weights)
+    equations = normal_equations(level)
+    bread, gradient = normal_equations(steep).information, equations.gradient
+    spread = error_of_measurement(level, equations.information)
     weak = here.prior(unknowns)[:solved, :solved]
     part = np.linalg.inv(bread[:solved, :solved] + weak)
     repeated = part @ (spread[:solved, :solved] + weak) @ part
 
-    level = unknowns.ground.precision / here.uneven_m**2
-    effect = np.linalg.solve(bread[dense:, dense:] + level, bread[dense:, :dense])
+    even = unknowns.ground.precision / here.uneven_m**2
+    effect = np.linalg.solve(bread[dense:, dense:] + even, bread[dense:, :dense])
     information = bread[:dense, :dense] - bread[:dense, dense:] @ effect
-    pull = effect.T @ (gradient[dense:] + level @ here.heights) - gradient[:dense]
-    spread[dense:, dense:] += level
+    pull = effect.T @ (gradient[dense:] + even @ here.heights) - gradient[:dense]
+    spread[dense:, dense:] += even
     reduced = np.concatenate([np.eye(dense), -effect.T], axis=1)
     believed = _believed(information, reduced @ spread @ reduced.T)
     return _Told(believed, believed @ np.linalg.pinv(information, hermitian=True) @ pull, repeated)
@@ -256,7 +261,7 @@ def _blocks(here: Estimate, stored: Sequence[Camera], unknowns: Unknowns, solved
 
     The first `solved` of the parameters were found with the poses, and are as far off as is expected.
     """
-    first, suspects = POSE_NUMBERS * unknowns.cameras, unknowns.parameters[solved:]
+    first, suspects = POSE_NUMBERS * unknowns.views, unknowns.parameters[solved:]
     owner = np.array([getattr(suspect, "camera", -1) for suspect in suspects])
     expected = np.array([parameter.expected for parameter in unknowns.parameters])
     moves = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
@@ -283,7 +288,7 @@ def _suspects(pitch: Field, cameras: Sequence[Camera], solved: Unknowns) -> list
 
 def _determined(number: int, unknowns: Unknowns, covariance: Array, value: Array) -> Determined:
     """What is known of the free parameter that is this number of all unknowns."""
-    first = POSE_NUMBERS * unknowns.cameras
+    first = POSE_NUMBERS * unknowns.views
     variance = np.diag(covariance)[first:]
     together = np.sqrt(variance * covariance[number, number])
     correlation = np.divide(covariance[number, first:], together, out=np.zeros_like(together), where=together > 0)

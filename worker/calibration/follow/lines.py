@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.normal_equations import CLUSTER_POINTS
+from worker.calibration.finish.least_squares import CLUSTER_POINTS
 from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.follow.motion_filter import Observed
 from worker.calibration.scene.camera import Array, Camera, Frame

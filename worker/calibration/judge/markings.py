@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.finish.estimate import PRIOR_M, PRIOR_RAD
-from worker.calibration.finish.normal_equations import CLUSTER_POINTS, LEAST_NOISE
+from worker.calibration.finish.least_squares import CLUSTER_POINTS, LEAST_NOISE
 from worker.calibration.finish.robust import tukey_weights
 from worker.calibration.finish.uncertainty import FinishedCamera
 from worker.calibration.scene.camera import Array, Camera
@@ -34,7 +34,7 @@ FEWEST_MEASURED = 6
 HARDLY, FARTHER_PX, MOST = 0.5, 30.0, 0.5
 """A marking of which less is found is looked for so far around its place, in pixels of a 4K frame; if so much of it is
 seen there, that is it."""
-MEASURED = ("index", "pixel", "normal", "px_per_metre", "px_per_metre_up", "length_px")
+MEASURED = ("index", "pixel", "normal", "px_per_metre", "px_per_metre_up", "length_px", "trust")
 LEAST_FREE = 0.1
 """What must be left of an offset when the pose has given way to it: a line that the pose hangs on has none."""
 PUT_BACK_ERROR = 0.3

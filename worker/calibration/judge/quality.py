@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from worker.calibration.finish.diagnosis import is_sure
-from worker.calibration.finish.residuals import FEWEST_MEASUREMENTS
+from worker.calibration.finish.least_squares import FEWEST_MEASUREMENTS
 from worker.calibration.finish.uncertainty import Deviation, FinishedCamera
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.judge.overlap import Overlap

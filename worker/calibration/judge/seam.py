@@ -86,8 +86,7 @@ def seam_between(pitch: Field, first: FinishedCamera, second: FinishedCamera) ->
 def _put(lines: LinePoints, camera: Camera, measured: Measurements, its: NDArray[np.intp]) -> tuple[Array, Array]:
     """How far (M,) m along the normals of the lines a camera puts their paint beside them, and the error of that."""
     chosen = measured[its]
-    expected = camera.project(lines.position[chosen.index])
-    offset = np.sum((chosen.pixel - expected) * chosen.normal, axis=1)
+    offset = chosen.offset(camera, lines.position[chosen.index])
     return offset / chosen.px_per_metre, chosen.noise_px / chosen.px_per_metre
 
 

@@ -103,7 +103,7 @@ def fit_measures(
     """The finish on the pitch with those measures that the lines tell; and what they tell of every measure."""
     free = free_field(pitch)
     everything = refine(pitch, cameras, sight, stitch_weight, free, (*FIRST_SEARCH_PX, *SEARCH_PX))
-    tried = try_ridges(everything, free, sight, stitch_weight)
+    tried = try_ridges(everything, free, sight)
     measures = [
         _measure(pitch, everything.pitch, parameter, found, tried, cameras)
         for parameter, found in zip(free, everything.determined, strict=True)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from worker.calibration.finish.estimate import Estimate, step
-from worker.calibration.finish.normal_equations import CLUSTER_POINTS
+from worker.calibration.finish.least_squares import CLUSTER_POINTS, Weighted, weighted
 from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Sight, measure_all
-from worker.calibration.finish.residuals import Residuals, Unknowns, residuals
 from worker.calibration.finish.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 from worker.calibration.finish.uncertainty import Finished
+from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import Ground
@@ -82,17 +82,17 @@ class TriedRidges:
         return np.array([ridge.cost for ridge in self.tried])
 
 
-def try_ridges(base: Finished, free: Sequence[Parameter], sight: Sight, stitch_weight: float) -> TriedRidges:
+def try_ridges(base: Finished, free: Sequence[Parameter], sight: Sight) -> TriedRidges:
     """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
     lines = base.pitch.line_points()
     measured = measure_all(lines, base.cameras, sight, ASSESSING_SEARCH_PX)
     unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
-    held, rows = _fitted(base.pitch, base.cameras, measured, unknowns, stitch_weight)
+    held, rows = _fitted(base.pitch, base.cameras, measured, unknowns)
     scale = robust_scale(rows.value)
     together = _together(rows, scale)
     tried = []
     for length in np.arange(0.0, base.pitch.length, SPACING_M).tolist():
-        there, left = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns, stitch_weight)
+        there, left = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns)
         away = there.away(base.cameras)
         loss = float(np.sum(tukey_loss(left.value, scale))) + float(away @ there.prior(unknowns) @ away)
         tried.append(TriedRidge(there.pitch, loss / together))
@@ -104,19 +104,17 @@ def _fitted(
     cameras: Sequence[Camera],
     measured: Sequence[Measurements],
     unknowns: Unknowns,
-    stitch_weight: float,
-) -> tuple[Estimate, Residuals]:
+) -> tuple[Estimate, Weighted]:
     """Everything else found for a pitch, and what is left of the lines then."""
     here = Estimate.at(pitch, cameras, unknowns)
     for _ in range(STEPS):
         unknowns = unknowns.around(here.pitch, here.lines)
-        here = step(here, cameras, measured, unknowns, stitch_weight, tukey_weights)
-    rows = residuals(here.lines.position, here.cameras, measured, unknowns, here.heights, stitch_weight, tukey_weights)
-    return here, rows
+        here = step(here, cameras, measured, unknowns, tukey_weights).to
+    return here, weighted(here.rows(measured, unknowns), here.heights, unknowns, tukey_weights)
 
 
-def _together(rows: Residuals, scale: float) -> float:
+def _together(rows: Weighted, scale: float) -> float:
     """As many residuals that neighbours on a line err alike count as one."""
     good = np.abs(rows.value) < TUKEY * scale
-    sums = np.bincount(rows.point[good] // CLUSTER_POINTS, rows.value[good])
+    sums = np.bincount(rows.points[rows.at[good]] // CLUSTER_POINTS, rows.value[good])
     return max(float(np.sum(sums**2) / np.sum(rows.value[good] ** 2)), 1.0)

@@ -23,6 +23,8 @@ UNEVEN_M = 0.015
 MOST_UNEVEN_M = 0.02
 """More than that is not taken for a swell: a ground that may do anything explains any pose."""
 NUGGET = 1e-6
+EVEN_SHARE, EVEN_NODES = 4 / 15, 2.0
+ORDINARY_NODES = 8.0
 
 
 @dataclass(frozen=True)
@@ -33,26 +35,22 @@ class Belief:
     nodes: float
 
 
-EVEN = Belief(0.004, 2.0)
-"""Finds poses: what a flat ground explains is not owed to swells."""
-ORDINARY = Belief(UNEVEN_M, 8.0)
-"""Says how sure they are: a few lines that fit a flat ground do not show that the whole of it has not sunk."""
-
-
 @dataclass(frozen=True)
 class Ground:
     """Nodes under the markings, K of them.
 
     `node` (N, 4) and `share` (N, 4): between which nodes each line point lies, and what it takes of each;
-    `precision` (K, K): the inverse covariance of heights that have a standard deviation of 1.
+    `precision` (K, K): the inverse covariance of heights that have a standard deviation of 1; `usual_m`: what that is
+    on a ground of this kind.
     """
 
     node: NDArray[np.intp]
     share: Array
     precision: Array
+    usual_m: float = UNEVEN_M
 
     @classmethod
-    def under(cls, lines: LinePoints) -> Ground:
+    def under(cls, lines: LinePoints, usual_m: float = UNEVEN_M) -> Ground:
         """The ground that carries some line points."""
         at = lines.position[:, :2] / NODE_M
         low = np.floor(at).astype(int)
@@ -62,30 +60,24 @@ class Ground:
         nodes, node = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
         apart = np.sqrt(3) * NODE_M * np.linalg.norm(nodes[:, None] - nodes[None], axis=-1) / CORRELATION_M
         covariance = (1 + apart) * np.exp(-apart) + NUGGET * np.eye(len(nodes))
-        return cls(node.reshape(-1, 4), share, np.linalg.inv(covariance))
+        return cls(node.reshape(-1, 4), share, np.linalg.inv(covariance), usual_m)
 
     def __len__(self) -> int:
         return len(self.precision)
 
+    @property
+    def even(self) -> Belief:
+        """Finds poses: what a flat ground explains is not owed to swells."""
+        return Belief(self.usual_m * EVEN_SHARE, EVEN_NODES)
+
+    @property
+    def ordinary(self) -> Belief:
+        """Says how sure they are: a few lines that fit a flat ground do not show that it has not sunk as a whole."""
+        return Belief(self.usual_m, ORDINARY_NODES)
+
     def under_points(self, heights: Array, point: NDArray[np.intp]) -> Array:
         """Heights (M,) under line points (M,), from those of the nodes (K,)."""
         return np.asarray(np.sum(self.share[point] * heights[self.node[point]], axis=1))
-
-    def gathered(self, point: NDArray[np.intp], values: Array) -> Array:
-        """Sums (K, C) of values (M, C) of line points (M,) by node, each as far as it belongs to it."""
-        sums = np.empty((len(self), values.shape[1]))
-        node = self.node[point].ravel()
-        for column, of_points in enumerate(values.T):
-            sums[:, column] = np.bincount(node, (self.share[point] * of_points[:, None]).ravel(), len(self))
-        return sums
-
-    def gathered_twice(self, point: NDArray[np.intp], values: Array) -> Array:
-        """Sums (K, K) of values (M,) of line points (M,) by the pairs of nodes they lie between."""
-        node, share = self.node[point], self.share[point]
-        pair = node[:, :, None] * len(self) + node[:, None, :]
-        both = share[:, :, None] * share[:, None, :] * values[:, None, None]
-        sums = np.bincount(pair.ravel(), both.ravel(), len(self) ** 2)
-        return np.asarray(sums.reshape(len(self), len(self)), dtype=float)
 
     def unevenness(self, heights: Array, covariance: Array, believed: float, before: Belief) -> float:
         """The standard deviation that heights (K,) speak for, known to a covariance (K, K) under a `believed` one.

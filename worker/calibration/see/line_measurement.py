@@ -6,22 +6,33 @@ the line as noise and things beside the line do not.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.camera import Array, Camera, Plane
 from worker.calibration.scene.field import LinePoints
 from worker.calibration.scene.ground import UNEVEN_M
+from worker.calibration.scene.motion import pixel_slopes
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.line_matching import LEAST_ALONG, LENS_BLUR_PX, Matches, filter_reach, match_lines
 from worker.calibration.see.line_profile import blurred_point, blurred_step
 from worker.calibration.see.sampling import bilinear
 
-LEAST_CORRELATION = 0.6
-LEAST_RESPONSE = 0.3
+CORRELATION = (0.55, 0.65)
+"""Correlation with the expected profile from which a measurement counts at all, and from which it counts in full.
+
+Every limit is a ramp: with a step, a measurement beside it would come and go as the pose moves by a hair.
+"""
+RESPONSE = (0.25, 0.35)
+"""The network's probability of a marking, and ..."""
+ALONG = (LEAST_ALONG - 0.05, LEAST_ALONG + 0.05)
+"""... the mean correlation along the line, likewise: the larger of the two counts."""
+SEARCH_EDGE_PX, PICTURE_EDGE_PX = 1.0, 2.0
+"""Over so many pixels a measurement fades towards the end of the search and the border of the picture."""
 CENTRE_STEPS = 2
 RIDGE = 1e-6
 OFF_CENTRE_PENALTY = 0.15
@@ -31,6 +42,8 @@ NOISE_PX = 0.2
 PAINT_M = 0.006
 """Lines are painted to about a centimetre."""
 
+SHARED_NOISE = 0.1
+"""Part of the variance of `NOISE_PX` that is the same in every frame of a camera that stands still."""
 MISFIT_ALIKE_PX = 10.0
 """Length of line over which what lens and field have wrong is the same."""
 
@@ -41,7 +54,8 @@ class Measurements:
 
     `index` (M,): which of the pitch's line points; `points`: those points; `pixel` (M, 2): where the line was found;
     `normal` (M, 2): across it in the picture, towards `points.normal`; `px_per_metre` and `px_per_metre_up` (M,): how
-    far it moves along that when the line or the ground under it does (see `SeenLines`).
+    far it moves along that when the line or the ground under it does (see `SeenLines`); `trust` (M,) in 0..1: how
+    much of a measurement it is; `jobs` (M,): the mean of so many frames of separate jobs.
     """
 
     index: NDArray[np.intp]
@@ -51,10 +65,20 @@ class Measurements:
     px_per_metre: Array
     px_per_metre_up: Array
     length_px: Array
+    trust: Array
     misfit_px: float = 0.0
+    jobs: Array | float = 1.0
 
     def __len__(self) -> int:
         return len(self.index)
+
+    def offset(self, camera: Camera, positions: Array) -> Array:
+        """Pixels (M,) along the normals from where `camera` puts points (M, 3) to where the lines were measured."""
+        return np.asarray(np.sum((self.pixel - camera.project(positions)) * self.normal, axis=1))
+
+    def slopes(self, camera: Camera, positions: Array) -> Array:
+        """The derivative (M, 6) of `offset` by the camera's pose, per rad and metre (see `motion`)."""
+        return -np.einsum("mij,mi->mj", pixel_slopes(camera, positions), self.normal)
 
     @property
     def sigma_px(self) -> Array:
@@ -67,8 +91,15 @@ class Measurements:
         """Expected error (M,) of a measurement when paint and ground are where the model has them.
 
         What nothing explains is alike over `MISFIT_ALIKE_PX`: so much of a line counts as one measurement of it.
+        The mean of many jobs keeps the part of the noise that all of them share.
         """
-        return np.hypot(NOISE_PX, self.misfit_px * np.sqrt(np.maximum(MISFIT_ALIKE_PX / self.length_px, 1.0)))
+        noise = NOISE_PX * np.sqrt(SHARED_NOISE + (1 - SHARED_NOISE) / np.asarray(self.jobs))
+        return np.hypot(noise, self.misfit_px * np.sqrt(self.alike))
+
+    @property
+    def alike(self) -> Array:
+        """How many (M,) neighbours share what nothing explains, 1 at least."""
+        return np.maximum(MISFIT_ALIKE_PX / self.length_px, 1.0)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Measurements:
         return Measurements(
@@ -79,8 +110,94 @@ class Measurements:
             self.px_per_metre[chosen],
             self.px_per_metre_up[chosen],
             self.length_px[chosen],
+            self.trust[chosen],
             self.misfit_px,
+            self.jobs if isinstance(self.jobs, float) else self.jobs[chosen],
         )
+
+
+class LineProfiles:
+    """Brightness across the expected lines of one frame, read once and matched from any pose that is near."""
+
+    def __init__(
+        self,
+        lines: LinePoints,
+        camera: Camera,
+        channels: Channels,
+        response: NDArray[np.float32],
+        reach_px: float,
+    ) -> None:
+        """Read it up to `reach_px` to each side of where `camera` expects the `lines`.
+
+        `channels` of the frame; `response` (H, W) the segmentation in 0..1.
+        """
+        self._camera, self._response, self._reach_px = camera, response, reach_px
+        self._seen = SeenLines.from_camera(lines, camera)
+        matches = match_lines(self._seen, channels, reach_px, camera.intrinsics.relative_size)
+        self._classes = [_Centred(of_class, self._seen.width_px[of_class.which]) for of_class in matches]
+
+    def measure(self, camera: Camera, lines: LinePoints, search_px: float) -> Measurements:
+        """The lines within `search_px` of where `camera` expects them: `lines` are those that were read.
+
+        What either the network or the ridge along a line calls a marking is measured.
+        """
+        expected = self._expected(camera, lines)
+        found = [self._found(of_class, expected[of_class.matches.which], search_px) for of_class in self._classes]
+        which, shift, trust = map(np.concatenate, zip(*found, strict=True))
+        seen = self._seen[which]
+        measured = Measurements(
+            seen.index,
+            lines[seen.index],
+            seen.pixel + shift[:, None] * seen.normal,
+            seen.normal,
+            seen.px_per_metre,
+            seen.px_per_metre_up,
+            seen.length_px,
+            trust,
+        )
+        return measured if camera.ignored is None else measured[camera.sees(measured.pixel)]
+
+    def cover(self, camera: Camera, lines: LinePoints, search_px: float) -> bool:
+        """Whether all that was read reaches `search_px` beyond where `camera` expects the lines."""
+        farthest = np.nanmax(np.abs(self._expected(camera, lines)), initial=0.0)
+        return bool(farthest + search_px <= self._reach_px)
+
+    def _expected(self, camera: Camera, lines: LinePoints) -> Array:
+        """Pixels (N,) along their normals by which `camera` expects the lines beside where they were read."""
+        moved = camera.project(lines.position[self._seen.index]) - self._seen.pixel
+        return np.asarray(np.sum(moved * self._seen.normal, axis=1))
+
+    def _found(self, centred: _Centred, expected: Array, search_px: float) -> tuple[NDArray[np.intp], Array, Array]:
+        """Of one class: which lines were found, how far (px) from where they were read, and how far to trust that."""
+        matches = centred.matches
+        shifts, row = matches.shifts, np.arange(len(matches.which))
+        beside = np.abs(shifts - expected[:, None])
+        preference = matches.correlation - OFF_CENTRE_PENALTY * (beside / search_px) ** 2
+        preference[~(beside <= search_px + matches.sampling_px)] = -np.inf
+        best = np.argmax(preference, axis=1)
+        seen = self._seen[matches.which]
+        shift = shifts[best] + centred.at(best)
+        pixel = seen.pixel + shift[:, None] * seen.normal
+        marking = np.maximum(_ramp(bilinear(self._response, pixel), *RESPONSE), _ramp(matches.along[row, best], *ALONG))
+        trust = (
+            marking
+            * _ramp(matches.correlation[row, best], *CORRELATION)
+            * _ramp(search_px - np.abs(shift - expected), 0.0, SEARCH_EDGE_PX)
+            * _ramp(self._to_border(seen, shift, matches), 0.0, PICTURE_EDGE_PX)
+        )
+        good = (trust > 0) & (best > 0) & (best < len(shifts) - 1)
+        return matches.which[good], shift[good], trust[good]
+
+    def _to_border(self, seen: SeenLines, shift: Array, matches: Matches) -> Array:
+        """Pixels (N,) from what was read of each line to the border of the picture, negative beyond it."""
+        width, height = self._camera.intrinsics.size
+        reach = np.abs(shift) + matches.offsets[-1]
+        nearest = np.full(len(seen), np.inf)
+        for sign in (1, -1):
+            end = seen.pixel + sign * reach[:, None] * seen.normal
+            for axis, last in ((0, width - 1), (1, height - 1)):
+                nearest = np.minimum(nearest, np.minimum(end[:, axis], last - end[:, axis]))
+        return nearest
 
 
 def measure_lines(
@@ -90,41 +207,32 @@ def measure_lines(
     response: NDArray[np.float32],
     search_px: float,
 ) -> Measurements:
-    """The lines of `camera` found within `search_px` of where its pose expects them.
-
-    `channels` of the frame; `response` (H, W) the segmentation in 0..1. What either the network or the ridge along a
-    line calls a marking is measured.
-    """
-    seen = SeenLines.from_camera(lines, camera)
-    found = [
-        _measured(seen[matches.which], matches, response, search_px)
-        for matches in match_lines(seen, channels, search_px, camera.intrinsics.relative_size)
-    ]
-    index, pixel, normal, px_per_metre, px_per_metre_up, length_px = map(np.concatenate, zip(*found, strict=True))
-    measured = Measurements(index, lines[index], pixel, normal, px_per_metre, px_per_metre_up, length_px)
-    return measured if camera.ignored is None else measured[camera.sees(measured.pixel)]
+    """The lines of `camera` found within `search_px` of where its pose expects them (see `LineProfiles`)."""
+    return LineProfiles(lines, camera, channels, response, search_px).measure(camera, lines, search_px)
 
 
-def _measured(
-    seen: SeenLines, matches: Matches, response: NDArray[np.float32], search_px: float
-) -> tuple[NDArray[np.intp], Array, Array, Array, Array, Array]:
-    """Where the lines of one class fit best, to a fraction of a pixel, but for what speaks against it."""
-    shifts, row = matches.shifts, np.arange(len(seen))
-    preference = matches.correlation - OFF_CENTRE_PENALTY * (shifts / search_px) ** 2
-    best = np.argmax(preference, axis=1)
-    windows = np.take_along_axis(matches.brightness, best[:, None] + np.arange(matches.expected.shape[1]), axis=1)
-    shift = shifts[best] + _centre(windows, seen.width_px, matches.offsets, matches.sampling_px)
-    pixel = seen.pixel + shift[:, None] * seen.normal
-    marking = (bilinear(response, pixel) >= LEAST_RESPONSE) | (matches.along[row, best] >= LEAST_ALONG)
-    good = (
-        (best > 0)
-        & (best < len(shifts) - 1)
-        & (matches.correlation[row, best] >= LEAST_CORRELATION)
-        & marking
-        & np.isfinite(matches.brightness).all(axis=1)
-    )
-    seen = seen[good]
-    return seen.index, pixel[good], seen.normal, seen.px_per_metre, seen.px_per_metre_up, seen.length_px
+class _Centred:
+    """Matches of one class of width, and where in their windows the lines' centres are: computed once for each."""
+
+    def __init__(self, matches: Matches, width_px: Array) -> None:
+        self.matches, self._width_px = matches, width_px
+        self._window = np.full(len(width_px), -1)
+        self._centre = np.zeros(len(width_px))
+
+    def at(self, window: NDArray[np.intp]) -> Array:
+        """Pixels (N,) from the middles of windows number `window` (N,) to the centres of their lines."""
+        new = np.flatnonzero(window != self._window)
+        if len(new):
+            reach = np.arange(self.matches.expected.shape[1])
+            across = np.take_along_axis(self.matches.brightness[new], window[new, None] + reach, axis=1)
+            self._centre[new] = _centre(across, self._width_px[new], self.matches.offsets, self.matches.sampling_px)
+            self._window[new] = window[new]
+        return self._centre
+
+
+def _ramp(value: Plane, low: float, high: float) -> Array:
+    """0 below `low`, 1 above `high`, straight between them; 0 for NaN."""
+    return np.nan_to_num(np.clip((np.asarray(value, dtype=float) - low) / (high - low), 0.0, 1.0))
 
 
 def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) -> Array:

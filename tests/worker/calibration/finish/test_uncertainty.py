@@ -8,9 +8,9 @@ import pytest
 from fields.template import load
 from tests.worker.calibration.synthetic import camera, moved
 from worker.calibration.finish.estimate import Estimate, step
-from worker.calibration.finish.residuals import Unknowns
 from worker.calibration.finish.robust import tukey_weights
 from worker.calibration.finish.uncertainty import judged
+from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.scene import parameters
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import Ground
@@ -28,7 +28,7 @@ def measured(lines, one):
     """Each visible piece of line where it is, expected to be off by some pixels."""
     seen = SeenLines.from_camera(lines, one)
     across = (seen.normal, seen.px_per_metre, seen.px_per_metre_up)
-    return Measurements(seen.index, seen.points, seen.pixel, *across, seen.length_px, MISFIT_PX)
+    return Measurements(seen.index, seen.points, seen.pixel, *across, seen.length_px, np.ones(len(seen)), MISFIT_PX)
 
 
 def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
@@ -42,10 +42,10 @@ def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
         found = [replace(exact, pixel=exact.pixel + off)]
         here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
         for _ in range(4):
-            here = step(here, [one], found, unknowns, 0.5, tukey_weights)
+            here = step(here, [one], found, unknowns, tukey_weights).to
         errors.append(here.cameras[0].pose.position - one.pose.position)
         if trial % 10 == 0:
-            said.append(judged(here, [one], found, [NO_EVIDENCE], unknowns, 0.5).each[0].repeatability.position_m)
+            said.append(judged(here, [one], found, [NO_EVIDENCE], unknowns).each[0].repeatability.position_m)
     spread = np.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
     assert np.mean(said) == pytest.approx(spread, rel=0.15)
 
@@ -59,7 +59,7 @@ def said_of_a_corner(**sigma):
     unknowns = Unknowns(1, [], Ground.under(lines))
     here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
     before = [moved(one, by=(0.0, -2.0, 1.0))]
-    (said,) = judged(here, before, [measured(lines, one)], [NO_EVIDENCE], unknowns, 0.5).each
+    (said,) = judged(here, before, [measured(lines, one)], [NO_EVIDENCE], unknowns).each
     return said.sigma.position_m
 
 

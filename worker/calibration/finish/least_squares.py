@@ -1,0 +1,286 @@
+"""The least squares of the finish: line measurements of several views, with their unknown errors of paint and ground.
+
+The offset of a measured line point from where its view expects it is (docs/model.md, 2)
+
+    offset = J d + across e + up (h + r) + noise
+
+with d the changes of all dense unknowns, h the height of the smooth ground under the point, and (e, r) what this point
+of the paint is off by, across the line and upwards, whatever the view. That pair is one unknown of each line point,
+shared by all views that measure it, and eliminated in closed form: so two cameras that see the same paint know it
+together, and no measurement counts twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.finish.robust import USUAL, Weigh, tukey_weights
+from worker.calibration.finish.unknowns import Unknowns
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.ground import UNEVEN_M
+from worker.calibration.scene.motion import POSE_NUMBERS
+from worker.calibration.scene.parameters import FIELD_STEP_M, FieldParameter, Parameter
+from worker.calibration.see.line_measurement import PAINT_M, Measurements
+
+FEWEST_MEASUREMENTS = 30
+CLUSTER_POINTS = 40
+"""Line points (25 cm apart) whose errors of paint, lens and measurement are taken as one."""
+LOCAL_VARIANCE = np.array([PAINT_M**2, UNEVEN_M**2])
+"""Of paint beside its place, and of the ground under it beside the smooth ground, at each line point, m²."""
+LEAST_NOISE = 0.2
+"""Part of the expected errors that the gradient varies by at least: no picture is perfect."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """M measurements of one view against its pose.
+
+    `offset` (M,) px, measured minus expected; `jacobian` (M, n) of it by the dense unknowns `columns` (n,); `across`
+    and `up` (M,) px per metre of paint that lies beside its place, or above it; `noise_px` (M,); `trust` (M,) 0..1;
+    `point` (M,): which of the line points.
+    """
+
+    offset: Array
+    columns: NDArray[np.intp]
+    jacobian: Array
+    across: Array
+    up: Array
+    noise_px: Array
+    trust: Array
+    point: NDArray[np.intp]
+
+    @classmethod
+    def of(
+        cls, positions: Array, camera: Camera, view: int, measured: Measurements, unknowns: Unknowns
+    ) -> Rows:
+        """The measurements of view number `view`; `positions` (N, 3): where the field has its line points."""
+        here = positions[measured.index]
+        parameters = unknowns.parameters_of(view)
+        columns = np.array([*range(*unknowns.pose(view).indices(len(unknowns))), *(n for n, _ in parameters)], np.intp)
+        jacobian = np.empty((len(measured), len(columns)))
+        jacobian[:, :POSE_NUMBERS] = measured.slopes(camera, here)
+        for column, (_, parameter) in enumerate(parameters, POSE_NUMBERS):
+            jacobian[:, column] = -_parameter_slope(here, camera, measured, parameter)
+        offset = measured.offset(camera, here)
+        known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
+        measured = measured[known]
+        return cls(
+            offset[known],
+            columns,
+            jacobian[known],
+            measured.px_per_metre,
+            measured.px_per_metre_up,
+            measured.noise_px,
+            measured.trust,
+            measured.index,
+        )
+
+
+def _parameter_slope(points: Array, camera: Camera, measured: Measurements, parameter: Parameter) -> Array:
+    """How far (M,) the expected lines at `points` (M, 3) move along their normals per unit of a parameter."""
+    if isinstance(parameter, FieldParameter):
+        step = FIELD_STEP_M
+        ahead, behind = (camera.project(points + sign * step * parameter.shift[measured.index]) for sign in (1, -1))
+    else:
+        step = parameter.step
+        ahead, behind = (parameter.changed(camera, sign * step).project(points) for sign in (1, -1))
+    return np.asarray(np.sum((ahead - behind) * measured.normal, axis=1) / (2 * step))
+
+
+def rows_of(
+    positions: Array, cameras: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns
+) -> list[Rows]:
+    """The rows of all views that have enough measurements; `positions` (N, 3): where the field has its line points."""
+    return [
+        Rows.of(positions, camera, view, found, unknowns)
+        for view, (camera, found) in enumerate(zip(cameras, measured, strict=True))
+        if len(found) >= FEWEST_MEASUREMENTS
+    ]
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """Rows of several views with their weights, on a ground of known heights; M rows of all views, P line points.
+
+    `residual` (M,) px; `weight` (M,) 1 / px², of the measurement alone; `points` (P,) and `at` (M,): which of the line
+    points the rows are about; `local` (M, 2) px per metre of (e, r); `precision` (P, 2, 2) of those given the rows, and
+    `beside` (P, 2) m, what they then are; `value` (M,): the residual in units of everything it may be off by, and
+    `belief` (M,), its robust weight.
+    """
+
+    rows: Sequence[Rows]
+    unknowns: Unknowns
+    residual: Array
+    weight: Array
+    points: NDArray[np.intp]
+    at: NDArray[np.intp]
+    local: Array
+    precision: Array
+    beside: Array
+    value: Array
+    belief: Array
+
+    @property
+    def shared(self) -> NDArray[np.bool_]:
+        """Which rows (M,) are about a line point that other rows are about as well."""
+        return np.asarray(np.bincount(self.at, minlength=len(self.points))[self.at] > 1)
+
+    @property
+    def weight_alone(self) -> Array:
+        """The weight (M,) of rows with all that they may be off by: of points that one view sees there is no more."""
+        of_model = (self.local**2) @ LOCAL_VARIANCE
+        return self.weight / (1 + self.weight * of_model)
+
+    def parts(self) -> list[slice]:
+        """Which of the M rows are those of each view."""
+        ends = np.cumsum([0, *(len(rows.offset) for rows in self.rows)]).tolist()
+        return [slice(first, last) for first, last in pairwise(ends)]
+
+
+def weighted(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: Weigh) -> Weighted:
+    """Weigh rows robustly: each by all that it may be off by, and where views share a point, by each other as well.
+
+    `heights` (K,) of the ground's nodes above the field.
+    """
+    ground = unknowns.ground
+    point = _joined([r.point for r in rows]).astype(np.intp)
+    local = np.stack([_joined([r.across for r in rows]), _joined([r.up for r in rows])], axis=1)
+    residual = _joined([r.offset for r in rows]) - local[:, 1] * ground.under_points(heights, point)
+    noise = _joined([r.noise_px for r in rows]) ** 2
+    of_model = (local**2) @ LOCAL_VARIANCE
+    value = residual / np.sqrt(noise + of_model)
+    belief = _joined([r.trust * weigh(one) for r, one in zip(rows, _split(value, rows), strict=True)])
+    # The weight that the measurement alone must have for the row to have this belief with all that it may be off by.
+    weight = belief / np.maximum(noise + (1 - belief) * of_model, 1e-12)
+    points, at, seen_by = np.unique(point, return_inverse=True, return_counts=True)
+    precision, beside = _beside(local, weight, residual, at.ravel(), len(points))
+    shared = seen_by[at.ravel()] > 1
+    if shared.any():
+        apart = (residual - np.sum(local * beside[at.ravel()], axis=1)) / np.sqrt(noise)
+        agree = np.ones(len(residual))
+        agree[shared] = weigh(apart[shared])
+        weight, belief = weight * agree, belief * np.minimum(agree, 1.0)
+        precision, beside = _beside(local, weight, residual, at.ravel(), len(points))
+    return Weighted(
+        rows, unknowns, residual, weight, points, at.ravel(), local, precision, beside, value, belief
+    )
+
+
+def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], count: int) -> tuple[Array, Array]:
+    """Precision (P, 2, 2) and mean (P, 2), m, of what each line point is off by, if all else is right."""
+    precision = np.empty((count, 2, 2))
+    precision[:, 0, 0] = 1 / LOCAL_VARIANCE[0] + np.bincount(at, weight * local[:, 0] ** 2, count)
+    precision[:, 1, 1] = 1 / LOCAL_VARIANCE[1] + np.bincount(at, weight * local[:, 1] ** 2, count)
+    precision[:, 0, 1] = precision[:, 1, 0] = np.bincount(at, weight * local[:, 0] * local[:, 1], count)
+    pull = np.stack([np.bincount(at, weight * residual * local[:, n], count) for n in (0, 1)], axis=1)
+    return precision, np.asarray(np.linalg.solve(precision, pull[..., None])[..., 0], dtype=float)
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """`information` (U, U) on all unknowns and the `gradient` (U,) of half the weighted squares."""
+
+    information: Array
+    gradient: Array
+
+
+def normal_equations(of: Weighted) -> NormalEquations:
+    """The sums over all rows, paint and roughness of each line point eliminated (docs/model.md, 3)."""
+    size = len(of.unknowns)
+    information, gradient = np.zeros((size, size)), np.zeros(size)
+    shared, number = np.unique(of.at[of.shared], return_inverse=True)
+    coupling = np.zeros((2, len(shared), size))
+    alone = np.where(of.shared, of.weight, of.weight_alone)
+    numbers = np.zeros(len(of.at), dtype=np.intp)
+    numbers[of.shared] = number
+    for rows, part in zip(of.rows, of.parts(), strict=True):
+        columns, jacobian = _with_ground(rows, of.unknowns)
+        heavy = jacobian * alone[part, None]
+        information[np.ix_(columns, columns)] += heavy.T @ jacobian
+        gradient[columns] += heavy.T @ of.residual[part]
+        both = of.shared[part]
+        for which in (0, 1):
+            coupling[which][numbers[part][both][:, None], columns] += heavy[both] * of.local[part][both, which, None]
+    root = np.linalg.cholesky(np.linalg.inv(of.precision[shared]))
+    first = coupling[0] * root[:, 0, :1] + coupling[1] * root[:, 1, :1]
+    reduced = np.concatenate([first, coupling[1] * root[:, 1, 1:]])
+    information -= reduced.T @ reduced
+    gradient -= np.einsum("kpu,pk->u", coupling, of.beside[shared])
+    return NormalEquations(information, gradient)
+
+
+def pulls(of: Weighted) -> Array:
+    """The part (P, U) of the gradient that each line point has, over all views."""
+    found = np.zeros((len(of.points), len(of.unknowns)))
+    left = of.residual - np.sum(of.local * of.beside[of.at], axis=1)
+    for rows, part in zip(of.rows, of.parts(), strict=True):
+        columns, jacobian = _with_ground(rows, of.unknowns)
+        found[of.at[part][:, None], columns] += jacobian * (of.weight[part] * left[part])[:, None]
+    return found
+
+
+def error_of_measurement(of: Weighted, information: Array) -> Array:
+    """Covariance (U, U) of the gradient by the residuals themselves, those of ten metres of line taken as one.
+
+    Neighbours on a line share the error of its paint and of the lens, so they are not as many as they seem (the
+    sandwich of Liang and Zeger, 1986). On top, a fifth of what their expected errors say.
+    """
+    clusters, cluster = np.unique(of.points // CLUSTER_POINTS, return_inverse=True)
+    by_cluster = np.zeros((len(clusters), len(of.unknowns)))
+    np.add.at(by_cluster, cluster, pulls(of))
+    usual = float(np.sum(of.belief**2) / max(float(np.sum(of.belief)), 1e-12))
+    return np.asarray(by_cluster.T @ by_cluster + LEAST_NOISE * usual * information)
+
+
+def _with_ground(rows: Rows, unknowns: Unknowns) -> tuple[NDArray[np.intp], Array]:
+    """Columns (n + k,) and jacobian (M, n + k) of the rows by dense unknowns and the k heights under their points."""
+    ground, count = unknowns.ground, len(rows.point)
+    nodes, node = np.unique(ground.node[rows.point], return_inverse=True)
+    by_height = np.zeros((count, len(nodes)))
+    # Shares of the four nodes around a point: each is another one.
+    by_height[np.arange(count)[:, None], node.reshape(count, -1)] = -rows.up[:, None] * ground.share[rows.point]
+    columns = np.concatenate([rows.columns, unknowns.dense + nodes])
+    return columns, np.concatenate([rows.jacobian, by_height], axis=1)
+
+
+def _joined(parts: Sequence[Array | NDArray[np.intp]]) -> Array:
+    return np.concatenate([*parts, np.empty(0)])
+
+
+def _split(values: Array, rows: Sequence[Rows]) -> list[Array]:
+    return np.split(values, np.cumsum([len(r.offset) for r in rows])[:-1]) if rows else []
+
+
+def rms_px(positions: Array, camera: Camera, measured: Measurements) -> float | None:
+    """Rms of the distances of the lines of one camera from the field's `positions` (N, 3), but for outliers.
+
+    None where it has too few.
+    """
+    if len(measured) < FEWEST_MEASUREMENTS:
+        return None
+    offset = measured.offset(camera, positions[measured.index])
+    known = np.isfinite(offset)
+    offset, sigma = offset[known], measured.sigma_px[known]
+    counted = tukey_weights(offset / sigma) > 0
+    return float(np.sqrt(np.mean(offset[counted] ** 2)))
+
+
+def misfit_px(positions: Array, camera: Camera, measured: Measurements) -> float:
+    """The further error, in px, that makes the usual distance of lines from `positions` (N, 3) what is expected.
+
+    0 where noise, paint and ground explain them. By the median: outliers say nothing of how well a lens is known.
+    """
+    offset = measured.offset(camera, positions[measured.index])
+    known = np.isfinite(offset)
+    if not known.any():
+        return 0.0
+    offset, measured = offset[known], measured[known]
+    explained = measured.sigma_px**2 - measured.misfit_px**2 * measured.alike
+    # What each offset would need for itself to be a usual one; half of them need less than their median.
+    needed = ((offset / USUAL) ** 2 - explained) / measured.alike
+    return float(np.sqrt(max(np.median(needed), 0.0)))
