@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from datetime import datetime
 from types import MappingProxyType
 
 import numpy as np
@@ -22,6 +23,7 @@ from worker.calibration.judge.pairs import (
 from worker.calibration.judge.quality import CameraResult, Gate, believable, ridge_rejection
 from worker.calibration.judge.registration import Response
 from worker.calibration.judge.seam import seam_between
+from worker.calibration.memory.camera_memory import CameraMemory, fitting
 from worker.calibration.nearby import settle_nearby
 from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
@@ -39,6 +41,7 @@ from worker.calibration.zoom import refit_zoomed
 FEWEST_VISIBLE_POINTS = 60
 """Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""
 NOTHING_USUAL: Mapping[str, UsualView] = MappingProxyType({})
+NO_MEMORIES: Mapping[str, CameraMemory] = MappingProxyType({})
 
 
 def calibrate(
@@ -50,19 +53,22 @@ def calibrate(
     report: Callable[[Progress], None] = lambda _: None,
     stop: Callable[[], bool] = lambda: False,
     usual: Mapping[str, UsualView] = NOTHING_USUAL,
+    memories: Mapping[str, CameraMemory] = NO_MEMORIES,
+    taken_at: datetime | None = None,
 ) -> Calibration:
     """Find the poses of all cameras at once, and judge each.
 
     `cameras` carry their stored poses; `frames[camera.id]` are one or more BGR frames (height, width, 3) of the size of
-    the intrinsics; `usual[camera.id]`: what the last accepted job saw there. Deterministic for `options.seed`, whatever
-    the number of the network's threads. Raises `CalibrationError` when a stored pose sees no markings, `Stopped` soon
+    the intrinsics; `usual[camera.id]`: what the last accepted job saw there; `memories[camera.id]`: its earlier nights;
+    `taken_at`: when the frames were taken. Deterministic for `options.seed`, whatever the number of the network's
+    threads. Raises `CalibrationError` when a stored pose sees no markings, `Stopped` soon
     after `stop()` turns true.
     """
     method = METHODS[options.preset]
     pitch = pitch.flat() if options.flat or method.flat else pitch
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey, usual)
-    here = Situation(method, pitch, cameras, seen, options, journey)
+    here = Situation(method, pitch, cameras, seen, options, journey, [memories.get(camera.id) for camera in cameras])
     near = look_nearby(here) if options.search == "auto" else None
     settled, answer = near or agree(here, refit_zoomed(here, settle(here)))
     with journey.measuring("quality"):
@@ -81,7 +87,26 @@ def calibrate(
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
         path="wide" if near is None else "near",
         lights=evened,
+        memories=remember(answer, cameras, memories, taken_at),
     )
+
+
+def remember(
+    answer: Answer,
+    stored: Sequence[Camera],
+    memories: Mapping[str, CameraMemory],
+    taken_at: datetime | None,
+) -> dict[str, CameraMemory]:
+    """The memories of the cameras whose poses are accepted, with this job in them; it is their first if they fit not."""
+    lines = answer.pitch.line_points()
+    after = {}
+    for before, result in zip(stored, answer.cameras, strict=True):
+        if not result.accepted or result.measured is None:
+            continue
+        (memory,) = fitting([memories.get(before.id)], lines)
+        job = (result.camera, result.measured, lines, taken_at)
+        after[before.id] = CameraMemory.begun(before, *job) if memory is None else memory.after(*job)
+    return after
 
 
 def look(

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from worker.calibration.finish.diagnosis import is_sure
-from worker.calibration.finish.refinement import SEARCH_PX, LineReader
+from worker.calibration.finish.refinement import SEARCH_PX
 from worker.calibration.judge.quality import CameraResult
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import LinePoints
@@ -31,7 +31,7 @@ def settle_nearby(here: Situation) -> Settled | None:
     if not here.method.tries_again or here.usable != everyone:
         return None
     lines = here.pitch.line_points()
-    reader = LineReader(here.seen.sight)
+    reader = here.seen.sight.reader()
     if not _all_caught(lines, here.cameras, reader.measure(lines, here.cameras, SEARCH_PX[0])):
         return None
     finished = here.finished_nearby(reader)

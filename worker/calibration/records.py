@@ -15,6 +15,7 @@ from worker.calibration.finish.diagnosis import Suspicion
 from worker.calibration.judge.pairs import Pair
 from worker.calibration.judge.quality import CameraResult
 from worker.calibration.judge.seam import Seam
+from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.scene.camera import Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.see.segmentation import Region
@@ -127,7 +128,7 @@ class Calibration(Answer):
     """The answer to frames: new poses. `suspicions`: what the lines contradict of what was given.
 
     `path`: whether they were found `near` their stored poses, or by a search (`wide`). `lights`: of accepted cameras
-    that overlap, by camera.
+    that overlap, by camera. `memories`: of cameras whose poses are accepted, with this job in them, by camera.
     """
 
     stitch_error_before_px: float | None
@@ -136,6 +137,7 @@ class Calibration(Answer):
     suspicions: Sequence[Suspicion]
     path: Path
     lights: Mapping[str, Light]
+    memories: Mapping[str, CameraMemory]
 
 
 class CalibrationError(Exception):

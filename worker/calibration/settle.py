@@ -19,6 +19,7 @@ from worker.calibration.judge.markings import markings_seen
 from worker.calibration.judge.overlap import overlap_of
 from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection
 from worker.calibration.judge.registration import Response
+from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.records import Journey, Options, Preset
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
@@ -81,7 +82,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Situation:
-    """Cameras at their stored poses around a pitch, what they see, and how they are to be found."""
+    """Cameras at their stored poses around a pitch, what they see, how they are to be found, and their memories."""
 
     method: Method
     pitch: Field
@@ -89,11 +90,13 @@ class Situation:
     seen: Seen
     options: Options
     journey: Journey
+    memories: Sequence[CameraMemory | None]
     gate: Gate = field(default_factory=Gate)
 
     def of(self, numbers: Sequence[int]) -> Situation:
         """That of some of the cameras."""
-        return replace(self, cameras=[self.cameras[n] for n in numbers], seen=self.seen.of(numbers))
+        cameras, memories = [self.cameras[n] for n in numbers], [self.memories[n] for n in numbers]
+        return replace(self, cameras=cameras, seen=self.seen.of(numbers), memories=memories)
 
     def by_itself(self, number: int) -> Situation:
         """That of one camera, which has no say in what all of them stand on."""
@@ -130,15 +133,28 @@ class Situation:
             self.journey.at("refinement", 0.0)
             asked = self.options
             return self.method.finish(
-                self.pitch, begun, self.seen.sight, asked.stitch_weight, self._free(), stored=self.cameras
+                self.pitch,
+                begun,
+                self.seen.sight,
+                asked.stitch_weight,
+                self._free(),
+                stored=self.cameras,
+                memories=self.memories,
             )
 
     def finished_nearby(self, reader: LineReader) -> Finished:
         """Where the finish leaves cameras that begin at their stored poses, around which the `reader` has measured."""
         with self.journey.measuring("refinement"):
             self.journey.at("refinement", 0.0)
-            weight = self.options.stitch_weight
-            return refine(self.pitch, self.cameras, self.seen.sight, weight, self._free(), reader=reader)
+            return refine(
+                self.pitch,
+                self.cameras,
+                self.seen.sight,
+                self.options.stitch_weight,
+                self._free(),
+                memories=self.memories,
+                reader=reader,
+            )
 
     def loss_of(self, pitch: Field, answered: Sequence[Camera]) -> float:
         """The loss of the search's middle level where the cameras are answered to stand, inf without any of use.
@@ -160,7 +176,8 @@ class Situation:
     def left(self) -> Finished:
         """The stored poses as they are."""
         with self.journey.measuring("refinement"):
-            return assess(self.pitch, self.cameras, self.seen.sight, self.options.stitch_weight, self._free())
+            weight = self.options.stitch_weight
+            return assess(self.pitch, self.cameras, self.seen.sight, weight, self._free(), memories=self.memories)
 
     def judged(self, finished: Finished) -> list[CameraResult]:
         """What each of them is worth by itself, beside its stored pose."""

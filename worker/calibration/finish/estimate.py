@@ -79,11 +79,15 @@ class Estimate:
     def prior(self, unknowns: Unknowns) -> Array:
         """Information (U, U) on every unknown before any line is measured."""
         known = np.zeros((len(unknowns), len(unknowns)))
-        poses = [PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3
-        expected = [parameter.expected**-2 for parameter in unknowns.parameters]
-        known[: unknowns.dense, : unknowns.dense] = np.diag([*(poses * unknowns.views), *expected])
+        poses = POSE_NUMBERS * unknowns.views
+        known[:poses, :poses] = self.weak_prior()
+        known[poses : unknowns.dense, poses : unknowns.dense] = np.diag([p.expected**-2 for p in unknowns.parameters])
         known[unknowns.dense :, unknowns.dense :] = unknowns.ground.precision / self.uneven_m**2
         return known
+
+    def weak_prior(self) -> Array:
+        """Information (6 V, 6 V) on the poses before any line is measured."""
+        return np.diag(([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3) * len(self.cameras))
 
     def away(self, found: Sequence[Camera]) -> Array:
         """How far (U,) every unknown is from where it was `found` by the search or given."""

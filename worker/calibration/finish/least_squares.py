@@ -55,9 +55,7 @@ class Rows:
     point: NDArray[np.intp]
 
     @classmethod
-    def of(
-        cls, positions: Array, camera: Camera, view: int, measured: Measurements, unknowns: Unknowns
-    ) -> Rows:
+    def of(cls, positions: Array, camera: Camera, view: int, measured: Measurements, unknowns: Unknowns) -> Rows:
         """The measurements of view number `view`; `positions` (N, 3): where the field has its line points."""
         here = positions[measured.index]
         parameters = unknowns.parameters_of(view)
@@ -166,9 +164,7 @@ def weighted(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: We
         agree[shared] = weigh(apart[shared])
         weight, belief = weight * agree, belief * np.minimum(agree, 1.0)
         precision, beside = _beside(local, weight, residual, at.ravel(), len(points))
-    return Weighted(
-        rows, unknowns, residual, weight, points, at.ravel(), local, precision, beside, value, belief
-    )
+    return Weighted(rows, unknowns, residual, weight, points, at.ravel(), local, precision, beside, value, belief)
 
 
 def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], count: int) -> tuple[Array, Array]:

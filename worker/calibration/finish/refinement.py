@@ -16,6 +16,7 @@ from worker.calibration.finish.least_squares import misfit_px
 from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.finish.uncertainty import Finished, judged
 from worker.calibration.finish.unknowns import Unknowns
+from worker.calibration.memory.camera_memory import CameraMemory, fitting
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground
@@ -23,7 +24,7 @@ from worker.calibration.scene.parameters import Parameter
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.evidence import Evidence, evidence_of
 from worker.calibration.see.left_out import left_out
-from worker.calibration.see.line_measurement import LineProfiles, Measurements, measure_lines
+from worker.calibration.see.line_measurement import LineProfiles, Measurements
 
 SEARCH_PX = (14.0, 8.0, 5.0)
 """How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
@@ -55,6 +56,10 @@ class Sight:
         """That of some of the cameras."""
         return Sight([self.channels[n] for n in numbers], [self.responses[n] for n in numbers])
 
+    def reader(self) -> LineReader:
+        """What measures the lines in it."""
+        return LineReader(self)
+
 
 class LineReader:
     """Measures the lines of several cameras around any poses; reads a frame again only where it has to."""
@@ -76,6 +81,13 @@ class LineReader:
             measured.append(profiles.measure(camera, lines, search))
         return measured
 
+    def evidence(self, pitch: Field, lines: LinePoints, cameras: Sequence[Camera]) -> list[Evidence]:
+        """How much of the lines the frames show where the cameras put them."""
+        return [
+            evidence_of(lines, camera, channels, response, left_out(pitch, camera))
+            for camera, channels, response in zip(cameras, self._sight.channels, self._sight.responses, strict=True)
+        ]
+
     def read_anew(self) -> None:
         """Read every frame again when it is measured next."""
         self._read.clear()
@@ -89,20 +101,21 @@ def refine(
     free: Sequence[Parameter] = (),
     searches_px: Sequence[float] = SEARCH_PX,
     stored: Sequence[Camera] | None = None,
+    memories: Sequence[CameraMemory | None] | None = None,
     reader: LineReader | None = None,
 ) -> Finished:
     """Measure the lines and move the cameras onto them, round by round with a narrower search.
 
     `stored`: where the cameras stood when that was last known, if not where they begin. `free`: numbers of lenses and
-    field to be found along with the poses; pitch and cameras come back with them. `reader`: of the `sight`, if it has
-    been measured before. `stitch_weight` 0: each camera on a ground of its own; any other has no effect, since
-    what cameras know of each other is weighed by its errors alone.
+    field to be found along with the poses; pitch and cameras come back with them. `memories`: of the earlier nights of
+    each camera. `reader`: of the `sight`, if it has been measured before. `stitch_weight` 0: each camera on a ground of
+    its own; any other has no effect, since what cameras know of each other is weighed by its errors alone.
     """
     if stitch_weight == 0 and len(cameras) > 1 and not free:
-        return _each_alone(pitch, cameras, sight, stored or cameras)
+        return _each_alone(pitch, cameras, sight, stored or cameras, memories)
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     here = Estimate.at(pitch, cameras, unknowns)
-    reader = reader or LineReader(sight)
+    reader = reader or sight.reader()
     for search in searches_px:
         unknowns = unknowns.around(here.pitch, here.lines)
         measured = reader.measure(here.on_ground(unknowns), here.cameras, search)
@@ -113,12 +126,10 @@ def refine(
     last, unknowns = _settled(here, cameras, reader, unknowns)
     uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _assessed(replace(last.to, uneven_m=uneven), stored or cameras, sight, unknowns)
+    return _assessed(replace(last.to, uneven_m=uneven), stored or cameras, memories, reader, unknowns)
 
 
-def _settled(
-    here: Estimate, found: Sequence[Camera], reader: LineReader, unknowns: Unknowns
-) -> tuple[Step, Unknowns]:
+def _settled(here: Estimate, found: Sequence[Camera], reader: LineReader, unknowns: Unknowns) -> tuple[Step, Unknowns]:
     """The step that leads to where the cameras stand still.
 
     What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew at
@@ -182,38 +193,46 @@ def assess(
     stitch_weight: float,  # noqa: ARG001  (every finish of a preset is asked alike)
     free: Sequence[Parameter] = (),
     stored: Sequence[Camera] | None = None,
+    memories: Sequence[CameraMemory | None] | None = None,
 ) -> Finished:
     """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    return _assessed(Estimate.at(pitch, cameras, unknowns), stored or cameras, sight, unknowns)
+    here = Estimate.at(pitch, cameras, unknowns)
+    return _assessed(here, stored or cameras, memories, sight.reader(), unknowns)
 
 
-def measure_all(lines: LinePoints, cameras: Sequence[Camera], sight: Sight, search_px: float) -> list[Measurements]:
-    """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
-    return [
-        measure_lines(lines, camera, channels, response, search_px * camera.intrinsics.relative_size)
-        for camera, channels, response in zip(cameras, sight.channels, sight.responses, strict=True)
-    ]
-
-
-def _each_alone(pitch: Field, cameras: Sequence[Camera], sight: Sight, stored: Sequence[Camera]) -> Finished:
+def _each_alone(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    sight: Sight,
+    stored: Sequence[Camera],
+    memories: Sequence[CameraMemory | None] | None,
+) -> Finished:
     """Cameras that need not agree, each on a ground of its own."""
-    ends = [refine(pitch, [camera], sight.of([n]), 0.0, stored=[stored[n]]) for n, camera in enumerate(cameras)]
+    ends = [
+        refine(pitch, [camera], sight.of([n]), 0.0, stored=[stored[n]], memories=memories and [memories[n]])
+        for n, camera in enumerate(cameras)
+    ]
     deviations = [deviation for end in ends for deviation in end.deviations if deviation.camera is not None]
     return Finished(pitch, [end.each[0] for end in ends], deviations, [])
 
 
-def _assessed(here: Estimate, stored: Sequence[Camera], sight: Sight, unknowns: Unknowns) -> Finished:
+def _assessed(
+    here: Estimate,
+    stored: Sequence[Camera],
+    memories: Sequence[CameraMemory | None] | None,
+    reader: LineReader,
+    unknowns: Unknowns,
+) -> Finished:
     unknowns = unknowns.around(here.pitch, here.lines)
     lines = here.on_ground(unknowns)
-    evidence = [
-        evidence_of(lines, camera, channels, response, left_out(here.pitch, camera))
-        for camera, channels, response in zip(here.cameras, sight.channels, sight.responses, strict=True)
-    ]
-    measured = doubted(here, _of_seen(measure_all(lines, here.cameras, sight, ASSESSING_SEARCH_PX), evidence))
+    evidence = reader.evidence(here.pitch, lines, here.cameras)
+    reader.read_anew()
+    measured = doubted(here, _of_seen(reader.measure(lines, here.cameras, ASSESSING_SEARCH_PX), evidence))
+    remembered = fitting(memories or [None] * len(here.cameras), here.lines)
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
-    finished = judged(ordinary, stored, measured, evidence, unknowns)
+    finished = judged(ordinary, stored, remembered, measured, evidence, unknowns)
     each = [
         replace(one, measured=its, uneven_m=ordinary.uneven_m) for one, its in zip(finished.each, measured, strict=True)
     ]

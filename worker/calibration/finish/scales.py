@@ -1,9 +1,10 @@
 """What numbers are when nobody knows how far off they may be: the lines choose the scale of their errors.
 
 Numbers are thought to be off by what is expected of them times the scale of their group: one for how far each camera
-moved, one for each lens, one for each measure of the field. Scales are those that make the lines likeliest (type-II
-maximum likelihood; MacKay, "Bayesian Interpolation", 1992). A zoom and a move along the view look alike to the lines of
-a far camera; but a camera that moved would have moved in other directions too, and so one that has not has zoomed.
+moved, one for each focal length, one for the rest of each lens, one for each measure of the field. Scales are those
+that make the lines likeliest (type-II maximum likelihood; MacKay, "Bayesian Interpolation", 1992). A zoom and a move
+along the view look alike to the lines of a far camera; but a camera that moved would have moved in other directions
+too, and so one that has not has zoomed.
 """
 
 from __future__ import annotations
@@ -23,13 +24,17 @@ SWEEPS = 3
 @dataclass(frozen=True)
 class Group:
     """Numbers whose errors are of one scale: `which` (n,) of those asked for, `expected` (n,) errors at scale 1 around
-    `mean` (n,), and the `scales` (S,) that may be theirs.
+    `mean` (n,), and the `scales` (S,), or (S, n) where they differ within the group, that may be theirs.
     """
 
     which: NDArray[np.intp]
     expected: Array
     mean: Array
     scales: Array
+
+    def certainty(self, scale: Array | float) -> Array:
+        """Prior information (n,) on the numbers at one of the scales."""
+        return np.asarray((self.expected * scale) ** -2)
 
 
 @dataclass(frozen=True)
@@ -50,23 +55,39 @@ def posterior(information: Array, pull: Array, blocks: Sequence[Sequence[Group]]
     certainty = np.empty(len(pull))
     for group in chain.from_iterable(blocks):
         mean[group.which] = group.mean
-        certainty[group.which] = (group.expected * group.scales[0]) ** -2
+        certainty[group.which] = group.certainty(group.scales[0])
+    choices = [block for block in blocks if any(len(group.scales) > 1 for group in block)]
     for _ in range(SWEEPS):
-        before = certainty
-        for block in blocks:
-            tried = [_with_scales(certainty, block, scales) for scales in product(*(group.scales for group in block))]
-            certainty = max(tried, key=lambda known: _log_evidence(information, pull, known, mean))
+        before = certainty.copy()
+        for block in choices:
+            which = np.concatenate([group.which for group in block])
+            certainty[which] = _likeliest(information, pull, certainty, mean, block, which)
         if np.array_equal(certainty, before):
             break
     covariance = np.asarray(np.linalg.inv(information + np.diag(certainty)), dtype=float)
     return Posterior(covariance @ (pull + certainty * mean), covariance, certainty)
 
 
-def _with_scales(certainty: Array, block: Sequence[Group], scales: Sequence[float]) -> Array:
-    changed = certainty.copy()
-    for group, scale in zip(block, scales, strict=True):
-        changed[group.which] = (group.expected * scale) ** -2
-    return changed
+def _likeliest(
+    information: Array,
+    pull: Array,
+    certainty: Array,
+    mean: Array,
+    block: Sequence[Group],
+    which: NDArray[np.intp],
+) -> Array:
+    """The prior information (n,) on the numbers of a block that makes the lines likeliest, all others as they are."""
+    rest = np.setdiff1d(np.arange(len(pull)), which)
+    of_rest = information[np.ix_(rest, rest)] + np.diag(certainty[rest])
+    coupling = information[np.ix_(rest, which)]
+    effect = np.linalg.solve(of_rest, coupling) if len(rest) else np.zeros((0, len(which)))
+    alone = information[np.ix_(which, which)] - coupling.T @ effect
+    drawn = pull[which] - effect.T @ (pull[rest] + certainty[rest] * mean[rest])
+    tried = (
+        np.concatenate([group.certainty(scale) for group, scale in zip(block, scales, strict=True)])
+        for scales in product(*(group.scales for group in block))
+    )
+    return max(tried, key=lambda known: _log_evidence(alone, drawn, known, mean[which]))
 
 
 def _log_evidence(information: Array, pull: Array, certainty: Array, mean: Array) -> float:

@@ -10,44 +10,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 
 import numpy as np
 
+from worker.calibration.finish.beliefs import Beliefs, believe
 from worker.calibration.finish.estimate import Estimate
-from worker.calibration.finish.least_squares import (
-    FEWEST_MEASUREMENTS,
-    error_of_measurement,
-    normal_equations,
-    rms_px,
-    weighted,
-)
-from worker.calibration.finish.robust import tukey_slopes, tukey_weights
-from worker.calibration.finish.scales import Group, posterior
+from worker.calibration.finish.information import Information, ask
+from worker.calibration.finish.least_squares import FEWEST_MEASUREMENTS, rms_px
+from worker.calibration.finish.scales import posterior
 from worker.calibration.finish.unknowns import Unknowns
+from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import UNEVEN_M
-from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved
+from worker.calibration.scene.motion import POSE_NUMBERS, moved
 from worker.calibration.scene.parameters import (
+    LENS_NUMBERS,
     LensParameter,
     Parameter,
-    field_parameters,
     lens_parameters,
     with_focal_length,
+    with_lens_changed,
 )
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.line_measurement import Measurements
 
-MOVED_RAD, MOVED_M = 0.01, 0.1
-"""How far a camera that has moved is expected to be from where it was, per axis, ..."""
-MOVEMENT_SCALES: Array = 0.3 * 2.0 ** np.arange(7.0)
-"""...times one of these: wind and heat move every camera a little."""
-LENS_SCALES: Array = 2.0 ** np.arange(8.0)
-"""A lens is off by what is expected of it, or by so many times more; never by less: lines that fit say little of it."""
-FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
-"""A measure of the field may have been taken better than expected, or worse."""
-LEAST_HELD, TINY = 1e-9, 1e-300
-"""Directions of which the lines say less than this part of what they say of single numbers are said nothing of."""
+FOCAL = LENS_NUMBERS.index("focal_length_px")
 
 
 @dataclass(frozen=True)
@@ -90,14 +79,43 @@ class Sigma:
 
 
 @dataclass(frozen=True)
+class Refined:
+    """Pose and lens of a camera as the lines have both: for whoever measures in the world.
+
+    `covariance` (12, 12): of the rotation in the camera's frame (rad), the position (m) and `LENS_NUMBERS`.
+    """
+
+    camera: Camera
+    covariance: Array
+
+    @property
+    def sigma(self) -> Sigma:
+        """How sure the pose is."""
+        return Sigma.from_covariance(self.covariance[:POSE_NUMBERS, :POSE_NUMBERS])
+
+
+@dataclass(frozen=True)
+class LensChange:
+    """How much longer a focal length is than in the first nights of a memory: part of it, and its `sigma`.
+
+    `since`: when those were, None where that is not known.
+    """
+
+    since: datetime | None
+    longer: float
+    sigma: float
+
+
+@dataclass(frozen=True)
 class FinishedCamera:
     """A camera where the finish left it. `evidence`: how much of the lines is seen where it puts them.
 
     None where it had too few measurements: `residual_px`, the rms of its lines, `covariance` (6, 6) of (rotation in the
     camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens, field and ground,
     which do not change. `zoom`: what the lines say of the focal length, None where it was found with the pose;
-    `likelier`: the camera with that focal length, where it then is. `measured`: the lines it was judged by;
-    `uneven_m`: how uneven their ground was taken to be.
+    `likelier`: the camera with that focal length, where it then is. `refined`: with all of its lens as the lines have
+    it. `lens_change`: since its memory began, if it has one. `measured`: the lines it was judged by; `uneven_m`: how
+    uneven their ground was taken to be.
     """
 
     camera: Camera
@@ -107,6 +125,8 @@ class FinishedCamera:
     repeatability: Sigma | None
     zoom: Deviation | None
     likelier: Camera | None
+    refined: Refined | None = field(default=None, kw_only=True)
+    lens_change: LensChange | None = field(default=None, kw_only=True)
     measured: Measurements | None = field(default=None, kw_only=True)
     uneven_m: float = field(default=UNEVEN_M, kw_only=True)
 
@@ -143,158 +163,152 @@ class Finished:
 def judged(
     here: Estimate,
     stored: Sequence[Camera],
+    memories: Sequence[CameraMemory | None],
     measured: Sequence[Measurements],
     evidence: Sequence[Evidence],
     solved: Unknowns,
 ) -> Finished:
     """The answer `here` and what it is worth, found with `solved` unknown.
 
-    `stored`: where the cameras stood when their poses were last known.
+    `stored`: where the cameras stood when their poses were last known; `memories`: of their earlier nights.
     """
-    lines, cameras = here.lines, here.cameras
-    suspects = _suspects(here.pitch, cameras, solved)
-    unknowns = Unknowns(solved.views, [*solved.parameters, *suspects], solved.ground).around(here.pitch, lines)
-    told = _told(here, measured, unknowns, solved.dense)
-    found = posterior(told.information, told.pull, _blocks(here, stored, unknowns, len(solved.parameters)))
-    # How far a camera moved helps to tell a zoom from a move. That it has not is no measurement of where it is: if the
-    # lenses are what they are said to be, lines alone have to determine it.
-    of_suspects = np.maximum(found.certainty[solved.dense :], [suspect.expected**-2 for suspect in suspects])
-    certainty = np.concatenate([np.diag(here.prior(solved))[: solved.dense], of_suspects])
-    by_lines = np.asarray(np.linalg.inv(told.information + np.diag(certainty)), dtype=float)
-    deviations = [
-        Deviation(
-            cameras[suspect.camera].id if isinstance(suspect, LensParameter) else None,
-            suspect.name,
-            float(found.value[number]),
-            float(np.sqrt(found.covariance[number, number])),
-            suspect.expected,
-        )
-        for number, suspect in enumerate(suspects, solved.dense)
+    memories = [
+        memory if memory is not None and len(found) >= FEWEST_MEASUREMENTS else None
+        for memory, found in zip(memories, measured, strict=True)
     ]
-    zooms = {deviation.camera: deviation for deviation in deviations if deviation.name == "focal_length_px"}
+    believed = believe(here, stored, memories, solved)
+    information = ask(here, measured, memories, believed.unknowns)
+    return _Judgement.of(here, believed, information).finished(memories, measured, evidence, solved)
 
-    def finished(number: int, camera: Camera, seen: Evidence, its: Measurements) -> FinishedCamera:
-        residual = rms_px(lines.position, camera, its)
+
+@dataclass(frozen=True)
+class _Judgement:
+    """What is known of everything in the end: `value` (A,) and `covariance` (A, A) of the independent errors.
+
+    `by_lines` (A, A): their covariance if nothing is known of how far cameras moved. `repeated`: see `Information`.
+    """
+
+    here: Estimate
+    believed: Beliefs
+    value: Array
+    covariance: Array
+    by_lines: Array
+    repeated: Array
+
+    @classmethod
+    def of(cls, here: Estimate, believed: Beliefs, information: Information) -> _Judgement:
+        mixing = believed.mixing
+        known, pull = mixing.T @ information.known @ mixing, mixing.T @ information.pull
+        found = posterior(known, pull, believed.blocks)
+        # How far a camera moved helps to tell a zoom from a move. That it has not is no measurement of where it is: if
+        # the lenses are what they are said to be, lines alone have to determine it.
+        certainty = found.certainty.copy()
+        for group in (group for block in believed.blocks for group in block):
+            certainty[group.which] = np.maximum(certainty[group.which], group.certainty(1.0))
+        certainty[believed.movements] = np.minimum(found.certainty[believed.movements], believed.free**-2)
+        by_lines = np.asarray(np.linalg.inv(known + np.diag(certainty)), dtype=float)
+        return cls(here, believed, found.value, found.covariance, by_lines, information.repeated)
+
+    def finished(
+        self,
+        memories: Sequence[CameraMemory | None],
+        measured: Sequence[Measurements],
+        evidence: Sequence[Evidence],
+        solved: Unknowns,
+    ) -> Finished:
+        """Everything that is answered."""
+        cameras = self.here.cameras
+        each = [
+            self._camera(number, memories[number], seen, its, solved)
+            for number, (seen, its) in enumerate(zip(evidence, measured, strict=True))
+        ]
+        determined = [self._determined(number, solved) for number in range(POSE_NUMBERS * len(cameras), solved.dense)]
+        return Finished(self.here.pitch, each, self._deviations(solved), determined)
+
+    def _camera(
+        self, number: int, memory: CameraMemory | None, seen: Evidence, its: Measurements, solved: Unknowns
+    ) -> FinishedCamera:
+        camera = self.here.cameras[number]
+        residual = rms_px(self.here.lines.position, camera, its)
         if len(its) < FEWEST_MEASUREMENTS:
             return FinishedCamera(camera, seen, residual, None, None, None, None)
-        pose = slice(POSE_NUMBERS * number, POSE_NUMBERS * (number + 1))
-        away = found.value[pose]
-        zoom = zooms.get(camera.id)
+        pose = self.believed.mixing[POSE_NUMBERS * number : POSE_NUMBERS * (number + 1)]
+        lens = self.believed.lens_tonight(number)
+        away = pose @ self.value
         covariance = max(
-            by_lines[pose, pose], found.covariance[pose, pose], key=lambda one: float(np.trace(one[3:, 3:]))
+            (pose @ one @ pose.T for one in (self.by_lines, self.covariance)),
+            key=lambda one: float(np.trace(one[3:, 3:])),
         )
+        zoom = next((d for d in self._of_lens(number, solved) if d.name == "focal_length_px"), None)
+        own = slice(POSE_NUMBERS * number, POSE_NUMBERS * (number + 1))
         return FinishedCamera(
             camera,
             seen,
             residual,
             covariance + np.outer(away, away),
-            Sigma.from_covariance(told.repeated[pose, pose]),
+            Sigma.from_covariance(self.repeated[own, own]),
             zoom,
             None if zoom is None else moved(with_focal_length(camera, zoom.value), away),
+            refined=self._refined(camera, pose, lens),
+            lens_change=None if memory is None else self._lens_change(camera, memory, lens),
         )
 
-    return Finished(
-        here.pitch,
-        [finished(*each) for each in zip(range(len(cameras)), cameras, evidence, measured, strict=True)],
-        deviations,
-        [
-            _determined(number, unknowns, by_lines, found.value)
-            for number in range(POSE_NUMBERS * len(cameras), solved.dense)
-        ],
-    )
+    def _refined(self, camera: Camera, pose: Array, lens: Array) -> Refined:
+        both = np.concatenate([pose, lens])
+        covariance = max(
+            (both @ one @ both.T for one in (self.by_lines, self.covariance)),
+            key=lambda one: float(np.trace(one[3:6, 3:6])),
+        )
+        return Refined(moved(with_lens_changed(camera, lens @ self.value), pose @ self.value), covariance)
 
+    def _lens_change(self, camera: Camera, memory: CameraMemory, lens: Array) -> LensChange:
+        """Beside what the focal length was in the first nights: what has changed since is an error of its own."""
+        since = np.zeros(len(self.value))
+        since[self.believed.changes_of(camera.id)] = 1.0
+        focal = camera.intrinsics.focal_length_px
+        sigma = float(np.sqrt(since @ self.covariance @ since)) / focal
+        return LensChange(memory.since, float(since @ self.value) / focal, sigma)
 
-@dataclass(frozen=True)
-class _Told:
-    """What lines say of the dense unknowns (D,), whatever the ground: `information` (D, D) and `pull` (D,).
+    def _deviations(self, solved: Unknowns) -> list[Deviation]:
+        """What the lines say of lenses and field that were not solved for."""
+        of_lenses = [one for number in range(len(self.here.cameras)) for one in self._of_lens(number, solved)]
+        return [*of_lenses, *self._of_field(solved)]
 
-    `repeated` (6 N + F, 6 N + F): covariance of poses and of the free numbers by the measurement alone.
-    """
+    def _of_lens(self, number: int, solved: Unknowns) -> list[Deviation]:
+        camera = self.here.cameras[number]
+        lens = self.believed.lens_tonight(number)
+        value, variance = lens @ self.value, np.einsum("ia,ab,ib->i", lens, self.covariance, lens)
+        free = {(p.camera, p.name) for p in solved.parameters if isinstance(p, LensParameter)}
+        return [
+            Deviation(camera.id, p.name, float(value[at]), float(np.sqrt(variance[at])), p.expected)
+            for at, p in enumerate(lens_parameters([camera]))
+            if (number, p.name) not in free
+        ]
 
-    information: Array
-    pull: Array
-    repeated: Array
+    def _of_field(self, solved: Unknowns) -> list[Deviation]:
+        first, free = POSE_NUMBERS * self.believed.unknowns.views, {p.name for p in solved.parameters}
+        told = []
+        for at, parameter in enumerate(self.believed.unknowns.parameters, first):
+            if isinstance(parameter, LensParameter) or parameter.name in free:
+                continue
+            row = self.believed.mixing[at]
+            sigma = float(np.sqrt(row @ self.covariance @ row))
+            told.append(Deviation(None, parameter.name, float(row @ self.value), sigma, parameter.expected))
+        return told
 
-
-def _told(here: Estimate, measured: Sequence[Measurements], unknowns: Unknowns, solved: int) -> _Told:
-    """By how the pull of the residuals varies, between how the pull changes with the unknowns: Huber's sandwich."""
-    dense = unknowns.dense
-    rows = here.rows(measured, unknowns)
-    steep = weighted(rows, here.heights, unknowns, tukey_slopes)
-    level = weighted(rows, here.heights, unknowns, tukey_weights)
-    equations = normal_equations(level)
-    bread, gradient = normal_equations(steep).information, equations.gradient
-    spread = error_of_measurement(level, equations.information)
-    weak = here.prior(unknowns)[:solved, :solved]
-    part = np.linalg.inv(bread[:solved, :solved] + weak)
-    repeated = part @ (spread[:solved, :solved] + weak) @ part
-
-    even = unknowns.ground.precision / here.uneven_m**2
-    effect = np.linalg.solve(bread[dense:, dense:] + even, bread[dense:, :dense])
-    information = bread[:dense, :dense] - bread[:dense, dense:] @ effect
-    pull = effect.T @ (gradient[dense:] + even @ here.heights) - gradient[:dense]
-    spread[dense:, dense:] += even
-    reduced = np.concatenate([np.eye(dense), -effect.T], axis=1)
-    believed = _believed(information, reduced @ spread @ reduced.T)
-    return _Told(believed, believed @ np.linalg.pinv(information, hermitian=True) @ pull, repeated)
-
-
-def _believed(information: Array, spread: Array) -> Array:
-    """The `information` (A, A) that is left when the pull varies by `spread` (A, A) and not by as much as that.
-
-    Few patches of line say little of how it varies in any one direction, so it is drawn to what it does on average.
-    """
-    scale = np.sqrt(np.maximum(np.diag(information), TINY))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    held = values > LEAST_HELD
-    directions, root = vectors[:, held], np.sqrt(values[held])
-    whitening = directions / root / scale[:, None]
-    variance = whitening.T @ spread @ whitening
-    usual = np.trace(variance) / max(len(variance), 1)
-    variance = (variance + usual * np.eye(len(variance))) / 2
-    back = directions * root * scale[:, None]
-    return np.asarray(back @ np.linalg.solve(variance, back.T))
-
-
-def _blocks(here: Estimate, stored: Sequence[Camera], unknowns: Unknowns, solved: int) -> list[list[Group]]:
-    """What may be off together: how far a camera moved and its lens; and each measure of the field for itself.
-
-    The first `solved` of the parameters were found with the poses, and are as far off as is expected.
-    """
-    first, suspects = POSE_NUMBERS * unknowns.views, unknowns.parameters[solved:]
-    owner = np.array([getattr(suspect, "camera", -1) for suspect in suspects])
-    expected = np.array([parameter.expected for parameter in unknowns.parameters])
-    moves = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
-
-    def alone(number: int, mean: float, scales: Array) -> list[Group]:
-        return [Group(np.array([first + number]), expected[number : number + 1], np.array([mean]), scales)]
-
-    blocks = [alone(number, -here.values[number], np.ones(1)) for number in range(solved)]
-    for number, (camera, before) in enumerate(zip(here.cameras, stored, strict=True)):
-        its = POSE_NUMBERS * number + np.arange(POSE_NUMBERS)
-        movement = Group(its, moves, change_between(camera, before), MOVEMENT_SCALES)
-        lens = solved + np.flatnonzero(owner == number)
-        blocks.append([movement, Group(first + lens, expected[lens], np.zeros(len(lens)), LENS_SCALES)])
-    fields = (solved + np.flatnonzero(owner == -1)).tolist()
-    return [*blocks, *(alone(number, 0.0, FIELD_SCALES) for number in fields)]
-
-
-def _suspects(pitch: Field, cameras: Sequence[Camera], solved: Unknowns) -> list[Parameter]:
-    """The numbers of lenses and field that were not solved for."""
-    known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
-    everything = [*lens_parameters(cameras), *field_parameters(pitch)]
-    return [p for p in everything if (getattr(p, "camera", None), p.name) not in known]
-
-
-def _determined(number: int, unknowns: Unknowns, covariance: Array, value: Array) -> Determined:
-    """What is known of the free parameter that is this number of all unknowns."""
-    first = POSE_NUMBERS * unknowns.views
-    variance = np.diag(covariance)[first:]
-    together = np.sqrt(variance * covariance[number, number])
-    correlation = np.divide(covariance[number, first:], together, out=np.zeros_like(together), where=together > 0)
-    correlation[number - first] = 0.0
-    most = int(np.argmax(np.abs(correlation)))
-    return Determined(
-        float(np.hypot(np.sqrt(covariance[number, number]), value[number])),
-        None if most == number - first else (unknowns.parameters[most], float(correlation[most])),
-    )
+    def _determined(self, number: int, solved: Unknowns) -> Determined:
+        """What is known of the free parameter that is this number of those that were solved for."""
+        unknowns = self.believed.unknowns
+        first = POSE_NUMBERS * unknowns.views
+        at = number - POSE_NUMBERS * len(self.here.cameras)
+        rows = self.believed.mixing[first : first + len(unknowns.parameters)]
+        covariance = rows @ self.by_lines @ rows.T
+        variance = np.diag(covariance)
+        together = np.sqrt(variance * variance[at])
+        correlation = np.divide(covariance[at], together, out=np.zeros_like(together), where=together > 0)
+        correlation[at] = 0.0
+        most = int(np.argmax(np.abs(correlation)))
+        return Determined(
+            float(np.hypot(np.sqrt(variance[at]), rows[at] @ self.value)),
+            None if most == at else (unknowns.parameters[most], float(correlation[most])),
+        )

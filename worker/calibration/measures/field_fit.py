@@ -83,7 +83,7 @@ def fit_field(
     """
     options, journey = Options(seed=seed), Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey)
-    here = Situation(METHODS["esc"], pitch, cameras, seen, options, journey)
+    here = Situation(METHODS["esc"], pitch, cameras, seen, options, journey, [None] * len(cameras))
     settled = settle(here)
     if len(here.usable) < len(cameras):
         fitted, results, measures = pitch, settled.results, leave_measures(pitch)

@@ -12,7 +12,7 @@ import numpy as np
 
 from worker.calibration.finish.estimate import Estimate, step
 from worker.calibration.finish.least_squares import CLUSTER_POINTS, Weighted, weighted
-from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Sight, measure_all
+from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Sight
 from worker.calibration.finish.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 from worker.calibration.finish.uncertainty import Finished
 from worker.calibration.finish.unknowns import Unknowns
@@ -85,7 +85,7 @@ class TriedRidges:
 def try_ridges(base: Finished, free: Sequence[Parameter], sight: Sight) -> TriedRidges:
     """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
     lines = base.pitch.line_points()
-    measured = measure_all(lines, base.cameras, sight, ASSESSING_SEARCH_PX)
+    measured = sight.reader().measure(lines, base.cameras, ASSESSING_SEARCH_PX)
     unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
     held, rows = _fitted(base.pitch, base.cameras, measured, unknowns)
     scale = robust_scale(rows.value)

@@ -83,12 +83,38 @@ class FieldParameter:
 
 
 Parameter = LensParameter | FieldParameter
+LENS_NUMBERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
+"""The numbers of a lens that lines are asked for."""
 
 
-def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
+def lens_numbers(lens: Intrinsics) -> Array:
+    """`LENS_NUMBERS` (6,) of a lens."""
+    (fx, _, cx), (_, fy, cy) = lens.matrix[:2].tolist()
+    k1, k2 = (*lens.distortion.tolist(), 0.0, 0.0)[:2]
+    return np.array([fx, cx, cy, fy / fx, k1, k2])
+
+
+def with_lens_changed(camera: Camera, changes: Array) -> Camera:
+    """The camera with `LENS_NUMBERS` changed by (6,)."""
+    for parameter, by in zip(lens_parameters([camera]), changes.tolist(), strict=True):
+        camera = parameter.changed(camera, by)
+    return camera
+
+
+def lens_parameters(cameras: Sequence[Camera]) -> list[LensParameter]:
     """The numbers of each lens, as uncertain as the lens says (`Intrinsics.sigma`), or as a good board leaves them, and
     the focal length as heat moves it besides."""
-    found: list[Parameter] = []
+    return [
+        replace(p, expected=hypot(p.expected, HEAT_FOCAL * cameras[p.camera].intrinsics.focal_length_px))
+        if p.name == "focal_length_px"
+        else p
+        for p in lens_parameters_without_heat(cameras)
+    ]
+
+
+def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParameter]:
+    """The same on the day of the photos of the board."""
+    found: list[LensParameter] = []
     for number, camera in enumerate(cameras):
         lens, known = camera.intrinsics, camera.intrinsics.sigma
         focal, pixel = lens.focal_length_px, lens.relative_size
@@ -108,16 +134,15 @@ def lens_parameters(cameras: Sequence[Camera]) -> list[Parameter]:
 
 
 def _focal_sigma(lens: Intrinsics) -> float:
-    """Of fx, with which fy changes: by what is known of either, the worse of both, and by what heat does to it."""
+    """Of fx, with which fy changes: by what is known of either, the worse of both."""
     fx, fy = float(lens.matrix[0, 0]), float(lens.matrix[1, 1])
     known = {"fx": 1.0, "fy": fx / fy}
-    measured = max(
+    return max(
         (lens.sigma[name] * scale for name, scale in known.items() if name in lens.sigma), default=BOARD_FOCAL * fx
     )
-    return hypot(measured, HEAT_FOCAL * fx)
 
 
-def field_parameters(pitch: Field) -> list[Parameter]:
+def field_parameters(pitch: Field) -> list[FieldParameter]:
     """What is measured once when a venue is set up."""
     return [
         _ridge_height(pitch, 0.02),
@@ -131,7 +156,7 @@ def with_focal_length(camera: Camera, longer_px: float) -> Camera:
     return replace(camera, intrinsics=_longer(camera.intrinsics, longer_px))
 
 
-def free_focal_lengths(cameras: Sequence[Camera]) -> list[Parameter]:
+def free_focal_lengths(cameras: Sequence[Camera]) -> list[LensParameter]:
     """The focal length of each camera, to be found along with its pose."""
     lengths = [p for p in lens_parameters(cameras) if p.name == "focal_length_px"]
     return [
@@ -140,7 +165,7 @@ def free_focal_lengths(cameras: Sequence[Camera]) -> list[Parameter]:
     ]
 
 
-def free_ridge(pitch: Field) -> list[Parameter]:
+def free_ridge(pitch: Field) -> list[FieldParameter]:
     """The height of the ridge, to be found along with the poses."""
     return [_ridge_height(pitch, FREE_RIDGE_M)]
 

@@ -6,7 +6,6 @@ the line as noise and things beside the line do not.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np

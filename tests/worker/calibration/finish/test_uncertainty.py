@@ -45,7 +45,7 @@ def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
             here = step(here, [one], found, unknowns, tukey_weights).to
         errors.append(here.cameras[0].pose.position - one.pose.position)
         if trial % 10 == 0:
-            said.append(judged(here, [one], found, [NO_EVIDENCE], unknowns).each[0].repeatability.position_m)
+            said.append(judged(here, [one], [None], found, [NO_EVIDENCE], unknowns).each[0].repeatability.position_m)
     spread = np.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
     assert np.mean(said) == pytest.approx(spread, rel=0.15)
 
@@ -59,7 +59,7 @@ def said_of_a_corner(**sigma):
     unknowns = Unknowns(1, [], Ground.under(lines))
     here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
     before = [moved(one, by=(0.0, -2.0, 1.0))]
-    (said,) = judged(here, before, [measured(lines, one)], [NO_EVIDENCE], unknowns).each
+    (said,) = judged(here, before, [None], [measured(lines, one)], [NO_EVIDENCE], unknowns).each
     return said.sigma.position_m
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames, pair_markings
-from worker.calibration.finish.refinement import Sight, measure_all
+from worker.calibration.finish.refinement import Sight
 from worker.calibration.judge.overlap import overlap_of
 from worker.calibration.scene.ignored import Ignored
 from worker.calibration.scene.visibility import SeenLines
@@ -37,8 +37,8 @@ def test_lines_in_an_ignored_area_are_not_expected():
 def test_nothing_is_measured_in_an_ignored_area_and_the_rest_as_ever():
     sight = Sight([Channels([pair_frames()[0]])], [of_use(PARTLY, pair_markings()[0])])
     whole_sight = Sight(sight.channels, [pair_markings()[0]])
-    (kept,) = measure_all(CROWNED.line_points(), [PARTLY], sight, 8.0)
-    (whole,) = measure_all(CROWNED.line_points(), [WHOLE], whole_sight, 8.0)
+    (kept,) = sight.reader().measure(CROWNED.line_points(), [PARTLY], 8.0)
+    (whole,) = whole_sight.reader().measure(CROWNED.line_points(), [WHOLE], 8.0)
     assert not within(kept.pixel).any()
     assert within(whole.pixel).any()
     assert 0.9 < len(kept) / (~within(whole.pixel)).sum() <= 1

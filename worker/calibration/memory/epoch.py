@@ -1,0 +1,164 @@
+"""An epoch: the mean of the line measurements of several accepted jobs, during which a camera stood still.
+
+It is kept as measurements and not as beliefs: what it says of lens, ground and paint is asked anew in every job,
+together with the lines of tonight, so that no error of an earlier answer confirms itself.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.finish.robust import tukey_weights
+from worker.calibration.scene.camera import LENSES, Array, Camera, Pose
+from worker.calibration.scene.field import LinePoints
+from worker.calibration.scene.motion import change_between, moved
+from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.see.line_measurement import Measurements
+
+MOST_JOBS = 100
+"""The mean of a point forgets as if it were of so many jobs at most."""
+LEAST_TRUST = 0.5
+SAME_PLACE_PX = 1.0
+"""A point that is farther from its mean, in pixels of a 4K frame, is not the same paint: somebody stands on it."""
+SAME_VIEW_PX = 60.0
+"""A camera whose picture of the field has moved by less, in pixels of a 4K frame, still looks the same way."""
+PX_STEP = 1e-3
+"""Offsets are written to a thousandth of a pixel."""
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """`camera`: the mean pose, and the lens that the poses were found with; `index` (M,): line points; `offset` (M,)
+    px: how far beside where that camera expects them, along their normals, they were measured on average; `count`
+    (M,): in how many jobs; `jobs` in all, from `first` to `last` (None: their time is not known).
+    """
+
+    camera: Camera
+    index: NDArray[np.intp]
+    offset: Array
+    count: Array
+    jobs: int
+    first: datetime | None
+    last: datetime | None
+
+    @classmethod
+    def begun(cls, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> Epoch:
+        """The epoch of one job, whose answer was `camera`; `lines` of its pitch."""
+        index, offset = _trusted(camera, measured, lines)
+        return cls(camera, index, offset, np.ones(len(index)), 1, at, at)
+
+    def joined(self, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> Epoch:
+        """The same with one more job, whose answer was `camera` with the same lens."""
+        new, value = _trusted(camera, measured, lines)
+        count = np.zeros(len(lines))
+        offset = np.zeros(len(lines))
+        count[self.index], offset[self.index] = self.count, self.offset
+        near = np.abs(value - offset[new]) <= SAME_PLACE_PX * camera.intrinsics.relative_size
+        taken = near | (count[new] == 0)
+        new, value = new[taken], value[taken]
+        count[new] = np.minimum(count[new], MOST_JOBS - 1) + 1
+        offset[new] += (value - offset[new]) / count[new]
+        index = np.flatnonzero(count)
+        mean = moved(self.camera, change_between(self.camera, camera) / min(self.jobs + 1, MOST_JOBS))
+        return Epoch(mean, index, offset[index], count[index], self.jobs + 1, self.first, at or self.last)
+
+    def without(self, gone: NDArray[np.intp]) -> Epoch:
+        """The same without some line points."""
+        left = ~np.isin(self.index, gone)
+        return replace(self, index=self.index[left], offset=self.offset[left], count=self.count[left])
+
+    def measurements(self, lines: LinePoints) -> Measurements:
+        """What `camera` measured on average of the `lines`."""
+        seen = SeenLines.from_camera(lines, self.camera)
+        seen = seen[np.isin(seen.index, self.index)]
+        where = np.searchsorted(self.index, seen.index)
+        pixel = seen.pixel + self.offset[where, None] * seen.normal
+        sizes = (seen.px_per_metre, seen.px_per_metre_up, seen.length_px)
+        trust = np.ones(len(seen))
+        return Measurements(seen.index, seen.points, pixel, seen.normal, *sizes, trust, jobs=self.count[where])
+
+    def looks_like(self, camera: Camera, lines: LinePoints) -> bool:
+        """Whether a camera has the same lens and looks the same way."""
+        ours, theirs = self.camera.intrinsics, camera.intrinsics
+        same_lens = np.array_equal(ours.matrix, theirs.matrix) and np.array_equal(ours.distortion, theirs.distortion)
+        places = lines.position[self.index]
+        apart = np.linalg.norm(camera.project(places) - self.camera.project(places), axis=1)
+        apart = apart[np.isfinite(apart)]
+        return bool(same_lens and len(apart) and apart.mean() <= SAME_VIEW_PX * ours.relative_size)
+
+    def to_json(self) -> dict[str, Any]:
+        """The epoch as a JSON object."""
+        return {
+            "camera": camera_to_json(self.camera),
+            "index": _packed(self.index, "<u2"),
+            "offset": _packed(np.clip(self.offset / PX_STEP, -32000, 32000).round(), "<i2"),
+            "count": _packed(self.count, "<u2"),
+            "jobs": self.jobs,
+            "first": None if self.first is None else self.first.isoformat(),
+            "last": None if self.last is None else self.last.isoformat(),
+        }
+
+    @classmethod
+    def from_json(cls, told: Mapping[str, Any]) -> Epoch:
+        """What `to_json` wrote."""
+        return cls(
+            camera_from_json(told["camera"]),
+            _unpacked(told["index"], "<u2").astype(np.intp),
+            _unpacked(told["offset"], "<i2") * PX_STEP,
+            _unpacked(told["count"], "<u2").astype(float),
+            int(told["jobs"]),
+            None if told["first"] is None else datetime.fromisoformat(told["first"]),
+            None if told["last"] is None else datetime.fromisoformat(told["last"]),
+        )
+
+
+def _trusted(camera: Camera, measured: Measurements, lines: LinePoints) -> tuple[NDArray[np.intp], Array]:
+    """Which line points were measured well, in order, and how far (px) beside where the camera expects them."""
+    offset = measured.offset(camera, lines.position[measured.index])
+    with np.errstate(invalid="ignore"):
+        good = np.isfinite(offset) & (measured.trust >= LEAST_TRUST)
+    good[good] = tukey_weights(offset[good] / measured.sigma_px[good]) > 0
+    order = np.argsort(measured.index[good])
+    return measured.index[good][order], offset[good][order]
+
+
+def camera_to_json(camera: Camera) -> dict[str, Any]:
+    """Pose and lens of a camera as a JSON object."""
+    lens = camera.intrinsics
+    return {
+        "id": camera.id,
+        "rotation": camera.pose.rotation.tolist(),
+        "position": camera.pose.position.tolist(),
+        "model": lens.model,
+        "matrix": lens.matrix.tolist(),
+        "distortion": lens.distortion.tolist(),
+        "size": list(lens.size),
+        "sigma": dict(lens.sigma),
+    }
+
+
+def camera_from_json(told: Mapping[str, Any]) -> Camera:
+    """What `camera_to_json` wrote."""
+    width, height = told["size"]
+    lens = LENSES[told["model"]](
+        np.array(told["matrix"], dtype=float),
+        np.array(told["distortion"], dtype=float),
+        (width, height),
+        dict(told["sigma"]),
+    )
+    return Camera(told["id"], lens, Pose(np.array(told["rotation"]), np.array(told["position"])))
+
+
+def _packed(values: NDArray[Any], kind: str) -> str:
+    return base64.b64encode(values.astype(kind).tobytes()).decode()
+
+
+def _unpacked(told: str, kind: str) -> NDArray[Any]:
+    return np.frombuffer(base64.b64decode(told), dtype=kind)
