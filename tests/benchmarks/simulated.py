@@ -111,7 +111,7 @@ class SimulatedSight:
 
 @dataclass
 class Installation:
-    """Cameras that a service calibrates night after night: `stored` poses and lenses, and what is remembered of each."""
+    """Cameras calibrated night after night: their `stored` poses and lenses, and what is remembered of each."""
 
     pitch: Field
     stored: list[Camera]
@@ -151,5 +151,3 @@ class Installation:
             for stored, after, was in zip(self.stored, finished.each, before, strict=True)
         ]
         return [replace(result, refusal=alone_rejection(result, Gate())) for result in results]
-
-

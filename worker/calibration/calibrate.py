@@ -97,7 +97,7 @@ def remember(
     memories: Mapping[str, CameraMemory],
     taken_at: datetime | None,
 ) -> dict[str, CameraMemory]:
-    """The memories of the cameras whose poses are accepted, with this job in them; it is their first if they fit not."""
+    """The memories of the cameras whose poses are accepted, with this job in them, which may be their first."""
     lines = answer.pitch.line_points()
     after = {}
     for before, result in zip(stored, answer.cameras, strict=True):

@@ -16,7 +16,6 @@ from worker.calibration.finish.least_squares import (
     FEWEST_MEASUREMENTS,
     Rows,
     error_of_measurement,
-    misfit_px,
     normal_equations,
     weighted,
 )
@@ -34,42 +33,72 @@ LEAST_HELD, TINY = 1e-9, 1e-300
 
 @dataclass(frozen=True)
 class Information:
-    """What lines say of the dense unknowns (D,), whatever the ground: `known` (D, D) and `pull` (D,).
+    """What lines say of changes of the dense unknowns (D,), whatever the ground: `known` (D, D) and `pull` (D,).
 
-    `repeated`: covariance of tonight's poses, and of what was solved for with them, by tonight's measurement alone.
+    `level` (K,) and `tilt` (K, D): the heights of the ground are `level - tilt @ changes`. `repeated`: covariance of
+    tonight's poses by tonight's measurement alone.
     """
 
     known: Array
     pull: Array
+    level: Array
+    tilt: Array
     repeated: Array
 
+    def heights(self, changes: Array) -> Array:
+        """The likeliest heights (K,) of the ground after changes (D,)."""
+        return self.level - self.tilt @ changes
 
-def ask(
-    here: Estimate,
-    measured: Sequence[Measurements],
-    memories: Sequence[CameraMemory | None],
-    unknowns: Unknowns,
-) -> Information:
-    """Ask the lines of tonight (`measured`) and those that are remembered."""
-    remembered, rows = _remembered(here, measured, memories, unknowns), here.rows(measured, unknowns)
-    dense = unknowns.dense
-    together = [*rows, *remembered]
-    level = weighted(together, here.heights, unknowns, tukey_weights)
-    equations = normal_equations(level)
-    steep = weighted(together, here.heights, unknowns, tukey_slopes)
-    bread, gradient = normal_equations(steep).information, equations.gradient
-    spread = error_of_measurement(level, equations.information)
-    repeated = _repeated(here, rows, unknowns) if remembered else _sandwich(here, bread, spread, len(here.cameras))
 
-    # Whatever the ground: its heights are eliminated.
-    even = unknowns.ground.precision / here.uneven_m**2
-    effect = np.linalg.solve(bread[dense:, dense:] + even, bread[dense:, :dense])
-    information = bread[:dense, :dense] - bread[:dense, dense:] @ effect
-    pull = effect.T @ (gradient[dense:] + even @ here.heights) - gradient[:dense]
-    spread[dense:, dense:] += even
-    reduced = np.concatenate([np.eye(dense), -effect.T], axis=1)
-    believed = _believed(information, reduced @ spread @ reduced.T)
-    return Information(believed, believed @ np.linalg.pinv(information, hermitian=True) @ pull, repeated)
+class Lines:
+    """The lines of tonight, and those that are remembered, beside an estimate of everything."""
+
+    def __init__(
+        self,
+        here: Estimate,
+        measured: Sequence[Measurements],
+        memories: Sequence[CameraMemory | None],
+        unknowns: Unknowns,
+    ) -> None:
+        self._here, self._unknowns = here, unknowns
+        self._tonight = here.rows(measured, unknowns)
+        self._remembered = _remembered(here, measured, memories, unknowns)
+
+    def ask(self) -> Information:
+        """What they say, weighed by how far they are from the estimate."""
+        return self._asked(np.zeros(self._unknowns.dense), self._here.heights)
+
+    def ask_at(self, changes: Array, heights: Array) -> Information:
+        """What they say, weighed by how far they are from it after changes (D,), on a ground of `heights` (K,).
+
+        An error of a lens that is known by now is no error of the measurements.
+        """
+        return self._asked(changes, heights)
+
+    def _asked(self, changes: Array, heights: Array) -> Information:
+        unknowns, dense = self._unknowns, self._unknowns.dense
+        tonight = [rows.shifted(changes, heights, unknowns) for rows in self._tonight]
+        together = [*tonight, *(rows.shifted(changes, heights, unknowns) for rows in self._remembered)]
+        flat = weighted(together, heights, unknowns, tukey_weights)
+        equations = normal_equations(flat)
+        steep = weighted(together, heights, unknowns, tukey_slopes)
+        bread, gradient = normal_equations(steep).information, equations.gradient
+        spread = error_of_measurement(flat, equations.information)
+        alone = self._remembered and _bread_and_spread(tonight, heights, unknowns)
+        repeated = _sandwich(self._here, *(alone or (bread, spread)))
+
+        # Whatever the ground: its heights are eliminated.
+        even = unknowns.ground.precision / self._here.uneven_m**2
+        of_heights = bread[dense:, dense:] + even
+        effect: Array = np.asarray(np.linalg.solve(of_heights, bread[dense:, :dense]), dtype=float)
+        towards = gradient[dense:] + even @ heights
+        information = bread[:dense, :dense] - bread[:dense, dense:] @ effect
+        pull = effect.T @ towards - gradient[:dense]
+        spread[dense:, dense:] += even
+        reduced = np.concatenate([np.eye(dense), -effect.T], axis=1)
+        believed, drawn = _believed(information, pull, reduced @ spread @ reduced.T)
+        risen = heights - np.asarray(np.linalg.solve(of_heights, towards), dtype=float)
+        return Information(believed, drawn + believed @ changes, risen + effect @ changes, effect, repeated)
 
 
 def _remembered(
@@ -87,7 +116,6 @@ def _remembered(
         for epoch in memory.epochs:
             its = epoch.measurements(here.lines)
             its = its[~np.isin(its.points.marking, repainted)]
-            its = replace(its, misfit_px=misfit_px(here.lines.position, epoch.camera, its))
             # An epoch has the lens of its time: what that differs by from tonight's is no error.
             differs = lens_numbers(camera.intrinsics) - lens_numbers(epoch.camera.intrinsics)
             if len(its) >= FEWEST_MEASUREMENTS:
@@ -107,27 +135,27 @@ def _by_lens(rows: Rows, unknowns: Unknowns, view: int, differs: Array) -> Array
     return changed
 
 
-def _repeated(here: Estimate, rows: Sequence[Rows], unknowns: Unknowns) -> Array:
-    """The sandwich of tonight's rows alone."""
-    level = weighted(rows, here.heights, unknowns, tukey_weights)
+def _bread_and_spread(rows: Sequence[Rows], heights: Array, unknowns: Unknowns) -> tuple[Array, Array]:
+    level = weighted(rows, heights, unknowns, tukey_weights)
     equations = normal_equations(level)
-    steep = normal_equations(weighted(rows, here.heights, unknowns, tukey_slopes))
-    return _sandwich(here, steep.information, error_of_measurement(level, equations.information), len(here.cameras))
+    steep = normal_equations(weighted(rows, heights, unknowns, tukey_slopes))
+    return steep.information, error_of_measurement(level, equations.information)
 
 
-def _sandwich(here: Estimate, bread: Array, spread: Array, cameras: int) -> Array:
-    """Covariance of the poses of tonight and of the numbers in the estimate by the measurement alone.
+def _sandwich(here: Estimate, bread: Array, spread: Array) -> Array:
+    """Covariance (6 C, 6 C) of the poses of tonight by the measurement alone.
 
     By how the pull of the residuals varies, between how the pull changes with the unknowns: Huber's sandwich.
     """
-    poses = POSE_NUMBERS * cameras
     weak = here.weak_prior()
+    poses = len(weak)
     part = np.linalg.inv(bread[:poses, :poses] + weak)
     return np.asarray(part @ (spread[:poses, :poses] + weak) @ part, dtype=float)
 
 
-def _believed(information: Array, spread: Array) -> Array:
-    """The `information` (A, A) that is left when the pull varies by `spread` (A, A) and not by as much as that.
+def _believed(information: Array, pull: Array, spread: Array) -> tuple[Array, Array]:
+    """The `information` (A, A) that is left when the `pull` (A,) varies by `spread` (A, A) and not by as much as that,
+    and the pull to the same place that goes with it.
 
     Few patches of line say little of how it varies in any one direction, so it is drawn to what it does on average.
     """
@@ -140,4 +168,5 @@ def _believed(information: Array, spread: Array) -> Array:
     usual = np.trace(variance) / max(len(variance), 1)
     variance = (variance + usual * np.eye(len(variance))) / 2
     back = directions * root * scale[:, None]
-    return np.asarray(back @ np.linalg.solve(variance, back.T))
+    believed = np.asarray(back @ np.linalg.solve(variance, back.T))
+    return believed, believed @ (whitening @ (whitening.T @ pull))

@@ -13,7 +13,7 @@ together, and no measurement counts twice.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +32,8 @@ CLUSTER_POINTS = 40
 """Line points (25 cm apart) whose errors of paint, lens and measurement are taken as one."""
 LOCAL_VARIANCE = np.array([PAINT_M**2, UNEVEN_M**2])
 """Of paint beside its place, and of the ground under it beside the smooth ground, at each line point, m²."""
+LEAST_BELIEF = 1e-3
+"""A line point whose rows are all disbelieved may lie anywhere."""
 LEAST_NOISE = 0.2
 """Part of the expected errors that the gradient varies by at least: no picture is perfect."""
 
@@ -42,7 +44,7 @@ class Rows:
 
     `offset` (M,) px, measured minus expected; `jacobian` (M, n) of it by the dense unknowns `columns` (n,); `across`
     and `up` (M,) px per metre of paint that lies beside its place, or above it; `noise_px` (M,); `trust` (M,) 0..1;
-    `point` (M,): which of the line points.
+    `point` (M,): which of the line points. They are made of `measured`.
     """
 
     offset: Array
@@ -53,6 +55,17 @@ class Rows:
     noise_px: Array
     trust: Array
     point: NDArray[np.intp]
+    measured: Measurements
+
+    def shifted(self, changes: Array, heights: Array, unknowns: Unknowns) -> Rows:
+        """The same rows after changes (D,) of the dense unknowns, on a ground of `heights` (K,).
+
+        What nothing explains is less where a lens that was wrong has been put right.
+        """
+        offset = self.offset + self.jacobian @ changes[self.columns]
+        left = offset - self.up * unknowns.ground.under_points(heights, self.point)
+        noise_px = replace(self.measured, misfit_px=misfit_px(left, self.measured)).noise_px
+        return replace(self, offset=offset, noise_px=noise_px)
 
     @classmethod
     def of(cls, positions: Array, camera: Camera, view: int, measured: Measurements, unknowns: Unknowns) -> Rows:
@@ -76,6 +89,7 @@ class Rows:
             measured.noise_px,
             measured.trust,
             measured.index,
+            measured,
         )
 
 
@@ -105,73 +119,75 @@ def rows_of(
 class Weighted:
     """Rows of several views with their weights, on a ground of known heights; M rows of all views, P line points.
 
-    `residual` (M,) px; `weight` (M,) 1 / px², of the measurement alone; `points` (P,) and `at` (M,): which of the line
-    points the rows are about; `local` (M, 2) px per metre of (e, r); `precision` (P, 2, 2) of those given the rows, and
-    `beside` (P, 2) m, what they then are; `value` (M,): the residual in units of everything it may be off by, and
-    `belief` (M,), its robust weight.
+    `residual` (M,) px; `points` (P,) and `at` (M,): which of the line points the rows are about; `shared` (M,): whether
+    other rows are about the same one; `weight` (M,) 1 / px²: of a shared point that of the measurement alone, of
+    another with all that it may be off by. `local` (M, 2) px per metre of (e, r); `precision` (P, 2, 2) of those given
+    the rows, and `beside` (P, 2) m, what they then are. `value` (M,): the residual in units of everything it may be
+    off by, and `belief` (M,), its robust weight.
     """
 
     rows: Sequence[Rows]
     unknowns: Unknowns
     residual: Array
-    weight: Array
     points: NDArray[np.intp]
     at: NDArray[np.intp]
+    shared: NDArray[np.bool_]
+    weight: Array
     local: Array
     precision: Array
     beside: Array
     value: Array
     belief: Array
 
-    @property
-    def shared(self) -> NDArray[np.bool_]:
-        """Which rows (M,) are about a line point that other rows are about as well."""
-        return np.asarray(np.bincount(self.at, minlength=len(self.points))[self.at] > 1)
-
-    @property
-    def weight_alone(self) -> Array:
-        """The weight (M,) of rows with all that they may be off by: of points that one view sees there is no more."""
-        of_model = (self.local**2) @ LOCAL_VARIANCE
-        return self.weight / (1 + self.weight * of_model)
-
     def parts(self) -> list[slice]:
         """Which of the M rows are those of each view."""
         ends = np.cumsum([0, *(len(rows.offset) for rows in self.rows)]).tolist()
         return [slice(first, last) for first, last in pairwise(ends)]
 
+    @property
+    def left(self) -> Array:
+        """What is left (M,) px of the residuals of shared points when those lie where all their rows say together."""
+        return self.residual - self.shared * np.sum(self.local * self.beside[self.at], axis=1)
+
 
 def weighted(rows: Sequence[Rows], heights: Array, unknowns: Unknowns, weigh: Weigh) -> Weighted:
-    """Weigh rows robustly: each by all that it may be off by, and where views share a point, by each other as well.
+    """Weigh rows robustly: each by all that it may be off by, and those that share a point by each other.
 
-    `heights` (K,) of the ground's nodes above the field.
+    Where a shared point is far off in the views that see it alike, it is the paint and not the measurements: it may lie
+    farther beside its place, and they say no less about each other. `heights` (K,): of the ground's nodes.
     """
     ground = unknowns.ground
     point = _joined([r.point for r in rows]).astype(np.intp)
     local = np.stack([_joined([r.across for r in rows]), _joined([r.up for r in rows])], axis=1)
     residual = _joined([r.offset for r in rows]) - local[:, 1] * ground.under_points(heights, point)
     noise = _joined([r.noise_px for r in rows]) ** 2
-    of_model = (local**2) @ LOCAL_VARIANCE
-    value = residual / np.sqrt(noise + of_model)
+    expected = noise + (local**2) @ LOCAL_VARIANCE
+    value = residual / np.sqrt(expected)
     belief = _joined([r.trust * weigh(one) for r, one in zip(rows, _split(value, rows), strict=True)])
-    # The weight that the measurement alone must have for the row to have this belief with all that it may be off by.
-    weight = belief / np.maximum(noise + (1 - belief) * of_model, 1e-12)
-    points, at, seen_by = np.unique(point, return_inverse=True, return_counts=True)
-    precision, beside = _beside(local, weight, residual, at.ravel(), len(points))
-    shared = seen_by[at.ravel()] > 1
+    points, number, seen_by = np.unique(point, return_inverse=True, return_counts=True)
+    at = number.ravel()
+    shared = seen_by[at] > 1
+    trust = _joined([r.trust for r in rows])
+    of_point = np.bincount(at, belief, len(points)) / np.maximum(np.bincount(at, trust, len(points)), 1e-12)
+    variance = LOCAL_VARIANCE / np.clip(of_point, LEAST_BELIEF, 1.0)[:, None]
+    weight = np.where(shared, trust / noise, belief / expected)
+    precision, beside = _beside(local, weight, residual, at, variance)
     if shared.any():
-        apart = (residual - np.sum(local * beside[at.ravel()], axis=1)) / np.sqrt(noise)
-        agree = np.ones(len(residual))
-        agree[shared] = weigh(apart[shared])
-        weight, belief = weight * agree, belief * np.minimum(agree, 1.0)
-        precision, beside = _beside(local, weight, residual, at.ravel(), len(points))
-    return Weighted(rows, unknowns, residual, weight, points, at.ravel(), local, precision, beside, value, belief)
+        apart = (residual - np.sum(local * beside[at], axis=1)) / np.sqrt(noise)
+        weight[shared] *= weigh(apart[shared])
+        precision, beside = _beside(local, weight, residual, at, variance)
+    return Weighted(rows, unknowns, residual, points, at, shared, weight, local, precision, beside, value, belief)
 
 
-def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], count: int) -> tuple[Array, Array]:
-    """Precision (P, 2, 2) and mean (P, 2), m, of what each line point is off by, if all else is right."""
+def _beside(local: Array, weight: Array, residual: Array, at: NDArray[np.intp], variance: Array) -> tuple[Array, Array]:
+    """Precision (P, 2, 2) and mean (P, 2), m, of what each line point is off by, if all else is right.
+
+    `variance` (P, 2) m²: of that before it is measured.
+    """
+    count = len(variance)
     precision = np.empty((count, 2, 2))
-    precision[:, 0, 0] = 1 / LOCAL_VARIANCE[0] + np.bincount(at, weight * local[:, 0] ** 2, count)
-    precision[:, 1, 1] = 1 / LOCAL_VARIANCE[1] + np.bincount(at, weight * local[:, 1] ** 2, count)
+    for n in (0, 1):
+        precision[:, n, n] = 1 / variance[:, n] + np.bincount(at, weight * local[:, n] ** 2, count)
     precision[:, 0, 1] = precision[:, 1, 0] = np.bincount(at, weight * local[:, 0] * local[:, 1], count)
     pull = np.stack([np.bincount(at, weight * residual * local[:, n], count) for n in (0, 1)], axis=1)
     return precision, np.asarray(np.linalg.solve(precision, pull[..., None])[..., 0], dtype=float)
@@ -191,12 +207,11 @@ def normal_equations(of: Weighted) -> NormalEquations:
     information, gradient = np.zeros((size, size)), np.zeros(size)
     shared, number = np.unique(of.at[of.shared], return_inverse=True)
     coupling = np.zeros((2, len(shared), size))
-    alone = np.where(of.shared, of.weight, of.weight_alone)
     numbers = np.zeros(len(of.at), dtype=np.intp)
     numbers[of.shared] = number
     for rows, part in zip(of.rows, of.parts(), strict=True):
         columns, jacobian = _with_ground(rows, of.unknowns)
-        heavy = jacobian * alone[part, None]
+        heavy = jacobian * of.weight[part, None]
         information[np.ix_(columns, columns)] += heavy.T @ jacobian
         gradient[columns] += heavy.T @ of.residual[part]
         both = of.shared[part]
@@ -213,7 +228,7 @@ def normal_equations(of: Weighted) -> NormalEquations:
 def pulls(of: Weighted) -> Array:
     """The part (P, U) of the gradient that each line point has, over all views."""
     found = np.zeros((len(of.points), len(of.unknowns)))
-    left = of.residual - np.sum(of.local * of.beside[of.at], axis=1)
+    left = of.left
     for rows, part in zip(of.rows, of.parts(), strict=True):
         columns, jacobian = _with_ground(rows, of.unknowns)
         found[of.at[part][:, None], columns] += jacobian * (of.weight[part] * left[part])[:, None]
@@ -266,12 +281,11 @@ def rms_px(positions: Array, camera: Camera, measured: Measurements) -> float | 
     return float(np.sqrt(np.mean(offset[counted] ** 2)))
 
 
-def misfit_px(positions: Array, camera: Camera, measured: Measurements) -> float:
-    """The further error, in px, that makes the usual distance of lines from `positions` (N, 3) what is expected.
+def misfit_px(offset: Array, measured: Measurements) -> float:
+    """The further error, in px, that makes the usual one of the offsets (M,) of measurements what is expected.
 
     0 where noise, paint and ground explain them. By the median: outliers say nothing of how well a lens is known.
     """
-    offset = measured.offset(camera, positions[measured.index])
     known = np.isfinite(offset)
     if not known.any():
         return 0.0

@@ -181,7 +181,7 @@ def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measuremen
     wrong lens puts beside itself by ten of its small sigmas would outweigh all near ones.
     """
     return [
-        replace(found, misfit_px=misfit_px(here.lines.position, camera, found))
+        replace(found, misfit_px=misfit_px(found.offset(camera, here.lines.position[found.index]), found))
         for camera, found in zip(here.cameras, measured, strict=True)
     ]
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from worker.calibration.finish.beliefs import Beliefs, believe
 from worker.calibration.finish.estimate import Estimate
-from worker.calibration.finish.information import Information, ask
+from worker.calibration.finish.information import Information, Lines
 from worker.calibration.finish.least_squares import FEWEST_MEASUREMENTS, rms_px
-from worker.calibration.finish.scales import posterior
+from worker.calibration.finish.scales import Posterior, posterior
 from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.scene.camera import Array, Camera
@@ -26,7 +26,6 @@ from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import UNEVEN_M
 from worker.calibration.scene.motion import POSE_NUMBERS, moved
 from worker.calibration.scene.parameters import (
-    LENS_NUMBERS,
     LensParameter,
     Parameter,
     lens_parameters,
@@ -36,7 +35,8 @@ from worker.calibration.scene.parameters import (
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.line_measurement import Measurements
 
-FOCAL = LENS_NUMBERS.index("focal_length_px")
+ASKED_AGAIN = 2
+"""How often lines are weighed again by where everything seems to be by then."""
 
 
 @dataclass(frozen=True)
@@ -177,8 +177,18 @@ def judged(
         for memory, found in zip(memories, measured, strict=True)
     ]
     believed = believe(here, stored, memories, solved)
-    information = ask(here, measured, memories, believed.unknowns)
+    lines = Lines(here, measured, memories, believed.unknowns)
+    information = lines.ask()
+    for _ in range(ASKED_AGAIN):
+        changes = believed.mixing @ _posterior(believed, information).value
+        information = lines.ask_at(changes, information.heights(changes))
     return _Judgement.of(here, believed, information).finished(memories, measured, evidence, solved)
+
+
+def _posterior(believed: Beliefs, information: Information) -> Posterior:
+    """What the independent errors are by what is believed of them and by what the lines say."""
+    mixing = believed.mixing
+    return posterior(mixing.T @ information.known @ mixing, mixing.T @ information.pull, believed.blocks)
 
 
 @dataclass(frozen=True)
@@ -197,9 +207,8 @@ class _Judgement:
 
     @classmethod
     def of(cls, here: Estimate, believed: Beliefs, information: Information) -> _Judgement:
-        mixing = believed.mixing
-        known, pull = mixing.T @ information.known @ mixing, mixing.T @ information.pull
-        found = posterior(known, pull, believed.blocks)
+        known = believed.mixing.T @ information.known @ believed.mixing
+        found = _posterior(believed, information)
         # How far a camera moved helps to tell a zoom from a move. That it has not is no measurement of where it is: if
         # the lenses are what they are said to be, lines alone have to determine it.
         certainty = found.certainty.copy()
@@ -222,7 +231,7 @@ class _Judgement:
             self._camera(number, memories[number], seen, its, solved)
             for number, (seen, its) in enumerate(zip(evidence, measured, strict=True))
         ]
-        determined = [self._determined(number, solved) for number in range(POSE_NUMBERS * len(cameras), solved.dense)]
+        determined = [self._determined(number) for number in range(POSE_NUMBERS * len(cameras), solved.dense)]
         return Finished(self.here.pitch, each, self._deviations(solved), determined)
 
     def _camera(
@@ -250,7 +259,7 @@ class _Judgement:
             zoom,
             None if zoom is None else moved(with_focal_length(camera, zoom.value), away),
             refined=self._refined(camera, pose, lens),
-            lens_change=None if memory is None else self._lens_change(camera, memory, lens),
+            lens_change=None if memory is None else self._lens_change(camera, memory),
         )
 
     def _refined(self, camera: Camera, pose: Array, lens: Array) -> Refined:
@@ -261,7 +270,7 @@ class _Judgement:
         )
         return Refined(moved(with_lens_changed(camera, lens @ self.value), pose @ self.value), covariance)
 
-    def _lens_change(self, camera: Camera, memory: CameraMemory, lens: Array) -> LensChange:
+    def _lens_change(self, camera: Camera, memory: CameraMemory) -> LensChange:
         """Beside what the focal length was in the first nights: what has changed since is an error of its own."""
         since = np.zeros(len(self.value))
         since[self.believed.changes_of(camera.id)] = 1.0
@@ -296,7 +305,7 @@ class _Judgement:
             told.append(Deviation(None, parameter.name, float(row @ self.value), sigma, parameter.expected))
         return told
 
-    def _determined(self, number: int, solved: Unknowns) -> Determined:
+    def _determined(self, number: int) -> Determined:
         """What is known of the free parameter that is this number of those that were solved for."""
         unknowns = self.believed.unknowns
         first = POSE_NUMBERS * unknowns.views
