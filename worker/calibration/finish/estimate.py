@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from worker.calibration.finish.least_squares import Rows, normal_equations, rows_of, weighted
-from worker.calibration.finish.robust import Weigh
 from worker.calibration.finish.unknowns import Unknowns
+from worker.calibration.robust import Weigh
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import Belief

@@ -19,9 +19,9 @@ from worker.calibration.finish.least_squares import (
     normal_equations,
     weighted,
 )
-from worker.calibration.finish.robust import tukey_slopes, tukey_weights
 from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.memory.camera_memory import CameraMemory
+from worker.calibration.robust import tukey_slopes, tukey_weights
 from worker.calibration.scene.camera import Array
 from worker.calibration.scene.motion import POSE_NUMBERS
 from worker.calibration.scene.parameters import LENS_NUMBERS, LensParameter, lens_numbers

@@ -19,8 +19,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.robust import USUAL, Weigh, tukey_weights
 from worker.calibration.finish.unknowns import Unknowns
+from worker.calibration.robust import USUAL, Weigh, tukey_weights
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.ground import UNEVEN_M
 from worker.calibration.scene.motion import POSE_NUMBERS

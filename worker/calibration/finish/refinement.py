@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from worker.calibration.finish.estimate import Estimate, Step, step
 from worker.calibration.finish.least_squares import misfit_px
-from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.finish.uncertainty import Finished, judged
 from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.memory.camera_memory import CameraMemory, fitting
+from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import MOST_UNEVEN_M, UNEVEN_M, Ground

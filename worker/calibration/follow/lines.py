@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.finish.least_squares import CLUSTER_POINTS
-from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.follow.motion_filter import Observed
+from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.scene.camera import Array, Camera, Frame
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.motion import POSE_NUMBERS, change_between, moved, pixel_slopes

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from worker.calibration.finish.estimate import PRIOR_M, PRIOR_RAD
 from worker.calibration.finish.least_squares import CLUSTER_POINTS, LEAST_NOISE
-from worker.calibration.finish.robust import tukey_weights
 from worker.calibration.finish.uncertainty import FinishedCamera
+from worker.calibration.robust import tukey_weights
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import Ground

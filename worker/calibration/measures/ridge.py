@@ -13,9 +13,9 @@ import numpy as np
 from worker.calibration.finish.estimate import Estimate, step
 from worker.calibration.finish.least_squares import CLUSTER_POINTS, Weighted, weighted
 from worker.calibration.finish.refinement import ASSESSING_SEARCH_PX, Sight
-from worker.calibration.finish.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 from worker.calibration.finish.uncertainty import Finished
 from worker.calibration.finish.unknowns import Unknowns
+from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import Ground

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.robust import tukey_weights
+from worker.calibration.robust import tukey_weights
 from worker.calibration.scene.camera import LENSES, Array, Camera, Pose
 from worker.calibration.scene.field import LinePoints
 from worker.calibration.scene.motion import change_between, moved

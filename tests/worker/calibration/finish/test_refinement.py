@@ -19,9 +19,9 @@ from tests.worker.calibration.synthetic import (
     pair_markings,
 )
 from worker.calibration.finish.refinement import Sight, assess, refine
-from worker.calibration.finish.robust import huber_weights, tukey_weights
 from worker.calibration.judge.quality import Gate
 from worker.calibration.judge.registration import register_pair
+from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import free_focal_lengths, free_ridge, lens_parameters

@@ -8,9 +8,9 @@ import pytest
 from fields.template import load
 from tests.worker.calibration.synthetic import camera, moved
 from worker.calibration.finish.estimate import Estimate, step
-from worker.calibration.finish.robust import tukey_weights
 from worker.calibration.finish.uncertainty import judged
 from worker.calibration.finish.unknowns import Unknowns
+from worker.calibration.robust import tukey_weights
 from worker.calibration.scene import parameters
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import Ground
