@@ -197,14 +197,14 @@ def _run(focal: float, view: str, number: int, wrong: dict[str, float], may_drif
 def _seen(focal: float, view: str, number: int) -> Seen:
     """The frame of a view and what the network says of it; the last few are kept."""
     rng = np.random.default_rng([9, int(focal), list(VIEWS).index(view), number])
-    camera = _camera(focal, view, rng)
+    camera = camera_of_view(focal, view, rng)
     drawn = Conditions.named(HOURS[number % len(HOURS)], rng)
     light = seen_well(drawn, swell=1.0, wobble=1.0)
     frame = rendered(f"lens-{focal:.0f}-{view}-{number}", PITCH, camera, light)
     return Seen(Scene(view, False, PITCH, [camera], [camera], {camera.id: [frame]}))
 
 
-def _camera(focal: float, view: str, rng: np.random.Generator) -> Camera:
+def camera_of_view(focal: float, view: str, rng: np.random.Generator) -> Camera:
     """Somewhere from where a view fills the picture."""
     target, across = VIEWS[view]
     distance = across * focal / SIZE[0]

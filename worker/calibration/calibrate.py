@@ -24,8 +24,8 @@ from worker.calibration.judge.quality import CameraResult, Gate, believable, rid
 from worker.calibration.judge.registration import Response
 from worker.calibration.judge.seam import seam_between
 from worker.calibration.memory.camera_memory import CameraMemory, fitting
-from worker.calibration.nearby import settle_nearby
-from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Progress, Segment
+from worker.calibration.nearby import found_nearby
+from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Path, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.visibility import SeenLines
@@ -34,7 +34,17 @@ from worker.calibration.see.left_out import of_use
 from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.see.steady import Sway, median, sways
 from worker.calibration.see.view import UsualView, ViewCondition, look_at
-from worker.calibration.settle import CAPTURE_RAD, METHODS, Seen, Settled, Situation, ridges_of, settle, settle_without
+from worker.calibration.settle import (
+    CAPTURE_RAD,
+    METHODS,
+    NOBODY,
+    Seen,
+    Settled,
+    Situation,
+    ridges_of,
+    settle,
+    settle_without,
+)
 from worker.calibration.stitch.evening import evened_out
 from worker.calibration.zoom import refit_zoomed
 
@@ -69,8 +79,7 @@ def calibrate(
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey, usual)
     here = Situation(method, pitch, cameras, seen, options, journey, [memories.get(camera.id) for camera in cameras])
-    near = look_nearby(here) if options.search == "auto" else None
-    settled, answer = near or agree(here, refit_zoomed(here, settle(here)))
+    settled, answer, path = find(here)
     with journey.measuring("quality"):
         before = _compared_before(pitch, cameras, seen.sight, answer)
         loss = here.loss_of(answer.pitch, [one.camera for one in answer.cameras])
@@ -85,7 +94,7 @@ def calibrate(
         loss=loss,
         generations=settled.generations,
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
-        path="wide" if near is None else "near",
+        path=path,
         lights=evened,
         memories=remember(answer, cameras, memories, taken_at),
     )
@@ -127,13 +136,18 @@ def look(
     return Seen(views, Sight([Channels(frames[camera.id], swayed[camera.id]) for camera in cameras], responses))
 
 
-def look_nearby(here: Situation) -> tuple[Settled, Answer] | None:
-    """The answer where all cameras are found near their stored poses and agree; None where a search is needed."""
-    settled = settle_nearby(replace(here, journey=here.journey.unreported()))
-    if settled is None:
-        return None
-    answer = judge(settled.pitch, settled.results, here.seen.sight, here.journey)
-    return (settled, answer) if answer.accepted else None
+def find(here: Situation) -> tuple[Settled, Answer, Path]:
+    """Where the cameras are and what they are worth together; searched for is only who is not near its stored pose."""
+    near = found_nearby(replace(here, journey=here.journey.unreported())) if here.options.search == "auto" else None
+    if near is not None and near.numbers == here.usable:
+        settled = near.settled(here)
+        answer = judge(settled.pitch, settled.results, here.seen.sight, here.journey)
+        if all(answer.cameras[n].accepted for n in near.numbers):
+            return settled, answer, "near"
+        # They contradict each other, so one of them is not where it seems to be.
+        near = None
+    settled = settle(here, NOBODY if near is None else near.cameras)
+    return *agree(here, refit_zoomed(here, settled)), "wide"
 
 
 def agree(here: Situation, settled: Settled) -> tuple[Settled, Answer]:

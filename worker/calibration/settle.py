@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import cv2
 import numpy as np
@@ -43,6 +44,7 @@ from worker.calibration.see.view import ViewCondition
 
 CAPTURE_RAD = 0.1
 """How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
+NOBODY: Mapping[int, Camera] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -206,16 +208,17 @@ class Settled:
     generations: int
 
 
-def settle(here: Situation) -> Settled:
-    """Search for all cameras that can be seen from their stored poses, and finish; see the module."""
+def settle(here: Situation, near: Mapping[int, Camera] = NOBODY) -> Settled:
+    """Search for all cameras that can be used but those found `near` their stored poses, and finish; see the module."""
     together = here.usable
-    first = here.of(together)
-    found = first.searched(first.by_network()) if together else Found([], np.inf, 0)
-    begun = list(here.cameras)
-    for n, camera in zip(together, found.cameras, strict=True):
+    lost = [n for n in together if n not in near]
+    first = here.of(lost)
+    found = first.searched(first.by_network()) if lost else Found([], np.inf, 0)
+    begun = [near.get(n, camera) for n, camera in enumerate(here.cameras)]
+    for n, camera in zip(lost, found.cameras, strict=True):
         begun[n] = camera
     everyone = range(len(begun))
-    alone = {n: _left(here.of([n])) for n in everyone if n not in together}
+    alone = {n: left_alone(here.of([n])) for n in everyone if n not in together}
     results = {n: attempt.result for n, attempt in alone.items()}
     finished = Finished(here.pitch, [], [], [])
     while together:
@@ -265,7 +268,7 @@ def _deviations(together: Finished, apart: Sequence[Finished]) -> list[Deviation
 
 
 @dataclass(frozen=True)
-class _Attempt:
+class Attempt:
     """What a camera by itself comes to from where it has `begun`."""
 
     begun: Camera
@@ -278,7 +281,7 @@ class _Attempt:
         return self.result.evidence.agreement
 
 
-def _tried_alone(here: Situation, found: Camera) -> _Attempt:
+def _tried_alone(here: Situation, found: Camera) -> Attempt:
     """The best that a camera by itself comes to: from where all have `found` it, and else from elsewhere."""
     best = _attempt(here, found)
     for start in _other_starts(here, lost=best.agreement < here.gate.least_agreement):
@@ -295,15 +298,15 @@ def _other_starts(here: Situation, *, lost: bool) -> Iterator[Camera]:
     yield here.cameras[0]
 
 
-def _attempt(here: Situation, begun: Camera) -> _Attempt:
+def _attempt(here: Situation, begun: Camera) -> Attempt:
     finished = here.finished([begun])
-    return _Attempt(begun, finished, here.judged(finished)[0])
+    return Attempt(begun, finished, here.judged(finished)[0])
 
 
-def _left(here: Situation) -> _Attempt:
+def left_alone(here: Situation) -> Attempt:
     """A camera whose frame cannot be used."""
     finished = here.left()
-    return _Attempt(here.cameras[0], finished, here.judged(finished)[0])
+    return Attempt(here.cameras[0], finished, here.judged(finished)[0])
 
 
 def judged_alone(

@@ -7,6 +7,7 @@ import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame, pair, pair_frames
 from tests.worker.calibration.test_calibrate import white_on_green
+from worker.calibration import settle as settling
 from worker.calibration.calibrate import calibrate
 from worker.calibration.records import Calibration, Options
 from worker.calibration.scene.camera import rotation_angles_deg
@@ -59,10 +60,32 @@ def test_what_a_search_would_refuse_is_not_accepted_nearby():
     assert (found.path, found.verdict) == ("wide", "rejected")
 
 
-def test_one_camera_that_cannot_be_used_has_the_other_searched_for():
+def test_a_camera_whose_frame_is_of_no_use_does_not_have_the_other_one_searched_for():
     frames = {"left": [pair_frames()[0]], "right": [np.zeros_like(pair_frames()[1])]}
     found = calibrated(frames=frames)
-    assert (found.path, found.verdict) == ("wide", "partly")
+    assert (found.path, found.verdict) == ("near", "partly")
+    left, right = found.cameras
+    assert left.accepted
+    assert right.refusal.reason == "view"
+    assert np.linalg.norm(left.camera.pose.position - pair()[0].pose.position) < 0.02
+
+
+def test_only_the_camera_that_was_turned_is_searched_for():
+    frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
+    left, right = pair()
+    searched: list[str] = []
+    real = settling.search
+
+    def watched(pitch, cameras, *others):
+        searched.extend(camera.id for camera in cameras)
+        return real(pitch, cameras, *others)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settling, "search", watched)
+        found = calibrate(CROWNED, [moved(left, *WIND), moved(right, *STORM)], frames, white_on_green, Options(seed=5))
+    assert searched == ["right"]
+    assert (found.path, found.verdict) == ("wide", "accepted")
+    assert off_m(found) < 0.02
 
 
 def test_nobody_is_told_of_looking_nearby_in_vain():

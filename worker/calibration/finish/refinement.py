@@ -5,8 +5,9 @@ Found with the poses: how the ground swells, and whatever number of lens or fiel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +65,14 @@ class Sight:
 class LineReader:
     """Measures the lines of several cameras around any poses; reads a frame again only where it has to."""
 
-    def __init__(self, sight: Sight) -> None:
+    def __init__(self, sight: Sight, read: Mapping[int, LineProfiles] = MappingProxyType({})) -> None:
         self._sight = sight
-        self._read: dict[int, LineProfiles] = {}
+        self._read = dict(read)
+
+    def of(self, numbers: Sequence[int]) -> LineReader:
+        """That of some of the cameras, with what has been read of them."""
+        read = {at: self._read[n] for at, n in enumerate(numbers) if n in self._read}
+        return LineReader(self._sight.of(numbers), read)
 
     def measure(self, lines: LinePoints, cameras: Sequence[Camera], search_px: float) -> list[Measurements]:
         """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""

@@ -26,6 +26,7 @@ from worker.calibration.scene.field import Field
 from worker.calibration.scene.ground import UNEVEN_M
 from worker.calibration.scene.motion import POSE_NUMBERS, moved
 from worker.calibration.scene.parameters import (
+    HEAT_FOCAL,
     LensParameter,
     Parameter,
     lens_parameters,
@@ -35,6 +36,8 @@ from worker.calibration.scene.parameters import (
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.line_measurement import Measurements
 
+SURE_CHANGE = 3.0
+"""A focal length has changed when it differs by so many times its sigma and what heat does together."""
 ASKED_AGAIN = 2
 """How often lines are weighed again by where everything seems to be by then."""
 
@@ -104,6 +107,11 @@ class LensChange:
     since: datetime | None
     longer: float
     sigma: float
+
+    @property
+    def notable(self) -> bool:
+        """Whether it is more than heat does to a lens, beyond doubt."""
+        return abs(self.longer) > SURE_CHANGE * float(np.hypot(self.sigma, HEAT_FOCAL))
 
 
 @dataclass(frozen=True)

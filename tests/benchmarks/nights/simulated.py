@@ -2,7 +2,7 @@
 
 The lines are where a field puts them whose ground swells and whose paint lies a little beside itself, the same in all
 nights; each night adds noise of its own. It takes a hundredth of the time that rendering takes, so that sequences of
-hundreds of nights can be tried; what pictures add to it is tried by `--only rendered`.
+hundreds of nights can be tried; what pictures add to it, the part with rendered frames says.
 """
 
 from __future__ import annotations
@@ -51,6 +51,11 @@ class Painted:
         beside = PAINT_M * rng.normal(size=len(lines))
         there = lines.position + beside[:, None] * lines.normal + up[:, None] * [0.0, 0.0, 1.0]
         return cls(pitch, lines, there)
+
+    def longest_seen(self, camera: Camera) -> str:
+        """The marking of which a camera sees most."""
+        seen = SeenLines.from_camera(self.lines, camera)
+        return self.pitch.markings()[int(np.argmax(np.bincount(seen.points.marking)))].name
 
     def painted_anew(self, name: str, aside_m: float) -> Painted:
         """The same with one marking that lies so far aside from now on."""
@@ -121,9 +126,10 @@ class Installation:
     def __post_init__(self) -> None:
         self.memories = self.memories or [None] * len(self.stored)
 
-    def night(self, sight: SimulatedSight) -> list[CameraResult]:
-        """One job: what is accepted is stored and remembered."""
-        finished = refine(self.pitch, self.stored, sight, 0.5, memories=self.memories)
+    def night(self, sight: SimulatedSight, begun: Sequence[Camera] | None = None) -> list[CameraResult]:
+        """One job: what is accepted is stored and remembered. `begun`: where a search left the cameras, if there was
+        one."""
+        finished = refine(self.pitch, begun or self.stored, sight, 0.5, stored=self.stored, memories=self.memories)
         results = self._judged(finished, sight)
         for number, result in enumerate(results):
             if not result.accepted:
