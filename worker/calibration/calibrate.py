@@ -114,7 +114,9 @@ def remember(
             continue
         (memory,) = fitting([memories.get(before.id)], lines)
         job = (result.camera, result.measured, lines, taken_at)
-        after[before.id] = CameraMemory.begun(before, *job) if memory is None else memory.after(*job)
+        after[before.id] = (
+            CameraMemory.begun(before, *job) if memory is None else memory.after(*job, result.painted_anew)
+        )
     return after
 
 

@@ -139,7 +139,9 @@ class Installation:
                 (memory,) = fitting([self.memories[number]], lines)
                 job = (result.camera, result.measured, lines, None)
                 self.memories[number] = (
-                    CameraMemory.begun(self.stored[number], *job) if memory is None else memory.after(*job)
+                    CameraMemory.begun(self.stored[number], *job)
+                    if memory is None
+                    else memory.after(*job, result.painted_anew)
                 )
             self.stored[number] = result.camera
         return results

@@ -62,7 +62,7 @@ class Lines:
     ) -> None:
         self._here, self._unknowns = here, unknowns
         self._tonight = here.rows(measured, unknowns)
-        self._remembered = _remembered(here, measured, memories, unknowns)
+        self._remembered = _remembered(here, memories, unknowns)
 
     def ask(self) -> Information:
         """What they say, weighed by how far they are from the estimate."""
@@ -101,21 +101,12 @@ class Lines:
         return Information(believed, drawn + believed @ changes, risen + effect @ changes, effect, repeated)
 
 
-def _remembered(
-    here: Estimate,
-    measured: Sequence[Measurements],
-    memories: Sequence[CameraMemory | None],
-    unknowns: Unknowns,
-) -> list[Rows]:
+def _remembered(here: Estimate, memories: Sequence[CameraMemory | None], unknowns: Unknowns) -> list[Rows]:
     """The rows of all epochs, in the order of their views."""
     rows, view = [], len(here.cameras)
-    for camera, memory, found in zip(here.cameras, memories, measured, strict=True):
-        if memory is None:
-            continue
-        repainted = memory.repainted(camera, found, here.lines)
-        for epoch in memory.epochs:
+    for camera, memory in zip(here.cameras, memories, strict=True):
+        for epoch in () if memory is None else memory.epochs:
             its = epoch.measurements(here.lines)
-            its = its[~np.isin(its.points.marking, repainted)]
             # An epoch has the lens of its time: what that differs by from tonight's is no error.
             differs = lens_numbers(camera.intrinsics) - lens_numbers(epoch.camera.intrinsics)
             if len(its) >= FEWEST_MEASUREMENTS:

@@ -17,6 +17,7 @@ from worker.calibration.finish.least_squares import misfit_px
 from worker.calibration.finish.uncertainty import Finished, judged
 from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.memory.camera_memory import CameraMemory, fitting
+from worker.calibration.memory.repainted import painted_anew
 from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
@@ -129,14 +130,43 @@ def refine(
         # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
         here = _down_huber(here, cameras, measured, unknowns)
         here = _towards_tukey(here, cameras, measured, unknowns).to
-    last, unknowns = _settled(here, cameras, reader, unknowns)
+    remembered = fitting(memories or [None] * len(here.cameras), here.lines)
+    anew = _painted_anew(here, remembered, reader, unknowns)
+    last, unknowns = _settled(here, cameras, reader, unknowns, anew)
     uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _assessed(replace(last.to, uneven_m=uneven), stored or cameras, memories, reader, unknowns)
+    return _assessed(replace(last.to, uneven_m=uneven), stored or cameras, remembered, reader, unknowns, anew)
 
 
-def _settled(here: Estimate, found: Sequence[Camera], reader: LineReader, unknowns: Unknowns) -> tuple[Step, Unknowns]:
-    """The step that leads to where the cameras stand still.
+def _painted_anew(
+    here: Estimate, remembered: Sequence[CameraMemory | None], reader: LineReader, unknowns: Unknowns
+) -> list[NDArray[np.intp]]:
+    """Per camera the markings that lie elsewhere than its memory has them: tonight they say nothing of its pose."""
+    if not any(remembered):
+        return [np.empty(0, dtype=np.intp)] * len(here.cameras)
+    measured = reader.measure(here.on_ground(unknowns), here.cameras, SEARCH_PX[0])
+    return [
+        np.empty(0, dtype=np.intp) if memory is None else painted_anew(memory, camera, found, here.lines)
+        for camera, memory, found in zip(here.cameras, remembered, measured, strict=True)
+    ]
+
+
+def _but(measured: Sequence[Measurements], anew: Sequence[NDArray[np.intp]]) -> list[Measurements]:
+    """The measurements of all other markings."""
+    return [
+        found[~np.isin(found.points.marking, markings)] if len(markings) else found
+        for found, markings in zip(measured, anew, strict=True)
+    ]
+
+
+def _settled(
+    here: Estimate,
+    found: Sequence[Camera],
+    reader: LineReader,
+    unknowns: Unknowns,
+    anew: Sequence[NDArray[np.intp]],
+) -> tuple[Step, Unknowns]:
+    """The step that leads to where the cameras stand still, by all markings but those that are painted `anew`.
 
     What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew at
     the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
@@ -147,7 +177,7 @@ def _settled(here: Estimate, found: Sequence[Camera], reader: LineReader, unknow
         reader.read_anew()
         for _ in range(MOST_LAST_STEPS):
             before = here
-            measured = reader.measure(here.on_ground(unknowns), here.cameras, LAST_SEARCH_PX)
+            measured = _but(reader.measure(here.on_ground(unknowns), here.cameras, LAST_SEARCH_PX), anew)
             last = _towards_tukey(here, found, measured, unknowns)
             here = last.to
             if here.farthest_from(before) < ARRIVED_M:
@@ -203,8 +233,10 @@ def assess(
 ) -> Finished:
     """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    here = Estimate.at(pitch, cameras, unknowns)
-    return _assessed(here, stored or cameras, memories, sight.reader(), unknowns)
+    here, reader = Estimate.at(pitch, cameras, unknowns), sight.reader()
+    remembered = fitting(memories or [None] * len(cameras), here.lines)
+    anew = _painted_anew(here, remembered, reader, unknowns)
+    return _assessed(here, stored or cameras, remembered, reader, unknowns, anew)
 
 
 def _each_alone(
@@ -226,21 +258,23 @@ def _each_alone(
 def _assessed(
     here: Estimate,
     stored: Sequence[Camera],
-    memories: Sequence[CameraMemory | None] | None,
+    remembered: Sequence[CameraMemory | None],
     reader: LineReader,
     unknowns: Unknowns,
+    anew: Sequence[NDArray[np.intp]],
 ) -> Finished:
     unknowns = unknowns.around(here.pitch, here.lines)
     lines = here.on_ground(unknowns)
     evidence = reader.evidence(here.pitch, lines, here.cameras)
     reader.read_anew()
-    measured = doubted(here, _of_seen(reader.measure(lines, here.cameras, ASSESSING_SEARCH_PX), evidence))
-    remembered = fitting(memories or [None] * len(here.cameras), here.lines)
+    everything = _of_seen(reader.measure(lines, here.cameras, ASSESSING_SEARCH_PX), evidence)
+    measured = doubted(here, _but(everything, anew))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
     finished = judged(ordinary, stored, remembered, measured, evidence, unknowns)
     each = [
-        replace(one, measured=its, uneven_m=ordinary.uneven_m) for one, its in zip(finished.each, measured, strict=True)
+        replace(one, measured=its, uneven_m=ordinary.uneven_m, painted_anew=tuple(markings.tolist()))
+        for one, its, markings in zip(finished.each, doubted(here, everything), anew, strict=True)
     ]
     return replace(finished, each=each)
 

@@ -122,7 +122,8 @@ class FinishedCamera:
     camera's frame rad, position m), and `repeatability`, the part of sigma that is not owed to lens, field and ground,
     which do not change. `zoom`: what the lines say of the focal length, None where it was found with the pose;
     `likelier`: the camera with that focal length, where it then is. `refined`: with all of its lens as the lines have
-    it. `lens_change`: since its memory began, if it has one. `measured`: the lines it was judged by; `uneven_m`: how
+    it. `lens_change`: since its memory began, if it has one. `measured`: the lines that were measured, and
+    `painted_anew`: which markings of them lie elsewhere than its memory has them, and were not asked; `uneven_m`: how
     uneven their ground was taken to be.
     """
 
@@ -136,6 +137,7 @@ class FinishedCamera:
     refined: Refined | None = field(default=None, kw_only=True)
     lens_change: LensChange | None = field(default=None, kw_only=True)
     measured: Measurements | None = field(default=None, kw_only=True)
+    painted_anew: tuple[int, ...] = field(default=(), kw_only=True)
     uneven_m: float = field(default=UNEVEN_M, kw_only=True)
 
     @property

@@ -25,22 +25,20 @@ ANCHOR_JOBS = 8
 """Jobs that make up the anchor."""
 MOST_EARLIER, FEWEST_JOBS = 2, 4
 """Earlier epochs that are kept, of so many jobs at least: another way of looking tells lens and ground apart."""
-REPAINTED_M, REPAINTED_PX = 0.025, 0.5
-"""A marking of which half the points lie farther than both from where they were has been painted anew ..."""
-FEWEST_REPAINTED, MOST_REPAINTED = 8, 0.34
-"""... if so many of its points say so, and if no larger part of all markings has: else it is not the paint."""
 
 
 @dataclass(frozen=True)
 class CameraMemory:
     """`origin`: the camera as it was stored before its first job; `anchor`: the first jobs, `recent`: those since, and
-    `earlier` ones that looked another way or had another lens; `lines`: the fingerprint of the field's line points.
+    `earlier` ones that looked another way or had another lens; `aside`: markings that have been painted elsewhere since,
+    of which nothing is remembered; `lines`: the fingerprint of the field's line points.
     """
 
     origin: Camera
     anchor: Epoch
     recent: Epoch | None
     earlier: tuple[Epoch, ...]
+    aside: tuple[int, ...]
     lines: str
 
     @classmethod
@@ -48,13 +46,19 @@ class CameraMemory:
         cls, stored: Camera, found: Camera, measured: Measurements, lines: LinePoints, at: datetime | None
     ) -> CameraMemory:
         """The memory of the first accepted job, which found a camera that was `stored` before."""
-        return cls(stored, Epoch.begun(found, measured, lines, at), None, (), fingerprint(lines))
+        return cls(stored, Epoch.begun(found, measured, lines, at), None, (), (), fingerprint(lines))
 
-    def after(self, found: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> CameraMemory:
-        """The memory with one more accepted job."""
-        repainted = self.repainted(found, measured, lines)
-        kept = self if len(repainted) == 0 else self.without(np.flatnonzero(np.isin(lines.marking, repainted)))
-        job = (found, measured, lines, at)
+    def after(
+        self,
+        found: Camera,
+        measured: Measurements,
+        lines: LinePoints,
+        at: datetime | None,
+        painted_anew: Sequence[int] | NDArray[np.intp] = (),
+    ) -> CameraMemory:
+        """The memory with one more accepted job; `painted_anew`: markings that do not lie any more where they did."""
+        kept = self.aware_of(painted_anew, lines)
+        job = (found, measured[~np.isin(measured.points.marking, kept.aside)], lines, at)
         if kept.recent is None and kept.anchor.jobs < ANCHOR_JOBS and kept.anchor.looks_like(found, lines):
             return replace(kept, anchor=kept.anchor.joined(*job))
         if kept.recent is None:
@@ -70,6 +74,11 @@ class CameraMemory:
         return [self.anchor, *([self.recent] if self.recent else []), *self.earlier]
 
     @property
+    def last(self) -> Epoch:
+        """The one of the last jobs."""
+        return self.recent or self.anchor
+
+    @property
     def jobs(self) -> int:
         """Of how many accepted jobs it is."""
         return sum(epoch.jobs for epoch in self.epochs)
@@ -79,31 +88,19 @@ class CameraMemory:
         """When the first of them was."""
         return self.anchor.first
 
-    def without(self, gone: NDArray[np.intp]) -> CameraMemory:
-        """The memory without some line points."""
+    def aware_of(self, painted_anew: Sequence[int] | NDArray[np.intp], lines: LinePoints) -> CameraMemory:
+        """The memory of a field that has some markings elsewhere: what it knew of them is forgotten."""
+        aside = np.union1d(self.aside, painted_anew).astype(int)
+        if len(aside) == len(self.aside):
+            return self
+        gone = np.flatnonzero(np.isin(lines.marking, aside))
         return replace(
             self,
+            aside=tuple(aside.tolist()),
             anchor=self.anchor.without(gone),
             recent=self.recent and self.recent.without(gone),
             earlier=tuple(epoch.without(gone) for epoch in self.earlier),
         )
-
-    def repainted(self, found: Camera, measured: Measurements, lines: LinePoints) -> NDArray[np.intp]:
-        """The markings whose paint lies elsewhere than the last epoch saw it."""
-        last = self.recent or self.anchor
-        before, which, old = np.intersect1d(measured.index, last.index, return_indices=True)
-        tonight = measured.offset(found, lines.position[measured.index])[which]
-        apart_px = tonight - last.offset[old]
-        scale = measured.px_per_metre[which]
-        marking = lines.marking[before]
-        limit_px = REPAINTED_PX * found.intrinsics.relative_size
-        told = {
-            number: (np.median(np.abs(apart_px[its])), np.median(np.abs(apart_px[its] / scale[its])))
-            for number in np.unique(marking)
-            if (its := np.flatnonzero(marking == number)).size >= FEWEST_REPAINTED
-        }
-        new = [number for number, (px, metres) in told.items() if px > limit_px and metres > REPAINTED_M]
-        return np.array(new if len(new) <= MOST_REPAINTED * len(told) else [], dtype=np.intp)
 
     def to_json(self) -> dict[str, Any]:
         """The memory as a JSON object, about 10 kB an epoch."""
@@ -114,6 +111,7 @@ class CameraMemory:
             "anchor": self.anchor.to_json(),
             "recent": None if self.recent is None else self.recent.to_json(),
             "earlier": [epoch.to_json() for epoch in self.earlier],
+            "aside": list(self.aside),
         }
 
     @classmethod
@@ -126,6 +124,7 @@ class CameraMemory:
             Epoch.from_json(told["anchor"]),
             None if told["recent"] is None else Epoch.from_json(told["recent"]),
             tuple(Epoch.from_json(epoch) for epoch in told["earlier"]),
+            tuple(told["aside"]),
             told["lines"],
         )
 
