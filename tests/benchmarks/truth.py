@@ -9,7 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from tests.benchmarks.scenes import Scene
-from worker.calibration.scene.camera import Camera, Intrinsics, inside, rotation_angles_deg
+from worker.calibration.scene.camera import Camera, Intrinsics, inside
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 GRID_M = 0.5
 

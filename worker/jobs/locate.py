@@ -21,8 +21,9 @@ from worker.calibration.first.clicks import Clicks, NoPose
 from worker.calibration.first.first_pose import first_pose
 from worker.calibration.first.freed_lens import LensGain
 from worker.calibration.first.verdict import FirstPose
-from worker.calibration.scene.camera import Array, Camera, Intrinsics, Pose, rotation_angles_deg
+from worker.calibration.scene.camera import Array, Camera, Intrinsics, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_angles_deg
 from worker.jobs.reading import Failure, decoded_frame, jpeg, lens_of, pitch_of
 from worker.jobs.wire import Solution, number, to_the_millisecond, wire_lens, wire_pose
 

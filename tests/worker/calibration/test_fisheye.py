@@ -21,8 +21,8 @@ from worker.calibration.scene.camera import (
     inside,
     project,
     project_planes,
-    rotation_angles_deg,
 )
+from worker.calibration.scene.rotation import rotation_angles_deg
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.stitch.views import ViewChoice, chosen_view

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.first.boards import Sighting
-from worker.calibration.scene.camera import LENSES, Array, Intrinsics, LensModel, rotation_matrices
+from worker.calibration.scene.camera import LENSES, Array, Intrinsics, LensModel
+from worker.calibration.scene.rotation import rotation_matrices
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from worker.calibration.first.clicks import Clicks
 from worker.calibration.first.labels import best_exchanges
-from worker.calibration.scene.camera import Array, Intrinsics, Pose, project, rotation_angles_deg
+from worker.calibration.scene.camera import Array, Intrinsics, Pose, project
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 TRIPLES = 400
 MOST_LISTED, DRAWN = 24, 4 * TRIPLES

@@ -8,15 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from worker.calibration.scene.camera import (
-    NEAREST_DEPTH_M,
-    Array,
-    Camera,
-    Pose,
-    cross_matrices,
-    rotation_matrices,
-    rotation_vectors,
-)
+from worker.calibration.scene.camera import NEAREST_DEPTH_M, Array, Camera, Pose
+from worker.calibration.scene.rotation import cross_matrices, rotation_matrices, rotation_vectors
 
 POSE_NUMBERS = 6
 

@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, Frame, Intrinsics, Pose, rotation_matrices
+from worker.calibration.scene.camera import Array, Camera, Frame, Intrinsics, Pose
 from worker.calibration.scene.motion import pixel_slopes
+from worker.calibration.scene.rotation import rotation_matrices
 
 Grey = NDArray[np.uint8]
 
