@@ -9,8 +9,9 @@ import pytest
 
 from models.training.pitches.render import Conditions, render_frame
 from tests.e2e.running import Service
-from worker.calibration.scene.camera import Camera, Intrinsics, Pose
+from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Intrinsics
 from worker.calibration.scene.rotation import rotation_angles_deg
 
 SIZE = (1280, 720)

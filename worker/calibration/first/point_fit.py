@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.first.clicks import Clicks
-from worker.calibration.scene.camera import Array, Camera, Intrinsics
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.lens import Lens
 from worker.calibration.scene.motion import POSE_NUMBERS, moved, pixel_slopes
 
 CLICK_PX = 2.0
@@ -131,7 +132,7 @@ def refit(before: PointFit, clicks: Clicks) -> PointFit:
 class _Problem:
     """Least squares of clicks over a pose and the free numbers of a lens."""
 
-    def __init__(self, clicks: Clicks, lens: Intrinsics, free: tuple[str, ...]) -> None:
+    def __init__(self, clicks: Clicks, lens: Lens, free: tuple[str, ...]) -> None:
         self.clicks = clicks
         self.lens = lens
         self.index = [LENS_NUMBERS.index(name) for name in free]
@@ -196,7 +197,7 @@ class _Problem:
         there = moved(camera, move[:POSE_NUMBERS])
         return (there.with_lens(self._lens(then)) if self.index else there), then
 
-    def _lens(self, change: Array) -> Intrinsics:
+    def _lens(self, change: Array) -> Lens:
         """The lens with its free numbers changed."""
         by = np.zeros(len(LENS_NUMBERS))
         by[self.index] = change

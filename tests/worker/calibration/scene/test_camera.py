@@ -8,15 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from worker.calibration.scene.camera import (
-    DISTORTION_LENGTHS,
-    Camera,
-    Intrinsics,
-    Pose,
-    inside,
-    project,
-    project_planes,
-)
+from worker.calibration.scene.camera import Camera, Pose, inside, project, project_planes
+from worker.calibration.scene.lens import DISTORTION_LENGTHS, Intrinsics
 
 
 def lens(distortion=(), size=(3000, 1800)):
