@@ -345,7 +345,8 @@ class Fisheye(Lens):
 
     def _bent_by_terms(self, rays: Array) -> Array:
         _, angle, outwards = self._polar(rays)
-        return outwards[..., None] * angle[..., None, None] ** [3, 5]
+        by_k1 = outwards * (angle * angle * angle)[..., None]
+        return np.stack([by_k1, by_k1 * (angle * angle)[..., None]], axis=-1)
 
     def _polar(self, rays: Array) -> tuple[Array, Array, Array]:
         """Of rays (..., 2): the radius (...), the angle (...) off the axis, and the direction (..., 2), 0 on the axis.
