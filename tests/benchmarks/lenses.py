@@ -23,8 +23,9 @@ from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, Scene, rendered, seen_well
 from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
-from worker.calibration.scene.camera import Camera, Intrinsics, Pose
+from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Intrinsics, Lens
 
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
 FOCAL_LENGTHS = (2200.0, 4000.0, 6000.0)
@@ -217,7 +218,7 @@ def camera_of_view(focal: float, view: str, rng: np.random.Generator) -> Camera:
     return Camera("camera", lens, Pose.looking_at(np.array([*target, 0.0]) + away, np.array([*target, 0.0])))
 
 
-def _lens(real: Intrinsics, wrong: dict[str, float]) -> Intrinsics:
+def _lens(real: Lens, wrong: dict[str, float]) -> Lens:
     """What a venue says of a lens that is really longer, and so on, by the numbers of `wrong`."""
     matrix, distortion = real.matrix.copy(), real.distortion.copy()
     matrix[[0, 1], [0, 1]] /= 1 + wrong.get("focal", 0.0)

@@ -9,7 +9,9 @@ from itertools import combinations
 import numpy as np
 
 from tests.benchmarks.scenes import Scene
-from worker.calibration.scene.camera import Camera, Intrinsics, inside, rotation_angles_deg
+from worker.calibration.scene.camera import Camera, inside
+from worker.calibration.scene.lens import Lens
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 GRID_M = 0.5
 
@@ -72,7 +74,7 @@ def apart_by_homography_px(scene: Scene, i: int, j: int, homography: np.ndarray)
     return 10 * float(np.linalg.norm(placed(scene, scene.real[i], first) - placed(scene, scene.real[i], back)))
 
 
-def _pinhole(lens: Intrinsics, pixel: np.ndarray) -> np.ndarray:
+def _pinhole(lens: Lens, pixel: np.ndarray) -> np.ndarray:
     """Where a pixel (2,) is in the undistorted picture, (3,) homogeneous."""
     return lens.matrix @ np.append(lens.undistort(pixel), 1.0)
 

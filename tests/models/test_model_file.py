@@ -9,8 +9,9 @@ import pytest
 from models import MODEL_PATH
 from models.training.evaluate import judge
 from models.training.pitches.render import Conditions, render_frame
-from worker.calibration.scene.camera import Camera, Intrinsics, Pose
+from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Intrinsics
 from worker.calibration.see.segmentation import Segmenter, whole_frame
 
 

@@ -21,8 +21,10 @@ from worker.calibration.first.clicks import Clicks, NoPose
 from worker.calibration.first.first_pose import first_pose
 from worker.calibration.first.freed_lens import LensGain
 from worker.calibration.first.verdict import FirstPose
-from worker.calibration.scene.camera import Array, Camera, Intrinsics, Pose, rotation_angles_deg
+from worker.calibration.scene.camera import Array, Camera, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Lens
+from worker.calibration.scene.rotation import rotation_angles_deg
 from worker.jobs.reading import Failure, decoded_frame, jpeg, lens_of, pitch_of
 from worker.jobs.wire import Solution, number, to_the_millisecond, wire_lens, wire_pose
 
@@ -46,7 +48,7 @@ def solve(
 def locate(
     camera: str,
     field: FieldOfPlay,
-    lens: Intrinsics,
+    lens: Lens,
     points: list[ClickedPoint],
     frame: bytes | None,
     report: Callable[[Progress], None],
@@ -66,7 +68,7 @@ def locate(
     return Solution(result_of(found, points, timings), {"points": drawn})
 
 
-def pose_of(camera: str, pitch: Field, lens: Intrinsics, clicks: Clicks) -> FirstPose:
+def pose_of(camera: str, pitch: Field, lens: Lens, clicks: Clicks) -> FirstPose:
     """The first pose that fits the clicks."""
     try:
         return first_pose(clicks, lens, pitch.places(), camera)

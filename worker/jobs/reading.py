@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from service.wire import geometry, view
 from service.wire.field import FieldOfPlay
 from service.wire.problems import KINDS, type_of
-from worker.calibration.scene.camera import LENSES, Camera, Intrinsics, Pose
+from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.ignored import Ignored
+from worker.calibration.scene.lens import LENSES, Lens
 from worker.calibration.stitch.light import Light
 from worker.calibration.stitch.views import ViewChoice
 
@@ -91,7 +92,7 @@ def pitch_of(field: FieldOfPlay) -> Field:
     return Field(*size, ridge, field.plan, field.measures_m, others=field.others)
 
 
-def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Intrinsics:
+def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Lens:
     """The engine's lens."""
     matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
     return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]), dict(lens.sigma or {}))

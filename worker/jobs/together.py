@@ -16,7 +16,7 @@ from service.wire.options import ClickedPoint
 from service.wire.results import LocateResult
 from worker.calibration.first.clicks import NoPose
 from worker.calibration.first.first_pose import first_pose
-from worker.calibration.scene.camera import Intrinsics
+from worker.calibration.scene.lens import Lens
 from worker.jobs.locate import clicks_of, locate
 from worker.jobs.reading import Failure, pitch_of
 from worker.jobs.wire import Solution
@@ -26,7 +26,7 @@ Ended = dict[str, Solution[LocateResult] | Failure]
 
 def locate_all(
     field: FieldOfPlay,
-    lenses: Mapping[str, Intrinsics],
+    lenses: Mapping[str, Lens],
     points: Mapping[str, list[ClickedPoint]],
     frames: Mapping[str, bytes],
     stored: Mapping[str, Pose],
@@ -65,9 +65,7 @@ def _misfit(end: Solution[LocateResult] | Failure) -> str | None:
     return None
 
 
-def _rms_px(
-    field: FieldOfPlay, camera: str, points: Mapping[str, list[ClickedPoint]], lens: Intrinsics
-) -> float | None:
+def _rms_px(field: FieldOfPlay, camera: str, points: Mapping[str, list[ClickedPoint]], lens: Lens) -> float | None:
     """How well a camera's points fit a lens as it is; None where they do not."""
     pitch = pitch_of(field)
     try:

@@ -28,7 +28,8 @@ from worker.calibration.finish import uncertainty
 from worker.calibration.judge import quality, seam
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.judge.pairs import Pair
-from worker.calibration.scene.camera import Intrinsics, Pose
+from worker.calibration.scene.camera import Pose
+from worker.calibration.scene.lens import Lens
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
 from worker.calibration.see.view import ViewCondition
 from worker.calibration.stitch.light import Light
@@ -69,7 +70,7 @@ def to_the_millisecond(timings_s: Mapping[str, float]) -> dict[str, float]:
     return {stage: round(seconds, 3) for stage, seconds in timings_s.items()}
 
 
-def wire_lens(lens: Intrinsics) -> geometry.Intrinsics:
+def wire_lens(lens: Lens) -> geometry.Intrinsics:
     """A lens of the engine for the wire."""
     # What photos or clicks hardly tell has a deviation beyond any number that says something.
     sigma = {

@@ -9,8 +9,9 @@ from fractions import Fraction
 
 from worker.calibration.follow.follower import Follower, How, Moment
 from worker.calibration.records import CalibrationError
-from worker.calibration.scene.camera import Camera, rotation_angles_deg
+from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_angles_deg
 from worker.calibration.stitch.light import Light
 from worker.calibration.stitch.moving import MovingPanorama
 from worker.calibration.stitch.panorama import Panorama

@@ -18,16 +18,10 @@ from tests.benchmarks.fields.engine import Engine, camera_row
 from tests.benchmarks.fields.judging import caught, far_off, overconfident, reasons, share
 from tests.benchmarks.scenes import started
 from tests.benchmarks.truth import apart
-from worker.calibration.scene.camera import (
-    Camera,
-    Frame,
-    Intrinsics,
-    Pose,
-    inside,
-    rotation_matrices,
-    rotation_vectors,
-)
+from worker.calibration.scene.camera import Camera, Frame, Pose, inside
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
 from worker.calibration.scene.visibility import SeenLines
 
 SIZE_PX = 1280

@@ -18,8 +18,9 @@ from tests.benchmarks.fields.judging import reasons, share
 from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
 from tests.benchmarks.truth import apart
 from worker.calibration.judge.quality import Gate
-from worker.calibration.scene.camera import Camera, Frame, Pose, inside, rotation_vectors
+from worker.calibration.scene.camera import Camera, Frame, Pose, inside
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_vectors
 from worker.calibration.see.view import UsualView, look_at
 
 OTHER = "another field's frame"

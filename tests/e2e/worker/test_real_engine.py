@@ -9,8 +9,10 @@ import pytest
 
 from models.training.pitches.render import Conditions, render_frame
 from tests.e2e.running import Service
-from worker.calibration.scene.camera import Camera, Intrinsics, Pose, rotation_angles_deg
+from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 SIZE = (1280, 720)
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))

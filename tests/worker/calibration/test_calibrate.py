@@ -10,8 +10,8 @@ from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.calibrate import calibrate
 from worker.calibration.judge.quality import Gate, ridge_rejection
 from worker.calibration.records import CalibrationError, Options, Stopped
-from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.parameters import free_focal_lengths
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 TURN = (0.006, -0.005, 0.004)
 SHIFT = (0.05, -0.06, 0.04)

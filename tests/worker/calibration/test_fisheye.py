@@ -12,17 +12,9 @@ from worker.calibration.calibrate import calibrate
 from worker.calibration.draw.mosaic import birdseye, stitched
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.records import Options
-from worker.calibration.scene.camera import (
-    FISHEYE_DISTORTION_LENGTHS,
-    WIDEST_FISHEYE_RAD,
-    Camera,
-    Fisheye,
-    Pose,
-    inside,
-    project,
-    project_planes,
-    rotation_angles_deg,
-)
+from worker.calibration.scene.camera import Camera, Pose, inside, project, project_planes
+from worker.calibration.scene.lens import FISHEYE_DISTORTION_LENGTHS, WIDEST_FISHEYE_RAD, Fisheye
+from worker.calibration.scene.rotation import rotation_angles_deg
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.segmentation import reachable_regions
 from worker.calibration.stitch.views import ViewChoice, chosen_view

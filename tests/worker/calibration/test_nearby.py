@@ -10,8 +10,8 @@ from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration import settle as settling
 from worker.calibration.calibrate import calibrate
 from worker.calibration.records import Calibration, Options
-from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 # What the wind does in a quarter of an hour: a pixel of these small frames.
 WIND = ((0.0012, -0.0008, 0.0005), (0.01, 0.005, -0.01))

@@ -12,8 +12,8 @@ from worker.calibration.calibrate import calibrate
 from worker.calibration.draw.mosaic import birdseye
 from worker.calibration.draw.overlays import overlay
 from worker.calibration.records import Options
-from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 # A tennis court, as a venue would give it: half of it, named as its owner likes.
 TENNIS = Template(

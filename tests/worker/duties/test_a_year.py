@@ -13,8 +13,9 @@ from service.wire.health import Alarms as Rules
 from service.wire.venue import VenueIn
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame
 from tests.worker.stock import Stock, anyway
-from worker.calibration.scene.camera import Camera, Intrinsics
+from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Intrinsics
 from worker.duties.alarms import Alarms
 from worker.jobs import calibration
 from worker.message import Means

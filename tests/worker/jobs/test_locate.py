@@ -8,7 +8,8 @@ from service.wire import geometry
 from service.wire.field import FieldOfPlay
 from service.wire.options import ClickedPoint
 from tests.worker.calibration.first.test_first_pose import NAMED
-from worker.calibration.scene.camera import Camera, Intrinsics, Pose, inside
+from worker.calibration.scene.camera import Camera, Pose, inside
+from worker.calibration.scene.lens import Intrinsics
 from worker.jobs.reading import Failure
 from worker.jobs.together import locate_all
 from worker.jobs.wire import wire_pose

@@ -22,7 +22,7 @@ from service.wire.venue import VenueIn
 from service.wire.view import ViewChoice
 from tests import demo
 from tests.worker.calibration.synthetic import PITCH, camera, paint_frame
-from worker.calibration.scene.camera import Fisheye
+from worker.calibration.scene.lens import Fisheye
 from worker.calibration.stitch.panorama import BACKDROP
 from worker.jobs.reading import camera_of
 from worker.jobs.wire import wire_lens, wire_pose

@@ -7,7 +7,7 @@ from tests.worker.calibration.synthetic import CROWNED, moved, pair
 from tests.worker.video.filming import frames_of
 from tests.worker.video.shaking import COUNT, film_shaking, turn
 from worker.calibration.scene import motion
-from worker.calibration.scene.camera import rotation_angles_deg
+from worker.calibration.scene.rotation import rotation_angles_deg
 from worker.calibration.stitch.light import NEUTRAL
 from worker.calibration.stitch.views import ViewChoice
 from worker.video.faults import VideoFault

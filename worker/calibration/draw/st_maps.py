@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Intrinsics
+from worker.calibration.scene.camera import Array
+from worker.calibration.scene.lens import Lens
 
 StMap = NDArray[np.float32]
 # Of pixels that nothing is behind: outside of every picture, and no NaN, which compositors spread.
@@ -20,7 +21,7 @@ NOWHERE = -1.0
 STRIPE = 64
 
 
-def undistorting(lens: Intrinsics) -> StMap:
+def undistorting(lens: Lens) -> StMap:
     """Per pixel of the picture without distortion, where to sample the frame: (height, width, 2), see `_st_map`."""
     inverse = np.linalg.inv(lens.matrix)
 
@@ -30,7 +31,7 @@ def undistorting(lens: Intrinsics) -> StMap:
     return _st_map(lens.size, sample)
 
 
-def distorting(lens: Intrinsics) -> StMap:
+def distorting(lens: Lens) -> StMap:
     """Per pixel of the frame, where to sample the picture without distortion: (height, width, 2), see `_st_map`."""
 
     def sample(pixels: Array) -> Array:

@@ -20,10 +20,10 @@ from worker.calibration.finish.scales import Group
 from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.lens import LENS_NUMBERS
 from worker.calibration.scene.motion import POSE_NUMBERS, change_between
 from worker.calibration.scene.parameters import (
     HEAT_FOCAL,
-    LENS_NUMBERS,
     FieldParameter,
     LensParameter,
     Parameter,

@@ -23,8 +23,9 @@ from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.robust import tukey_slopes, tukey_weights
 from worker.calibration.scene.camera import Array
+from worker.calibration.scene.lens import LENS_NUMBERS
 from worker.calibration.scene.motion import POSE_NUMBERS
-from worker.calibration.scene.parameters import LENS_NUMBERS, LensParameter, lens_numbers
+from worker.calibration.scene.parameters import LensParameter, lens_numbers
 from worker.calibration.see.line_measurement import Measurements
 
 LEAST_HELD, TINY = 1e-9, 1e-300

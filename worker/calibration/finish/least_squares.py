@@ -23,8 +23,8 @@ from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.robust import USUAL, Weigh, tukey_weights
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.ground import UNEVEN_M
-from worker.calibration.scene.motion import POSE_NUMBERS
-from worker.calibration.scene.parameters import FIELD_STEP_M, FieldParameter, Parameter
+from worker.calibration.scene.lens import LENS_NUMBERS
+from worker.calibration.scene.parameters import FieldParameter, LensParameter, Parameter
 from worker.calibration.see.line_measurement import PAINT_M, Measurements
 
 FEWEST_MEASUREMENTS = 30
@@ -73,10 +73,9 @@ class Rows:
         here = positions[measured.index]
         parameters = unknowns.parameters_of(view)
         columns = np.array([*range(*unknowns.pose(view).indices(len(unknowns))), *(n for n, _ in parameters)], np.intp)
-        jacobian = np.empty((len(measured), len(columns)))
-        jacobian[:, :POSE_NUMBERS] = measured.slopes(camera, here)
-        for column, (_, parameter) in enumerate(parameters, POSE_NUMBERS):
-            jacobian[:, column] = -_parameter_slope(here, camera, measured, parameter)
+        by_pose = measured.slopes(camera, here)
+        by_parameters = _by_parameters(by_pose, here, camera, measured, [parameter for _, parameter in parameters])
+        jacobian = np.concatenate([by_pose, by_parameters], axis=1)
         offset = measured.offset(camera, here)
         known = np.isfinite(offset) & np.isfinite(jacobian).all(axis=1)
         measured = measured[known]
@@ -93,15 +92,22 @@ class Rows:
         )
 
 
-def _parameter_slope(points: Array, camera: Camera, measured: Measurements, parameter: Parameter) -> Array:
-    """How far (M,) the expected lines at `points` (M, 3) move along their normals per unit of a parameter."""
-    if isinstance(parameter, FieldParameter):
-        step = FIELD_STEP_M
-        ahead, behind = (camera.project(points + sign * step * parameter.shift[measured.index]) for sign in (1, -1))
-    else:
-        step = parameter.step
-        ahead, behind = (parameter.changed(camera, sign * step).project(points) for sign in (1, -1))
-    return np.asarray(np.sum((ahead - behind) * measured.normal, axis=1) / (2 * step))
+def _by_parameters(
+    by_pose: Array, points: Array, camera: Camera, measured: Measurements, parameters: Sequence[Parameter]
+) -> Array:
+    """The derivative (M, E) of the offsets from `points` (M, 3) by numbers of lens and field, px per unit of each.
+
+    `by_pose` (M, 6): that by the pose.
+    """
+    slopes = np.empty((len(measured), len(parameters)))
+    lens = {at: LENS_NUMBERS.index(p.name) for at, p in enumerate(parameters) if isinstance(p, LensParameter)}
+    if lens:
+        slopes[:, list(lens)] = measured.lens_slopes(camera, points)[:, list(lens.values())]
+    for at, parameter in enumerate(parameters):
+        if isinstance(parameter, FieldParameter):
+            # A point that moves is a camera that moves the other way.
+            slopes[:, at] = -np.sum(by_pose[:, 3:] * parameter.shift[measured.index], axis=1)
+    return slopes
 
 
 def rows_of(

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Intrinsics, inside
+from worker.calibration.scene.camera import Array, inside
+from worker.calibration.scene.lens import Lens
 
 FEWEST_CLICKS = 4
 COLLINEAR = 0.01
@@ -71,7 +72,7 @@ class NoPose(Exception):  # noqa: N818
     """The clicks cannot fix a pose, whatever they are worth: says what to add or to change."""
 
 
-def require_a_plane(clicks: Clicks, lens: Intrinsics) -> None:
+def require_a_plane(clicks: Clicks, lens: Lens) -> None:
     """Refuse sets of points that many poses fit alike."""
     if clicks.distinct < FEWEST_CLICKS:
         raise NoPose(f"{clicks.distinct} different points are too few: give at least {FEWEST_CLICKS}, better 8 or more")

@@ -16,13 +16,14 @@ from worker.calibration.first.labels import relabelled
 from worker.calibration.first.point_fit import AMBIGUOUS, STRONG, PointFit, fit
 from worker.calibration.first.proposals import alike, promising, proposals
 from worker.calibration.first.verdict import HEIGHTS_M, LARGEST_RMS_PX, FirstPose, judged
-from worker.calibration.scene.camera import Array, Camera, Intrinsics
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.lens import Lens
 
 MOST_DOUBTED = 0.25
 """Share of the clicks; where more are doubted, something is wrong with all of them."""
 
 
-def first_pose(clicks: Clicks, lens: Intrinsics, landmarks: Mapping[str, Array], name: str = "camera") -> FirstPose:
+def first_pose(clicks: Clicks, lens: Lens, landmarks: Mapping[str, Array], name: str = "camera") -> FirstPose:
     """The pose that explains most clicks. `landmarks`: points (3,) of the pitch that a click may be meant for.
 
     Deterministic. Raises `NoPose` where the points cannot fix a pose.
@@ -45,7 +46,7 @@ def first_pose(clicks: Clicks, lens: Intrinsics, landmarks: Mapping[str, Array],
     return judged(clicks, relabelled(gain.found), gain, [], landmarks)
 
 
-def _candidates(clicks: Clicks, lens: Intrinsics, name: str) -> list[PointFit]:
+def _candidates(clicks: Clicks, lens: Lens, name: str) -> list[PointFit]:
     """Fits above the ground, the best first, no two of the same pose."""
     rotations, positions = proposals(clicks, lens)
     above = positions[:, 2] > HEIGHTS_M[0]
@@ -73,7 +74,7 @@ def _needs_explaining(best: PointFit) -> bool:
     )
 
 
-def _require_not_mirrored(fits: Sequence[PointFit], clicks: Clicks, lens: Intrinsics, name: str) -> None:
+def _require_not_mirrored(fits: Sequence[PointFit], clicks: Clicks, lens: Lens, name: str) -> None:
     """Labels of a pitch seen in a mirror fit perfectly, from below the ground."""
     flipped = _candidates(Clicks(clicks.names, clicks.world * [-1.0, 1.0, 1.0], clicks.pixel), lens, name)
     if not flipped or flipped[0].doubted.mean() > MOST_DOUBTED:

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from worker.calibration.first.point_fit import STRONG, PointFit, fit, refit
-from worker.calibration.scene.camera import Array, Intrinsics
+from worker.calibration.scene.camera import Array
+from worker.calibration.scene.lens import Lens
 from worker.calibration.scene.motion import POSE_NUMBERS
 
 LENS_LADDER: tuple[tuple[str, ...], ...] = (
@@ -93,7 +94,7 @@ def left_out_px(found: PointFit) -> float:
     return float(np.sqrt(np.nanmean(np.concatenate(squared)))) if squared else float("inf")
 
 
-def two_terms(lens: Intrinsics) -> Intrinsics:
+def two_terms(lens: Lens) -> Lens:
     """The lens of the same kind with k1 and k2 alone, and square pixels, that comes nearest to `lens`.
 
     How well the matrix is known stays; k1 and k2 are others, of which nothing is known yet.
@@ -116,7 +117,7 @@ def two_terms(lens: Intrinsics) -> Intrinsics:
     return type(lens)(matrix, distortion, lens.size, sigma)
 
 
-def _radial_only(lens: Intrinsics) -> Array:
+def _radial_only(lens: Lens) -> Array:
     """The distortion of a lens without what is not the same all around its axis."""
     distortion = np.array(lens.distortion, dtype=float)
     if lens.model == "opencv":
@@ -125,7 +126,7 @@ def _radial_only(lens: Intrinsics) -> Array:
     return distortion
 
 
-def _border(lens: Intrinsics) -> Array:
+def _border(lens: Lens) -> Array:
     """Pixels (M, 2) along the border of the picture."""
     width, height = lens.size
     x, y = np.linspace(0, width - 1, 20), np.linspace(0, height - 1, 20)

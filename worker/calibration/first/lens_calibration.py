@@ -28,7 +28,8 @@ from worker.calibration.first.lens_fit import (
     off_px,
     rms,
 )
-from worker.calibration.scene.camera import Array, Intrinsics, LensModel
+from worker.calibration.scene.camera import Array
+from worker.calibration.scene.lens import Lens, LensModel
 
 FEWEST_PHOTOS, FEW_PHOTOS = 4, 10
 FOLDS = 5
@@ -102,7 +103,7 @@ class LensCalibration:
     and projected minus seen, px.
     """
 
-    lens: Intrinsics
+    lens: Lens
     terms: tuple[str, ...]
     rms_px: float
     left_out_px: float
@@ -313,7 +314,7 @@ def _verdicts(
     ]
 
 
-def _by_name(values: Array, rung: Rung, lens: Intrinsics) -> dict[str, float]:
+def _by_name(values: Array, rung: Rung, lens: Lens) -> dict[str, float]:
     known = dict(zip(NUMBERS[lens.model], values.tolist(), strict=True))
     # One focal length: OpenCV keeps the ratio and gives the deviation of fy alone.
     known["f"] = max(known["fx"], known["fy"])
@@ -352,7 +353,7 @@ def cover(corners: Array, size: tuple[int, int]) -> Coverage:
 
 
 def _warnings(
-    lens: Intrinsics,
+    lens: Lens,
     chosen: _Chosen,
     sigma: Mapping[str, float],
     spread: Mapping[str, float],

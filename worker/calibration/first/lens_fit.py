@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.first.boards import Sighting
-from worker.calibration.scene.camera import LENSES, Array, Intrinsics, LensModel, rotation_matrices
+from worker.calibration.scene.camera import Array
+from worker.calibration.scene.lens import LENSES, Lens, LensModel
+from worker.calibration.scene.rotation import rotation_matrices
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ NUMBERS: Mapping[LensModel, tuple[str, ...]] = {
 class LensFit:
     """OpenCV's answer: the board's place in each photo, `sigma` (K,) in the order of `NUMBERS`, rms `by_photo`."""
 
-    lens: Intrinsics
+    lens: Lens
     turns: Sequence[Array]
     shifts: Sequence[Array]
     sigma: Array
@@ -104,7 +106,7 @@ def _centred(focal: float, size: tuple[int, int]) -> Array:
 
 
 def _fisheye_sigma(
-    lens: Intrinsics, turns: Sequence[Array], shifts: Sequence[Array], world: Sequence[Array], rung: Rung, off: Array
+    lens: Lens, turns: Sequence[Array], shifts: Sequence[Array], world: Sequence[Array], rung: Rung, off: Array
 ) -> Array:
     """What `calibrateCameraExtended` gives for a pinhole: the boards' places taken out of the normal matrix (Schur)."""
     names = NUMBERS["fisheye"]
@@ -123,7 +125,7 @@ def _fisheye_sigma(
     return sigma
 
 
-def foretold_px(lens: Intrinsics, sighting: Sighting) -> float:
+def foretold_px(lens: Lens, sighting: Sighting) -> float:
     """Rms of the corners of a photo by a lens that was not fitted to it; only the board's place is."""
     unforetold = float(max(lens.size))
     rays = lens.undistort(sighting.pixel)
@@ -137,7 +139,7 @@ def foretold_px(lens: Intrinsics, sighting: Sighting) -> float:
     return rms(np.linalg.norm(np.nan_to_num(off, nan=unforetold), axis=1))
 
 
-def off_px(lens: Intrinsics, turn: Array, shift: Array, world: Array, pixel: Array) -> Array:
+def off_px(lens: Lens, turn: Array, shift: Array, world: Array, pixel: Array) -> Array:
     """Projected minus seen (N, 2) of a board at OpenCV's rvec and tvec."""
     points = world @ rotation_matrices(turn).T + shift
     return lens.distort(points[:, :2] / points[:, 2:]) - pixel
@@ -152,7 +154,7 @@ def _vectors(columns: Any) -> list[Array]:
     return [_floats(column).ravel() for column in columns]
 
 
-def numbers_of(lens: Intrinsics) -> Array:
+def numbers_of(lens: Lens) -> Array:
     """What a lens has, in the order of `NUMBERS`."""
     terms = lens.coefficients[: len(NUMBERS[lens.model]) - 4]
     return np.array([lens.matrix[0, 0], lens.matrix[1, 1], lens.matrix[0, 2], lens.matrix[1, 2], *terms])

@@ -15,20 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.first.clicks import Clicks
-from worker.calibration.scene.camera import Array, Camera, Intrinsics
-from worker.calibration.scene.motion import POSE_NUMBERS, moved, pixel_slopes
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.lens import LENS_NUMBERS, Lens
+from worker.calibration.scene.motion import POSE_NUMBERS, lens_slopes, moved, pixel_slopes
 
 CLICK_PX = 2.0
 """How well people click, in pixels of a 4K frame, and after how many numbers of evidence that belief counts half."""
 CLICK_EVIDENCE = 4.0
-LENS_NUMBERS = ("focal length", "centre x", "centre y", "k1", "k2")
+FREE_NUMBERS = {
+    "focal length": "focal_length_px",
+    "centre x": "principal_point_x_px",
+    "centre y": "principal_point_y_px",
+    "k1": "k1",
+    "k2": "k2",
+}
+"""Which of `LENS_NUMBERS` clicks may set free, by their names in a fit, where the focal length is its logarithm."""
 LEAST_NOISE_PX = (16.0, 8.0, 4.0, CLICK_PX)
 """In the rounds before any click is believed or doubted, in pixels of a 4K frame: a start from three clicks fits those
 exactly, and they alone must not settle how well people click.
 """
 VERDICTS, STEPS = 4, 6
 """Rounds in which each click is believed or doubted, and steps of Levenberg-Marquardt with the same weights."""
-TERM_STEP = 1e-6
 UNFIXED = 1e3
 """Standard deviation (rad, m) of what the clicks do not fix of a pose: more than any pitch has room for."""
 STRONG, AMBIGUOUS = 10.0, 6.0
@@ -95,7 +102,7 @@ def anywhere_cost(size: tuple[int, int]) -> float:
 
 
 def fit(clicks: Clicks, start: Camera, free: tuple[str, ...] = ()) -> PointFit:
-    """The robust fit nearest to `start`: its pose, and the numbers of its lens that are `free` (`LENS_NUMBERS`)."""
+    """The robust fit nearest to `start`: its pose, and the numbers of its lens that are `free` (`FREE_NUMBERS`)."""
     problem = _Problem(clicks, start.intrinsics, free)
     camera, change = start, np.zeros(len(free))
     for least in LEAST_NOISE_PX:
@@ -131,10 +138,11 @@ def refit(before: PointFit, clicks: Clicks) -> PointFit:
 class _Problem:
     """Least squares of clicks over a pose and the free numbers of a lens."""
 
-    def __init__(self, clicks: Clicks, lens: Intrinsics, free: tuple[str, ...]) -> None:
+    def __init__(self, clicks: Clicks, lens: Lens, free: tuple[str, ...]) -> None:
         self.clicks = clicks
         self.lens = lens
-        self.index = [LENS_NUMBERS.index(name) for name in free]
+        self.index = [list(FREE_NUMBERS).index(name) for name in free]
+        self.columns = [LENS_NUMBERS.index(FREE_NUMBERS[name]) for name in free]
         # Expected errors of a lens that was measured badly; they keep what the clicks do not tell from running away.
         everything = np.array([0.2, 0.1 * lens.size[0], 0.1 * lens.size[0], 0.3, 0.3])
         self.information = np.concatenate([np.zeros(POSE_NUMBERS), everything[self.index] ** -2])
@@ -196,9 +204,9 @@ class _Problem:
         there = moved(camera, move[:POSE_NUMBERS])
         return (there.with_lens(self._lens(then)) if self.index else there), then
 
-    def _lens(self, change: Array) -> Intrinsics:
+    def _lens(self, change: Array) -> Lens:
         """The lens with its free numbers changed."""
-        by = np.zeros(len(LENS_NUMBERS))
+        by = np.zeros(len(FREE_NUMBERS))
         by[self.index] = change
         matrix = self.lens.matrix.copy()
         matrix[[0, 1], [0, 1]] *= np.exp(np.clip(by[0], -2, 2))
@@ -216,7 +224,7 @@ class _Problem:
         return float(np.sum(weights * np.nan_to_num(squared, nan=unseen)) + prior)
 
     def _normal(self, camera: Camera, change: Array, weights: Array) -> tuple[Array, Array]:
-        off, jacobian = self.off(camera), self._jacobian(camera, change)
+        off, jacobian = self.off(camera), self._jacobian(camera)
         seen = np.isfinite(off).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))
         off, jacobian, weights = off[seen], jacobian[seen], weights[seen]
         normal = np.einsum("nai,n,naj->ij", jacobian, weights, jacobian) + np.diag(self.information)
@@ -224,18 +232,8 @@ class _Problem:
         gradient[POSE_NUMBERS:] += self.information[POSE_NUMBERS:] * change
         return normal, gradient
 
-    def _jacobian(self, camera: Camera, change: Array) -> Array:
+    def _jacobian(self, camera: Camera) -> Array:
         """Of the pixels by pose and free numbers: (N, 2, 6 + L)."""
-        columns = [self._by_lens_number(which, camera, change)[..., None] for which in self.index]
-        return np.concatenate([pixel_slopes(camera, self.clicks.world), *columns], axis=-1)
-
-    def _by_lens_number(self, which: int, camera: Camera, change: Array) -> Array:
-        """Of the pixels (N, 2) by one free number."""
-        if LENS_NUMBERS[which] == "focal length":
-            return camera.project(self.clicks.world) - camera.intrinsics.matrix[:2, 2]
-        if LENS_NUMBERS[which] in ("centre x", "centre y"):
-            return np.broadcast_to(np.eye(2)[which - 1], self.clicks.pixel.shape)
-        step = np.zeros(len(self.index))
-        step[self.index.index(which)] = TERM_STEP
-        ahead, behind = (camera.with_lens(self._lens(change + sign * step)) for sign in (1, -1))
-        return (ahead.project(self.clicks.world) - behind.project(self.clicks.world)) / (2 * TERM_STEP)
+        by_lens = lens_slopes(camera, self.clicks.world)
+        by_lens[..., 0] *= camera.intrinsics.focal_length_px
+        return np.concatenate([pixel_slopes(camera, self.clicks.world), by_lens[..., self.columns]], axis=-1)

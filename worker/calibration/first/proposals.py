@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from worker.calibration.first.clicks import Clicks
 from worker.calibration.first.labels import best_exchanges
-from worker.calibration.scene.camera import Array, Intrinsics, Pose, project, rotation_angles_deg
+from worker.calibration.scene.camera import Array, Pose, project
+from worker.calibration.scene.lens import Lens
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 TRIPLES = 400
 MOST_LISTED, DRAWN = 24, 4 * TRIPLES
@@ -28,7 +30,7 @@ LEAST_AREA = 1e-9
 """Of a triple on the pitch (m²) times in the picture at depth 1: those on a line propose nothing."""
 
 
-def proposals(clicks: Clicks, lens: Intrinsics) -> tuple[Array, Array]:
+def proposals(clicks: Clicks, lens: Lens) -> tuple[Array, Array]:
     """Every pose, (P, 3) rotations and (P, 3) positions, that puts three clicks where they are (P3P)."""
     rays = lens.undistort(clicks.pixel)
     rotations, positions = [], []
@@ -71,7 +73,7 @@ def _area(corners: Array) -> Array:
     return 0.5 * np.sqrt(np.maximum(squared, 0.0))
 
 
-def promising(clicks: Clicks, lens: Intrinsics, rotations: Array, positions: Array) -> list[tuple[Pose, Clicks]]:
+def promising(clicks: Clicks, lens: Lens, rotations: Array, positions: Array) -> list[tuple[Pose, Clicks]]:
     """The poses that explain most, no two alike, each with the labels with which it does."""
     if len(rotations) == 0:
         return []
@@ -93,7 +95,7 @@ def promising(clicks: Clicks, lens: Intrinsics, rotations: Array, positions: Arr
     return chosen
 
 
-def _soft_costs(squared: Array, lens: Intrinsics) -> Array:
+def _soft_costs(squared: Array, lens: Lens) -> Array:
     """What being off by the root of `squared` (...) costs a proposal: it grows, but slowly, whatever the scale is."""
     scale = (PROPOSAL_PX * lens.relative_size) ** 2
     worst = float(max(lens.size)) ** 2

@@ -23,7 +23,7 @@ from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import Ground
 from worker.calibration.scene.motion import POSE_NUMBERS, pixel_slopes
-from worker.calibration.scene.parameters import LensParameter, lens_parameters
+from worker.calibration.scene.parameters import lens_parameters
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.line_measurement import Measurements, measure_lines
 
@@ -311,13 +311,9 @@ def _rises(ground: Ground, measured: Measurements) -> Array:
 
 
 def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
-    """How far (M, C), in px along their normals, points (M, 3) move for one sigma of each number of the lens."""
-    moves = []
-    for number in lens_parameters([camera]):
-        assert isinstance(number, LensParameter)
-        ahead, behind = (number.changed(camera, sign * number.step).project(points) for sign in (1, -1))
-        moves.append(number.expected * np.sum((ahead - behind) * measured.normal, axis=1) / (2 * number.step))
-    return np.nan_to_num(np.stack(moves, axis=1))
+    """How far (M, 6), in px along their normals, points (M, 3) move for one sigma of each number of the lens."""
+    expected = np.array([number.expected for number in lens_parameters([camera])])
+    return np.nan_to_num(-measured.lens_slopes(camera, points) * expected)
 
 
 def _given_way(

@@ -13,8 +13,9 @@ from worker.calibration.finish.least_squares import FEWEST_MEASUREMENTS
 from worker.calibration.finish.uncertainty import Deviation, FinishedCamera
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.judge.overlap import Overlap
-from worker.calibration.scene.camera import Camera, inside, rotation_angles_deg
+from worker.calibration.scene.camera import Camera, inside
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_angles_deg
 from worker.calibration.see.evidence import LEAST_ROOM, Evidence
 from worker.calibration.see.view import ViewCondition
 

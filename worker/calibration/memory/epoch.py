@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.robust import tukey_weights
-from worker.calibration.scene.camera import LENSES, Array, Camera, Pose
+from worker.calibration.scene.camera import Array, Camera, Pose
 from worker.calibration.scene.field import LinePoints
+from worker.calibration.scene.lens import LENSES
 from worker.calibration.scene.motion import change_between, moved
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.line_measurement import Measurements

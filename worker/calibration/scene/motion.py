@@ -1,22 +1,15 @@
-"""A small change of a camera's pose, and what moves by it: the pose's derivatives, all of one kind.
+"""A small change of a camera's pose or lens, and what moves by it: the derivatives of a camera, all of one kind.
 
-A change (6,) is a turn (rad, a rotation vector in the camera's own frame) and a shift (m, in the world). So a turn
-turns the view about the camera, and a shift means the same for all cameras.
+A change (6,) of a pose is a turn (rad, a rotation vector in the camera's own frame) and a shift (m, in the world). So a
+turn turns the view about the camera, and a shift means the same for all cameras.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from worker.calibration.scene.camera import (
-    NEAREST_DEPTH_M,
-    Array,
-    Camera,
-    Pose,
-    cross_matrices,
-    rotation_matrices,
-    rotation_vectors,
-)
+from worker.calibration.scene.camera import NEAREST_DEPTH_M, Array, Camera, Pose
+from worker.calibration.scene.rotation import cross_matrices, rotation_matrices, rotation_vectors
 
 POSE_NUMBERS = 6
 
@@ -39,11 +32,19 @@ def pixel_slopes(camera: Camera, points: Array) -> Array:
     NaN where `Camera.project` is.
     """
     seen = _in_camera(camera, points)
-    depth = np.where(seen[..., 2:] > NEAREST_DEPTH_M, seen[..., 2:], np.nan)
-    rays = seen[..., :2] / depth
+    rays = _rays(seen)
     by_ray = camera.intrinsics.slopes(rays)
-    by_point = np.concatenate([by_ray, -(by_ray @ rays[..., None])], axis=-1) / depth[..., None]
-    return by_point @ _point_slopes(camera, seen)
+    by_point = np.concatenate([by_ray, -(by_ray @ rays[..., None])], axis=-1) / seen[..., 2:, None]
+    # A turn w moves a point p by w x p, and b . (w x p) is w . (p x b); a shift of the camera moves it the other way.
+    return np.concatenate([np.cross(seen[..., None, :], by_point), -by_point @ camera.pose.matrix], axis=-1)
+
+
+def lens_slopes(camera: Camera, points: Array) -> Array:
+    """How the pixels of world points (..., 3) move when a number of the lens does: (..., 2, 6), px per unit of each.
+
+    The numbers are `LENS_NUMBERS`. NaN where `Camera.project` is.
+    """
+    return camera.intrinsics.slopes_by_numbers(_rays(_in_camera(camera, points)))
 
 
 def ground_slopes(camera: Camera, points: Array) -> Array:
@@ -60,6 +61,12 @@ def ground_slopes(camera: Camera, points: Array) -> Array:
 def _in_camera(camera: Camera, points: Array) -> Array:
     """World points (..., 3) in the camera's frame."""
     return (points - camera.pose.position) @ camera.pose.matrix.T
+
+
+def _rays(seen: Array) -> Array:
+    """Undistorted image coordinates (..., 2) at depth 1 of points (..., 3) in the camera's frame; NaN behind it."""
+    depth = seen[..., 2:]
+    return seen[..., :2] / np.where(depth > NEAREST_DEPTH_M, depth, np.nan)
 
 
 def _point_slopes(camera: Camera, seen: Array) -> Array:

@@ -8,8 +8,9 @@ from math import hypot
 
 import numpy as np
 
-from worker.calibration.scene.camera import Array, Camera, Intrinsics
+from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
+from worker.calibration.scene.lens import Lens
 
 FIELD_STEP_M = 1e-3
 BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
@@ -32,7 +33,7 @@ class LensParameter:
     name: str
     expected: float
     step: float
-    change: Callable[[Intrinsics, float], Intrinsics]
+    change: Callable[[Lens, float], Lens]
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
         """Cameras and pitch with this number changed."""
@@ -83,11 +84,9 @@ class FieldParameter:
 
 
 Parameter = LensParameter | FieldParameter
-LENS_NUMBERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
-"""The numbers of a lens that lines are asked for."""
 
 
-def lens_numbers(lens: Intrinsics) -> Array:
+def lens_numbers(lens: Lens) -> Array:
     """`LENS_NUMBERS` (6,) of a lens."""
     (fx, _, cx), (_, fy, cy) = lens.matrix[:2].tolist()
     k1, k2 = (*lens.distortion.tolist(), 0.0, 0.0)[:2]
@@ -102,7 +101,7 @@ def with_lens_changed(camera: Camera, changes: Array) -> Camera:
 
 
 def lens_parameters(cameras: Sequence[Camera]) -> list[LensParameter]:
-    """The numbers of each lens, as uncertain as the lens says (`Intrinsics.sigma`), or as a good board leaves them, and
+    """The numbers of each lens, as uncertain as the lens says (`Lens.sigma`), or as a good board leaves them, and
     the focal length as heat moves it besides."""
     return [
         replace(p, expected=hypot(p.expected, HEAT_FOCAL * cameras[p.camera].intrinsics.focal_length_px))
@@ -133,7 +132,7 @@ def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParamete
     return found
 
 
-def _focal_sigma(lens: Intrinsics) -> float:
+def _focal_sigma(lens: Lens) -> float:
     """Of fx, with which fy changes: by what is known of either, the worse of both."""
     fx, fy = float(lens.matrix[0, 0]), float(lens.matrix[1, 1])
     known = {"fx": 1.0, "fy": fx / fy}
@@ -196,27 +195,27 @@ def _width(pitch: Field, expected: float) -> FieldParameter:
     return FieldParameter.of(pitch, "width_m", expected, lambda one: one.width, lambda one, now: one.resized(width=now))
 
 
-def _longer(lens: Intrinsics, by: float) -> Intrinsics:
+def _longer(lens: Lens, by: float) -> Lens:
     """Another focal length; the ratio of the sides of a pixel stays."""
     matrix = lens.matrix.copy()
     matrix[[0, 1], [0, 1]] *= 1 + by / matrix[0, 0]
     return replace(lens, matrix=matrix)
 
 
-def _centred(lens: Intrinsics, right: float, down: float) -> Intrinsics:
+def _centred(lens: Lens, right: float, down: float) -> Lens:
     matrix = lens.matrix.copy()
     matrix[:2, 2] += (right, down)
     return replace(lens, matrix=matrix)
 
 
-def _taller(lens: Intrinsics, by: float) -> Intrinsics:
+def _taller(lens: Lens, by: float) -> Lens:
     """Another ratio of the vertical focal length to the horizontal one."""
     matrix = lens.matrix.copy()
     matrix[1, 1] += by * matrix[0, 0]
     return replace(lens, matrix=matrix)
 
 
-def _bent(lens: Intrinsics, number: int, by: float) -> Intrinsics:
+def _bent(lens: Lens, number: int, by: float) -> Lens:
     """Another radial coefficient: number 0 or 1 of the distortion."""
     distortion = np.zeros(max(len(lens.distortion), 4))
     distortion[: len(lens.distortion)] = lens.distortion

@@ -24,8 +24,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, rotation_matrices
+from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_matrices
 from worker.calibration.see.line_profile import blurred_line
 from worker.calibration.see.sampling import bilinear
 

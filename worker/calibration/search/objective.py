@@ -20,8 +20,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, Intrinsics, Plane, project_planes
+from worker.calibration.scene.camera import Array, Camera, Plane, project_planes
 from worker.calibration.scene.field import Field, LinePoints
+from worker.calibration.scene.lens import Lens
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.line_profile import blurred_line
 from worker.calibration.see.sampling import bilinear_planes
@@ -132,7 +133,7 @@ class SingleTerm:
     height: Response
     weight: Response
     band: BlurredResponse
-    intrinsics: Intrinsics
+    intrinsics: Lens
 
     @classmethod
     def build(cls, lines: LinePoints, camera: Camera, band: BlurredResponse, sigma: float) -> SingleTerm:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from worker.calibration.scene.camera import Array, Camera, Plane
 from worker.calibration.scene.field import LinePoints
 from worker.calibration.scene.ground import UNEVEN_M
-from worker.calibration.scene.motion import pixel_slopes
+from worker.calibration.scene.motion import lens_slopes, pixel_slopes
 from worker.calibration.scene.visibility import SeenLines
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.line_matching import LEAST_ALONG, LENS_BLUR_PX, Matches, filter_reach, match_lines
@@ -78,6 +78,10 @@ class Measurements:
     def slopes(self, camera: Camera, positions: Array) -> Array:
         """The derivative (M, 6) of `offset` by the camera's pose, per rad and metre (see `motion`)."""
         return -np.einsum("mij,mi->mj", pixel_slopes(camera, positions), self.normal)
+
+    def lens_slopes(self, camera: Camera, positions: Array) -> Array:
+        """The derivative (M, 6) of `offset` by `LENS_NUMBERS` of the camera's lens, px per unit of each."""
+        return -np.einsum("mij,mi->mj", lens_slopes(camera, positions), self.normal)
 
     @property
     def sigma_px(self) -> Array:

@@ -14,8 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, Frame, Intrinsics, Pose, rotation_matrices
+from worker.calibration.scene.camera import Array, Camera, Frame, Pose
+from worker.calibration.scene.lens import Lens
 from worker.calibration.scene.motion import pixel_slopes
+from worker.calibration.scene.rotation import rotation_matrices
 
 Grey = NDArray[np.uint8]
 
@@ -41,7 +43,7 @@ class Sway:
     shift: NDArray[np.float32] | None
 
     @classmethod
-    def from_turn(cls, turn: Array, lens: Intrinsics) -> Sway:
+    def from_turn(cls, turn: Array, lens: Lens) -> Sway:
         """That of a camera that has turned by a rotation vector (3,) in its own frame, rad."""
         width, height = lens.size
         grid = np.stack(
@@ -65,7 +67,7 @@ class Sway:
         return np.asarray(read, dtype=np.uint8)
 
 
-def sways(frames: Sequence[Frame], lens: Intrinsics) -> list[Sway]:
+def sways(frames: Sequence[Frame], lens: Lens) -> list[Sway]:
     """How each of several frames lies beside where the camera was on average. Deterministic."""
     if len(frames) == 1:
         return [Sway(None)]
@@ -96,7 +98,7 @@ def _grey(frame: Frame) -> Grey:
     return np.asarray(cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
-def _turn(first: Grey, later: Grey, corners: NDArray[np.floating], lens: Intrinsics) -> Array:
+def _turn(first: Grey, later: Grey, corners: NDArray[np.floating], lens: Lens) -> Array:
     """By what rotation vector (3,) rad the camera has turned between two frames; zeros where nothing tells."""
     before, after = _standing_still(first, later, corners)
     if len(before) < FEWEST_FOLLOWED:
@@ -125,6 +127,6 @@ def _standing_still(first: Grey, later: Grey, corners: NDArray[np.floating]) -> 
     return before.astype(float), after.astype(float)
 
 
-def _at_origin(lens: Intrinsics) -> Camera:
+def _at_origin(lens: Lens) -> Camera:
     """A camera that looks along its own axes: its rays are directions in its own frame."""
     return Camera("still", lens, Pose(np.zeros(3), np.zeros(3)))

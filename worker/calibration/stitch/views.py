@@ -8,9 +8,10 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from worker.calibration.scene.camera import Array, Camera, Pose, inside, rotation_matrices, rotation_vectors
+from worker.calibration.scene.camera import Array, Camera, Pose, inside
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.look import ground_grid
+from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
 
 Projection = Literal["pannini", "cylinder", "rectilinear", "birds-eye"]
 LevelProjection = Literal["pannini", "cylinder", "rectilinear"]

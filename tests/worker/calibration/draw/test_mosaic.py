@@ -16,16 +16,9 @@ from tests.worker.calibration.synthetic import (
     pair_frames,
 )
 from worker.calibration.draw.mosaic import birdseye, stitched
-from worker.calibration.scene.camera import (
-    Array,
-    Camera,
-    Frame,
-    Pose,
-    inside,
-    rotation_matrices,
-    rotation_vectors,
-)
+from worker.calibration.scene.camera import Array, Camera, Frame, Pose, inside
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
 from worker.calibration.stitch.evening import LARGEST_GAIN, evened_out
 from worker.calibration.stitch.panorama import BACKDROP, panorama, seam_weights
 from worker.calibration.stitch.views import View, ViewChoice, chosen_view

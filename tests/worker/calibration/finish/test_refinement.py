@@ -22,9 +22,9 @@ from worker.calibration.finish.refinement import Sight, assess, refine
 from worker.calibration.judge.quality import Gate
 from worker.calibration.judge.registration import register_pair
 from worker.calibration.robust import huber_weights, tukey_weights
-from worker.calibration.scene.camera import rotation_angles_deg
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.parameters import free_focal_lengths, free_ridge, lens_parameters
+from worker.calibration.scene.rotation import rotation_angles_deg
 from worker.calibration.see.contrast import Channels
 from worker.calibration.see.line_matching import expected_profiles, sliding_correlation
 from worker.calibration.see.line_measurement import measure_lines

@@ -12,8 +12,10 @@ from worker.calibration.first.clicks import Clicks, NoPose
 from worker.calibration.first.first_pose import first_pose
 from worker.calibration.first.freed_lens import two_terms
 from worker.calibration.first.point_fit import fit
-from worker.calibration.scene.camera import Camera, Fisheye, Intrinsics, Pose, inside, rotation_angles_deg
+from worker.calibration.scene.camera import Camera, Pose, inside
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Fisheye, Intrinsics
+from worker.calibration.scene.rotation import rotation_angles_deg
 
 PITCH = Field(105.0, 68.0, ridge=np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
 # Some points have two names.

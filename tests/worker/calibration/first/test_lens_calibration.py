@@ -9,7 +9,8 @@ import pytest
 from worker.calibration.draw.inspection import BARE, COVERED, WIDTH_PX, coverage_picture
 from worker.calibration.first.boards import Board, Charuco, Sighting, find_board, other_size
 from worker.calibration.first.lens_calibration import NoLens, Photo, calibrate_lens, cover
-from worker.calibration.scene.camera import LENSES, rotation_matrices
+from worker.calibration.scene.lens import LENSES
+from worker.calibration.scene.rotation import rotation_matrices
 
 SIZE = (1280, 960)
 BOARD = Board(9, 6, 0.03)

@@ -21,8 +21,9 @@ from worker.calibration.judge.registration import (
     register_pair,
     shares_plenty,
 )
-from worker.calibration.scene.camera import Array, Camera, Pose, rotation_matrices, rotation_vectors
+from worker.calibration.scene.camera import Array, Camera, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
 
 LEFT, RIGHT = pair()
 FACING = camera("facing", (0.0, 48.0, 10.0), (0.0, 0.0))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, PITCH, pair
-from worker.calibration.scene.camera import Camera, Intrinsics
+from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.lens import Intrinsics
 from worker.calibration.scene.look import ground_grid, ground_view
 
 CAMERAS = pair()

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, paint_frame
-from worker.calibration.scene.camera import Fisheye, Pose
+from worker.calibration.scene.camera import Pose
+from worker.calibration.scene.lens import Fisheye
 from worker.calibration.scene.motion import moved
 from worker.calibration.see.contrast import GREEN, Channels
 from worker.calibration.see.steady import Sway, median, sways

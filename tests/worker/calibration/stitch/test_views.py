@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, PITCH, pair
-from worker.calibration.scene.camera import Pose, rotation_matrices, rotation_vectors
+from worker.calibration.scene.camera import Pose
+from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
 from worker.calibration.stitch.views import LevelView, ViewChoice, chosen_view
 
 CAMERAS = pair()
