@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from worker.calibration.finish.estimate import PRIOR_M, PRIOR_RAD, Estimate
 from worker.calibration.finish.scales import Group
 from worker.calibration.finish.unknowns import Unknowns
-from worker.calibration.memory.camera_memory import CameraMemory
+from worker.calibration.memory.camera_memory import WIND, CameraMemory
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.lens import LENS_NUMBERS
 from worker.calibration.scene.motion import POSE_NUMBERS, change_between
@@ -44,8 +44,6 @@ LENS_SCALES: Array = 2.0 ** np.arange(3.0)
 """... and nothing moves the rest of a lens so far."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
 """A measure of the field may have been taken better than expected, or worse."""
-WIND_RAD, WIND_M = 0.003, 0.03
-"""How far wind and heat hold a camera from where its mount stands, per axis, at the moment of a frame."""
 LEAST_WIND = 1 / 3
 """Of that is left in the mean of many nights: some of it is the season and not the wind."""
 TOUCHED_SCALES: Array = np.array([[s] * 6 for s in (0.01, 1.0, 4.0, 16.0)] + [[s] * 3 + [0.1] * 3 for s in (4.0, 16.0)])
@@ -119,9 +117,12 @@ def believe(
     suspects = _suspects(here, memories, solved)
     remembered = [view for view, owner in enumerate(owner_of) if memories[owner] is not None]
     heats: list[Parameter] = [
-        LensParameter(_heat_number(views, view), "focal_length_px", HEAT_FOCAL * one.expected, one.step, one.change)
+        LensParameter(
+            _heat_number(views, view),
+            "focal_length_px",
+            HEAT_FOCAL * here.cameras[owner_of[view]].intrinsics.focal_length_px,
+        )
         for view in remembered
-        for one in [_unit_focal_length(here.cameras[owner_of[view]])]
     ]
     unknowns = Unknowns(
         views,
@@ -165,7 +166,6 @@ def believe(
 
 
 MOVED = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
-WIND = np.array([WIND_RAD] * 3 + [WIND_M] * 3)
 
 
 def _add_remembered(
@@ -246,12 +246,6 @@ def _suspects(here: Estimate, memories: Sequence[CameraMemory | None], solved: U
     lenses = [b if memories[b.camera] is not None else a for a, b in zip(fresh, aged, strict=True)]
     everything: list[Parameter] = [*lenses, *field_parameters(here.pitch)]
     return [p for p in everything if (getattr(p, "camera", None), p.name) not in known]
-
-
-def _unit_focal_length(camera: Camera) -> LensParameter:
-    """The focal length of a camera, expected to be off by all of itself."""
-    (found,) = (p for p in lens_parameters([camera]) if p.name == "focal_length_px")
-    return LensParameter(0, found.name, camera.intrinsics.focal_length_px, found.step, found.change)
 
 
 def _views_of(number: int, owner_of: Sequence[int]) -> list[int]:

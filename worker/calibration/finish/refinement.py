@@ -121,93 +121,111 @@ def refine(
     if stitch_weight == 0 and len(cameras) > 1 and not free:
         return _each_alone(pitch, cameras, sight, stored or cameras, memories)
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    here = Estimate.at(pitch, cameras, unknowns)
-    reader = reader or sight.reader()
-    for search in searches_px:
-        unknowns = unknowns.around(here.pitch, here.lines)
-        measured = reader.measure(here.on_ground(unknowns), here.cameras, search)
-        # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One step
-        # towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
-        here = _down_huber(here, cameras, measured, unknowns)
-        here = _towards_tukey(here, cameras, measured, unknowns).to
-    remembered = fitting(memories or [None] * len(here.cameras), here.lines)
-    anew = _painted_anew(here, remembered, reader, unknowns)
-    last, unknowns = _settled(here, cameras, reader, unknowns, anew)
+    begun = Estimate.at(pitch, cameras, unknowns)
+    remembered = fitting(memories or [None] * len(cameras), begun.lines)
+    finish = _Finish(reader or sight.reader(), unknowns, [_aside(memory) for memory in remembered], cameras)
+    caught = finish.catch(begun, searches_px)
+    anew = _painted_anew(caught, remembered, finish)
+    if any(len(a) != len(b) for a, b in zip(anew, finish.anew, strict=True)):
+        # They have pulled the cameras away from all other markings.
+        finish = replace(finish, anew=anew)
+        caught = finish.catch(begun, searches_px)
+    last = finish.settle(caught)
     uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
     # Judged by a wider search than the last round's, which could not see an error larger than itself.
-    return _assessed(replace(last.to, uneven_m=uneven), stored or cameras, remembered, reader, unknowns, anew)
+    return _assessed(replace(last.to, uneven_m=uneven), stored or cameras, remembered, finish)
 
 
-def _painted_anew(
-    here: Estimate, remembered: Sequence[CameraMemory | None], reader: LineReader, unknowns: Unknowns
-) -> list[NDArray[np.intp]]:
-    """Per camera the markings that lie elsewhere than its memory has them: tonight they say nothing of its pose."""
-    if not any(remembered):
-        return [np.empty(0, dtype=np.intp)] * len(here.cameras)
-    measured = reader.measure(here.on_ground(unknowns), here.cameras, SEARCH_PX[0])
-    return [
-        np.empty(0, dtype=np.intp) if memory is None else painted_anew(memory, camera, found, here.lines)
-        for camera, memory, found in zip(here.cameras, remembered, measured, strict=True)
-    ]
+@dataclass(frozen=True)
+class _Finish:
+    """What moves cameras from where they were `found` onto the lines that a `reader` measures.
 
-
-def _but(measured: Sequence[Measurements], anew: Sequence[NDArray[np.intp]]) -> list[Measurements]:
-    """The measurements of all other markings."""
-    return [
-        found[~np.isin(found.points.marking, markings)] if len(markings) else found
-        for found, markings in zip(measured, anew, strict=True)
-    ]
-
-
-def _settled(
-    here: Estimate,
-    found: Sequence[Camera],
-    reader: LineReader,
-    unknowns: Unknowns,
-    anew: Sequence[NDArray[np.intp]],
-) -> tuple[Step, Unknowns]:
-    """The step that leads to where the cameras stand still, by all markings but those that are painted `anew`.
-
-    What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew at
-    the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
+    `anew`: per camera the numbers of the markings that are painted elsewhere and say nothing of its pose.
     """
-    for _ in range(MOST_READINGS):
-        read_at = here
-        unknowns = unknowns.around(here.pitch, here.lines)
-        reader.read_anew()
-        for _ in range(MOST_LAST_STEPS):
-            before = here
-            measured = _but(reader.measure(here.on_ground(unknowns), here.cameras, LAST_SEARCH_PX), anew)
-            last = _towards_tukey(here, found, measured, unknowns)
-            here = last.to
-            if here.farthest_from(before) < ARRIVED_M:
+
+    reader: LineReader
+    unknowns: Unknowns
+    anew: Sequence[NDArray[np.intp]]
+    found: Sequence[Camera]
+
+    def measure(self, here: Estimate, search_px: float) -> list[Measurements]:
+        """The lines within `search_px` (of a 4K frame) of where the cameras expect them, on their ground."""
+        return self.but_anew(self.reader.measure(here.on_ground(self.unknowns), here.cameras, search_px))
+
+    def but_anew(self, measured: Sequence[Measurements]) -> list[Measurements]:
+        """The measurements of all markings that are where they were."""
+        return [
+            found[~np.isin(found.points.marking, markings)] if len(markings) else found
+            for found, markings in zip(measured, self.anew, strict=True)
+        ]
+
+    def around(self, here: Estimate) -> _Finish:
+        """The same on a pitch that has been changed since."""
+        return replace(self, unknowns=self.unknowns.around(here.pitch, here.lines))
+
+    def catch(self, here: Estimate, searches_px: Sequence[float]) -> Estimate:
+        """Where the cameras are when they have caught the lines, round by round with a narrower search."""
+        for search in searches_px:
+            this = self.around(here)
+            measured = this.measure(here, search)
+            # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One
+            # step towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
+            here = this.down_huber(here, measured)
+            here = this.towards_tukey(here, measured).to
+        return here
+
+    def settle(self, here: Estimate) -> Step:
+        """The step that leads to where the cameras stand still.
+
+        What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew
+        at the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
+        """
+        for _ in range(MOST_READINGS):
+            read_at, this = here, self.around(here)
+            this.reader.read_anew()
+            for _ in range(MOST_LAST_STEPS):
+                before = here
+                last = this.towards_tukey(here, this.measure(here, LAST_SEARCH_PX))
+                here = last.to
+                if here.farthest_from(before) < ARRIVED_M:
+                    break
+            if here.farthest_from(read_at) < ARRIVED_M:
                 break
-        if here.farthest_from(read_at) < ARRIVED_M:
-            break
-    return last, unknowns
+        return last
+
+    def down_huber(self, here: Estimate, measured: Sequence[Measurements]) -> Estimate:
+        """Where Huber's loss of the same measurements is least."""
+        for _ in range(MOST_STEPS):
+            before = here
+            here = step(here, self.found, doubted(here, measured), self.unknowns, huber_weights).to
+            if here.farthest_from(before) < SETTLED_M:
+                break
+        return here
+
+    def towards_tukey(self, here: Estimate, measured: Sequence[Measurements]) -> Step:
+        """One step towards the least of Tukey's loss, and how uneven the ground is there."""
+        measured = doubted(here, measured)
+        made = step(here, self.found, measured, self.unknowns, tukey_weights)
+        uneven = made.unevenness(self.unknowns, self.unknowns.ground.even)
+        # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
+        uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
+        return replace(made, to=replace(made.to, uneven_m=min(uneven, MOST_UNEVEN_M)))
 
 
-def _down_huber(
-    here: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns
-) -> Estimate:
-    """Where Huber's loss of the same measurements is least."""
-    for _ in range(MOST_STEPS):
-        before, here = here, step(here, found, doubted(here, measured), unknowns, huber_weights).to
-        if here.farthest_from(before) < SETTLED_M:
-            break
-    return here
+def _aside(memory: CameraMemory | None) -> NDArray[np.intp]:
+    """The markings that a memory says are painted elsewhere."""
+    return np.array(() if memory is None else memory.aside, dtype=np.intp)
 
 
-def _towards_tukey(
-    here: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns
-) -> Step:
-    """One step towards the least of Tukey's loss, and how uneven the ground is there."""
-    measured = doubted(here, measured)
-    made = step(here, found, measured, unknowns, tukey_weights)
-    uneven = made.unevenness(unknowns, unknowns.ground.even)
-    # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
-    uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
-    return replace(made, to=replace(made.to, uneven_m=min(uneven, MOST_UNEVEN_M)))
+def _painted_anew(here: Estimate, remembered: Sequence[CameraMemory | None], finish: _Finish) -> list[NDArray[np.intp]]:
+    """Per camera the markings that lie elsewhere than its memory has them."""
+    if not any(remembered):
+        return list(finish.anew)
+    measured = finish.reader.measure(here.on_ground(finish.unknowns), here.cameras, SEARCH_PX[0])
+    return [
+        known if memory is None else painted_anew(memory, found, here.lines)
+        for known, memory, found in zip(finish.anew, remembered, measured, strict=True)
+    ]
 
 
 def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
@@ -233,10 +251,11 @@ def assess(
 ) -> Finished:
     """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
-    here, reader = Estimate.at(pitch, cameras, unknowns), sight.reader()
+    here = Estimate.at(pitch, cameras, unknowns)
     remembered = fitting(memories or [None] * len(cameras), here.lines)
-    anew = _painted_anew(here, remembered, reader, unknowns)
-    return _assessed(here, stored or cameras, remembered, reader, unknowns, anew)
+    finish = _Finish(sight.reader(), unknowns, [_aside(memory) for memory in remembered], cameras)
+    finish = replace(finish, anew=_painted_anew(here, remembered, finish))
+    return _assessed(here, stored or cameras, remembered, finish)
 
 
 def _each_alone(
@@ -256,25 +275,20 @@ def _each_alone(
 
 
 def _assessed(
-    here: Estimate,
-    stored: Sequence[Camera],
-    remembered: Sequence[CameraMemory | None],
-    reader: LineReader,
-    unknowns: Unknowns,
-    anew: Sequence[NDArray[np.intp]],
+    here: Estimate, stored: Sequence[Camera], remembered: Sequence[CameraMemory | None], finish: _Finish
 ) -> Finished:
-    unknowns = unknowns.around(here.pitch, here.lines)
-    lines = here.on_ground(unknowns)
+    finish = finish.around(here)
+    lines, reader = here.on_ground(finish.unknowns), finish.reader
     evidence = reader.evidence(here.pitch, lines, here.cameras)
     reader.read_anew()
     everything = _of_seen(reader.measure(lines, here.cameras, ASSESSING_SEARCH_PX), evidence)
-    measured = doubted(here, _but(everything, anew))
+    measured = doubted(here, finish.but_anew(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
-    finished = judged(ordinary, stored, remembered, measured, evidence, unknowns)
+    finished = judged(ordinary, stored, remembered, measured, evidence, finish.unknowns)
     each = [
         replace(one, measured=its, uneven_m=ordinary.uneven_m, painted_anew=tuple(markings.tolist()))
-        for one, its, markings in zip(finished.each, doubted(here, everything), anew, strict=True)
+        for one, its, markings in zip(finished.each, doubted(here, everything), finish.anew, strict=True)
     ]
     return replace(finished, each=each)
 

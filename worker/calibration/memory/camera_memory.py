@@ -21,6 +21,9 @@ from worker.calibration.scene.field import LinePoints
 from worker.calibration.see.line_measurement import Measurements
 
 FORMAT = 1
+WIND_RAD, WIND_M = 0.003, 0.03
+"""How far wind and heat hold a camera from where its mount stands, per axis, at the moment of a frame."""
+WIND = np.array([WIND_RAD] * 3 + [WIND_M] * 3)
 ANCHOR_JOBS = 8
 """Jobs that make up the anchor."""
 MOST_EARLIER, FEWEST_JOBS = 2, 4
@@ -30,8 +33,8 @@ MOST_EARLIER, FEWEST_JOBS = 2, 4
 @dataclass(frozen=True)
 class CameraMemory:
     """`origin`: the camera as it was stored before its first job; `anchor`: the first jobs, `recent`: those since, and
-    `earlier` ones that looked another way or had another lens; `aside`: markings that have been painted elsewhere since,
-    of which nothing is remembered; `lines`: the fingerprint of the field's line points.
+    `earlier` ones that looked another way or had another lens; `aside`: markings that have been painted elsewhere, of
+    which nothing is remembered since; `lines`: the fingerprint of the field's line points.
     """
 
     origin: Camera

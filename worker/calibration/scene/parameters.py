@@ -10,7 +10,7 @@ import numpy as np
 
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.lens import Lens
+from worker.calibration.scene.lens import LENS_NUMBERS, Lens
 
 FIELD_STEP_M = 1e-3
 BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
@@ -32,8 +32,6 @@ class LensParameter:
     camera: int
     name: str
     expected: float
-    step: float
-    change: Callable[[Lens, float], Lens]
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
         """Cameras and pitch with this number changed."""
@@ -43,7 +41,9 @@ class LensParameter:
 
     def changed(self, camera: Camera, by: float) -> Camera:
         """The camera with this number changed."""
-        return replace(camera, intrinsics=self.change(camera.intrinsics, by))
+        numbers = lens_numbers(camera.intrinsics)
+        numbers[LENS_NUMBERS.index(self.name)] += by
+        return camera.with_lens(with_lens_numbers(camera.intrinsics, numbers))
 
 
 @dataclass(frozen=True)
@@ -93,11 +93,19 @@ def lens_numbers(lens: Lens) -> Array:
     return np.array([fx, cx, cy, fy / fx, k1, k2])
 
 
+def with_lens_numbers(lens: Lens, numbers: Array) -> Lens:
+    """The lens with other `LENS_NUMBERS` (6,)."""
+    fx, cx, cy, aspect, k1, k2 = numbers.tolist()
+    matrix = np.array([[fx, lens.matrix[0, 1], cx], [0.0, aspect * fx, cy], [0.0, 0.0, 1.0]])
+    distortion = lens.distortion
+    if k1 or k2 or len(distortion):
+        distortion = np.array([k1, k2, *(lens.distortion[2:] if len(distortion) else (0.0, 0.0))])
+    return replace(lens, matrix=matrix, distortion=distortion)
+
+
 def with_lens_changed(camera: Camera, changes: Array) -> Camera:
     """The camera with `LENS_NUMBERS` changed by (6,)."""
-    for parameter, by in zip(lens_parameters([camera]), changes.tolist(), strict=True):
-        camera = parameter.changed(camera, by)
-    return camera
+    return camera.with_lens(with_lens_numbers(camera.intrinsics, lens_numbers(camera.intrinsics) + changes))
 
 
 def lens_parameters(cameras: Sequence[Camera]) -> list[LensParameter]:
@@ -116,19 +124,16 @@ def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParamete
     found: list[LensParameter] = []
     for number, camera in enumerate(cameras):
         lens, known = camera.intrinsics, camera.intrinsics.sigma
-        focal, pixel = lens.focal_length_px, lens.relative_size
-        found += [
-            LensParameter(number, "focal_length_px", _focal_sigma(lens), 1e-5 * focal, _longer),
-            LensParameter(
-                number, "principal_point_x_px", known.get("cx", pixel), 0.01, lambda one, by: _centred(one, by, 0.0)
-            ),
-            LensParameter(
-                number, "principal_point_y_px", known.get("cy", pixel), 0.01, lambda one, by: _centred(one, 0.0, by)
-            ),
-            LensParameter(number, "aspect", known.get("aspect", BOARD_ASPECT), 1e-5, _taller),
-            LensParameter(number, "k1", known.get("k1", BOARD_RADIAL), 1e-5, lambda one, by: _bent(one, 0, by)),
-            LensParameter(number, "k2", known.get("k2", BOARD_RADIAL), 1e-5, lambda one, by: _bent(one, 1, by)),
-        ]
+        pixel = lens.relative_size
+        expected = {
+            "focal_length_px": _focal_sigma(lens),
+            "principal_point_x_px": known.get("cx", pixel),
+            "principal_point_y_px": known.get("cy", pixel),
+            "aspect": known.get("aspect", BOARD_ASPECT),
+            "k1": known.get("k1", BOARD_RADIAL),
+            "k2": known.get("k2", BOARD_RADIAL),
+        }
+        found += [LensParameter(number, name, expected[name]) for name in LENS_NUMBERS]
     return found
 
 
@@ -152,7 +157,7 @@ def field_parameters(pitch: Field) -> list[FieldParameter]:
 
 def with_focal_length(camera: Camera, longer_px: float) -> Camera:
     """The camera with a focal length that is so much longer."""
-    return replace(camera, intrinsics=_longer(camera.intrinsics, longer_px))
+    return with_lens_changed(camera, longer_px * np.eye(len(LENS_NUMBERS))[0])
 
 
 def free_focal_lengths(cameras: Sequence[Camera]) -> list[LensParameter]:
@@ -193,31 +198,3 @@ def _length(pitch: Field, expected: float) -> FieldParameter:
 
 def _width(pitch: Field, expected: float) -> FieldParameter:
     return FieldParameter.of(pitch, "width_m", expected, lambda one: one.width, lambda one, now: one.resized(width=now))
-
-
-def _longer(lens: Lens, by: float) -> Lens:
-    """Another focal length; the ratio of the sides of a pixel stays."""
-    matrix = lens.matrix.copy()
-    matrix[[0, 1], [0, 1]] *= 1 + by / matrix[0, 0]
-    return replace(lens, matrix=matrix)
-
-
-def _centred(lens: Lens, right: float, down: float) -> Lens:
-    matrix = lens.matrix.copy()
-    matrix[:2, 2] += (right, down)
-    return replace(lens, matrix=matrix)
-
-
-def _taller(lens: Lens, by: float) -> Lens:
-    """Another ratio of the vertical focal length to the horizontal one."""
-    matrix = lens.matrix.copy()
-    matrix[1, 1] += by * matrix[0, 0]
-    return replace(lens, matrix=matrix)
-
-
-def _bent(lens: Lens, number: int, by: float) -> Lens:
-    """Another radial coefficient: number 0 or 1 of the distortion."""
-    distortion = np.zeros(max(len(lens.distortion), 4))
-    distortion[: len(lens.distortion)] = lens.distortion
-    distortion[number] += by
-    return replace(lens, distortion=distortion)
