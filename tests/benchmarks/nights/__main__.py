@@ -12,9 +12,9 @@ from __future__ import annotations
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 
-from tests.benchmarks.nights import single
+from tests.benchmarks.nights import single, venues
 
-SECTIONS = {"single": single.table}
+SECTIONS = {"single": single.table, "venues": venues.table}
 
 
 def main() -> None:
