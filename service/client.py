@@ -37,7 +37,7 @@ from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
 from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, Status, StitchFormat
-from service.wire.venue import Venue, VenueIn, Venues
+from service.wire.venue import ChangedVenue, Venue, VenueIn, Venues
 
 if TYPE_CHECKING:
     from service.wire.job import Job
@@ -74,17 +74,18 @@ class AsyncClient:
 
     # Venues
 
-    async def put_venue(self, venue: VenueIn, if_match: str | None = None) -> Venue:
-        """Create or replace a venue; `if_match`: only the one with this tag."""
+    async def put_venue(self, venue: VenueIn, if_match: str | None = None) -> ChangedVenue:
+        """Create or replace a venue, and say what it leaves to be assumed; `if_match`: only the one with this tag."""
         content = venue.model_dump(mode="json", exclude_none=True)
         headers = {"If-Match": if_match} if if_match else {}
-        return Venue.model_validate_json(await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers))
+        answer = await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers)
+        return ChangedVenue.model_validate_json(answer)
 
-    async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> Venue:
+    async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> ChangedVenue:
         """Change parts of a venue by a JSON merge patch; cameras may be an object of their ids."""
         headers = {"Content-Type": MERGE_PATCH} | ({"If-Match": if_match} if if_match else {})
         content = json.dumps(patch).encode()
-        return Venue.model_validate_json(
+        return ChangedVenue.model_validate_json(
             await self._ask("PATCH", f"/venues/{venue_id}", content=content, headers=headers)
         )
 

@@ -23,7 +23,7 @@ from service.wire.merge_patch import MEDIA_TYPE, merged
 from service.wire.names import ID_PATTERN, FormatName
 from service.wire.problems import Problem
 from service.wire.told import callback_urls
-from service.wire.venue import PATCH_EXAMPLES, Camera, Venue, VenueIn, Venues
+from service.wire.venue import PATCH_EXAMPLES, Camera, ChangedVenue, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # While a job is open.
@@ -84,7 +84,7 @@ def revision_unfit(unfit: RevisionUnfit) -> Problem:
     openapi_extra=needs("admin"),
     responses={
         200: headers("ETag"),
-        201: {"model": Venue, **headers("ETag")},
+        201: {"model": ChangedVenue, **headers("ETag")},
         **problems(400, 408, 412, 413, 415, 422),
     },
 )
@@ -95,7 +95,7 @@ def put_venue(
     context: InContext,
     if_match: Annotated[str | None, Header()] = None,
     if_none_match: Annotated[str | None, Header()] = None,
-) -> Venue:
+) -> ChangedVenue:
     """Create or replace a venue. Its poses are where the next calibration starts."""
     stored = _checked(venue, venue_id, context.settings)
 
@@ -111,7 +111,7 @@ def put_venue(
     new = context.venues.put(stored, allow, credentials)
     response.headers["ETag"] = etags.quoted(tag_of(stored))
     response.status_code = 201 if new else 200
-    return stored
+    return ChangedVenue.of(stored)
 
 
 @router.patch(
@@ -125,7 +125,7 @@ def patch_venue(
     response: Response,
     context: InContext,
     if_match: Annotated[str | None, Header()] = None,
-) -> Venue:
+) -> ChangedVenue:
     """Change parts of a venue and leave the others as they are, the poses that were calibrated among them.
 
     A JSON merge patch (RFC 7396). `cameras` may be an object of camera ids: `{"cameras": {"left": {"source": "..."}}}`.
@@ -145,7 +145,7 @@ def patch_venue(
 
     stored, _ = context.venues.change(venue_id, change)
     response.headers["ETag"] = etags.quoted(tag_of(stored))
-    return stored
+    return ChangedVenue.of(stored)
 
 
 @router.get("", openapi_extra=needs("read"))

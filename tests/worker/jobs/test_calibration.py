@@ -26,6 +26,7 @@ from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
 from worker.calibration.settle import METHODS
 from worker.calibration.stitch.light import Light
 from worker.jobs import calibration, pictures, reading, wire
+from worker.jobs.calibration import Nights
 from worker.message import Means, Message
 
 SIZE = (320, 180)
@@ -64,8 +65,9 @@ def asked(monkeypatch):
     """
     asked = {"against": {}}
 
-    def calibrate(pitch, cameras, frames, segment, options, report, usual):
+    def calibrate(pitch, cameras, frames, segment, options, report, usual, memories, taken_at):
         asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options, usual=usual)
+        asked.update(memories=memories, taken_at=taken_at)
         for several in frames.values():
             for frame in several:
                 segment(frame, [])
@@ -95,9 +97,8 @@ def asked(monkeypatch):
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
         found = pitch.flat() if options.flat else pitch.raised(asked.get("raised", 0.0))
-        return engine.Calibration(
-            found, results, against, 0.2, spent, None, 0.1, 3, [doubt], "near", asked.get("lights", {})
-        )
+        lights, after = asked.get("lights", {}), asked.get("after", {})
+        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, [doubt], "near", lights, after)
 
     class Segmenter:
         sha256 = "f" * 64
@@ -127,7 +128,7 @@ def means(tmp_path):
 
 def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, means):
     last = {"left": View(usable=True, detail="", lines_found=0.9, blur_px=None)}
-    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, last)
+    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, Nights(last))
     assert asked["usual"] == {"left": UsualView(0.9, None)}
     assert outcome.result.cameras[0].view.lines_found == 0.8
 
