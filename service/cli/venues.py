@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, OneCamera, Output, Url, VenueId, checked
+from service.cli.arguments import LOCAL, ApiKey, AsJson, CameraId, Form, Lens, OneCamera, Output, Url, VenueId, checked
 from service.cli.calling import called
 from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
 from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, outcome, say, say_changed, tell
@@ -125,13 +125,14 @@ def venue_poses(
     venue: VenueId,
     form: Form = "json",
     camera: OneCamera = None,
+    lens: Lens = "stored",
     output: Output = None,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
     """Write the poses that hold now in the format of another tool."""
     with called(url, api_key) as client:
-        hand_out(client.venue_poses(venue, form, camera), output)
+        hand_out(client.venue_poses(venue, form, camera, lens), output)
 
 
 @app.command("stitch")
@@ -240,6 +241,21 @@ def restore_venue(
     """Let the poses of a revision hold again, see `esc venue history`."""
     with called(url, api_key) as client:
         say(client.restore(venue, revision))
+
+
+@app.command("adopt")
+def adopt_refined(
+    venue: VenueId,
+    camera: CameraId,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Store the refined pose and lens of a camera, which the last accepted calibration found, as a new revision.
+
+    What that changes is in the job: `longer` and `differs_m` of the camera's `refined`.
+    """
+    with called(url, api_key) as client:
+        say(client.adopt_refined(venue, camera))
 
 
 def _happened(event: Event) -> str:
