@@ -76,7 +76,7 @@ class Decisions(Repository):
             began_with, _, newest = _found(connection, job_id)
             if newest is None or revision_of_job(connection, job_id) is None:
                 return
-            if newest.job != job_id:
+            if newest.job != job_id or newest.cause == "adopted":
                 raise MovedOn(newest)
             if newest.cause in TAKEN:
                 now_stored = find_venue(connection, began_with.id)
