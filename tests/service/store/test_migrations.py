@@ -132,6 +132,7 @@ ROWS = {
         }
         for number, cause, job, pose in ((1, "put", None, FIRST_POSE), (2, "calibrated", DONE, VENUE.cameras[0].pose))
     ],
+    "memories": [{"venue": VENUE.id, "revision": 2, "document": {"left": {"format": 1}}}],
     "venue_quality": [{"venue": VENUE.id, "stitch_error_px": 0.2, "moved_px": 2.0, "accepted_at": NOON}],
 }
 
@@ -185,6 +186,8 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(upgraded, revis
     task = stores.attempts.begin(WAITING)
     assert (task.venue, task.options.seed, task.frames) == (VENUE, 7, FRAMES)
     assert task.origin.request_id == "van-3"
+    # A release without memories leaves none, and its jobs begin them.
+    assert (task.memories, task.taken_at) == ({} if revision == "0001" else {"left": {"format": 1}}, NOON)
     assert stores.workers.silent(0) == ["w"]
     (key,) = stores.keys.all()
     assert (key.name, key.scope, key.last_used_at) == ("cron", "calibrate", NOON)
