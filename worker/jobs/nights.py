@@ -18,7 +18,7 @@ from service.wire.results import LensChange, Refined
 from worker.calibration.finish import uncertainty
 from worker.calibration.judge.quality import CameraResult
 from worker.calibration.memory.camera_memory import CameraMemory
-from worker.calibration.scene.camera import Array
+from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.far_marking import far_marking_shift_m
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.motion import POSE_NUMBERS
@@ -40,7 +40,7 @@ def memories_of(told: Mapping[str, Mapping[str, Any]]) -> dict[str, CameraMemory
 def wire_refined(pitch: Field, found: CameraResult) -> Refined | None:
     """The refined pose and lens of a camera beside its answer; None where it has none."""
     refined = found.refined
-    if refined is None:
+    if refined is None or not _is_a_camera(refined.camera):
         return None
     focal, focal_refined = (one.intrinsics.focal_length_px for one in (found.camera, refined.camera))
     covariance = refined.covariance if np.isfinite(refined.covariance).all() else None
@@ -54,6 +54,15 @@ def wire_refined(pitch: Field, found: CameraResult) -> Refined | None:
     )
 
 
+def _is_a_camera(camera: Camera) -> bool:
+    """Whether this can be a camera: lines that determine next to nothing can end far outside of all lenses."""
+    lens = camera.intrinsics
+    numbers = np.concatenate([camera.pose.rotation, camera.pose.position, lens.matrix.ravel(), lens.distortion])
+    focal = np.diag(lens.matrix)[:2]
+    bent = np.abs(lens.distortion).max(initial=0.0)
+    return bool(np.isfinite(numbers).all() and (focal > 0).all() and bent <= geometry.LARGEST_COEFFICIENT)
+
+
 def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:
     """The standard deviations of the numbers of a lens, from the (12, 12) of pose and lens."""
     if covariance is None:
@@ -65,7 +74,7 @@ def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:
 def wire_lens_change(found: CameraResult, tonight: datetime | None) -> LensChange | None:
     """How much longer a focal length is than in the first nights of a memory; None where there is no memory."""
     change = found.lens_change
-    if change is None or not math.isfinite(change.sigma):
+    if change is None or not math.isfinite(change.sigma) or not math.isfinite(change.longer):
         return None
     return LensChange(
         longer=change.longer, sigma=change.sigma, since=change.since, words=lens_change_in_words(change, tonight)

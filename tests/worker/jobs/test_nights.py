@@ -63,6 +63,12 @@ def test_a_covariance_that_is_not_determined_is_none(found):
     assert (told.covariance, told.sigma, told.intrinsics.sigma) == (None, None, None)
 
 
+@pytest.mark.parametrize("change", [[-3000.0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 2000.0, 0], [np.nan, 0, 0, 0, 0, 0]])
+def test_lines_that_end_outside_of_all_lenses_have_found_no_camera(found, change):
+    there = with_lens_changed(CAMERA, np.array(change))
+    assert wire_refined(PITCH, replace(found, refined=Refined(there, np.eye(12)))) is None
+
+
 def test_a_camera_without_a_refined_pose_or_a_memory_has_nothing_to_tell(found):
     assert (wire_refined(PITCH, found), wire_lens_change(found, TONIGHT)) == (None, None)
 
