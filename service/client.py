@@ -36,8 +36,8 @@ from service.refused import passing, pause_s_of, refusal
 from service.wire.health import VenueHealth
 from service.wire.history import History, Revision
 from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
-from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, Status, StitchFormat
-from service.wire.venue import Venue, VenueIn, Venues
+from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, LensChoice, Status, StitchFormat
+from service.wire.venue import ChangedVenue, Venue, VenueIn, Venues
 
 if TYPE_CHECKING:
     from service.wire.job import Job
@@ -74,17 +74,18 @@ class AsyncClient:
 
     # Venues
 
-    async def put_venue(self, venue: VenueIn, if_match: str | None = None) -> Venue:
-        """Create or replace a venue; `if_match`: only the one with this tag."""
+    async def put_venue(self, venue: VenueIn, if_match: str | None = None) -> ChangedVenue:
+        """Create or replace a venue, and say what it leaves to be assumed; `if_match`: only the one with this tag."""
         content = venue.model_dump(mode="json", exclude_none=True)
         headers = {"If-Match": if_match} if if_match else {}
-        return Venue.model_validate_json(await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers))
+        answer = await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers)
+        return ChangedVenue.model_validate_json(answer)
 
-    async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> Venue:
+    async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> ChangedVenue:
         """Change parts of a venue by a JSON merge patch; cameras may be an object of their ids."""
         headers = {"Content-Type": MERGE_PATCH} | ({"If-Match": if_match} if if_match else {})
         content = json.dumps(patch).encode()
-        return Venue.model_validate_json(
+        return ChangedVenue.model_validate_json(
             await self._ask("PATCH", f"/venues/{venue_id}", content=content, headers=headers)
         )
 
@@ -129,9 +130,15 @@ class AsyncClient:
         answer = await self._ask("POST", f"/venues/{venue_id}/restore", json={"revision": revision})
         return Venue.model_validate_json(answer)
 
-    async def venue_poses(self, venue_id: str, form: FormatName, camera: str | None = None) -> bytes:
+    async def adopt_refined(self, venue_id: str, camera: str) -> Venue:
+        """Store the refined pose and lens of a camera that the last accepted calibration found."""
+        return Venue.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/cameras/{camera}/adopt-refined"))
+
+    async def venue_poses(
+        self, venue_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
+    ) -> bytes:
         """The poses that hold now, of one camera or all, as a file of another tool's format."""
-        return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera))
+        return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera, lens))
 
     async def venue_stitch(
         self, venue_id: str, form: StitchFormat, view: Mapping[str, Any] = NOTHING, known: str | None = None
@@ -267,9 +274,11 @@ class AsyncClient:
         """Put back what was before the poses of a calibration."""
         return _job(await self._ask("POST", f"/jobs/{job_id}/reject"))
 
-    async def job_poses(self, job_id: str, form: FormatName, camera: str | None = None) -> bytes:
+    async def job_poses(
+        self, job_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
+    ) -> bytes:
         """The poses that a job found, of one camera or all, as a file of another tool's format."""
-        return await self._ask("GET", f"/jobs/{job_id}/poses", params=_wanted(form, camera))
+        return await self._ask("GET", f"/jobs/{job_id}/poses", params=_wanted(form, camera, lens))
 
     async def picture(self, of: Job, name: str) -> bytes | None:
         """A picture by the name of its link; None where the job made no such one."""
@@ -371,6 +380,7 @@ class Client:
     venue_health = Call(AsyncClient.venue_health)
     history = Call(AsyncClient.history)
     restore = Call(AsyncClient.restore)
+    adopt_refined = Call(AsyncClient.adopt_refined)
     venue_poses = Call(AsyncClient.venue_poses)
     venue_stitch = Call(AsyncClient.venue_stitch)
     venue_events = Stream(AsyncClient.venue_events)
@@ -416,8 +426,10 @@ def _split(stream: bytes) -> list[bytes]:
     return stream.split(b"\n")
 
 
-def _wanted(form: FormatName, camera: str | None) -> dict[str, str]:
-    return {"format": form} | ({"camera": camera} if camera else {})
+def _wanted(form: FormatName, camera: str | None, lens: LensChoice) -> dict[str, str]:
+    # An older service knows no choice of lens, and has the stored one.
+    chosen = {"lens": lens} if lens != "stored" else {}
+    return {"format": form} | chosen | ({"camera": camera} if camera else {})
 
 
 def _upload(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Literal
+from typing import IO, TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel
 
@@ -72,6 +72,8 @@ class Message(BaseModel):
     pictures: dict[str, int] = {}
     # The names of those that can be drawn when somebody looks.
     later: list[str] = []
+    # Of a calibration: the memories of the accepted cameras with this job in them, by camera.
+    memories: dict[str, dict[str, Any]] = {}
 
     @property
     def last(self) -> bool:

@@ -198,7 +198,7 @@ class Worker:
         if last is None:
             log.info("job taken away")
         elif last.result is not None:
-            self._attempts.finish(task, last.result, [*last.pictures, *last.later])
+            self._attempts.finish(task, last.result, [*last.pictures, *last.later], last.memories)
         elif last.error is not None:
             self._attempts.fail(task, last.error)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from service.cli.printing import USAGE, fail
-from service.wire.names import ID_PATTERN, JOB_ID_PATTERN, FormatName
+from service.wire.names import ID_PATTERN, JOB_ID_PATTERN, FormatName, LensChoice
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -88,6 +88,10 @@ VenueId = Annotated[
     str,
     typer.Argument(metavar="VENUE", callback=_is_of_a_venue, help="Id of a venue, as `esc venue list` prints it."),
 ]
+CameraId = Annotated[
+    str,
+    typer.Argument(metavar="CAMERA", callback=_is_of_a_venue, help="Id of a camera, as `esc venue list` prints it."),
+]
 JobId = Annotated[
     str, typer.Argument(metavar="JOB", callback=_is_of_a_job, help="Id of a job, as `esc job list` prints it.")
 ]
@@ -102,6 +106,13 @@ Form = Annotated[
     FormatName,
     typer.Option(
         "--format", help="File format: json is ESC's own, the others are those of the tools they are named after."
+    ),
+]
+Lens = Annotated[
+    LensChoice,
+    typer.Option(
+        "--lens",
+        help="stored: the poses for the lenses that the venue has; refined: poses and lenses as the lines have both.",
     ),
 ]
 OneCamera = Annotated[

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, JobId, OneCamera, Output, Url
+from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, JobId, Lens, OneCamera, Output, Url
 from service.cli.calling import called
 from service.cli.printing import ACCEPTED, FAILED, REJECTED, fail, followed, hand_out, outcome, say, tell, verdict
 from service.store.jobs.files import picture_file
@@ -111,13 +111,14 @@ def job_poses(
     job: JobId,
     form: Form = "json",
     camera: OneCamera = None,
+    lens: Lens = "stored",
     output: Output = None,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
     """Write the poses that a job found in the format of another tool."""
     with called(url, api_key) as client:
-        hand_out(client.job_poses(job, form, camera), output)
+        hand_out(client.job_poses(job, form, camera, lens), output)
 
 
 @app.command("accept")

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from service.wire.job import Job
     from service.wire.job import Progress as Step
     from service.wire.results import FieldResult, IntrinsicsResult, LocateResult, Result
+    from service.wire.venue import ChangedVenue
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
 ZIP_START = b"PK"
@@ -29,6 +30,13 @@ def tell(line: str) -> None:
 def say(what: BaseModel | dict[str, str]) -> None:
     """Print an answer, as JSON."""
     print(json.dumps(what, indent=2) if isinstance(what, dict) else what.model_dump_json(indent=2))
+
+
+def say_changed(venue: ChangedVenue) -> None:
+    """Print a venue that was put or patched, as JSON, and what it leaves to be assumed for whoever looks."""
+    print(venue.model_dump_json(indent=2, exclude={"warnings"}))
+    for warning in venue.warnings:
+        tell(f"Warning: {warning}")
 
 
 def hand_out(document: bytes, output: Path | None) -> None:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, OneCamera, Output, Url, VenueId, checked
+from service.cli.arguments import LOCAL, ApiKey, AsJson, CameraId, Form, Lens, OneCamera, Output, Url, VenueId, checked
 from service.cli.calling import called
 from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
-from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, outcome, say, tell
+from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, outcome, say, say_changed, tell
 from service.wire.names import EventKind, Projection, StitchFormat
 
 if TYPE_CHECKING:
@@ -46,14 +46,14 @@ def put_venue(
     with called(url, api_key) as client:
         before = _stored(client, venue.id)
         if before is None:
-            say(client.put_venue(venue))
+            say_changed(client.put_venue(venue))
             return
         stored, tag = before
         wanted = standing_like(venue, stored) if keep_poses else venue
         lost = what_is_lost(wanted.stored(), stored, client.history(venue.id, 1)[0])
         if lost and not force:
             fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *lost, OTHERWISE]), FAILED)
-        say(client.put_venue(wanted, tag))
+        say_changed(client.put_venue(wanted, tag))
 
 
 @app.command("set")
@@ -73,7 +73,7 @@ def set_venue(
     """Change parts of a venue and leave the others as they are, its poses among them."""
     patch = patch_of(changes)
     with called(url, api_key) as client:
-        say(client.patch_venue(venue, patch))
+        say_changed(client.patch_venue(venue, patch))
 
 
 @app.command("edit")
@@ -89,7 +89,7 @@ def edit_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None
         if not patch:
             tell("Nothing was changed.")
             return
-        say(client.patch_venue(venue, patch, tag))
+        say_changed(client.patch_venue(venue, patch, tag))
 
 
 @app.command("get")
@@ -125,13 +125,14 @@ def venue_poses(
     venue: VenueId,
     form: Form = "json",
     camera: OneCamera = None,
+    lens: Lens = "stored",
     output: Output = None,
     url: Url = LOCAL,
     api_key: ApiKey = None,
 ) -> None:
     """Write the poses that hold now in the format of another tool."""
     with called(url, api_key) as client:
-        hand_out(client.venue_poses(venue, form, camera), output)
+        hand_out(client.venue_poses(venue, form, camera, lens), output)
 
 
 @app.command("stitch")
@@ -240,6 +241,21 @@ def restore_venue(
     """Let the poses of a revision hold again, see `esc venue history`."""
     with called(url, api_key) as client:
         say(client.restore(venue, revision))
+
+
+@app.command("adopt")
+def adopt_refined(
+    venue: VenueId,
+    camera: CameraId,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Store the refined pose and lens of a camera, which the last accepted calibration found, as a new revision.
+
+    What that changes is in the job: `longer` and `differs_m` of the camera's `refined`.
+    """
+    with called(url, api_key) as client:
+        say(client.adopt_refined(venue, camera))
 
 
 def _happened(event: Event) -> str:

@@ -54,6 +54,8 @@ templates.filters |= {
     "on_the_pitch": words.on_the_pitch,
     "degrees": words.degrees,
     "percent": words.percent,
+    "longer": words.longer,
+    "capitalised": words.capitalised,
     "ago": words.ago,
     "moment": words.moment,
     "seconds": words.seconds,

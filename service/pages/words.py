@@ -38,6 +38,16 @@ def percent(share: float | None) -> str:
     return NONE if share is None else f"{100 * share:.0f} %"
 
 
+def longer(share: float) -> str:
+    """How much longer a focal length is than another one, of which it is this share longer: 0.12 % shorter."""
+    return f"{100 * abs(share):.2f} % {'longer' if share >= 0 else 'shorter'}"
+
+
+def capitalised(words: str) -> str:
+    """Words that begin a sentence; the rest stays as it is."""
+    return words[:1].upper() + words[1:]
+
+
 def ago(moment: datetime, now: datetime | None = None) -> str:
     """How long it is since."""
     seconds = max(0.0, ((now or datetime.now(UTC)) - moment).total_seconds())

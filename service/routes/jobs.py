@@ -14,7 +14,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context, InContext, JobIdPath
 from service.routes.contract.documented import needs, problems
-from service.routes.contract.exported import DOCUMENTS, Wanted, exported
+from service.routes.contract.exported import DOCUMENTS, Wanted, exported, refined_venue
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
 from service.routes.venues import RETRY_AFTER_S, revision_unfit
@@ -225,6 +225,9 @@ def job_poses(
     venue = context.jobs.posed(job.id)
     if venue is None:
         raise _no_poses(job)
+    if wanted.lens == "refined":
+        why_none = "its lines do not determine a lens, or the job is one of an earlier release."
+        venue = refined_venue(venue, context.refined.of_job(job.id), wanted.camera, why_none)
     return exported(context, venue, f"{venue.id}-{job.id}", form, wanted)
 
 

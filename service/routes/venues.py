@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Depends, Header, Query, Response
+from fastapi import APIRouter, Body, Depends, Header, Path, Query, Response
 from pydantic import ValidationError
 
 from service.api import etags
@@ -12,10 +12,11 @@ from service.api.context import InContext, VenueIdPath
 from service.api.problems import invalid
 from service.intake import sources
 from service.routes.contract.documented import headers, needs, problems
-from service.routes.contract.exported import DOCUMENTS, Wanted, exported
+from service.routes.contract.exported import DOCUMENTS, Wanted, exported, no_refined_pose, refined_venue
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_known
 from service.settings import Settings
+from service.store.refined import NoRefinedPose
 from service.store.revisions import NoSuchRevision, RevisionUnfit
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
@@ -23,7 +24,7 @@ from service.wire.merge_patch import MEDIA_TYPE, merged
 from service.wire.names import ID_PATTERN, FormatName
 from service.wire.problems import Problem
 from service.wire.told import callback_urls
-from service.wire.venue import PATCH_EXAMPLES, Camera, Venue, VenueIn, Venues
+from service.wire.venue import PATCH_EXAMPLES, Camera, ChangedVenue, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # While a job is open.
@@ -74,6 +75,14 @@ def _existing(venue_id: VenueIdPath, context: InContext) -> Venue:
 ExistingVenue = Annotated[Venue, Depends(_existing)]
 
 
+def no_refined_since(venue_id: str) -> str:
+    """Why a camera has no refined pose, and what to do."""
+    return (
+        "no calibration that found one was accepted since its pose, its lens or the field were put, or the job was "
+        f"deleted. POST /venues/{venue_id}/calibrate."
+    )
+
+
 def revision_unfit(unfit: RevisionUnfit) -> Problem:
     """The same answer wherever a revision is put back."""
     return Problem("revision-unfit", f"{unfit} PUT the venue with the poses that you want.")
@@ -84,7 +93,7 @@ def revision_unfit(unfit: RevisionUnfit) -> Problem:
     openapi_extra=needs("admin"),
     responses={
         200: headers("ETag"),
-        201: {"model": Venue, **headers("ETag")},
+        201: {"model": ChangedVenue, **headers("ETag")},
         **problems(400, 408, 412, 413, 415, 422),
     },
 )
@@ -95,7 +104,7 @@ def put_venue(
     context: InContext,
     if_match: Annotated[str | None, Header()] = None,
     if_none_match: Annotated[str | None, Header()] = None,
-) -> Venue:
+) -> ChangedVenue:
     """Create or replace a venue. Its poses are where the next calibration starts."""
     stored = _checked(venue, venue_id, context.settings)
 
@@ -111,7 +120,7 @@ def put_venue(
     new = context.venues.put(stored, allow, credentials)
     response.headers["ETag"] = etags.quoted(tag_of(stored))
     response.status_code = 201 if new else 200
-    return stored
+    return ChangedVenue.of(stored)
 
 
 @router.patch(
@@ -125,7 +134,7 @@ def patch_venue(
     response: Response,
     context: InContext,
     if_match: Annotated[str | None, Header()] = None,
-) -> Venue:
+) -> ChangedVenue:
     """Change parts of a venue and leave the others as they are, the poses that were calibrated among them.
 
     A JSON merge patch (RFC 7396). `cameras` may be an object of camera ids: `{"cameras": {"left": {"source": "..."}}}`.
@@ -145,7 +154,7 @@ def patch_venue(
 
     stored, _ = context.venues.change(venue_id, change)
     response.headers["ETag"] = etags.quoted(tag_of(stored))
-    return stored
+    return ChangedVenue.of(stored)
 
 
 @router.get("", openapi_extra=needs("read"))
@@ -184,7 +193,9 @@ def venue_poses(
     wanted: Annotated[Wanted, Depends()],
     form: Annotated[FormatName, Query(alias="format")] = "json",
 ) -> Response:
-    """The poses that hold now, in the format of another tool."""
+    """The poses that hold now, in the format of another tool; with `lens=refined` those of the last accepted job."""
+    if wanted.lens == "refined":
+        venue = refined_venue(venue, context.refined.of_venue(venue), wanted.camera, no_refined_since(venue.id))
     return exported(context, venue, venue.id, form, wanted)
 
 
@@ -245,6 +256,37 @@ def restore_venue(
         raise revision_unfit(unfit) from None
     response.headers["ETag"] = etags.quoted(tag_of(restored))
     return restored
+
+
+@router.post(
+    "/{venue_id}/cameras/{camera}/adopt-refined",
+    openapi_extra=needs("calibrate"),
+    responses={200: headers("ETag"), **problems(404, 412)},
+)
+def adopt_refined(
+    venue_id: VenueIdPath,
+    camera: Annotated[str, Path(pattern=ID_PATTERN)],
+    response: Response,
+    context: InContext,
+    if_match: Annotated[str | None, Header()] = None,
+) -> Venue:
+    """Store a camera's refined pose and lens of the last accepted calibration; that is a revision of its own.
+
+    What is said of how well the lens is known (`sigma`) stays. Nothing changes if the camera has them already.
+    """
+
+    def allow(before: Venue | None) -> None:
+        if before is None:
+            raise no_such_venue(venue_id)
+        camera_of(before, camera)
+        _require_match(if_match, before)
+
+    try:
+        adopted = context.refined.adopt(venue_id, camera, allow)
+    except NoRefinedPose:
+        raise no_refined_pose(camera, no_refined_since(venue_id)) from None
+    response.headers["ETag"] = etags.quoted(tag_of(adopted))
+    return adopted
 
 
 @router.delete("/{venue_id}", openapi_extra=needs("admin"), status_code=204, responses=problems(404, 409, 412))

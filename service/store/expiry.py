@@ -23,6 +23,7 @@ from service.store.revisions import TAKEN
 
 j = tables.jobs.c
 r = tables.revisions.c
+m = tables.memories.c
 e = tables.events.c
 left = tables.leftovers.c
 LAST_ACCEPTED = (
@@ -113,6 +114,8 @@ class Expiry(Repository):
         with writing(self._engine) as connection:
             serialise(connection, "expiry")
             ids = list(connection.scalars(old))
+            of_them = sa.exists().where(r.id.in_(ids), r.venue == m.venue, r.number == m.revision)
+            connection.execute(sa.delete(tables.memories).where(of_them))
             connection.execute(sa.delete(tables.revisions).where(r.id.in_(ids)))
             return len(ids)
 

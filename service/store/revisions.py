@@ -42,8 +42,11 @@ def add_revision(
     job: str | None = None,
     restored: Revision | None = None,
     stitch_error_px: float | None = None,
-) -> None:
-    """Write down the state that a venue has from now on, inside the caller's serialised transaction."""
+) -> int:
+    """Write down the state that a venue has from now on, inside the caller's serialised transaction.
+
+    Gives the number of the revision.
+    """
     before, at = _newest_row(connection, venue.id), clock(connection)
     number = 1 if before is None else before.number + 1
     movements = _movements(connection, venue, number, before, cause, restored)
@@ -74,6 +77,7 @@ def add_revision(
     add_event(connection, venue.id, venue.webhooks, "poses.changed", poses, at)
     drifts = [movement.drift.pixels for movement in movements.values() if movement.drift]
     note(connection, venue.id, drift_px=max((drift for drift in drifts if drift is not None), default=None))
+    return number
 
 
 def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None:

@@ -11,6 +11,7 @@ from service.store.jobs.decisions import Decisions
 from service.store.jobs.reading import Jobs
 from service.store.jobs.submission import Submissions
 from service.store.keys import Keys
+from service.store.refined import RefinedPoses
 from service.store.schedules import Schedules
 from service.store.sessions import Sessions
 from service.store.told.deliveries import Deliveries
@@ -27,6 +28,7 @@ class Stores:
         migrate(engine)
         self.venues = Venues(engine)
         self.schedules = Schedules(engine)
+        self.refined = RefinedPoses(engine)
         self.submissions = Submissions(engine)
         self.jobs = Jobs(engine)
         self.attempts = Attempts(engine)

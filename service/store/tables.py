@@ -55,6 +55,17 @@ revisions = sa.Table(
     sa.Index("revisions_by_time", "cause", "at"),
 )
 
+# What earlier nights of a venue's cameras measured, see memories.py.
+memories = sa.Table(
+    "memories",
+    metadata,
+    sa.Column("venue", sa.String(64), primary_key=True),
+    # The number of the revision that it came with.
+    sa.Column("revision", sa.Integer, primary_key=True, autoincrement=False),
+    # By camera what `CameraMemory.to_json` of the engine wrote.
+    sa.Column("document", sa.JSON, nullable=False),
+)
+
 # Of a calibration that waits or runs. A query that says it in these words finds it in the index of these words.
 ACTIVE = sa.text("status IN ('queued', 'running') AND kind = 'calibration'")
 

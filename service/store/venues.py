@@ -11,6 +11,14 @@ from service.store.alarms import health_of, settle_alarms
 from service.store.counts.courses import note_held
 from service.store.counts.figures import note
 from service.store.engine import Repository, clock, reading, serialise, writing
+from service.store.memories import (
+    Memories,
+    forget_memories,
+    keep_memories,
+    memories_at,
+    newest_memories,
+    without_those_that_changed,
+)
 from service.store.revisions import add_revision, revisions_of, state_at
 from service.store.schedules import plan
 from service.store.told.events import add_venue_event
@@ -21,7 +29,14 @@ from service.wire.results import Result
 from service.wire.venue import Venue
 
 # What goes with a venue.
-OF_VENUES = (tables.revisions, tables.alarms, tables.schedules, tables.credentials, tables.venue_quality)
+OF_VENUES = (
+    tables.revisions,
+    tables.memories,
+    tables.alarms,
+    tables.schedules,
+    tables.credentials,
+    tables.venue_quality,
+)
 
 
 class Venues(Repository):
@@ -74,8 +89,7 @@ class Venues(Repository):
                 add_venue_event(connection, venue, "venue.created", [])
             elif changed := venue.differs_in(before):
                 add_venue_event(connection, venue, "venue.changed", changed)
-            if before is None or not venue.stands_like(before):
-                add_revision(connection, venue, "put")
+            _note_put(connection, before, venue)
             settle_alarms(connection, venue)
             plan(connection, venue)
             return venue, before is None
@@ -162,14 +176,37 @@ def save_venue(connection: sa.Connection, venue: Venue) -> None:
         connection.execute(sa.insert(table).values(id=venue.id, **values))
 
 
+def _note_put(connection: sa.Connection, before: Venue | None, venue: Venue) -> None:
+    """Write down the revision that a PUT may be, with the memories that it leaves.
+
+    A camera that was put elsewhere, or has another lens, begins anew, and on another field all of them do.
+    """
+    if before is not None and before.field != venue.field:
+        forget_memories(connection, venue.id)
+    if before is None or not venue.stands_like(before):
+        memories = newest_memories(connection, venue.id)
+        left = {} if before is None else without_those_that_changed(memories, before, venue)
+        keep_memories(connection, venue.id, add_revision(connection, venue, "put"), left)
+
+
 def let_hold(
-    connection: sa.Connection, venue: Venue, result: Result, cameras: Collection[str], cause: Cause, job_id: str
+    connection: sa.Connection,
+    venue: Venue,
+    result: Result,
+    cameras: Collection[str],
+    cause: Cause,
+    job_id: str,
+    memories: Memories,
 ) -> None:
-    """Let some cameras of a venue be as a calibration found them, inside the caller's serialised transaction."""
+    """Let some cameras of a venue be as a calibration found them, inside the caller's serialised transaction.
+
+    `memories`: those that the venue then has.
+    """
     found = with_result(venue, result, cameras)
     save_venue(connection, found)
     note_held(connection, venue.id, result, cameras, clock(connection))
-    add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
+    number = add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
+    keep_memories(connection, venue.id, number, memories)
     settle_alarms(connection, found)
 
 
@@ -196,11 +233,13 @@ def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = 
 
 
 def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job: str | None = None) -> Venue:
-    """Let a revision of a venue hold again, inside the caller's serialised transaction."""
+    """Let a revision of a venue hold again with its memories, inside the caller's serialised transaction."""
     then, revision = state_at(connection, venue, number)
     if not then.stands_like(venue):
         save_venue(connection, then)
-        add_revision(connection, then, "restored", rejected_job, revision, revision.stitch_error_px)
+        memories = memories_at(connection, venue.id, number)
+        restored = add_revision(connection, then, "restored", rejected_job, revision, revision.stitch_error_px)
+        keep_memories(connection, venue.id, restored, memories)
         note(connection, venue.id, stitch_error_px=revision.stitch_error_px)
     return then
 

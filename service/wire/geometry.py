@@ -23,6 +23,7 @@ COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
 MATRIX_NUMBERS = ("fx", "fy", "aspect", "cx", "cy")
 LEAST_SIGMA, LARGEST_SIGMA = 1e-9, 1e6
 LARGEST_SIDE = 16384
+LARGEST_COEFFICIENT = 1000
 # A position and a translation that are less apart say the same: more is not lost by writing them down.
 AGREEING_M = 1e-6
 Metres = Annotated[Number, Field(ge=-2000, le=2000)]
@@ -99,9 +100,9 @@ class Intrinsics(Wire):
 
     model: LensModel = Field("opencv", description="`fisheye`: OpenCV's fisheye module (Kannala-Brandt).")
     matrix: Annotated[list[Row], Field(min_length=3, max_length=3)]
-    distortion: Annotated[list[Annotated[Number, Field(ge=-1000, le=1000)]], Field(max_length=14)] = Field(
-        description="0, 4, 5, 8, 12 or 14 numbers; of a fisheye 0 or 4."
-    )
+    distortion: Annotated[
+        list[Annotated[Number, Field(ge=-LARGEST_COEFFICIENT, le=LARGEST_COEFFICIENT)]], Field(max_length=14)
+    ] = Field(description="0, 4, 5, 8, 12 or 14 numbers; of a fisheye 0 or 4.")
     sigma: dict[str, Deviation] | None = Field(
         None,
         description="How well the lens is known: one standard deviation by name, of fx, fy, cx and cy in pixels, of "

@@ -18,8 +18,9 @@ class RevisionCamera(Movement):
     pose: Pose
 
 
-# What brought a revision: a PUT, a calibration by itself, a result that was accepted by hand, an older revision.
-Cause = Literal["put", "calibrated", "accepted", "restored"]
+# What brought a revision: a PUT, a calibration by itself, a result that was accepted by hand, an older revision, or the
+# refined pose and lens of a camera, by hand as well.
+Cause = Literal["put", "calibrated", "accepted", "restored", "adopted"]
 
 
 class Revision(Wire):

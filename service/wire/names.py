@@ -13,6 +13,8 @@ PHOTOS_PART = "photos"
 LensModel = Literal["opencv", "fisheye"]
 # Of files that poses leave in; `service.formats.table` has what is behind the names.
 FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
+# With which lens: the one that the venue has, or the one that the lines have.
+LensChoice = Literal["stored", "refined"]
 # What a stitched view is projected by, and what its package is made for.
 Projection = Literal["pannini", "cylinder", "rectilinear", "birds-eye"]
 StitchFormat = Literal["ffmpeg", "st-map", "st-map-unreal", "opencv"]

@@ -55,6 +55,7 @@ KINDS: dict[str, Kind] = {
     "venue-moved-on": Kind(409, "The venue is not as the job left or found it"),
     "revision-not-found": Kind(404, "The venue has no such revision"),
     "revision-unfit": Kind(409, "The revision does not fit the venue as it is now"),
+    "refined-not-found": Kind(404, "The camera has no refined pose and lens"),
     # Frames.
     "unknown-camera": Kind(422, "The venue has no such camera"),
     "missing-camera": Kind(422, "A camera of the venue has no frame"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Any, Literal
 
 from pydantic import Field
@@ -65,6 +66,44 @@ class MarkingResult(Wire):
     elsewhere: bool = Field(False, description="Beyond three sigma and 3 cm: the paint is off, or a measure.")
 
 
+class Refined(Wire):
+    """A camera's pose and lens as the lines have both, of this night and of those that its memory holds.
+
+    For whoever measures in the world. The camera's `pose` is the one for the lens that the venue has.
+    """
+
+    pose: Pose
+    intrinsics: Intrinsics = Field(description="The lens; its `sigma` is the root of the diagonal of `covariance`.")
+    covariance: list[list[float]] | None = Field(
+        description="12x12: rotation in the camera's frame (rad), position (m), focal length (px), principal point x "
+        "and y (px), aspect (fy/fx), k1, k2. Null where the lines do not determine it."
+    )
+    sigma: Sigma | None = Field(description="Of the pose, with what is not known of the lens.")
+    longer: float = Field(
+        description="How much longer its focal length is than that of the lens of `pose`: 0.001 is 0.1 %."
+    )
+    differs_m: float | None = Field(
+        description="How far apart on the ground the same pixels are by `pose` and by the refined one: the median over "
+        "the points in view of the marking that is farthest from the camera, in most views the far touchline. Null "
+        "where no marking is in view."
+    )
+
+
+class LensChange(Wire):
+    """How a camera's focal length has changed since the first nights of its memory.
+
+    It is longer by `longer` ± `sigma` of itself (0.001 is 0.1 %) than on the day of `since`; null: not known.
+    """
+
+    longer: float
+    sigma: float
+    since: datetime | None
+    words: str | None = Field(
+        description="The change in words; null while it is within three sigma.",
+        examples=["focal length 0.6 ± 0.1 % longer than on 3 November: zoom ring or focus"],
+    )
+
+
 class CameraResult(Wire):
     """One camera's answer."""
 
@@ -101,6 +140,13 @@ class CameraResult(Wire):
         None, description="How it is evened out with the other accepted cameras in a stitched view; kept with the pose."
     )
     view: View | None = None
+    refined: Refined | None = Field(
+        None, description="Pose and lens as the lines have both; null where they are not determined."
+    )
+    lens_change: LensChange | None = Field(None, description="Null before its memory has a night.")
+    nights: int = Field(
+        0, description="Accepted jobs in the camera's memory, this one too where it is accepted and no dry run."
+    )
     markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
 
 
@@ -166,6 +212,7 @@ class Result(Wire):
     cameras: list[CameraResult]
     ridge: list[Row] | None = Field(None, description="With fit_ridge: as it was found.")
     diagnosis: list[Suspicion] = Field([], description="What the lines say is wrong with what the venue says.")
+    warnings: list[str] = Field([], description="What the venue leaves to be assumed: lenses without a `sigma`.")
     stitch_error_px: float | None
     stitch_error_before_px: float | None
     stitch_error_limit_px: float | None = Field(None, description="What the gate lets pass at most.")

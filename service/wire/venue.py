@@ -44,6 +44,8 @@ Ignore = Annotated[
     ),
 ]
 
+# What the engine takes the focal length of a lens without a sigma to be known to, one standard deviation.
+BOARD_FOCAL_PERCENT = 0.03
 LIGHT = "How it is evened out with the others in a stitched view; accepted calibrations find it and keep it steady."
 
 
@@ -150,6 +152,9 @@ class VenueIn(_Place):
     schedule: Schedule | None = None
     webhooks: Webhooks = Field([])
     view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
+    warnings: list[str] = Field(
+        [], exclude=True, description="Ignored: so that what answers a PUT can be put again as it is."
+    )
 
     @model_validator(mode="after")
     def _can_be_fetched(self) -> Self:
@@ -177,7 +182,8 @@ class VenueIn(_Place):
             Camera(**dict(c) | {"pose": Pose.of(c.pose), "source": c.source and without_credentials(c.source)[0]})
             for c in self.cameras
         ]
-        return Venue(**dict(self) | {"cameras": cameras})
+        parts = {name: value for name, value in self if name != "warnings"}
+        return Venue(**parts | {"cameras": cameras})
 
 
 class Venue(_Place):
@@ -200,6 +206,16 @@ class Venue(_Place):
     def lights(self) -> dict[str, Light]:
         """How cameras are evened out with the others, by the ids of those of which it is known."""
         return {camera.id: camera.light for camera in self.cameras if camera.light is not None}
+
+    @property
+    def lens_warnings(self) -> list[str]:
+        """A line for each camera whose lens is taken to be well known because nobody said how well it is."""
+        return [
+            f"camera {camera.id}: its lens has no sigma and is taken to be as sure as a good board leaves it, "
+            f"{BOARD_FOCAL_PERCENT:g} % of the focal length"
+            for camera in self.cameras
+            if not camera.intrinsics.sigma
+        ]
 
     @property
     def standing(self) -> list[PosedCamera]:
@@ -231,6 +247,26 @@ class Venue(_Place):
     def films_like(self, other: Venue) -> bool:
         """Whether frames of the one are frames of the other: same pitch and lenses, wherever the cameras stand."""
         return self.calibrates_like(other.with_poses(self.poses))
+
+
+class ChangedVenue(Venue):
+    """A venue as it was put or patched, with what it leaves to be assumed."""
+
+    warnings: list[str] = Field(
+        [],
+        description="Of lenses without a `sigma`. Not kept: GET does not show it, and PUT takes it and ignores it.",
+        examples=[
+            [
+                "camera west: its lens has no sigma and is taken to be as sure as a good board leaves it, "
+                "0.03 % of the focal length"
+            ]
+        ],
+    )
+
+    @classmethod
+    def of(cls, venue: Venue) -> ChangedVenue:
+        """The answer to whoever changed a venue."""
+        return cls(**dict(venue), warnings=venue.lens_warnings)
 
 
 class Venues(Wire):

@@ -29,8 +29,8 @@ def fail(kind: str, detail: str, camera: str | None = None) -> None:
     say(error={"type": f"/problems/{kind}", "title": "", "detail": detail, "camera": camera})
 
 
-def done(result: dict, pictures: list[str]) -> None:
-    say(result=result, pictures=dict.fromkeys(pictures, len(JPEG)))
+def done(result: dict, pictures: list[str], memories: dict | None = None) -> None:
+    say(result=result, pictures=dict.fromkeys(pictures, len(JPEG)), memories=memories or {})
     sys.stdout.buffer.write(JPEG * len(pictures))
     sys.stdout.flush()
 
@@ -65,6 +65,7 @@ def main() -> None:
         fail("no-pose", "This program only moves cameras.")
         return
     cameras = task["venue"]["cameras"]
+    memories = remembered(task, [camera["id"] for camera in cameras]) if behaviour == "refine" else {}
     pictures = ["preview", "birdseye", *(f"overlay_{camera['id']}" for camera in cameras)]
     if behaviour == "reject":
         pictures.remove("preview")
@@ -73,7 +74,10 @@ def main() -> None:
     common = {
         "accepted": everyone,
         "rejected_because": None if everyone else "the lines do not fit",
-        "cameras": [found(camera, accepted=number < good) for number, camera in enumerate(cameras)],
+        "cameras": [
+            found(camera, accepted=number < good) | (refined(camera, memories) if behaviour == "refine" else {})
+            for number, camera in enumerate(cameras)
+        ],
         "stitch_error_px": 0.2,
         "timings_s": {"decode": 0.1},
         "provenance": {
@@ -96,7 +100,44 @@ def main() -> None:
                 "generations": 10,
             },
             pictures,
+            memories,
         )
+
+
+def remembered(task: dict, cameras: list[str]) -> dict:
+    """What each camera remembers: how many jobs it was in, and when its frames of the last one were taken."""
+    return {
+        camera: {"jobs": task["memories"].get(camera, {"jobs": 0})["jobs"] + 1, "last": task["taken_at"]}
+        for camera in cameras
+    }
+
+
+def refined(camera: dict, memories: dict) -> dict:
+    """A focal length that is a tenth of a per cent longer, 2 cm above the answer, and what the memory says of it."""
+    (fx, skew, cx), (_, fy, cy), last = camera["intrinsics"]["matrix"]
+    pose = found(camera, accepted=True)["pose"]
+    x, y, z = pose["position"]
+    return {
+        "refined": {
+            "pose": {"rotation": pose["rotation"], "position": [x, y, z + 0.02], "translation": pose["translation"]},
+            "intrinsics": {
+                "matrix": [[1.001 * fx, skew, cx], [0, 1.001 * fy, cy], last],
+                "distortion": [0, 0, 0, 0],
+                "sigma": {"fx": 0.01},
+            },
+            "covariance": None,
+            "sigma": None,
+            "longer": 0.001,
+            "differs_m": 0.034,
+        },
+        "lens_change": {
+            "longer": 0.006,
+            "sigma": 0.001,
+            "since": "2026-11-03T02:00:00Z",
+            "words": "focal length 0.6 ± 0.1 % longer than on 3 November: zoom ring or focus",
+        },
+        "nights": memories[camera["id"]]["jobs"],
+    }
 
 
 def found(camera: dict, *, accepted: bool) -> dict:

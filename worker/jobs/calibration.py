@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
-from types import MappingProxyType
+from dataclasses import dataclass, field, fields
+from datetime import datetime
+from typing import Any
 
 from service.wire.job import Progress
 from service.wire.options import Options
@@ -13,16 +14,37 @@ from service.wire.venue import Venue
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
 from worker.calibration.judge.quality import Gate
+from worker.calibration.memory.camera_memory import CameraMemory, fitting
+from worker.calibration.scene.field import Field
 from worker.calibration.see.view import UsualView
 from worker.calibration.stitch.light import Light
 from worker.jobs import from_frames
 from worker.jobs.from_frames import Drawn, Given
+from worker.jobs.nights import memories_of, wire_lens_change, wire_refined
 from worker.jobs.pictures import Scene, draw, masks
 from worker.jobs.reading import light_of
 from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens, wire_light, wire_pair
 from worker.message import Means
 
-NO_VIEWS: Mapping[str, View] = MappingProxyType({})
+
+@dataclass(frozen=True)
+class Nights:
+    """What is known of the nights before a job, by camera, and when its frames were taken.
+
+    `last_views`: what the frames of the last accepted calibration were like; `memories`: as the engine wrote them.
+    """
+
+    last_views: Mapping[str, View] = field(default_factory=dict)
+    memories: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    taken_at: datetime | None = None
+
+    @property
+    def usual(self) -> dict[str, UsualView]:
+        """The views, for the engine."""
+        return {camera: UsualView(view.lines_found, view.blur_px) for camera, view in self.last_views.items()}
+
+
+FIRST_NIGHT = Nights()
 
 
 def solve(
@@ -31,11 +53,11 @@ def solve(
     options: Options,
     means: Means,
     report: Callable[[Progress], None],
-    last_views: Mapping[str, View] = NO_VIEWS,
+    nights: Nights = FIRST_NIGHT,
 ) -> Solution[Result]:
-    """Calibrate a venue from the files of its cameras; `last_views`: those of its last accepted calibration."""
+    """Calibrate a venue from the files of its cameras, by what is known of its `nights`."""
     asked = _engine_options(venue, options)
-    usual = {camera: UsualView(view.lines_found, view.blur_px) for camera, view in last_views.items()}
+    memories = memories_of(nights.memories)
     return from_frames.solve(
         venue,
         files,
@@ -43,10 +65,21 @@ def solve(
         means,
         report,
         lambda given, step: calibrate(
-            given.pitch, given.cameras, given.frames, given.network, asked, step, usual=usual
+            given.pitch,
+            given.cameras,
+            given.frames,
+            given.network,
+            asked,
+            step,
+            usual=nights.usual,
+            memories=memories,
+            taken_at=nights.taken_at,
         ),
         lambda given, found: _drawn(venue, given, found, options),
-        lambda found, spent, provenance: _allowed(venue, options, _result(venue, found, options, spent, provenance)),
+        lambda found, spent, provenance: _allowed(
+            venue, options, _result(venue, found, options, spent, provenance, memories, nights.taken_at)
+        ),
+        lambda found: {camera: memory.to_json() for camera, memory in found.memories.items()},
     )
 
 
@@ -79,8 +112,15 @@ def _engine_options(venue: Venue, options: Options) -> engine.Options:
 
 
 def _result(
-    venue: Venue, found: engine.Calibration, options: Options, spent: engine.Spent, provenance: Provenance
+    venue: Venue,
+    found: engine.Calibration,
+    options: Options,
+    spent: engine.Spent,
+    provenance: Provenance,
+    memories: Mapping[str, CameraMemory],
+    taken_at: datetime | None,
 ) -> Result:
+    remembered = memories if options.dry_run else {**memories, **found.memories}
     ridge = found.pitch.ridge
     lights = {camera: wire_light(light) for camera, light in _steadied(venue, found).items()}
     return Result(
@@ -92,11 +132,18 @@ def _result(
                 camera,
                 wire_lens(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
                 lights.get(camera.camera.id),
+            ).model_copy(
+                update={
+                    "refined": wire_refined(found.pitch, camera),
+                    "lens_change": wire_lens_change(camera, taken_at),
+                    "nights": _nights(found.pitch, remembered.get(camera.camera.id)),
+                }
             )
             for camera in found.cameras
         ],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
         diagnosis=[Suspicion(**vars(suspicion)) for suspicion in found.suspicions],
+        warnings=venue.lens_warnings,
         stitch_error_px=number(found.stitch_error_px),
         stitch_error_before_px=number(found.stitch_error_before_px),
         stitch_error_limit_px=Gate().largest_stitch_error_px,
@@ -108,6 +155,12 @@ def _result(
         cpu_s=to_the_millisecond(spent.core_seconds),
         provenance=provenance,
     )
+
+
+def _nights(pitch: Field, memory: CameraMemory | None) -> int:
+    """How many jobs a memory is of; one of another field is none."""
+    (fits,) = fitting([memory], pitch.line_points())
+    return 0 if fits is None else fits.jobs
 
 
 def _allowed(venue: Venue, options: Options, result: Result) -> Result:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -77,10 +77,11 @@ def solve(
     engine: Callable[[Given, Callable[[records.Progress], None]], A],
     draw: Callable[[Given, A], Drawn],
     tell: Callable[[A, Spent, Provenance], R],
+    remember: Callable[[A], Mapping[str, dict[str, Any]]] = lambda _: {},
 ) -> Solution[R]:
     """Call the `engine` with what a venue and the files of its cameras hold, `draw` its answer and `tell` it.
 
-    With or without a server around it.
+    `remember`: the memories that the answer leaves, by camera. With or without a server around it.
     """
     segmenter = segmenter_of(means)
     cv2.setNumThreads(means.threads)
@@ -97,4 +98,5 @@ def solve(
     spent.add(answer.spent)
     with spent.measuring("preview"):
         drawn = draw(given, answer)
-    return Solution(tell(answer, spent, provenance_of(segmenter, options)), drawn.pictures, drawn.later)
+    result = tell(answer, spent, provenance_of(segmenter, options))
+    return Solution(result, drawn.pictures, drawn.later, remember(answer))

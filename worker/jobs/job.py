@@ -40,9 +40,8 @@ def main() -> None:
         parent.told(Message(error=failure.error))
         return
     sizes = {name: len(picture) for name, picture in solution.pictures.items()}
-    parent.told(
-        Message(result=solution.result, pictures=sizes, later=list(solution.later)), *solution.pictures.values()
-    )
+    last = Message(result=solution.result, pictures=sizes, later=list(solution.later), memories=dict(solution.memories))
+    parent.told(last, *solution.pictures.values())
 
 
 def _compute(
@@ -70,7 +69,8 @@ def _compute(
             from worker.jobs import calibration
 
             assert task.venue is not None
-            return calibration.solve(task.venue, files, options, means, report, task.last_views)
+            nights = calibration.Nights(task.last_views, task.memories, task.taken_at)
+            return calibration.solve(task.venue, files, options, means, report, nights)
 
 
 class Parent(logging.Handler):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from math import isfinite, isnan
 from typing import Any, Generic, TypeVar
@@ -46,12 +46,13 @@ R = TypeVar("R", bound=AnyResult, covariant=True)
 class Solution(Generic[R]):
     """A result and the files of its pictures, by the names that `service.store.jobs.files.picture_file` knows.
 
-    `later`: the names of those that can be drawn when somebody looks.
+    `later`: the names of those that can be drawn when somebody looks; `memories`: of the accepted cameras, by camera.
     """
 
     result: R
     pictures: dict[str, bytes]
     later: Sequence[str] = ()
+    memories: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
 
 def provenance_of(segmenter: Segmenter, options: Options | FieldOptions) -> Provenance:
@@ -133,8 +134,8 @@ def wire_camera(
         refusal=None if found.refusal is None else refusal_of(found.refusal.reason),
         pose=wire_pose(found.camera.pose),
         intrinsics=lens,
-        sigma=_sigma(found.sigma),
-        repeatability=_sigma(found.repeatability),
+        sigma=wire_sigma(found.sigma),
+        repeatability=wire_sigma(found.repeatability),
         moved=Moved(
             rotation_deg=found.moved.rotation_deg,
             position_m=found.moved.position_m,
@@ -199,7 +200,8 @@ def _view(found: ViewCondition) -> View:
     )
 
 
-def _sigma(sigma: uncertainty.Sigma | None) -> Sigma | None:
+def wire_sigma(sigma: uncertainty.Sigma | None) -> Sigma | None:
+    """A standard deviation of the engine for the wire; None where a pose is not determined."""
     if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
         return None
     return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)

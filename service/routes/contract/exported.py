@@ -14,8 +14,10 @@ from service.formats.lens import Shot
 from service.formats.table import formats
 from service.routes.contract.documented import BINARY, headers
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
-from service.wire.names import ID_PATTERN, FormatName
+from service.store.refined import with_refined
+from service.wire.names import ID_PATTERN, FormatName, LensChoice
 from service.wire.problems import Problem
+from service.wire.results import Refined
 from service.wire.venue import Venue
 
 # Of `responses=`: what a document can be.
@@ -36,12 +38,21 @@ class Wanted:
     """Which part of a document a caller asks for, and which he has."""
 
     camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None
+    lens: Annotated[
+        LensChoice,
+        Query(
+            description="`stored`: the poses for the lenses that the venue has. `refined`: poses and lenses as the "
+            "lines have both, for whoever measures in the world."
+        ),
+    ] = "stored"
     if_none_match: IfNoneMatch = None
 
 
 def exported(context: Context, venue: Venue, called: str, form: FormatName, wanted: Wanted) -> Response:
     """The poses of a venue as a file whose name begins with `called`."""
     shots = _shots(venue, wanted.camera)
+    if wanted.lens == "refined":
+        called = f"{called}-refined"
     # What the document is made of names it: one that the caller has is not computed again.
     made_of: list[Any] = [form, context.settings.freed_axes, version("esc-calibration")]
     made_of += [[shot.number, shot.camera.model_dump(mode="json")] for shot in shots]
@@ -53,6 +64,22 @@ def exported(context: Context, venue: Venue, called: str, form: FormatName, want
         return Response(written.content, headers=head, media_type=written.media_type)
 
     return unless_known(json.dumps(made_of).encode(), wanted.if_none_match, document)
+
+
+def refined_venue(venue: Venue, refined: dict[str, Refined], camera: str | None, why_none: str) -> Venue:
+    """A venue with refined poses and lenses, of one camera or of all; a `Problem` where one that is asked for has none.
+
+    `why_none`: what the problem says about that.
+    """
+    lacking = [shot.id for shot in _shots(venue, camera) if shot.id not in refined]
+    if lacking:
+        raise no_refined_pose(lacking[0], f"{why_none} Or ask for lens=stored.")
+    return with_refined(venue, refined)
+
+
+def no_refined_pose(camera: str, why: str) -> Problem:
+    """The same answer wherever a refined pose is asked for."""
+    return Problem("refined-not-found", f"Camera {camera} has none: {why}", camera=camera)
 
 
 def _shots(venue: Venue, camera: str | None) -> list[Shot]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import uuid
 from collections.abc import Sequence
 from datetime import timedelta
+from types import MappingProxyType
 
 import sqlalchemy as sa
 
@@ -20,6 +21,7 @@ from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.jobs.ending import Still, changed, end, still_open
 from service.store.jobs.reading import ONE, asked
 from service.store.jobs.task import Task
+from service.store.memories import Memories, newest_memories
 from service.store.venues import find_venue, let_hold, venue_lock
 from service.wire.job import JobError, Progress
 from service.wire.names import OPEN
@@ -27,6 +29,7 @@ from service.wire.options import Options
 from service.wire.results import AnyResult, Result
 from service.wire.venue import Venue
 
+NO_MEMORIES: Memories = MappingProxyType({})
 DONE = Progress(stage="preview", fraction=1.0)
 j = tables.jobs.c
 
@@ -55,7 +58,15 @@ class Attempts(Repository):
             row = connection.execute(ONE, {"job_id": job_id}).one()
             job = asked(row)
             last_views = views_of(connection, row.venue) if row.venue else {}
-            return Task(**job, run_token=row.run_token, attempt=row.attempt, last_views=last_views)
+            memories = newest_memories(connection, row.venue) if row.kind == "calibration" else {}
+            return Task(
+                **job,
+                run_token=row.run_token,
+                attempt=row.attempt,
+                last_views=last_views,
+                memories=dict(memories),
+                taken_at=row.created_at,
+            )
 
     def holds(self, task: Task) -> bool:
         """Whether the job is still this attempt's; False if it has lost it, to a cancellation or to another attempt."""
@@ -74,10 +85,11 @@ class Attempts(Repository):
             shown = {"progress": progress.model_dump(), **changed(clock(connection))}
             connection.execute(sa.update(tables.jobs).where(*_fence(task)).values(**shown))
 
-    def finish(self, task: Task, result: AnyResult, pictures: Sequence[str]) -> None:
+    def finish(self, task: Task, result: AnyResult, pictures: Sequence[str], memories: Memories = NO_MEMORIES) -> None:
         """End a job with a result and the names of its pictures.
 
-        If it is that of a calibration, the poses that are accepted become the stored ones in the same transaction.
+        If it is that of a calibration, the poses that are accepted become the stored ones in the same transaction, and
+        `memories` those of their cameras.
         """
         with writing(self._engine) as connection:
             if task.venue is not None:
@@ -85,7 +97,7 @@ class Attempts(Repository):
             if not _locked(connection, _fence(task)):
                 return
             if isinstance(result, Result):
-                result = _move_poses(connection, task, result)
+                result = _move_poses(connection, task, result, memories)
             end(
                 connection,
                 task.job_id,
@@ -123,8 +135,9 @@ def _locked(connection: sa.Connection, still: Still) -> bool:
     return connection.scalar(sa.select(j.id).where(*still).with_for_update()) is not None
 
 
-def _move_poses(connection: sa.Connection, task: Task, result: Result) -> Result:
-    """Let the poses hold that are accepted, and note what the result says about the venue.
+def _move_poses(connection: sa.Connection, task: Task, result: Result, memories: Memories) -> Result:
+    """Let the poses hold that are accepted with the memories of their cameras, and note what the result says about the
+    venue.
 
     Gives the result with what the venue has to say about that.
     """
@@ -139,7 +152,9 @@ def _move_poses(connection: sa.Connection, task: Task, result: Result) -> Result
     note_quality(connection, task.venue.id, result, moved=bool(held))
     if held:
         note_missed(connection, task.venue.id, now_stored.poses.keys() - held)
-        let_hold(connection, now_stored, result, held, "calibrated", task.job_id)
+        with_this_job = {camera: memory for camera, memory in memories.items() if camera in held}
+        known = {**newest_memories(connection, task.venue.id), **with_this_job}
+        let_hold(connection, now_stored, result, held, "calibrated", task.job_id, known)
     elif not task.options.dry_run:
         _miss(connection, now_stored)
     return result

@@ -12,6 +12,7 @@ from service.store.counts.figures import note_quality
 from service.store.engine import Repository, clock, serialise, writing
 from service.store.jobs.ending import changed, end, still_open
 from service.store.jobs.reading import found_poses
+from service.store.memories import Memories, newest_memories
 from service.store.revisions import TAKEN, newest_revision, revision_before, revision_of_job
 from service.store.venues import find_venue, let_hold, put_back, venue_lock, with_result
 from service.wire.history import Revision
@@ -60,7 +61,10 @@ class Decisions(Repository):
             if now_stored is None or not untouched(now_stored, began_with, result):
                 raise MovedOn(newest)
             note_quality(connection, began_with.id, result, moved=True)
-            let_hold(connection, now_stored, result, chosen, "accepted", job_id)
+            memories = newest_memories(connection, began_with.id)
+            let_hold(
+                connection, now_stored, result, chosen, "accepted", job_id, _without_refused(memories, result, chosen)
+            )
             _touch(connection, job_id)
 
     def reject(self, job_id: str) -> None:
@@ -72,7 +76,7 @@ class Decisions(Repository):
             began_with, _, newest = _found(connection, job_id)
             if newest is None or revision_of_job(connection, job_id) is None:
                 return
-            if newest.job != job_id:
+            if newest.job != job_id or newest.cause == "adopted":
                 raise MovedOn(newest)
             if newest.cause in TAKEN:
                 now_stored = find_venue(connection, began_with.id)
@@ -107,6 +111,15 @@ def _lies_between(now_stored: Venue, began_with: Venue, result: Result) -> bool:
             now in ways for now, *ways in zip(now_stored.standing, began_with.standing, found.standing, strict=True)
         )
     )
+
+
+def _without_refused(memories: Memories, result: Result, chosen: Collection[str]) -> Memories:
+    """The memories but for those of chosen cameras whose poses the gate refused.
+
+    Somebody says that these stand otherwise than their nights have it: the next job begins their memories anew.
+    """
+    anew = set(chosen) - set(result.accepted_cameras)
+    return {camera: memory for camera, memory in memories.items() if camera not in anew}
 
 
 def _touch(connection: sa.Connection, job_id: str) -> None:

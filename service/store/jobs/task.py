@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
@@ -79,6 +80,10 @@ class Task(Asked):
     attempt: int = 1
     # By camera: what the frames of the venue's last accepted calibration were like.
     last_views: dict[str, View] = {}
+    # By camera: what the engine keeps of its earlier nights.
+    memories: dict[str, dict[str, Any]] = {}
+    # When the frames were taken; nobody says so yet, and they are taken to be as old as their upload.
+    taken_at: datetime | None = None
 
     def without_addresses(self) -> Task:
         """The same but for who is told of it: to compute it nobody need know, and the addresses may be secrets."""

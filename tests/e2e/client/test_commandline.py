@@ -404,3 +404,25 @@ def test_a_worker_alone_serves_an_api_alone(start):
     worker.send_signal(signal.SIGTERM)
     assert worker.wait(30) == 0
     wait_for(lambda: service.http.get("/readyz").status_code == 503)
+
+
+def test_refined_poses_are_exported_and_stored_by_name(service, esc, name):
+    job = service.calibrated(service.venue(name, "refine"))
+    refined = job["result"]["cameras"][0]["refined"]
+    for command in (("venue", "poses", name), ("job", "poses", job["id"])):
+        exported = json.loads(esc(*command, "--lens", "refined").stdout)
+        assert exported["cameras"][0]["pose"] == refined["pose"]
+        assert json.loads(esc(*command).stdout)["cameras"][0]["pose"] == job["result"]["cameras"][0]["pose"]
+    stored = json.loads(esc("venue", "adopt", name, "left").stdout)
+    assert stored["cameras"][0]["pose"] == refined["pose"]
+    history = esc("venue", "history", name, "--limit", "1").stdout.split()
+    assert history[2:4] == ["adopted", job["id"]]
+    none = esc("venue", "adopt", name, "middle")
+    assert (none.returncode, "left, right" in none.stderr) == (1, True)
+
+
+def test_a_lens_without_a_sigma_is_told_beside_the_venue(service, esc, name, tmp_path):
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name)))
+    put = esc("venue", "put", str(tmp_path / "venue.json"))
+    assert put.stderr.count("its lens has no sigma") == 2
+    assert "warnings" not in json.loads(put.stdout)

@@ -132,6 +132,7 @@ ROWS = {
         }
         for number, cause, job, pose in ((1, "put", None, FIRST_POSE), (2, "calibrated", DONE, VENUE.cameras[0].pose))
     ],
+    "memories": [{"venue": VENUE.id, "revision": 2, "document": {"left": {"format": 1}}}],
     "venue_quality": [{"venue": VENUE.id, "stitch_error_px": 0.2, "moved_px": 2.0, "accepted_at": NOON}],
 }
 
@@ -185,6 +186,8 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(upgraded, revis
     task = stores.attempts.begin(WAITING)
     assert (task.venue, task.options.seed, task.frames) == (VENUE, 7, FRAMES)
     assert task.origin.request_id == "van-3"
+    # A release without memories leaves none, and its jobs begin them.
+    assert (task.memories, task.taken_at) == ({} if revision == "0001" else {"left": {"format": 1}}, NOON)
     assert stores.workers.silent(0) == ["w"]
     (key,) = stores.keys.all()
     assert (key.name, key.scope, key.last_used_at) == ("cron", "calibrate", NOON)
@@ -281,7 +284,7 @@ def test_a_database_from_before_the_first_release_is_told_and_left_alone(home, t
             "INSERT INTO alembic_version VALUES ('0001')",
         ):
             connection.exec_driver_sql(statement)
-    with pytest.raises(UnsupportedDatabase, match=r"development version .* begins with schema 0001 .* new place"):
+    with pytest.raises(UnsupportedDatabase, match=r"development version .* begins with schema 0002 .* new place"):
         migrate(engine)
     assert sorted(sa.inspect(engine).get_table_names()) == ["alembic_version", "jobs"]
     engine.dispose()
@@ -291,5 +294,5 @@ def test_a_database_from_before_the_first_release_is_told_and_left_alone(home, t
 def test_a_database_that_a_newer_version_has_upgraded_is_told(engine):
     with writing(engine) as connection:
         connection.exec_driver_sql(f"UPDATE {SCHEMA_TABLE} SET version_num = '0999'")
-    with pytest.raises(UnsupportedDatabase, match=r"has schema 0999, .* knows none after 0001: .* restore the backup"):
+    with pytest.raises(UnsupportedDatabase, match=r"has schema 0999, .* knows none after 0002: .* restore the backup"):
         migrate(engine)

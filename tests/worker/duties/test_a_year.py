@@ -96,8 +96,11 @@ class Year:
         files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
         task = self.home.attempts.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
         before = self.home.venues.get("v").cameras
-        found = calibration.solve(task.venue, files, task.options, Means.of(self.home.settings), lambda _: None)
-        self.home.attempts.finish(task, found.result, [])
+        nights = calibration.Nights(task.last_views, task.memories, task.taken_at)
+        means = Means.of(self.home.settings)
+        found = calibration.solve(task.venue, files, task.options, means, lambda _: None, nights)
+        self.home.attempts.finish(task, found.result, [], found.memories)
+        self.last = found.result
         if not found.result.accepted:
             self.rejected[called] = found.result.rejected_because
         now = self.home.venues.get("v").cameras
@@ -136,6 +139,26 @@ def exchanged(of: Camera) -> Camera:
     matrix = longer.matrix.copy()
     matrix[:2, 2] = of.intrinsics.matrix[:2, 2]
     return Camera(of.id, Intrinsics(matrix, of.intrinsics.distortion, SIZE), of.pose)
+
+
+def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(stock, monkeypatch):
+    monkeypatch.setattr(calibration, "draw", lambda *_: {})
+    year = Year(stock)
+    for night in range(3):
+        year.pass_(1)
+        assert year.day(f"night {night}", year.frames())
+        assert [one.nights for one in year.last.cameras] == [night + 1] * 2
+    assert [one.lens_change is None for one in year.last.cameras] == [False] * 2
+    for refined in (one.refined for one in year.last.cameras):
+        assert np.shape(refined.covariance) == (12, 12)
+        # The lens is the one that it is said to be.
+        assert abs(refined.longer) < 0.005
+        assert refined.differs_m < 0.5
+    adopted = stock.refined.adopt("v", "left", anyway)
+    assert adopted.cameras[0].pose == year.last.cameras[0].refined.pose
+    year.pass_(1)
+    assert year.day("the night after", year.frames())
+    assert [one.nights for one in year.last.cameras] == [4, 4]
 
 
 @pytest.mark.long

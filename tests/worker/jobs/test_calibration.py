@@ -1,6 +1,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import cv2
 import numpy as np
@@ -20,12 +21,15 @@ from worker.calibration.finish.uncertainty import Sigma
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.judge.overlap import Overlap
 from worker.calibration.judge.quality import CameraResult, Movement, Refusal
+from worker.calibration.memory.camera_memory import CameraMemory, fingerprint
+from worker.calibration.memory.epoch import Epoch
 from worker.calibration.scene.camera import Pose
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
 from worker.calibration.settle import METHODS
 from worker.calibration.stitch.light import Light
 from worker.jobs import calibration, pictures, reading, wire
+from worker.jobs.calibration import Nights
 from worker.message import Means, Message
 
 SIZE = (320, 180)
@@ -64,8 +68,9 @@ def asked(monkeypatch):
     """
     asked = {"against": {}}
 
-    def calibrate(pitch, cameras, frames, segment, options, report, usual):
+    def calibrate(pitch, cameras, frames, segment, options, report, usual, memories, taken_at):
         asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options, usual=usual)
+        asked.update(memories=memories, taken_at=taken_at)
         for several in frames.values():
             for frame in several:
                 segment(frame, [])
@@ -95,9 +100,8 @@ def asked(monkeypatch):
         doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
         found = pitch.flat() if options.flat else pitch.raised(asked.get("raised", 0.0))
-        return engine.Calibration(
-            found, results, against, 0.2, spent, None, 0.1, 3, [doubt], "near", asked.get("lights", {})
-        )
+        lights, after = asked.get("lights", {}), asked.get("after", {})
+        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, [doubt], "near", lights, after)
 
     class Segmenter:
         sha256 = "f" * 64
@@ -127,7 +131,7 @@ def means(tmp_path):
 
 def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, means):
     last = {"left": View(usable=True, detail="", lines_found=0.9, blur_px=None)}
-    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, last)
+    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, Nights(last))
     assert asked["usual"] == {"left": UsualView(0.9, None)}
     assert outcome.result.cameras[0].view.lines_found == 0.8
 
@@ -366,3 +370,37 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, mea
     outcome = calibration.solve(venue, files, Options(seed=1, pictures=True), means, lambda _: None)
     assert {"birdseye", "overlay_left", "overlay_right"} <= set(outcome.pictures)
     assert not {"preview", "preview_before"} & set(outcome.pictures)
+
+
+def memory_of(camera):
+    """A memory of one job, in which the camera was found where it is stored and measured nothing."""
+    nothing = np.zeros(0)
+    epoch = Epoch(reading.camera_of(camera), nothing.astype(int), nothing, nothing, 1, None, None)
+    return CameraMemory(reading.camera_of(camera), epoch, None, (), "another field")
+
+
+def test_memories_reach_the_engine_and_those_that_it_leaves_come_back(venue, files, asked, means):
+    left = venue.cameras[0]
+    asked["after"] = {"left": memory_of(left)}
+    before = {"left": memory_of(left).to_json(), "right": {"format": 0}}
+    at = datetime(2026, 11, 23, 2, tzinfo=UTC)
+    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, Nights({}, before, at))
+    assert (asked["taken_at"], list(asked["memories"])) == (at, ["left"])
+    assert asked["memories"]["left"].to_json() == before["left"]
+    assert outcome.memories == {"left": memory_of(left).to_json()}
+    # Of another field they are no nights of this one.
+    assert [camera.nights for camera in outcome.result.cameras] == [0, 0]
+
+
+def test_the_nights_of_a_camera_are_counted(venue, files, asked, means):
+    fits = fingerprint(reading.pitch_of(venue.field).line_points())
+    asked["after"] = {"left": replace(memory_of(venue.cameras[0]), lines=fits)}
+    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None)
+    assert [camera.nights for camera in outcome.result.cameras] == [1, 0]
+    dry = calibration.solve(venue, files, Options(seed=7, dry_run=True), means, lambda _: None)
+    assert [camera.nights for camera in dry.result.cameras] == [0, 0]
+
+
+def test_an_answer_says_which_lenses_are_taken_to_be_well_known(venue, files, asked, means):
+    warnings = calibration.solve(venue, files, Options(seed=7), means, lambda _: None).result.warnings
+    assert [warning.split(":")[0] for warning in warnings] == ["camera left", "camera right"]

@@ -1,0 +1,71 @@
+"""The memories of the cameras of venues: what earlier nights measured, kept beside the revisions. All SQL about them.
+
+The engine writes and reads a memory; to the service it is a JSON object. The memories of a venue are one document,
+camera id to memory, and a row belongs to the revision with which the document came, so that undoing a revision takes
+its nights back too. A venue without a row has no memories yet, as one of an earlier release.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import sqlalchemy as sa
+import structlog
+
+from service.store import tables
+from service.wire.venue import Venue
+
+# A memory as the engine has written it; and those of a venue, by camera.
+Memory = dict[str, Any]
+Memories = Mapping[str, Memory]
+# Documents of a venue that are kept, the newest: a few revisions can be undone with the nights that they had.
+KEPT = 4
+# As JSON. A dozen cameras that remember as much as they can have this; what is larger is not what the engine writes.
+LARGEST_BYTES = 512 * 1024
+m = tables.memories.c
+log = structlog.get_logger()
+
+
+def newest_memories(connection: sa.Connection, venue_id: str) -> Memories:
+    """The memories that hold now, {} if there are none."""
+    query = sa.select(m.document).where(m.venue == venue_id).order_by(m.revision.desc()).limit(1)
+    return connection.scalar(query) or {}
+
+
+def memories_at(connection: sa.Connection, venue_id: str, revision: int) -> Memories:
+    """The memories that came with a revision, {} if none did or if they are kept no more."""
+    query = sa.select(m.document).where(m.venue == venue_id, m.revision == revision)
+    return connection.scalar(query) or {}
+
+
+def keep_memories(connection: sa.Connection, venue_id: str, revision: int, memories: Memories) -> None:
+    """Let a new revision of a venue have these memories, inside the caller's serialised transaction."""
+    kept = _unless_too_large(venue_id, memories)
+    if not kept and not newest_memories(connection, venue_id):
+        return
+    connection.execute(sa.insert(tables.memories).values(venue=venue_id, revision=revision, document=kept))
+    numbers = sa.select(m.revision).where(m.venue == venue_id).order_by(m.revision.desc()).limit(KEPT)
+    oldest_kept = min(connection.scalars(numbers))
+    connection.execute(sa.delete(tables.memories).where(m.venue == venue_id, m.revision < oldest_kept))
+
+
+def forget_memories(connection: sa.Connection, venue_id: str) -> None:
+    """Drop all memories of a venue, those of its earlier revisions too, inside the caller's serialised transaction."""
+    connection.execute(sa.delete(tables.memories).where(m.venue == venue_id))
+
+
+def without_those_that_changed(memories: Memories, before: Venue, after: Venue) -> Memories:
+    """The memories of the cameras that stand and image in one venue as in another."""
+    stood = {camera.id: camera for camera in before.standing}
+    same = {camera.id for camera in after.standing if stood.get(camera.id) == camera}
+    return {camera: memory for camera, memory in memories.items() if camera in same}
+
+
+def _unless_too_large(venue_id: str, memories: Memories) -> Memories:
+    size = len(json.dumps(memories).encode())
+    if size <= LARGEST_BYTES:
+        return memories
+    log.warning("memories too large, dropped", venue=venue_id, bytes=size, most=LARGEST_BYTES)
+    return {}

@@ -1,0 +1,100 @@
+"""What earlier nights say of a camera, for the wire: its refined pose and lens, and how its focal length has changed.
+
+The pose of a result belongs to the lens that the venue has. The refined one belongs to the lens as the lines have it,
+those of tonight and those of the camera's memory together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+from service.wire import geometry
+from service.wire.results import LensChange, Refined
+from worker.calibration.finish import uncertainty
+from worker.calibration.judge.quality import CameraResult
+from worker.calibration.memory.camera_memory import CameraMemory
+from worker.calibration.scene.camera import Array, Camera
+from worker.calibration.scene.far_marking import far_marking_shift_m
+from worker.calibration.scene.field import Field
+from worker.calibration.scene.motion import POSE_NUMBERS
+from worker.calibration.scene.parameters import LENS_NUMBERS
+from worker.jobs.wire import wire_lens, wire_pose, wire_sigma
+
+SURE = 3.0
+"""Sigmas from which a change of the lens is put into words."""
+WIRE_NAMES = dict(zip(LENS_NUMBERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
+"""What the numbers of a lens are called in `geometry.Intrinsics.sigma`."""
+
+
+def memories_of(told: Mapping[str, Mapping[str, Any]]) -> dict[str, CameraMemory]:
+    """The memories of cameras, as the engine takes them, but for those that another release wrote otherwise."""
+    read = {camera: CameraMemory.from_json(memory) for camera, memory in told.items()}
+    return {camera: memory for camera, memory in read.items() if memory is not None}
+
+
+def wire_refined(pitch: Field, found: CameraResult) -> Refined | None:
+    """The refined pose and lens of a camera beside its answer; None where it has none."""
+    refined = found.refined
+    if refined is None or not _is_a_camera(refined.camera):
+        return None
+    focal, focal_refined = (one.intrinsics.focal_length_px for one in (found.camera, refined.camera))
+    covariance = refined.covariance if np.isfinite(refined.covariance).all() else None
+    return Refined(
+        pose=wire_pose(refined.camera.pose),
+        intrinsics=wire_lens(refined.camera.intrinsics).model_copy(update={"sigma": _lens_sigma(covariance)}),
+        covariance=None if covariance is None else covariance.tolist(),
+        sigma=wire_sigma(refined.sigma),
+        longer=focal_refined / focal - 1,
+        differs_m=far_marking_shift_m(pitch, found.camera, refined.camera),
+    )
+
+
+def _is_a_camera(camera: Camera) -> bool:
+    """Whether this can be a camera: lines that determine next to nothing can end far outside of all lenses."""
+    lens = camera.intrinsics
+    numbers = np.concatenate([camera.pose.rotation, camera.pose.position, lens.matrix.ravel(), lens.distortion])
+    focal = np.diag(lens.matrix)[:2]
+    bent = np.abs(lens.distortion).max(initial=0.0)
+    return bool(np.isfinite(numbers).all() and (focal > 0).all() and bent <= geometry.LARGEST_COEFFICIENT)
+
+
+def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:
+    """The standard deviations of the numbers of a lens, from the (12, 12) of pose and lens."""
+    if covariance is None:
+        return None
+    sigma = np.sqrt(np.diag(covariance)[POSE_NUMBERS:]).clip(geometry.LEAST_SIGMA, geometry.LARGEST_SIGMA)
+    return dict(zip(WIRE_NAMES.values(), sigma.tolist(), strict=True))
+
+
+def wire_lens_change(found: CameraResult, tonight: datetime | None) -> LensChange | None:
+    """How much longer a focal length is than in the first nights of a memory; None where there is no memory."""
+    change = found.lens_change
+    if change is None or not math.isfinite(change.sigma) or not math.isfinite(change.longer):
+        return None
+    return LensChange(
+        longer=change.longer, sigma=change.sigma, since=change.since, words=lens_change_in_words(change, tonight)
+    )
+
+
+def lens_change_in_words(change: uncertainty.LensChange, tonight: datetime | None) -> str | None:
+    """The change for a person, for instance "focal length 0.6 ± 0.1 % longer than on 3 November: zoom ring or focus".
+
+    None while it may be chance.
+    """
+    if abs(change.longer) < SURE * change.sigma or change.longer == 0:
+        return None
+    places = max(0, -math.floor(math.log10(100 * change.sigma))) if change.sigma > 0 else 2
+    by = f"{100 * abs(change.longer):.{places}f} ± {100 * change.sigma:.{places}f} %"
+    than = f"on {_day(change.since, tonight)}" if change.since else "in its first nights"
+    return f"focal length {by} {'longer' if change.longer > 0 else 'shorter'} than {than}: zoom ring or focus"
+
+
+def _day(moment: datetime, tonight: datetime | None) -> str:
+    """A day without its year, unless that is another one."""
+    day = f"{moment.day} {moment:%B}"
+    return day if tonight is not None and tonight.year == moment.year else f"{day} {moment.year}"
