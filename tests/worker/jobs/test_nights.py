@@ -10,8 +10,9 @@ from service.wire.venue import BOARD_FOCAL_PERCENT
 from worker.calibration.finish.uncertainty import LensChange, Refined
 from worker.calibration.judge.overlap import Overlap
 from worker.calibration.judge.quality import CameraResult, Movement
-from worker.calibration.scene.camera import Camera, Intrinsics, Pose
+from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Intrinsics
 from worker.calibration.scene.parameters import BOARD_FOCAL, with_lens_changed
 from worker.calibration.see.evidence import Evidence
 from worker.calibration.see.view import ViewCondition, ViewFigures

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from worker.calibration.scene.camera import Camera, Intrinsics, Pose
+from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.far_marking import far_marking_shift_m
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import Intrinsics
 from worker.calibration.scene.parameters import with_focal_length
 
 PITCH = Field(105.0, 68.0)
