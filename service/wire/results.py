@@ -11,6 +11,7 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Intrinsics, Light, Moved, Pose, Row
 from service.wire.options import Coordinates, Landmark
 from service.wire.problems import refusal_of
+from service.wire.trend import Displacement
 
 CPU_S: Any = Field(
     {}, description="Core-seconds, of all threads, of the stages that `timings_s` times; {} of earlier releases."
@@ -102,6 +103,9 @@ class CameraResult(Wire):
     )
     view: View | None = None
     markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
+    displacement: Displacement | None = Field(
+        None, description="From the camera's anchor, see `GET /venues/{id}/cameras/{camera}/trend`."
+    )
 
 
 class SeamPlace(Wire):

@@ -27,13 +27,13 @@ def first_told(values, baseline=USUAL, sigma=1.0):
 
 
 def test_nothing_happens_for_most_of_a_year_between_false_alarms():
-    runs = [first_told(noise(seed, 3000)) for seed in range(300)]
+    runs = [first_told(noise(seed, 3000)) for seed in range(120)]
     assert fmean(runs) > 250
 
 
 def test_with_a_baseline_of_twenty_nights_false_alarms_stay_months_apart():
     runs = []
-    for seed in range(300):
+    for seed in range(120):
         values = noise(seed, 3000)
         runs.append(first_told(values[20:], Baseline.of(nights(values))))
     assert median(runs) > 100

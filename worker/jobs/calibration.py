@@ -9,6 +9,7 @@ from types import MappingProxyType
 from service.wire.job import Progress
 from service.wire.options import Options
 from service.wire.results import Provenance, Result, Suspicion, View
+from service.wire.trend import Anchor
 from service.wire.venue import Venue
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
@@ -19,10 +20,20 @@ from worker.jobs import from_frames
 from worker.jobs.from_frames import Drawn, Given
 from worker.jobs.pictures import Scene, draw, masks
 from worker.jobs.reading import light_of
-from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens, wire_light, wire_pair
+from worker.jobs.wire import (
+    Solution,
+    number,
+    to_the_millisecond,
+    wire_camera,
+    wire_displacement,
+    wire_lens,
+    wire_light,
+    wire_pair,
+)
 from worker.message import Means
 
 NO_VIEWS: Mapping[str, View] = MappingProxyType({})
+NO_ANCHORS: Mapping[str, Anchor] = MappingProxyType({})
 
 
 def solve(
@@ -32,8 +43,13 @@ def solve(
     means: Means,
     report: Callable[[Progress], None],
     last_views: Mapping[str, View] = NO_VIEWS,
+    anchors: Mapping[str, Anchor] = NO_ANCHORS,
 ) -> Solution[Result]:
-    """Calibrate a venue from the files of its cameras; `last_views`: those of its last accepted calibration."""
+    """Calibrate a venue from the files of its cameras.
+
+    `last_views`: those of its last accepted calibration; `anchors`: the poses that movement is counted from. Both by
+    camera, of those that have one.
+    """
     asked = _engine_options(venue, options)
     usual = {camera: UsualView(view.lines_found, view.blur_px) for camera, view in last_views.items()}
     return from_frames.solve(
@@ -46,7 +62,9 @@ def solve(
             given.pitch, given.cameras, given.frames, given.network, asked, step, usual=usual
         ),
         lambda given, found: _drawn(venue, given, found, options),
-        lambda found, spent, provenance: _allowed(venue, options, _result(venue, found, options, spent, provenance)),
+        lambda found, spent, provenance: _allowed(
+            venue, options, _result(venue, found, options, spent, provenance, anchors)
+        ),
     )
 
 
@@ -79,7 +97,12 @@ def _engine_options(venue: Venue, options: Options) -> engine.Options:
 
 
 def _result(
-    venue: Venue, found: engine.Calibration, options: Options, spent: engine.Spent, provenance: Provenance
+    venue: Venue,
+    found: engine.Calibration,
+    options: Options,
+    spent: engine.Spent,
+    provenance: Provenance,
+    anchors: Mapping[str, Anchor],
 ) -> Result:
     ridge = found.pitch.ridge
     lights = {camera: wire_light(light) for camera, light in _steadied(venue, found).items()}
@@ -92,6 +115,7 @@ def _result(
                 camera,
                 wire_lens(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
                 lights.get(camera.camera.id),
+                wire_displacement(found.pitch, camera, anchors.get(camera.camera.id)),
             )
             for camera in found.cameras
         ],

@@ -70,7 +70,7 @@ def _compute(
             from worker.jobs import calibration
 
             assert task.venue is not None
-            return calibration.solve(task.venue, files, options, means, report, task.last_views)
+            return calibration.solve(task.venue, files, options, means, report, task.last_views, task.anchors)
 
 
 class Parent(logging.Handler):

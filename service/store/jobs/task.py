@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 from service.wire.names import Kind
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
 from service.wire.results import View
+from service.wire.trend import Anchor
 from service.wire.venue import Venue
 
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
@@ -79,6 +80,8 @@ class Task(Asked):
     attempt: int = 1
     # By camera: what the frames of the venue's last accepted calibration were like.
     last_views: dict[str, View] = {}
+    # By camera: the pose that its movement is counted from, of those that have one.
+    anchors: dict[str, Anchor] = {}
 
     def without_addresses(self) -> Task:
         """The same but for who is told of it: to compute it nobody need know, and the addresses may be secrets."""

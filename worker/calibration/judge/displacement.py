@@ -55,10 +55,11 @@ def displacement(pitch: Field, anchor: Camera, found: CameraResult) -> Displacem
         return None
     axes = sight_axes(anchor, place)
     moved = ground_point(found.camera, anchor.project(place), place[2])
-    if not np.isfinite(moved).all():
-        return None
     slopes = axes @ ground_slopes(anchor, place)
-    sigma = np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+    with np.errstate(invalid="ignore"):
+        sigma = np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+    if not (np.isfinite(moved).all() and np.isfinite(sigma).all()):
+        return None
     return Displacement(
         place,
         axes @ (moved - place)[:2],

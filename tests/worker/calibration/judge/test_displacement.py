@@ -67,9 +67,9 @@ def test_sigma_is_that_of_the_pose_at_that_place():
     root = rng.normal(size=(6, 6)) * np.repeat([2e-5, 3e-3], 3)[:, None]
     covariance = root @ root.T
     stated = displacement(PITCH, ANCHOR, answered([0] * 6, covariance=covariance)).sigma
-    changes = rng.multivariate_normal(np.zeros(6), covariance, size=2000)
+    changes = rng.multivariate_normal(np.zeros(6), covariance, size=300)
     shifts = np.array([displacement(PITCH, ANCHOR, answered(change)).shift for change in changes])
-    assert stated == pytest.approx(shifts.std(axis=0), rel=0.1)
+    assert stated == pytest.approx(shifts.std(axis=0), rel=0.15)
 
 
 def test_repeatability_is_the_stated_part_of_sigma_and_never_more_than_all_of_it():
