@@ -36,11 +36,13 @@ class Night:
 class Baseline:
     """What is usual: the centre of the values, and the `extra` spread that they have beyond what is stated of each.
 
-    `extra` is what wind and heat do, which no single night knows of.
+    `extra` is what wind and heat do, which no single night knows of. `unsure`: one standard deviation of the centre, in
+    those of a night: it is an estimate, and taken for exact it would make charts ring three times as often.
     """
 
     centre: float
     extra: float
+    unsure: float = 0.0
 
     @classmethod
     def of(cls, nights: Sequence[Night]) -> Baseline:
@@ -50,7 +52,7 @@ class Baseline:
         centre = hodges_lehmann(values)
         spread = MAD_TO_SIGMA * median(abs(value - centre) for value in values)
         stated = median(night.sigma for night in first)
-        return cls(centre, math.sqrt(max(spread**2 - stated**2, 0.0)))
+        return cls(centre, math.sqrt(max(spread**2 - stated**2, 0.0)), 1 / math.sqrt(len(first)))
 
     def spread(self, night: Night) -> float:
         """One standard deviation that the value of a night may be off the centre by, never below the stated one."""
@@ -101,14 +103,18 @@ def charted(nights: Iterable[Night | None], baseline: Baseline) -> Iterator[Char
         standardised = (night.value - baseline.centre) / _above_zero(baseline.spread(night))
         ewma += WEIGHT * (standardised - ewma)
         high_since, low_since = number if high == 0 else high_since, number if low == 0 else low_since
-        high, low = max(0.0, high + standardised - SLACK_SIGMA), max(0.0, low - standardised - SLACK_SIGMA)
+        slack = SLACK_SIGMA + baseline.unsure
+        high, low = max(0.0, high + standardised - slack), max(0.0, low - standardised - slack)
         since = None if high == low == 0 else high_since if high >= low else low_since
-        yield ChartPoint(standardised, ewma, ewma_limit(measured), high, low, since)
+        yield ChartPoint(standardised, ewma, ewma_limit(measured, baseline.unsure), high, low, since)
 
 
-def ewma_limit(nights: int) -> float:
-    """How far from 0 an EWMA of independent values of standard deviation 1 may be after so many of them."""
-    return LIMIT_SIGMA * math.sqrt(WEIGHT / (2 - WEIGHT) * (1 - (1 - WEIGHT) ** (2 * nights)))
+def ewma_limit(nights: int, unsure: float = 0.0) -> float:
+    """How far from 0 an EWMA of independent values of standard deviation 1 may be after so many of them.
+
+    `unsure`: the standard deviation of what they are counted from.
+    """
+    return LIMIT_SIGMA * math.sqrt(WEIGHT / (2 - WEIGHT) * (1 - (1 - WEIGHT) ** (2 * nights)) + unsure**2)
 
 
 def hodges_lehmann(values: Sequence[float]) -> float:

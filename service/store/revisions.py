@@ -16,6 +16,7 @@ from service.store import tables
 from service.store.counts.figures import note
 from service.store.engine import clock
 from service.store.told.events import add_event
+from service.store.trends import begin_anchors, go_back
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Movement, PosedCamera
 from service.wire.history import Cause, Revision, RevisionCamera
@@ -42,8 +43,8 @@ def add_revision(
     job: str | None = None,
     restored: Revision | None = None,
     stitch_error_px: float | None = None,
-) -> None:
-    """Write down the state that a venue has from now on, inside the caller's serialised transaction."""
+) -> int:
+    """Write down the state that a venue has now, inside the caller's serialised transaction. Gives its number."""
     before, at = _newest_row(connection, venue.id), clock(connection)
     number = 1 if before is None else before.number + 1
     movements = _movements(connection, venue, number, before, cause, restored)
@@ -61,6 +62,11 @@ def add_revision(
             movements={camera: movement.model_dump() for camera, movement in movements.items()},
         )
     )
+    changed = _changed(venue, _cameras(before))
+    if restored is not None:
+        go_back(connection, venue, restored.revision)
+    elif cause == "put":
+        begin_anchors(connection, venue, changed, number)
     poses = Poses(
         venue=venue.id,
         revision=number,
@@ -69,11 +75,12 @@ def add_revision(
         stitch_error_px=stitch_error_px,
         ridge=venue.field.ridge,
         cameras=[camera.posed for camera in venue.cameras],
-        changed=_changed(venue, _cameras(before)),
+        changed=changed,
     )
     add_event(connection, venue.id, venue.webhooks, "poses.changed", poses, at)
     drifts = [movement.drift.pixels for movement in movements.values() if movement.drift]
     note(connection, venue.id, drift_px=max((drift for drift in drifts if drift is not None), default=None))
+    return number
 
 
 def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None:

@@ -14,6 +14,7 @@ from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.revisions import add_revision, revisions_of, state_at
 from service.store.schedules import plan
 from service.store.told.events import add_venue_event
+from service.store.trends import note_night
 from service.wire.health import VenueHealth
 from service.wire.history import Cause, Revision
 from service.wire.names import OPEN
@@ -21,7 +22,15 @@ from service.wire.results import Result
 from service.wire.venue import Venue
 
 # What goes with a venue.
-OF_VENUES = (tables.revisions, tables.alarms, tables.schedules, tables.credentials, tables.venue_quality)
+OF_VENUES = (
+    tables.revisions,
+    tables.alarms,
+    tables.schedules,
+    tables.credentials,
+    tables.venue_quality,
+    tables.camera_anchors,
+    tables.camera_trend,
+)
 
 
 class Venues(Repository):
@@ -169,7 +178,9 @@ def let_hold(
     found = with_result(venue, result, cameras)
     save_venue(connection, found)
     note_held(connection, venue.id, result, cameras, clock(connection))
-    add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
+    number = add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
+    night = [camera for camera in result.cameras if camera.id in cameras]
+    note_night(connection, found, night, job_id, number, by_hand=cause == "accepted")
     settle_alarms(connection, found)
 
 

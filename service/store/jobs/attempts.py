@@ -20,6 +20,7 @@ from service.store.engine import Repository, clock, reading, serialise, writing
 from service.store.jobs.ending import Still, changed, end, still_open
 from service.store.jobs.reading import ONE, asked
 from service.store.jobs.task import Task
+from service.store.trends import anchors_of
 from service.store.venues import find_venue, let_hold, venue_lock
 from service.wire.job import JobError, Progress
 from service.wire.names import OPEN
@@ -55,7 +56,8 @@ class Attempts(Repository):
             row = connection.execute(ONE, {"job_id": job_id}).one()
             job = asked(row)
             last_views = views_of(connection, row.venue) if row.venue else {}
-            return Task(**job, run_token=row.run_token, attempt=row.attempt, last_views=last_views)
+            anchors = anchors_of(connection, row.venue) if row.venue else {}
+            return Task(**job, run_token=row.run_token, attempt=row.attempt, last_views=last_views, anchors=anchors)
 
     def holds(self, task: Task) -> bool:
         """Whether the job is still this attempt's; False if it has lost it, to a cancellation or to another attempt."""
