@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from datetime import UTC, date, datetime, time
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Depends, Header, Query, Response
+from fastapi import APIRouter, Body, Depends, Header, Path, Query, Response
 from pydantic import ValidationError
 
 from service.api import etags
@@ -23,6 +24,7 @@ from service.wire.merge_patch import MEDIA_TYPE, merged
 from service.wire.names import ID_PATTERN, FormatName
 from service.wire.problems import Problem
 from service.wire.told import callback_urls
+from service.wire.trend import Trend
 from service.wire.venue import PATCH_EXAMPLES, Camera, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
@@ -206,6 +208,29 @@ def venue_history(
     more = len(page) > limit
     shown = History(revisions=page[:limit], next_cursor=page[limit - 1].revision if more else None)
     body = shown.model_dump_json().encode()
+    return unless_known(body, if_none_match, json(body))
+
+
+@router.get(
+    "/{venue_id}/cameras/{camera}/trend",
+    openapi_extra=needs("read"),
+    response_model=Trend,
+    responses=TAGGED | problems(404),
+)
+def camera_trend(
+    venue: ExistingVenue,
+    camera: Annotated[str, Path(pattern=ID_PATTERN)],
+    context: InContext,
+    since: Annotated[date | None, Query(description="The first night to tell, a day of UTC; without it, all.")] = None,
+    if_none_match: IfNoneMatch = None,
+) -> Response:
+    """How a camera has moved since its anchor, night by night, and what control charts (EWMA, CUSUM) say of it.
+
+    In metres on the ground at the farthest marking in view, which a camera on the long side has on the far touchline.
+    """
+    camera_of(venue, camera)
+    first = None if since is None else datetime.combine(since, time.min, UTC)
+    body = context.trends.of(venue, camera, first).model_dump_json().encode()
     return unless_known(body, if_none_match, json(body))
 
 
