@@ -227,11 +227,12 @@ camera_anchors = sa.Table(
     # By quantity: control_charts.Baseline, once it is settled.
     sa.Column("baselines", sa.JSON, nullable=False),
     # What the charts said after the last night, see wire.trend.Trend: whether a mean has moved, by how much at the far
-    # touchline, the largest cumulative sum, and all of it in words.
+    # touchline (null: of an anchor that counts no more, too), the largest cumulative sum, and all of it in words.
     sa.Column("beyond", sa.Boolean, nullable=False),
     sa.Column("moved_m", sa.Double),
     sa.Column("cusum", sa.Double),
     sa.Column("words", sa.String(500), nullable=False),
+    sa.Index("camera_anchors_by_move", "moved_m"),
 )
 
 # How far each accepted job found each camera from its anchor: wire.trend.Displacement, and the sigma of the pose.

@@ -81,6 +81,15 @@ def trends_of(connection: sa.Connection, venue_id: str) -> dict[str, CameraTrend
     }
 
 
+def most_moved(connection: sa.Connection, most: int) -> list[CameraTrend]:
+    """What the charts said last of the cameras that have moved farthest, inside the caller's transaction."""
+    query = sa.select(tables.camera_anchors).where(c.moved_m.is_not(None)).order_by(c.moved_m.desc()).limit(most)
+    return [
+        CameraTrend(row.venue, row.camera, row.beyond, row.moved_m, row.cusum, row.words)
+        for row in connection.execute(query)
+    ]
+
+
 def begin_anchors(connection: sa.Connection, venue: Venue, changed: Collection[str], revision: int) -> None:
     """Somebody has put cameras where they are now: the first pose that is accepted from then on is their anchor."""
     for table in (tables.camera_anchors, tables.camera_trend):
@@ -134,6 +143,8 @@ def note_night(
 
 def _add_anchor(connection: sa.Connection, venue_id: str, camera: str, revision: int) -> None:
     key = {"venue": venue_id, "camera": camera, "revision": revision}
+    those_before = sa.update(tables.camera_anchors).where(c.venue == venue_id, c.camera == camera)
+    connection.execute(those_before.values(moved_m=None))
     connection.execute(sa.insert(tables.camera_anchors).values(**key, **_nothing_said(camera)))
 
 

@@ -24,6 +24,7 @@ def upgrade() -> None:
         sa.Column("cusum", sa.Double),
         sa.Column("words", sa.String(500), nullable=False),
     )
+    op.create_index("camera_anchors_by_move", "camera_anchors", ["moved_m"])
     op.create_table(
         "camera_trend",
         sa.Column("id", sa.Integer, primary_key=True),
