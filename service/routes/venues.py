@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, date, datetime, time
+from datetime import UTC, datetime, time
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Header, Path, Query, Response
@@ -18,6 +18,7 @@ from service.routes.contract.guarded import Guarded
 from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_known
 from service.settings import Settings
 from service.store.revisions import NoSuchRevision, RevisionUnfit
+from service.wire.base import Day
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
 from service.wire.merge_patch import MEDIA_TYPE, merged
@@ -221,7 +222,7 @@ def camera_trend(
     venue: ExistingVenue,
     camera: Annotated[str, Path(pattern=ID_PATTERN)],
     context: InContext,
-    since: Annotated[date | None, Query(description="The first night to tell, a day of UTC; without it, all.")] = None,
+    since: Annotated[Day | None, Query(description="The first night to tell, a day of UTC; without it, all.")] = None,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """How a camera has moved since its anchor, night by night, and what control charts (EWMA, CUSUM) say of it.

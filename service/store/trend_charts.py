@@ -130,9 +130,10 @@ class CameraCharts:
             f"Camera {camera} {' and '.join(told)}: beyond what its own spread explains ({self._which_charts(beyond)})."
         )
 
-    def trend(self, venue: str, camera: str, anchor: int, alarm_m: float) -> Trend:
-        """All of it."""
+    def trend(self, venue: str, camera: str, anchor: int, alarm_m: float, since: datetime | None) -> Trend:
+        """All of it; `since`: without the nights before that."""
         number = len(self.nights) - 1
+        told = [n for n, rows in enumerate(self.nights) if since is None or rows[-1].at >= since]
         return Trend(
             venue=venue,
             camera=camera,
@@ -143,7 +144,7 @@ class CameraCharts:
             alarm_m=alarm_m,
             moved_m=self.moved_m(number),
             baseline_nights=min(number + 1, NIGHTS_OF_BASELINE),
-            points=[self._point(n, alarm_m) for n in range(number + 1)],
+            points=[self._point(n, alarm_m) for n in told],
         )
 
     def _since(self, several: Sequence[Series]) -> str:
@@ -175,7 +176,11 @@ class CameraCharts:
             sigma_position_m=_median(rows, "sigma_position_m"),
             focal_length=_mean(rows, "focal_length"),
             sigma_focal_length=_median(rows, "sigma_focal_length"),
-            charts=[chart for series in self.series if (chart := _chart(series, number)) is not None],
+            charts=[
+                chart
+                for series in self.series
+                if (chart := _chart(series, number, rows[-1].focal_length_m)) is not None
+            ],
             state=self.state(number, alarm_m),
         )
 
@@ -200,15 +205,17 @@ def _night(rows: Rows, value_column: str, sigma_column: str) -> Night | None:
     return None if value is None or sigma is None else Night(value, sigma)
 
 
-def _chart(series: Series, number: int) -> Chart | None:
+def _chart(series: Series, number: int, focal_length_m: float) -> Chart | None:
     night, point = series.nights[number], series.points[number]
     if night is None or point is None:
         return None
     spread = series.baseline.spread(night)
+    mean = point.ewma * spread
     return Chart(
         quantity=series.quantity,
         value=night.value - series.baseline.centre,
-        mean=point.ewma * spread,
+        mean=mean,
+        mean_m=mean * focal_length_m if series.quantity == "focal-length" else mean,
         spread=spread,
         ewma=point.ewma,
         ewma_limit=point.limit,

@@ -52,9 +52,7 @@ class Trends(Repository):
         with reading(self._engine) as connection:
             anchor = _newest_anchors(connection, venue.id).get(camera)
             rows = _rows(connection, venue.id, camera)
-        trend = _trend(venue, camera, anchor, rows)
-        told = [point for point in trend.points if since is None or point.at >= since]
-        return trend.model_copy(update={"points": told})
+        return _trend(venue, camera, anchor, rows, since)
 
 
 def alarm_m_of(venue: Venue) -> float:
@@ -230,11 +228,12 @@ def _trim(connection: sa.Connection, rows: Sequence[Any]) -> None:
     connection.execute(sa.delete(tables.camera_trend).where(t.id.in_([row.id for row in by_worth[:excess]])))
 
 
-def _trend(venue: Venue, camera: str, anchor: Any, rows: Sequence[Any]) -> Trend:
-    since = [row for row in rows if anchor is not None and row.anchor == anchor.revision]
+def _trend(venue: Venue, camera: str, anchor: Any, rows: Sequence[Any], since: datetime | None) -> Trend:
+    counted = [row for row in rows if anchor is not None and row.anchor == anchor.revision]
     alarm_m = alarm_m_of(venue)
-    if since:
-        return CameraCharts.of(since, _baselines(anchor)).trend(venue.id, camera, anchor.revision, alarm_m)
+    if counted:
+        charts = CameraCharts.of(counted, _baselines(anchor))
+        return charts.trend(venue.id, camera, anchor.revision, alarm_m, since)
     return Trend(
         venue=venue.id,
         camera=camera,

@@ -70,6 +70,7 @@ class Chart(Wire):
     quantity: Quantity
     value: float
     mean: float
+    mean_m: float = Field(description="What `mean` amounts to at the far touchline, in metres.")
     spread: float = Field(description="One standard deviation that `value` may have by what is usual.")
     ewma: float = Field(description="Weight 0.2.")
     ewma_limit: float = Field(description="Three standard deviations of the EWMA, as many nights after the anchor.")

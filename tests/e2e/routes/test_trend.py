@@ -46,4 +46,4 @@ def test_what_there_is_no_trend_of_is_said(service, name):
     camera = trend(service, name, "elsewhere")
     assert (camera.status_code, camera.json()["type"]) == (404, "/problems/no-such-camera")
     assert trend(service, "nowhere").status_code == 404
-    assert trend(service, name, since="yesterday").status_code == 422
+    assert [trend(service, name, since=day).status_code for day in ("yesterday", "0", "20261103")] == [422] * 3
