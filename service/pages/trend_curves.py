@@ -13,10 +13,11 @@ from service.wire.trend import Chart, Trend, TrendPoint, TrendState
 WIDTH, HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 520.0, 190.0, 46.0, 10.0, 10.0, 28.0
 LEAST_TOP_CM, LEAST_TOP_PERCENT = 2.0, 0.05
 """What the scale reaches at least, so that harmless noise looks harmless."""
-MOST_LEVELS, MOST_DATES = 5, 5
+MOST_LEVELS, MOST_DATES = 5, 4
 NIGHTS_WITH_DOTS = 130
-"""Of more nights, those alone have a dot that a chart has told."""
-RADII: dict[TrendState, float] = {"quiet": 2.2, "drifting": 3.4, "alarm": 3.8}
+"""Of more nights, those alone have a dot that a chart has told, and a smaller one."""
+RADII: dict[TrendState, float] = {"quiet": 2.2, "drifting": 3.2, "alarm": 3.8}
+SMALL = 0.5
 
 
 @dataclass(frozen=True)
@@ -146,9 +147,11 @@ def _band(values: Sequence[_Value], across: Callable[[datetime], float], up: Cal
 def _dots(
     values: Sequence[_Value], unit: str, across: Callable[[datetime], float], up: Callable[[float], float]
 ) -> list[Dot]:
-    shown = [value for value in values if len(values) <= NIGHTS_WITH_DOTS or value.state != "quiet"]
+    many = len(values) > NIGHTS_WITH_DOTS
+    shown = [value for value in values if not many or value.state != "quiet"]
+    size = SMALL if many else 1.0
     return [
-        Dot(across(one.at), up(one.value), RADII[one.state], one.state, f"{_date(one.at)}: {_figure(one, unit)}")
+        Dot(across(one.at), up(one.value), size * RADII[one.state], one.state, f"{_date(one.at)}: {_figure(one, unit)}")
         for one in shown
     ]
 
