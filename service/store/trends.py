@@ -124,15 +124,15 @@ def note_night(
         moved, anchor = result.displacement, anchors.get(result.id)
         if moved is None:
             continue
-        if by_hand or anchor is None:
+        if anchor is None or (by_hand and anchor.revision != revision):
             _add_anchor(connection, venue.id, result.id, revision)
-        if by_hand or anchor is None or anchor.posed is None:
-            number = revision if by_hand or anchor is None else anchor.revision
+            number, is_new = revision, True
+        else:
+            number, is_new = anchor.revision, anchor.posed is None
+        if is_new:
             moved = moved.as_anchor()
             _set_anchor(connection, venue.id, posed[result.id], number, at)
-        elif moved.anchor == anchor.revision:
-            number = anchor.revision
-        else:
+        elif moved.anchor != number:
             # It was compared with another one than the camera now has.
             continue
         _add_row(connection, venue.id, result, moved, number, revision, job_id, at)

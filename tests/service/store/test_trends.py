@@ -84,6 +84,19 @@ def test_a_result_that_a_person_accepts_is_the_new_anchor(stock):
 
 
 @in_both_homes
+def test_a_person_who_accepts_what_holds_already_says_that_the_camera_is_right_there(stock):
+    venue = stock.venue("v")
+    stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}), anyway)
+    nights(stock, 40, AUTUMN, noisy(1, lambda number: 0.045 if number >= 30 else 0.0))
+    assert len(stock.venues.health("v").alarms) == 2
+    for _ in range(2):
+        stock.decisions.accept(stock.enqueued[-1], ["left"])
+        assert (moved_m(stock), trend(stock).state, trend(stock, "right").state) == ([0.0], "quiet", "alarm")
+    assert [alarm.camera for alarm in stock.venues.health("v").alarms] == ["right"]
+    assert len(stock.venues.history("v", None, 100)) == 41
+
+
+@in_both_homes
 def test_a_job_that_is_rejected_by_hand_is_taken_out_of_the_trend(stock):
     nights(stock, 2, AUTUMN, lambda _: displacement(0.01))
     stock.decisions.reject(night(stock, displacement(0.2), at=AUTUMN + timedelta(days=2)))
