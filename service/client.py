@@ -40,8 +40,11 @@ from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, LensCh
 from service.wire.venue import ChangedVenue, Venue, VenueIn, Venues
 
 if TYPE_CHECKING:
+    from datetime import date
+
     from service.wire.job import Job
     from service.wire.told.events import Event
+    from service.wire.trend import Trend
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
@@ -124,6 +127,14 @@ class AsyncClient:
             page = History.model_validate_json(await self._ask("GET", address, params={"cursor": page.next_cursor}))
             found += page.revisions
         return found[:most]
+
+    async def trend(self, venue_id: str, camera: str, since: date | None = None) -> Trend:
+        """How a camera has moved since its anchor, night by night; `since`: the first night to tell."""
+        from service.wire.trend import Trend
+
+        params = {"since": since.isoformat()} if since else {}
+        answer = await self._ask("GET", f"/venues/{venue_id}/cameras/{camera}/trend", params=params)
+        return Trend.model_validate_json(answer)
 
     async def restore(self, venue_id: str, revision: int) -> Venue:
         """Let the poses of a revision hold again."""
@@ -379,6 +390,7 @@ class Client:
     delete_venue = Call(AsyncClient.delete_venue)
     venue_health = Call(AsyncClient.venue_health)
     history = Call(AsyncClient.history)
+    trend = Call(AsyncClient.trend)
     restore = Call(AsyncClient.restore)
     adopt_refined = Call(AsyncClient.adopt_refined)
     venue_poses = Call(AsyncClient.venue_poses)

@@ -17,9 +17,12 @@ from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, outcom
 from service.wire.names import EventKind, Projection, StitchFormat
 
 if TYPE_CHECKING:
+    from datetime import date
+
     from service.client import Client
     from service.wire.geometry import Moved
     from service.wire.told.events import Event
+    from service.wire.trend import Trend
     from service.wire.venue import Venue
 
 OTHERWISE = "Keep the poses with --keep-poses, change parts with esc venue set or edit, or put it anyway with --force."
@@ -200,6 +203,36 @@ def venue_history(
         print(f"{revision.revision}\t{revision.at:%Y-%m-%dT%H:%M:%SZ}\t{cause}\t{revision.job or '-'}\t{cameras}")
 
 
+@app.command("trend")
+def venue_trend(
+    venue: VenueId,
+    camera: Annotated[
+        str | None, typer.Argument(metavar="[CAMERA]", help="Night by night; otherwise a line for each camera.")
+    ] = None,
+    since: Annotated[
+        str | None, typer.Option("--since", metavar="YYYY-MM-DD", help="The first night to print, a day of UTC.")
+    ] = None,
+    as_json: AsJson = False,
+    url: Url = LOCAL,
+    api_key: ApiKey = None,
+) -> None:
+    """Print how cameras have moved since their anchor, in cm at the far touchline, and what control charts say of it.
+
+    A line per camera: id, state, cm, words. Of one camera, a line per night: time, state, cm, one sigma, focal length.
+    """
+    first = _day(since)
+    with called(url, api_key) as client:
+        ids = [camera] if camera else [one.id for one in client.venue(venue).cameras]
+        trends = [client.trend(venue, one, first) for one in ids]
+    for trend in trends:
+        if as_json:
+            print(trend.model_dump_json())
+        elif camera is None:
+            print(f"{trend.camera}\t{trend.state}\t{100 * trend.moved_m:.1f}\t{trend.words}")
+        else:
+            _print_nights(trend)
+
+
 @app.command("health")
 def venue_health(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
     """Print how a venue is doing: alarms, drift, schedule. Exit: 0 ok, 3 an alarm rings."""
@@ -295,6 +328,23 @@ def _stored(client: Client, venue_id: str) -> tuple[Venue, str] | None:
         if refused.status == HTTPStatus.NOT_FOUND:
             return None
         raise
+
+
+def _day(text: str | None) -> date | None:
+    from datetime import date
+
+    try:
+        return None if text is None else date.fromisoformat(text)
+    except ValueError:
+        fail(f"--since takes a day such as 2026-11-03, not {text}", USAGE)
+
+
+def _print_nights(trend: Trend) -> None:
+    for night in trend.points:
+        focal = "-" if night.focal_length is None else f"{night.focal_length:+.3%}"
+        figures = f"{100 * night.displacement_m:.1f}\t{100 * night.sigma_m:.1f}\t{focal}"
+        print(f"{night.at:%Y-%m-%dT%H:%M:%SZ}\t{night.state}\t{figures}")
+    tell(trend.words)
 
 
 def _pixels(moved: Moved | None) -> str:

@@ -33,6 +33,7 @@ from service.store.counts.tallies import DURATION, STAGE, STITCH_ERROR, WAIT, Bu
 from service.store.engine import AWAY
 from service.store.jobs.submission import PRIORITIES
 from service.store.told.deliveries import CALLBACKS
+from service.store.trends import CameraTrend
 from service.store.workers import SeenWorker
 from service.wire.health import AlarmRule
 
@@ -49,6 +50,23 @@ OF_VENUES: tuple[tuple[str, str, Callable[[VenueQuality], float | None]], ...] =
         "esc_venue_accepted_timestamp_seconds",
         "When poses were last accepted.",
         lambda venue: None if venue.accepted_at is None else venue.accepted_at.timestamp(),
+    ),
+)
+OF_CAMERAS: tuple[tuple[str, str, Callable[[CameraTrend], float | None]], ...] = (
+    (
+        "esc_camera_trend_meters",
+        "How far its moving average is from what is usual, at the far touchline.",
+        lambda camera: camera.moved_m,
+    ),
+    (
+        "esc_camera_trend_cusum",
+        "The largest cumulative sum of its control charts, in standard deviations; above 5 its mean has moved.",
+        lambda camera: camera.cusum,
+    ),
+    (
+        "esc_camera_trend_beyond",
+        "1 while a control chart, EWMA or CUSUM, says that its mean has moved.",
+        lambda camera: float(camera.beyond),
     ),
 )
 log = structlog.get_logger()
@@ -96,6 +114,7 @@ class _Stored(Collector):
         yield from _queue(figures)
         yield from _jobs(figures.tallies)
         yield from _venues(figures.venues)
+        yield from _trends(figures.trends)
         yield from _alarms(figures)
         yield from _workers(figures.workers, self._silence_s)
         yield from _callbacks(figures)
@@ -168,6 +187,17 @@ def _venues(venues: list[VenueQuality]) -> Iterator[Metric]:
             value = figure(venue)
             if value is not None:
                 family.add_metric([venue.venue], value)
+        yield family
+
+
+def _trends(trends: list[CameraTrend]) -> Iterator[Metric]:
+    """Of the cameras that have moved farthest: how many at most is a setting."""
+    for name, meaning, figure in OF_CAMERAS:
+        family = GaugeMetricFamily(name, meaning, labels=["venue", "camera"])
+        for camera in trends:
+            value = figure(camera)
+            if value is not None:
+                family.add_metric([camera.venue, camera.camera], value)
         yield family
 
 

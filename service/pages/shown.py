@@ -19,6 +19,7 @@ from service.api.auth import COOKIE, SCOPES, page_token
 from service.pages import words
 from service.pages.assets import address
 from service.pages.seam import seam_curve
+from service.pages.trend_curves import trend_curves
 from service.routes.contract.guarded import Guarded
 from service.store.engine import AWAY
 from service.store.keys import Key
@@ -46,6 +47,7 @@ templates.globals |= {
     "static": address,
     "version": version("esc-calibration"),
     "seam_curve": seam_curve,
+    "trend_curves": trend_curves,
     "reasons": REASONS,
 }
 templates.filters |= {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
@@ -27,6 +28,8 @@ from service.wire.view import ViewChoice
 PER_PAGE = 50
 # What a chart shows, and a table beside it.
 IN_CHART, IN_TABLE = 1000, 12
+# Of the trends: a year has every season in it, and three would be three times as slow to draw.
+IN_TRENDS = timedelta(days=365)
 router = APIRouter(route_class=Page, include_in_schema=False)
 data = APIRouter(route_class=Guarded, include_in_schema=False)
 
@@ -80,6 +83,7 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
     revisions = context.venues.history(venue_id, None, IN_TABLE)
     health = context.venues.health(venue_id)
     active = context.past_calibrations.active([venue_id]).get(venue_id)
+    a_year_ago = datetime.now(UTC) - IN_TRENDS
     return page(
         request,
         "venue.html",
@@ -89,6 +93,7 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         revisions=revisions,
         health=health,
         holds=job is not None and holds(job, revisions[0]),
+        trends=[context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],
         active=context.jobs.get(active) if active else None,
         formats=get_args(FormatName),
         usual_view=ViewChoice(),

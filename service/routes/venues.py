@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime, time
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Header, Path, Query, Response
@@ -18,12 +19,14 @@ from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_kno
 from service.settings import Settings
 from service.store.refined import NoRefinedPose
 from service.store.revisions import NoSuchRevision, RevisionUnfit
+from service.wire.base import Day
 from service.wire.health import VenueHealth
 from service.wire.history import History, Restore
 from service.wire.merge_patch import MEDIA_TYPE, merged
 from service.wire.names import ID_PATTERN, FormatName
 from service.wire.problems import Problem
 from service.wire.told import callback_urls
+from service.wire.trend import Trend
 from service.wire.venue import PATCH_EXAMPLES, Camera, ChangedVenue, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
@@ -217,6 +220,29 @@ def venue_history(
     more = len(page) > limit
     shown = History(revisions=page[:limit], next_cursor=page[limit - 1].revision if more else None)
     body = shown.model_dump_json().encode()
+    return unless_known(body, if_none_match, json(body))
+
+
+@router.get(
+    "/{venue_id}/cameras/{camera}/trend",
+    openapi_extra=needs("read"),
+    response_model=Trend,
+    responses=TAGGED | problems(404),
+)
+def camera_trend(
+    venue: ExistingVenue,
+    camera: Annotated[str, Path(pattern=ID_PATTERN)],
+    context: InContext,
+    since: Annotated[Day | None, Query(description="The first night to tell, a day of UTC; without it, all.")] = None,
+    if_none_match: IfNoneMatch = None,
+) -> Response:
+    """How a camera has moved since its anchor, night by night, and what control charts (EWMA, CUSUM) say of it.
+
+    In metres on the ground at the farthest marking in view, which a camera on the long side has on the far touchline.
+    """
+    camera_of(venue, camera)
+    first = None if since is None else datetime.combine(since, time.min, UTC)
+    body = context.trends.of(venue, camera, first).model_dump_json().encode()
     return unless_known(body, if_none_match, json(body))
 
 

@@ -20,6 +20,7 @@ from service.store.revisions import TAKEN, newest_revision, revision_at
 from service.store.schedules import schedule_of
 from service.store.told.deliveries import add_event_delivery
 from service.store.told.events import add_event
+from service.store.trends import trends_of
 from service.wire.health import Alarm, AlarmRule, Alarms, CameraHealth, VenueAlarm, VenueHealth
 from service.wire.history import Revision, RevisionCamera
 from service.wire.venue import Venue
@@ -93,7 +94,17 @@ def _rings(connection: sa.Connection, venue: Venue, now: datetime) -> tuple[dict
     known = courses_of(connection, venue.id)
     courses = {camera.id: known.get(camera.id, Course()) for camera in newest.cameras}
     overdue, due_at = _overdue(connection, venue, newest, quality, courses, now)
-    return _moved(venue.alarms, newest) | _rejected(venue.alarms, quality, courses) | overdue, due_at
+    moved = _moved(venue.alarms, newest) | _drifting(connection, venue)
+    return moved | _rejected(venue.alarms, quality, courses) | overdue, due_at
+
+
+def _drifting(connection: sa.Connection, venue: Venue) -> dict[Key, str]:
+    """The cameras that move slowly: what their control charts say, where that is so far that the rule minds."""
+    limit_m = venue.alarms.trend_m if venue.alarms else None
+    if limit_m is None:
+        return {}
+    trends = trends_of(connection, venue.id)
+    return {("trend", camera): trend.words for camera, trend in trends.items() if trend.state(limit_m) == "alarm"}
 
 
 def _rejected(rules: Alarms, quality: Any, courses: Mapping[str, Course]) -> dict[Key, str]:

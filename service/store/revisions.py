@@ -16,6 +16,7 @@ from service.store import tables
 from service.store.counts.figures import note
 from service.store.engine import clock
 from service.store.told.events import add_event
+from service.store.trends import begin_anchors, go_back
 from service.wire.field import FieldOfPlay
 from service.wire.geometry import Movement, PosedCamera
 from service.wire.history import Cause, Revision, RevisionCamera
@@ -43,7 +44,7 @@ def add_revision(
     restored: Revision | None = None,
     stitch_error_px: float | None = None,
 ) -> int:
-    """Write down the state that a venue has from now on, inside the caller's serialised transaction.
+    """Write down the state that a venue has now, inside the caller's serialised transaction.
 
     Gives the number of the revision.
     """
@@ -64,6 +65,11 @@ def add_revision(
             movements={camera: movement.model_dump() for camera, movement in movements.items()},
         )
     )
+    changed = _changed(venue, _cameras(before))
+    if restored is not None:
+        go_back(connection, venue, restored.revision)
+    elif cause == "put":
+        begin_anchors(connection, venue, changed, number)
     poses = Poses(
         venue=venue.id,
         revision=number,
@@ -72,7 +78,7 @@ def add_revision(
         stitch_error_px=stitch_error_px,
         ridge=venue.field.ridge,
         cameras=[camera.posed for camera in venue.cameras],
-        changed=_changed(venue, _cameras(before)),
+        changed=changed,
     )
     add_event(connection, venue.id, venue.webhooks, "poses.changed", poses, at)
     drifts = [movement.drift.pixels for movement in movements.values() if movement.drift]

@@ -16,6 +16,7 @@ from service.store.schedules import Schedules
 from service.store.sessions import Sessions
 from service.store.told.deliveries import Deliveries
 from service.store.told.following import Following
+from service.store.trends import Trends
 from service.store.venues import Venues
 from service.store.workers import Workers
 
@@ -27,6 +28,7 @@ class Stores:
         self.engine = engine = connect(url)
         migrate(engine)
         self.venues = Venues(engine)
+        self.trends = Trends(engine)
         self.schedules = Schedules(engine)
         self.refined = RefinedPoses(engine)
         self.submissions = Submissions(engine)

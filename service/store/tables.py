@@ -223,6 +223,57 @@ venue_quality = sa.Table(
     sa.Index("venues_by_alarm", "alarm_due_at"),
 )
 
+# From where the movement of each camera is counted: the newest of a camera counts, those before it are there to go back
+# to. One begins with whatever says where a camera is: a PUT that changed it, a result that was accepted by hand.
+camera_anchors = sa.Table(
+    "camera_anchors",
+    metadata,
+    sa.Column("venue", sa.String(64), primary_key=True),
+    sa.Column("camera", sa.String(64), primary_key=True),
+    # Of the venue, in which that happened.
+    sa.Column("revision", sa.Integer, primary_key=True, autoincrement=False),
+    # When the first pose was accepted since then, and wire.geometry.PosedCamera as it then was; null: none was yet.
+    sa.Column("at", Instant),
+    sa.Column("posed", sa.JSON(none_as_null=True)),
+    # By quantity: control_charts.Baseline, once it is settled.
+    sa.Column("baselines", sa.JSON, nullable=False),
+    # What the charts said after the last night, see wire.trend.Trend: whether a mean has moved, by how much at the far
+    # touchline (null: of an anchor that counts no more, too), the largest cumulative sum, and all of it in words.
+    sa.Column("beyond", sa.Boolean, nullable=False),
+    sa.Column("moved_m", sa.Double),
+    sa.Column("cusum", sa.Double),
+    sa.Column("words", sa.String(500), nullable=False),
+    sa.Index("camera_anchors_by_move", "moved_m"),
+)
+
+# How far each accepted job found each camera from its anchor: wire.trend.Displacement, and the sigma of the pose.
+camera_trend = sa.Table(
+    "camera_trend",
+    metadata,
+    sa.Column("id", sa.Integer, primary_key=True),
+    sa.Column("venue", sa.String(64), nullable=False),
+    sa.Column("camera", sa.String(64), nullable=False),
+    # Which of camera_anchors, and the revision that the pose became.
+    sa.Column("anchor", sa.Integer, nullable=False),
+    sa.Column("revision", sa.Integer, nullable=False),
+    sa.Column("job", sa.String(26), nullable=False),
+    sa.Column("at", Instant, nullable=False),
+    sa.Column("across_m", sa.Double, nullable=False),
+    sa.Column("away_m", sa.Double, nullable=False),
+    sa.Column("sigma_across_m", sa.Double, nullable=False),
+    sa.Column("sigma_away_m", sa.Double, nullable=False),
+    sa.Column("repeatability_across_m", sa.Double, nullable=False),
+    sa.Column("repeatability_away_m", sa.Double, nullable=False),
+    sa.Column("rotation_deg", sa.Double, nullable=False),
+    sa.Column("sigma_rotation_deg", sa.Double),
+    sa.Column("position_m", sa.Double, nullable=False),
+    sa.Column("sigma_position_m", sa.Double),
+    sa.Column("focal_length", sa.Double),
+    sa.Column("sigma_focal_length", sa.Double),
+    sa.Column("focal_length_m", sa.Double, nullable=False),
+    sa.Index("camera_trend_by_camera", "venue", "camera", "id"),
+)
+
 # Those that ring.
 alarms = sa.Table(
     "alarms",

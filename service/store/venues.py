@@ -22,6 +22,7 @@ from service.store.memories import (
 from service.store.revisions import add_revision, revisions_of, state_at
 from service.store.schedules import plan
 from service.store.told.events import add_venue_event
+from service.store.trends import note_night
 from service.wire.health import VenueHealth
 from service.wire.history import Cause, Revision
 from service.wire.names import OPEN
@@ -36,6 +37,8 @@ OF_VENUES = (
     tables.schedules,
     tables.credentials,
     tables.venue_quality,
+    tables.camera_anchors,
+    tables.camera_trend,
 )
 
 
@@ -207,6 +210,8 @@ def let_hold(
     note_held(connection, venue.id, result, cameras, clock(connection))
     number = add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
     keep_memories(connection, venue.id, number, memories)
+    night = [camera for camera in result.cameras if camera.id in cameras]
+    note_night(connection, found, night, job_id, number, by_hand=cause == "accepted")
     settle_alarms(connection, found)
 
 

@@ -37,12 +37,17 @@ class Alarms(Wire):
     not_calibrated_for_h: Annotated[Number, Field(gt=0, le=10000)] | None = Field(
         None, description="No pose is accepted for so many hours, of a camera or of any."
     )
+    trend_m: Annotated[Number, Field(gt=0, le=100)] | None = Field(
+        None,
+        description="Over nights, a camera moves beyond what its own spread explains, and by at least so many metres "
+        "at the far touchline, see `GET /venues/{id}/cameras/{camera}/trend`.",
+    )
     callback_url: CallbackUrl | None = Field(
         None, description="Told when an alarm begins and when it is over, signed (Standard Webhooks)."
     )
 
 
-AlarmRule = Literal["moved-since-last", "moved-since-first", "rejected-in-a-row", "not-calibrated"]
+AlarmRule = Literal["moved-since-last", "moved-since-first", "rejected-in-a-row", "not-calibrated", "trend"]
 
 
 class Alarm(Wire):

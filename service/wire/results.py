@@ -12,6 +12,7 @@ from service.wire.field import FieldOfPlay
 from service.wire.geometry import Intrinsics, Light, Moved, Pose, Row
 from service.wire.options import Coordinates, Landmark
 from service.wire.problems import refusal_of
+from service.wire.trend import Displacement
 
 CPU_S: Any = Field(
     {}, description="Core-seconds, of all threads, of the stages that `timings_s` times; {} of earlier releases."
@@ -148,6 +149,9 @@ class CameraResult(Wire):
         0, description="Accepted jobs in the camera's memory, this one too where it is accepted and no dry run."
     )
     markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
+    displacement: Displacement | None = Field(
+        None, description="From the camera's anchor, see `GET /venues/{id}/cameras/{camera}/trend`."
+    )
 
 
 class SeamPlace(Wire):

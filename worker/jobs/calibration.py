@@ -10,6 +10,7 @@ from typing import Any
 from service.wire.job import Progress
 from service.wire.options import Options
 from service.wire.results import Provenance, Result, Suspicion, View
+from service.wire.trend import Anchor
 from service.wire.venue import Venue
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
@@ -23,7 +24,16 @@ from worker.jobs.from_frames import Drawn, Given
 from worker.jobs.nights import memories_of, wire_lens_change, wire_refined
 from worker.jobs.pictures import Scene, draw, masks
 from worker.jobs.reading import light_of
-from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera, wire_lens, wire_light, wire_pair
+from worker.jobs.wire import (
+    Solution,
+    number,
+    to_the_millisecond,
+    wire_camera,
+    wire_displacement,
+    wire_lens,
+    wire_light,
+    wire_pair,
+)
 from worker.message import Means
 
 
@@ -31,11 +41,13 @@ from worker.message import Means
 class Nights:
     """What is known of the nights before a job, by camera, and when its frames were taken.
 
-    `last_views`: what the frames of the last accepted calibration were like; `memories`: as the engine wrote them.
+    `last_views`: what the frames of the last accepted calibration were like; `memories`: as the engine wrote them;
+    `anchors`: the poses that movement is counted from.
     """
 
     last_views: Mapping[str, View] = field(default_factory=dict)
     memories: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    anchors: Mapping[str, Anchor] = field(default_factory=dict)
     taken_at: datetime | None = None
 
     @property
@@ -77,7 +89,7 @@ def solve(
         ),
         lambda given, found: _drawn(venue, given, found, options),
         lambda found, spent, provenance: _allowed(
-            venue, options, _result(venue, found, options, spent, provenance, memories, nights.taken_at)
+            venue, options, _result(venue, found, options, spent, provenance, memories, nights)
         ),
         lambda found: {camera: memory.to_json() for camera, memory in found.memories.items()},
     )
@@ -118,7 +130,7 @@ def _result(
     spent: engine.Spent,
     provenance: Provenance,
     memories: Mapping[str, CameraMemory],
-    taken_at: datetime | None,
+    nights: Nights,
 ) -> Result:
     remembered = memories if options.dry_run else {**memories, **found.memories}
     ridge = found.pitch.ridge
@@ -132,10 +144,11 @@ def _result(
                 camera,
                 wire_lens(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
                 lights.get(camera.camera.id),
+                wire_displacement(found.pitch, camera, nights.anchors.get(camera.camera.id)),
             ).model_copy(
                 update={
                     "refined": wire_refined(found.pitch, camera),
-                    "lens_change": wire_lens_change(camera, taken_at),
+                    "lens_change": wire_lens_change(camera, nights.taken_at),
                     "nights": _nights(found.pitch, remembered.get(camera.camera.id)),
                 }
             )

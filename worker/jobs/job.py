@@ -69,7 +69,7 @@ def _compute(
             from worker.jobs import calibration
 
             assert task.venue is not None
-            nights = calibration.Nights(task.last_views, task.memories, task.taken_at)
+            nights = calibration.Nights(task.last_views, task.memories, task.anchors, task.taken_at)
             return calibration.solve(task.venue, files, options, means, report, nights)
 
 

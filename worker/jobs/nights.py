@@ -21,12 +21,10 @@ from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.scene.camera import Array, Camera
 from worker.calibration.scene.far_marking import far_marking_shift_m
 from worker.calibration.scene.field import Field
+from worker.calibration.scene.lens import LENS_NUMBERS
 from worker.calibration.scene.motion import POSE_NUMBERS
-from worker.calibration.scene.parameters import LENS_NUMBERS
 from worker.jobs.wire import wire_lens, wire_pose, wire_sigma
 
-SURE = 3.0
-"""Sigmas from which a change of the lens is put into words."""
 WIRE_NAMES = dict(zip(LENS_NUMBERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
 """What the numbers of a lens are called in `geometry.Intrinsics.sigma`."""
 
@@ -84,9 +82,9 @@ def wire_lens_change(found: CameraResult, tonight: datetime | None) -> LensChang
 def lens_change_in_words(change: uncertainty.LensChange, tonight: datetime | None) -> str | None:
     """The change for a person, for instance "focal length 0.6 ± 0.1 % longer than on 3 November: zoom ring or focus".
 
-    None while it may be chance.
+    None while it may be chance, or heat.
     """
-    if abs(change.longer) < SURE * change.sigma or change.longer == 0:
+    if not change.notable:
         return None
     places = max(0, -math.floor(math.log10(100 * change.sigma))) if change.sigma > 0 else 2
     by = f"{100 * abs(change.longer):.{places}f} ± {100 * change.sigma:.{places}f} %"

@@ -23,17 +23,20 @@ from service.wire.results import (
     Sigma,
     View,
 )
+from service.wire.trend import Anchor, Displacement
 from worker.calibration import records
 from worker.calibration.finish import uncertainty
 from worker.calibration.judge import quality, seam
+from worker.calibration.judge.displacement import displacement
 from worker.calibration.judge.markings import MarkingSeen
 from worker.calibration.judge.pairs import Pair
 from worker.calibration.scene.camera import Pose
+from worker.calibration.scene.field import Field
 from worker.calibration.scene.lens import Lens
 from worker.calibration.see.segmentation import ProviderMissing, Segmenter
 from worker.calibration.see.view import ViewCondition
 from worker.calibration.stitch.light import Light
-from worker.jobs.reading import Failure
+from worker.jobs.reading import Failure, camera_of
 from worker.message import Means
 
 PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
@@ -124,7 +127,10 @@ def wire_progress(step: records.Progress) -> Progress:
 
 
 def wire_camera(
-    found: quality.CameraResult, lens: geometry.Intrinsics | None = None, light: geometry.Light | None = None
+    found: quality.CameraResult,
+    lens: geometry.Intrinsics | None = None,
+    light: geometry.Light | None = None,
+    moved_from_anchor: Displacement | None = None,
 ) -> CameraResult:
     """What a finish has to say of a camera; `lens` and `light` where they were found as well."""
     return CameraResult(
@@ -150,6 +156,31 @@ def wire_camera(
         residual_px=number(found.residual_px),
         light=light,
         markings=[_marking(one) for one in found.markings],
+        displacement=moved_from_anchor,
+    )
+
+
+def wire_displacement(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
+    """How far a camera is from its anchor; one that has none yet is its own. None where that cannot be told."""
+    begun = found.camera if anchor is None else camera_of(anchor.posed)
+    moved = displacement(pitch, begun, found)
+    if moved is None:
+        return None
+    turned_and_moved = quality.Movement.between(pitch, begun, found.camera)
+    return Displacement(
+        anchor=None if anchor is None else anchor.revision,
+        at=moved.place[:2].round(2).tolist(),
+        across_m=moved.shift[0],
+        away_m=moved.shift[1],
+        sigma_across_m=moved.sigma[0],
+        sigma_away_m=moved.sigma[1],
+        repeatability_across_m=moved.repeatability[0],
+        repeatability_away_m=moved.repeatability[1],
+        rotation_deg=turned_and_moved.rotation_deg,
+        position_m=turned_and_moved.position_m,
+        focal_length=None if moved.focal is None else moved.focal.value,
+        sigma_focal_length=None if moved.focal is None else moved.focal.sigma,
+        focal_length_m=moved.focal_shift_m,
     )
 
 

@@ -13,6 +13,7 @@ from service.store import tables
 from service.store.counts import tallies
 from service.store.counts.tallies import Key
 from service.store.engine import clock, reading
+from service.store.trends import CameraTrend, most_moved
 from service.store.workers import SeenWorker, seen
 from service.wire.names import OPEN
 from service.wire.results import Result
@@ -65,11 +66,15 @@ class Figures:
     venues: list[VenueQuality]
     alarms: Mapping[str, int]
     ringing: list[Ringing]
+    trends: list[CameraTrend]
     tallies: Mapping[Key, float]
 
 
 def look(engine: sa.Engine, most_venues: int) -> Figures:
-    """Read it all in one state of the database; of the venues those with the worst stitch errors."""
+    """Read it all in one state of the database; of the venues those with the worst stitch errors.
+
+    And of their cameras as many, those that have moved farthest.
+    """
     with reading(engine) as connection:
         now = clock(connection)
         queue, running = _queue(connection, now)
@@ -81,6 +86,7 @@ def look(engine: sa.Engine, most_venues: int) -> Figures:
             venues=_venues(connection, most_venues),
             alarms=_alarms(connection),
             ringing=_ringing(connection, most_venues),
+            trends=most_moved(connection, most_venues),
             tallies=tallies.read(connection),
         )
 

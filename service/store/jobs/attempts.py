@@ -22,6 +22,7 @@ from service.store.jobs.ending import Still, changed, end, still_open
 from service.store.jobs.reading import ONE, asked
 from service.store.jobs.task import Task
 from service.store.memories import Memories, newest_memories
+from service.store.trends import anchors_of
 from service.store.venues import find_venue, let_hold, venue_lock
 from service.wire.job import JobError, Progress
 from service.wire.names import OPEN
@@ -59,12 +60,14 @@ class Attempts(Repository):
             job = asked(row)
             last_views = views_of(connection, row.venue) if row.venue else {}
             memories = newest_memories(connection, row.venue) if row.kind == "calibration" else {}
+            anchors = anchors_of(connection, row.venue) if row.venue else {}
             return Task(
                 **job,
                 run_token=row.run_token,
                 attempt=row.attempt,
                 last_views=last_views,
                 memories=dict(memories),
+                anchors=anchors,
                 taken_at=row.created_at,
             )
 

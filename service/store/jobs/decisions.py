@@ -14,6 +14,7 @@ from service.store.jobs.ending import changed, end, still_open
 from service.store.jobs.reading import found_poses
 from service.store.memories import Memories, newest_memories
 from service.store.revisions import TAKEN, newest_revision, revision_before, revision_of_job
+from service.store.trends import note_night
 from service.store.venues import find_venue, let_hold, put_back, venue_lock, with_result
 from service.wire.history import Revision
 from service.wire.results import Result
@@ -45,8 +46,9 @@ class Decisions(Repository):
             end(connection, job_id, still_open(job_id), "cancelled")
 
     def accept(self, job_id: str, cameras: Collection[str] | None = None) -> None:
-        """Let the poses that a calibration found hold, whatever the gate said; nothing to do if they do.
+        """Let the poses that a calibration found hold, whatever the gate said.
 
+        If they hold by themselves, a person now says so too: the trends of the cameras begin anew with them.
         `cameras`: only theirs, None: those of all. Raises `MovedOn` if the venue is neither as the calibration began
         with it nor as it left it, `NoPoses` if it found none.
         """
@@ -55,7 +57,10 @@ class Decisions(Repository):
             chosen = list(began_with.poses) if cameras is None else cameras
             now_stored = find_venue(connection, began_with.id)
             left_by_it = newest is not None and newest.job == job_id and newest.cause in TAKEN
-            if now_stored and left_by_it and with_result(now_stored, result, chosen).stands_like(now_stored):
+            if now_stored and newest and left_by_it and with_result(now_stored, result, chosen).stands_like(now_stored):
+                found = [camera for camera in result.cameras if camera.id in chosen]
+                note_night(connection, now_stored, found, job_id, newest.revision, by_hand=True)
+                settle_alarms(connection, now_stored)
                 return
             untouched = _lies_between if left_by_it else _is_as_it_was
             if now_stored is None or not untouched(now_stored, began_with, result):

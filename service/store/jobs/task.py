@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 from service.wire.names import Kind
 from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
 from service.wire.results import View
+from service.wire.trend import Anchor
 from service.wire.venue import Venue
 
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
@@ -84,6 +85,8 @@ class Task(Asked):
     memories: dict[str, dict[str, Any]] = {}
     # When the frames were taken; nobody says so yet, and they are taken to be as old as their upload.
     taken_at: datetime | None = None
+    # By camera: the pose that its movement is counted from, of those that have one.
+    anchors: dict[str, Anchor] = {}
 
     def without_addresses(self) -> Task:
         """The same but for who is told of it: to compute it nobody need know, and the addresses may be secrets."""

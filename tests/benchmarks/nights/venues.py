@@ -1,4 +1,4 @@
-"""Venues that do not match their models, over a hundred nights: the answer, the refined one, and where pictures meet."""
+"""Venues that do not match their models, over a hundred nights: answers, refined ones, and where pictures meet."""
 
 from __future__ import annotations
 

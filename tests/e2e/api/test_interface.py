@@ -35,6 +35,7 @@ REACHED = {
     ("GET", "/jobs/*/poses", 422),
     ("GET", "/venues/*/poses", 200),
     ("GET", "/venues/*/history", 200),
+    ("GET", "/venues/*/cameras/left/trend", 200),
     ("POST", "/venues/*/restore", 200),
     ("GET", "/jobs/*/preview.jpg", 200),
     ("GET", "/jobs/*/overlay/left.jpg", 200),

@@ -213,6 +213,20 @@ def test_jobs_are_listed_waited_for_and_submitted_again(service, esc, name):
     assert esc("job", "list", "--venue", name, "--status", "failed").stdout == ""
 
 
+def test_the_trend_of_a_venue_is_a_line_per_camera_and_that_of_a_camera_a_line_per_night(service, esc, name):
+    service.calibrated(service.venue(name))
+    service.calibrated(name)
+    lines = [line.split("\t") for line in esc("venue", "trend", name).stdout.splitlines()]
+    assert [line[:2] for line in lines] == [["left", "quiet"], ["right", "quiet"]]
+    assert "has not moved beyond what its own spread explains" in lines[0][3]
+    (night,) = [line.split("\t") for line in esc("venue", "trend", name, "left").stdout.splitlines()]
+    assert night[1:] == ["quiet", "2.5", "1.7", "+0.010%"]
+    assert json.loads(esc("venue", "trend", name, "left", "--json").stdout)["points"][0]["jobs"] == 2
+    assert esc("venue", "trend", name, "left", "--since", "2999-01-01").stdout == ""
+    refused = esc("venue", "trend", name, "--since", "yesterday")
+    assert (refused.returncode, "2026-11-03" in refused.stderr) == (2, True)
+
+
 def test_a_venue_is_followed_line_by_line_until_it_is_deleted(service, name):
     service.venue(name)
     command = [sys.executable, "-m", "service.cli", "venue", "follow", name, "--url", service.url]

@@ -15,6 +15,7 @@ from service.store.workers import Workers
 from service.wire.job import JobError
 from service.wire.results import View
 from tests.homes import in_both_homes
+from tests.trending import displacement, night
 from tests.worker.stock import Stock, result
 
 pytestmark = in_both_homes
@@ -142,3 +143,17 @@ def test_an_attempt_after_the_first_is_counted(stock):
         task = stock.attempts.begin(job)
     stock.attempts.finish(task, result(task.venue, True), [])
     assert figures(stock)["esc_job_restarts_total",] == 2
+
+
+def test_each_camera_has_its_trend_from_its_anchor_on(stock):
+    night(stock, displacement(0.0))
+    found = figures(stock)
+    left = (("camera", "left"), ("venue", "v"))
+    assert found["esc_camera_trend_meters", *left] == pytest.approx(0.0)
+    assert (found["esc_camera_trend_cusum", *left], found["esc_camera_trend_beyond", *left]) == (0, 0)
+    # One that somebody has put elsewhere has no trend until its next pose is accepted.
+    stock.moved_by_hand("v", -3.0)
+    after = figures(stock)
+    assert ("esc_camera_trend_meters", *left) not in after
+    assert ("esc_camera_trend_meters", ("camera", "right"), ("venue", "v")) in after
+    assert len([key for key in figures(stock, venues=0) if key[0].startswith("esc_camera_trend")]) == 0

@@ -284,7 +284,7 @@ def test_a_database_from_before_the_first_release_is_told_and_left_alone(home, t
             "INSERT INTO alembic_version VALUES ('0001')",
         ):
             connection.exec_driver_sql(statement)
-    with pytest.raises(UnsupportedDatabase, match=r"development version .* begins with schema 0002 .* new place"):
+    with pytest.raises(UnsupportedDatabase, match=r"development version .* begins with schema 0003 .* new place"):
         migrate(engine)
     assert sorted(sa.inspect(engine).get_table_names()) == ["alembic_version", "jobs"]
     engine.dispose()
@@ -294,5 +294,5 @@ def test_a_database_from_before_the_first_release_is_told_and_left_alone(home, t
 def test_a_database_that_a_newer_version_has_upgraded_is_told(engine):
     with writing(engine) as connection:
         connection.exec_driver_sql(f"UPDATE {SCHEMA_TABLE} SET version_num = '0999'")
-    with pytest.raises(UnsupportedDatabase, match=r"has schema 0999, .* knows none after 0002: .* restore the backup"):
+    with pytest.raises(UnsupportedDatabase, match=r"has schema 0999, .* knows none after 0003: .* restore the backup"):
         migrate(engine)

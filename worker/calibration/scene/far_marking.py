@@ -26,7 +26,7 @@ def far_marking_shift_m(pitch: Field, camera: Camera, other: Camera) -> float | 
     points = _farthest_marking(pitch, camera)
     if len(points) == 0:
         return None
-    shift = np.linalg.norm(_on_the_ground(other, camera.project(points), points[:, 2]) - points[:, :2], axis=1)
+    shift = np.linalg.norm(on_the_ground(other, camera.project(points), points[:, 2]) - points[:, :2], axis=1)
     median = float(np.median(np.where(np.isfinite(shift), shift, np.inf)))
     return median if np.isfinite(median) else None
 
@@ -41,7 +41,7 @@ def _farthest_marking(pitch: Field, camera: Camera) -> Array:
     return seen.position[seen.marking == farthest]
 
 
-def _on_the_ground(camera: Camera, pixels: Array, height: Array) -> Array:
+def on_the_ground(camera: Camera, pixels: Array, height: Array) -> Array:
     """Where (N, 2) the rays through pixels (N, 2) meet the planes z = height (N,); NaN where they do not."""
     ray = camera.rays(pixels)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,0 +1,267 @@
+"""How each camera of a venue has moved since its anchor, job by job. All SQL about it.
+
+A job's worker compares a camera with the anchor that it was given; what it says is kept where that anchor still is the
+camera's. Undoing takes it back: who restores a revision forgets the anchors and the rows that came after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+from service.control_charts import Baseline
+from service.store import tables
+from service.store.engine import Repository, clock, reading
+from service.store.trend_charts import ALARM_M, CameraCharts, state_of
+from service.wire.geometry import PosedCamera
+from service.wire.results import CameraResult
+from service.wire.trend import Anchor, Displacement, Trend, TrendState
+from service.wire.venue import Venue
+
+KEPT_ROWS = 1100
+"""Of each camera: three years of nights."""
+c = tables.camera_anchors.c
+t = tables.camera_trend.c
+
+
+@dataclass(frozen=True)
+class CameraTrend:
+    """What the charts of a camera said after its last night; `moved_m` and `cusum` are None before the first."""
+
+    venue: str
+    camera: str
+    beyond: bool
+    moved_m: float | None
+    cusum: float | None
+    words: str
+
+    def state(self, alarm_m: float) -> TrendState:
+        """How the camera is doing, where so many metres at the far touchline are an alarm."""
+        return state_of(beyond=self.beyond, moved_m=self.moved_m or 0.0, alarm_m=alarm_m)
+
+
+class Trends(Repository):
+    """The trends of the cameras in the database."""
+
+    def of(self, venue: Venue, camera: str, since: datetime | None = None) -> Trend:
+        """The trend of one camera since its anchor; `since`: only the nights from then on are told, all are charted."""
+        with reading(self._engine) as connection:
+            anchor = _newest_anchors(connection, venue.id).get(camera)
+            rows = _rows(connection, venue.id, camera)
+        return _trend(venue, camera, anchor, rows, since)
+
+
+def alarm_m_of(venue: Venue) -> float:
+    """What a shift at the far touchline amounts to that is an alarm, by the rules of a venue or the usual."""
+    limit = venue.alarms.trend_m if venue.alarms else None
+    return ALARM_M if limit is None else limit
+
+
+def anchors_of(connection: sa.Connection, venue_id: str) -> dict[str, Anchor]:
+    """What to compare cameras with, by camera, of those that have had a pose accepted since they were put."""
+    newest = _newest_anchors(connection, venue_id)
+    return {
+        camera: Anchor(revision=row.revision, posed=PosedCamera.model_validate(row.posed))
+        for camera, row in newest.items()
+        if row.posed is not None
+    }
+
+
+def trends_of(connection: sa.Connection, venue_id: str) -> dict[str, CameraTrend]:
+    """What the charts said last, by camera, inside the caller's transaction."""
+    return {
+        camera: CameraTrend(venue_id, camera, row.beyond, row.moved_m, row.cusum, row.words)
+        for camera, row in _newest_anchors(connection, venue_id).items()
+    }
+
+
+def most_moved(connection: sa.Connection, most: int) -> list[CameraTrend]:
+    """What the charts said last of the cameras that have moved farthest, inside the caller's transaction."""
+    query = sa.select(tables.camera_anchors).where(c.moved_m.is_not(None)).order_by(c.moved_m.desc()).limit(most)
+    return [
+        CameraTrend(row.venue, row.camera, row.beyond, row.moved_m, row.cusum, row.words)
+        for row in connection.execute(query)
+    ]
+
+
+def begin_anchors(connection: sa.Connection, venue: Venue, changed: Collection[str], revision: int) -> None:
+    """Somebody has put cameras where they are now: the first pose that is accepted from then on is their anchor."""
+    for table in (tables.camera_anchors, tables.camera_trend):
+        gone = table.c.camera.not_in([camera.id for camera in venue.cameras])
+        connection.execute(sa.delete(table).where(table.c.venue == venue.id, gone))
+    for camera in changed:
+        _add_anchor(connection, venue.id, camera, revision)
+
+
+def go_back(connection: sa.Connection, venue: Venue, revision: int) -> None:
+    """A revision of a venue holds again: what came after it is forgotten, and the trends are those of that time."""
+    connection.execute(sa.delete(tables.camera_anchors).where(c.venue == venue.id, c.revision > revision))
+    connection.execute(sa.delete(tables.camera_trend).where(t.venue == venue.id, t.revision > revision))
+    _chart(connection, venue.id, [camera.id for camera in venue.cameras])
+
+
+def note_night(
+    connection: sa.Connection,
+    venue: Venue,
+    results: Sequence[CameraResult],
+    job_id: str,
+    revision: int,
+    *,
+    by_hand: bool,
+) -> None:
+    """Keep how far the cameras of an accepted result are from their anchors, inside the caller's transaction.
+
+    `venue`: as it is with them; `revision`: what it became by them. What a person accepted `by_hand` is right by that
+    person's word: it is the new anchor.
+    """
+    posed = {camera.id: camera.posed for camera in venue.cameras}
+    anchors, at = _newest_anchors(connection, venue.id), clock(connection)
+    for result in results:
+        moved, anchor = result.displacement, anchors.get(result.id)
+        if moved is None:
+            continue
+        if anchor is None or (by_hand and anchor.revision != revision):
+            _add_anchor(connection, venue.id, result.id, revision)
+            number, is_new = revision, True
+        else:
+            number, is_new = anchor.revision, anchor.posed is None
+        if is_new:
+            moved = moved.as_anchor()
+            _set_anchor(connection, venue.id, posed[result.id], number, at)
+        elif moved.anchor != number:
+            # It was compared with another one than the camera now has.
+            continue
+        _add_row(connection, venue.id, result, moved, number, revision, job_id, at)
+    _chart(connection, venue.id, [result.id for result in results])
+
+
+def _add_anchor(connection: sa.Connection, venue_id: str, camera: str, revision: int) -> None:
+    key = {"venue": venue_id, "camera": camera, "revision": revision}
+    those_before = sa.update(tables.camera_anchors).where(c.venue == venue_id, c.camera == camera)
+    connection.execute(those_before.values(moved_m=None))
+    connection.execute(sa.insert(tables.camera_anchors).values(**key, **_nothing_said(camera)))
+
+
+def _nothing_said(camera: str) -> dict[str, Any]:
+    """Of an anchor that no pose was accepted for yet."""
+    nothing: dict[str, Any] = {
+        "at": None,
+        "posed": None,
+        "baselines": {},
+        "beyond": False,
+        "moved_m": None,
+        "cusum": None,
+    }
+    return {**nothing, "words": f"Camera {camera} has had no pose accepted since it was put."}
+
+
+def _set_anchor(connection: sa.Connection, venue_id: str, camera: PosedCamera, revision: int, at: datetime) -> None:
+    posed = {"at": at, "posed": camera.model_dump(mode="json")}
+    connection.execute(sa.update(tables.camera_anchors).where(*_is(venue_id, camera.id, revision)).values(**posed))
+
+
+def _add_row(
+    connection: sa.Connection,
+    venue_id: str,
+    result: CameraResult,
+    moved: Displacement,
+    anchor: int,
+    revision: int,
+    job_id: str,
+    at: datetime,
+) -> None:
+    # A person may accept by hand what a job has brought already.
+    before = sa.delete(tables.camera_trend).where(t.venue == venue_id, t.camera == result.id, t.job == job_id)
+    connection.execute(before)
+    sigma = result.sigma
+    connection.execute(
+        sa.insert(tables.camera_trend).values(
+            venue=venue_id,
+            camera=result.id,
+            anchor=anchor,
+            revision=revision,
+            job=job_id,
+            at=at,
+            sigma_rotation_deg=sigma.rotation_deg if sigma else None,
+            sigma_position_m=sigma.position_m if sigma else None,
+            **moved.model_dump(exclude={"anchor", "at"}),
+        )
+    )
+
+
+def _chart(connection: sa.Connection, venue_id: str, cameras: Collection[str]) -> None:
+    """Write down what the charts of cameras say now, and forget the rows that are too many."""
+    anchors = _newest_anchors(connection, venue_id)
+    for camera in anchors.keys() & cameras:
+        anchor, rows = anchors[camera], _rows(connection, venue_id, camera)
+        _trim(connection, rows)
+        since = [row for row in rows if row.anchor == anchor.revision]
+        said = _said(camera, since, anchor) if since else _nothing_said(camera)
+        of_anchor = _is(venue_id, camera, anchor.revision)
+        connection.execute(sa.update(tables.camera_anchors).where(*of_anchor).values(**said))
+
+
+def _said(camera: str, since: Sequence[Any], anchor: Any) -> dict[str, Any]:
+    """What the charts of a camera say, by the rows since its anchor."""
+    charts = CameraCharts.of(since, _baselines(anchor))
+    last = len(charts.nights) - 1
+    return {
+        "baselines": {quantity: asdict(baseline) for quantity, baseline in charts.settled.items()},
+        "beyond": bool(charts.beyond(last)),
+        "moved_m": charts.moved_m(last),
+        "cusum": charts.cusum(last),
+        "words": charts.words(camera),
+    }
+
+
+def _trim(connection: sa.Connection, rows: Sequence[Any]) -> None:
+    """Keep so many rows as is said above: of days with several jobs the last one, and then the newest days."""
+    excess = len(rows) - KEPT_ROWS
+    if excess <= 0:
+        return
+    last_of_days = {row.at.date(): row.id for row in rows}.values()
+    by_worth = sorted(rows, key=lambda row: (row.id in last_of_days, row.id))
+    connection.execute(sa.delete(tables.camera_trend).where(t.id.in_([row.id for row in by_worth[:excess]])))
+
+
+def _trend(venue: Venue, camera: str, anchor: Any, rows: Sequence[Any], since: datetime | None) -> Trend:
+    counted = [row for row in rows if anchor is not None and row.anchor == anchor.revision]
+    alarm_m = alarm_m_of(venue)
+    if counted:
+        charts = CameraCharts.of(counted, _baselines(anchor))
+        return charts.trend(venue.id, camera, anchor.revision, alarm_m, since)
+    return Trend(
+        venue=venue.id,
+        camera=camera,
+        anchor=None,
+        since=None,
+        state="quiet",
+        words=_nothing_said(camera)["words"],
+        alarm_m=alarm_m,
+        moved_m=0.0,
+        baseline_nights=0,
+        points=[],
+    )
+
+
+def _baselines(anchor: Any) -> Mapping[str, Baseline]:
+    return {quantity: Baseline(**numbers) for quantity, numbers in anchor.baselines.items()}
+
+
+def _rows(connection: sa.Connection, venue_id: str, camera: str) -> Sequence[Any]:
+    """All rows of a camera, oldest first."""
+    of_camera = (t.venue == venue_id, t.camera == camera)
+    return connection.execute(sa.select(tables.camera_trend).where(*of_camera).order_by(t.id)).all()
+
+
+def _newest_anchors(connection: sa.Connection, venue_id: str) -> dict[str, Any]:
+    query = sa.select(tables.camera_anchors).where(c.venue == venue_id).order_by(c.revision)
+    return {row.camera: row for row in connection.execute(query)}
+
+
+def _is(venue_id: str, camera: str, revision: int) -> list[sa.ColumnElement[bool]]:
+    return [c.venue == venue_id, c.camera == camera, c.revision == revision]
