@@ -23,7 +23,7 @@ from worker.calibration.judge.pairs import (
 from worker.calibration.judge.quality import CameraResult, Gate, believable, ridge_rejection
 from worker.calibration.judge.registration import Response
 from worker.calibration.judge.seam import seam_between
-from worker.calibration.memory.camera_memory import CameraMemory, fitting
+from worker.calibration.memory.camera_memory import CameraMemory, Job, fingerprint_of_frames, fitting
 from worker.calibration.nearby import found_nearby
 from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Path, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
@@ -96,13 +96,14 @@ def calibrate(
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
         path=path,
         lights=evened,
-        memories=remember(answer, cameras, memories, taken_at),
+        memories=remember(answer, cameras, frames, memories, taken_at),
     )
 
 
 def remember(
     answer: Answer,
     stored: Sequence[Camera],
+    frames: Mapping[str, Sequence[Frame]],
     memories: Mapping[str, CameraMemory],
     taken_at: datetime | None,
 ) -> dict[str, CameraMemory]:
@@ -112,11 +113,10 @@ def remember(
     for before, result in zip(stored, answer.cameras, strict=True):
         if not result.accepted or result.measured is None:
             continue
+        seen = fingerprint_of_frames(frames[before.id])
+        job = Job(result.camera, result.measured, lines, taken_at, result.painted_anew, seen)
         (memory,) = fitting([memories.get(before.id)], lines)
-        job = (result.camera, result.measured, lines, taken_at)
-        after[before.id] = (
-            CameraMemory.begun(before, *job) if memory is None else memory.after(*job, result.painted_anew)
-        )
+        after[before.id] = CameraMemory.begun(before, job) if memory is None else memory.after(job)
     return after
 
 

@@ -184,7 +184,7 @@ class Situation:
     def judged(self, finished: Finished) -> list[CameraResult]:
         """What each of them is worth by itself, beside its stored pose."""
         with self.journey.measuring("quality"):
-            return judged_alone(self.pitch, self.cameras, self.seen, finished, self.gate)
+            return judged_alone(self.pitch, self.cameras, self.memories, self.seen, finished, self.gate)
 
     def _free(self) -> list[Parameter]:
         """What is to be found along with the poses."""
@@ -310,7 +310,12 @@ def left_alone(here: Situation) -> Attempt:
 
 
 def judged_alone(
-    pitch: Field, stored: Sequence[Camera], seen: Seen, finished: Finished, gate: Gate
+    pitch: Field,
+    stored: Sequence[Camera],
+    memories: Sequence[CameraMemory | None],
+    seen: Seen,
+    finished: Finished,
+    gate: Gate,
 ) -> list[CameraResult]:
     """What each finished camera is worth by itself beside the `stored` one on the `pitch` it was stored for."""
     lines = pitch.line_points()
@@ -322,9 +327,10 @@ def judged_alone(
             evidence_before=evidence_of(lines, before, channels, response, left_out(pitch, before)),
             moved=Movement.between(pitch, before, after.camera),
             markings=markings_seen(finished.pitch, after, channels, response),
+            moved_in_all=None if memory is None else Movement.between(pitch, memory.origin, after.camera),
         )
-        for before, after, view, channels, response in zip(
-            stored, finished.each, seen.views, seen.sight.channels, seen.sight.responses, strict=True
+        for before, memory, after, view, channels, response in zip(
+            stored, memories, finished.each, seen.views, seen.sight.channels, seen.sight.responses, strict=True
         )
     ]
     return [replace(result, refusal=alone_rejection(result, gate)) for result in results]

@@ -16,7 +16,7 @@ from worker.calibration.finish.refinement import refine
 from worker.calibration.finish.uncertainty import Finished
 from worker.calibration.judge.overlap import Overlap
 from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection
-from worker.calibration.memory.camera_memory import CameraMemory, fitting
+from worker.calibration.memory.camera_memory import CameraMemory, Job, fitting
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import Ground
@@ -121,7 +121,6 @@ class Installation:
     pitch: Field
     stored: list[Camera]
     memories: list[CameraMemory | None] = field(default_factory=list)
-    remembers: bool = True
 
     def __post_init__(self) -> None:
         self.memories = self.memories or [None] * len(self.stored)
@@ -135,14 +134,12 @@ class Installation:
             if not result.accepted:
                 continue
             lines = self.pitch.line_points()
-            if self.remembers:
-                (memory,) = fitting([self.memories[number]], lines)
-                job = (result.camera, result.measured, lines, None)
-                self.memories[number] = (
-                    CameraMemory.begun(self.stored[number], *job)
-                    if memory is None
-                    else memory.after(*job, result.painted_anew)
-                )
+            frames = str(sight.noise[number].sum())
+            job = Job(result.camera, result.measured, lines, None, result.painted_anew, frames)
+            (memory,) = fitting([self.memories[number]], lines)
+            self.memories[number] = (
+                CameraMemory.begun(self.stored[number], job) if memory is None else memory.after(job)
+            )
             self.stored[number] = result.camera
         return results
 
@@ -155,7 +152,8 @@ class Installation:
                 overlap=Overlap(1.0, 1.0, 0.0),
                 evidence_before=was,
                 moved=Movement.between(self.pitch, stored, after.camera),
+                moved_in_all=memory and Movement.between(self.pitch, memory.origin, after.camera),
             )
-            for stored, after, was in zip(self.stored, finished.each, before, strict=True)
+            for stored, after, was, memory in zip(self.stored, finished.each, before, self.memories, strict=True)
         ]
         return [replace(result, refusal=alone_rejection(result, Gate())) for result in results]

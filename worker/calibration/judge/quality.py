@@ -94,6 +94,17 @@ class Movement:
             float(shift.mean()) if len(shift) else 0.0,
         )
 
+    def beyond(self, gate: Gate) -> bool:
+        """Whether it is more than a camera may move without somebody storing a new pose."""
+        return self.rotation_deg > gate.largest_rotation_deg or self.position_m > gate.largest_shift_m
+
+    def words(self, gate: Gate) -> str:
+        """How far it moved, and the limits."""
+        return (
+            f"turned by {self.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
+            f"{self.position_m:.2f} m (at most {gate.largest_shift_m})"
+        )
+
 
 @dataclass(frozen=True)
 class CameraResult(FinishedCamera):
@@ -101,7 +112,8 @@ class CameraResult(FinishedCamera):
 
     `view`: whether its frame could be used, and what is wrong with it if not; `overlap`: of expected lines and the
     segmentation; `refusal`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
-    camera's lens is not the stored one but what the lines say; `markings`: what is seen of each.
+    camera's lens is not the stored one but what the lines say; `markings`: what is seen of each; `moved_in_all`: since
+    its memory began, None without one.
     """
 
     view: ViewCondition
@@ -111,6 +123,7 @@ class CameraResult(FinishedCamera):
     refusal: Refusal | None = None
     lens_found: bool = False
     markings: Sequence[MarkingSeen] = field(default=(), kw_only=True)
+    moved_in_all: Movement | None = field(default=None, kw_only=True)
 
     @property
     def accepted(self) -> bool:
@@ -181,12 +194,16 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             f"{gate.largest_sigma_deg} allowed), {sigma.position_m:.2f} m (at most {gate.largest_sigma_m}); let the "
             "camera see lines in more than one direction, or calibrate its lens again",
         )
-    if moved.rotation_deg > gate.largest_rotation_deg or moved.position_m > gate.largest_shift_m:
+    if moved.beyond(gate):
         return Refusal(
             "moved",
-            f"turned by {moved.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
-            f"{moved.position_m:.2f} m (at most {gate.largest_shift_m}); if somebody moved the camera, store a new "
-            "first pose",
+            f"{moved.words(gate)}; if somebody moved the camera, store a new first pose",
+        )
+    if result.moved_in_all is not None and result.moved_in_all.beyond(gate):
+        return Refusal(
+            "moved",
+            f"{result.moved_in_all.words(gate)}, over all jobs since its pose was last stored by hand: its mount may "
+            "be giving way; look at it, then store this pose, or accept the job by hand",
         )
     if seen.agreement < result.evidence_before.agreement - gate.agreement_loss:
         return Refusal(

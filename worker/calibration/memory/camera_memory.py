@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.memory.epoch import Epoch, camera_from_json, camera_to_json
-from worker.calibration.scene.camera import Camera
+from worker.calibration.scene.camera import Camera, Frame
 from worker.calibration.scene.field import LinePoints
 from worker.calibration.see.line_measurement import Measurements
 
@@ -31,10 +31,34 @@ MOST_EARLIER, FEWEST_JOBS = 2, 4
 
 
 @dataclass(frozen=True)
+class Job:
+    """What an accepted job leaves of a camera: where it was `found`, what was `measured` of the `lines`, `at` what time
+    (None: not known), which markings were `painted_anew`, and the fingerprint of its `frames`.
+    """
+
+    found: Camera
+    measured: Measurements
+    lines: LinePoints
+    at: datetime | None
+    painted_anew: tuple[int, ...] = ()
+    frames: str = ""
+
+    @property
+    def for_epoch(self) -> tuple[Camera, Measurements, LinePoints, datetime | None]:
+        """What an epoch takes of it."""
+        return self.found, self.measured, self.lines, self.at
+
+    def without(self, markings: Sequence[int]) -> Job:
+        """The same without the measurements of some markings."""
+        return replace(self, measured=self.measured[~np.isin(self.measured.points.marking, markings)])
+
+
+@dataclass(frozen=True)
 class CameraMemory:
     """`origin`: the camera as it was stored before its first job; `anchor`: the first jobs, `recent`: those since, and
     `earlier` ones that looked another way or had another lens; `aside`: markings that have been painted elsewhere, of
-    which nothing is remembered since; `lines`: the fingerprint of the field's line points.
+    which nothing is remembered since; `lines`: the fingerprint of the field's line points; `frames`: of the last job's
+    frames.
     """
 
     origin: Camera
@@ -43,33 +67,27 @@ class CameraMemory:
     earlier: tuple[Epoch, ...]
     aside: tuple[int, ...]
     lines: str
+    frames: str = ""
 
     @classmethod
-    def begun(
-        cls, stored: Camera, found: Camera, measured: Measurements, lines: LinePoints, at: datetime | None
-    ) -> CameraMemory:
+    def begun(cls, stored: Camera, job: Job) -> CameraMemory:
         """The memory of the first accepted job, which found a camera that was `stored` before."""
-        return cls(stored, Epoch.begun(found, measured, lines, at), None, (), (), fingerprint(lines))
+        return cls(stored, Epoch.begun(*job.for_epoch), None, (), (), fingerprint(job.lines), job.frames)
 
-    def after(
-        self,
-        found: Camera,
-        measured: Measurements,
-        lines: LinePoints,
-        at: datetime | None,
-        painted_anew: Sequence[int] | NDArray[np.intp] = (),
-    ) -> CameraMemory:
-        """The memory with one more accepted job; `painted_anew`: markings that do not lie any more where they did."""
-        kept = self.aware_of(painted_anew, lines)
-        job = (found, measured[~np.isin(measured.points.marking, kept.aside)], lines, at)
-        if kept.recent is None and kept.anchor.jobs < ANCHOR_JOBS and kept.anchor.looks_like(found, lines):
-            return replace(kept, anchor=kept.anchor.joined(*job))
+    def after(self, job: Job) -> CameraMemory:
+        """The memory with one more accepted job; the same frames sent again say nothing new."""
+        if job.frames == self.frames:
+            return self
+        kept = replace(self.aware_of(job.painted_anew, job.lines), frames=job.frames)
+        told = job.without(kept.aside).for_epoch
+        if kept.recent is None and kept.anchor.jobs < ANCHOR_JOBS and kept.anchor.looks_like(job.found, job.lines):
+            return replace(kept, anchor=kept.anchor.joined(*told))
         if kept.recent is None:
-            return replace(kept, recent=Epoch.begun(*job))
-        if kept.recent.looks_like(found, lines):
-            return replace(kept, recent=kept.recent.joined(*job))
+            return replace(kept, recent=Epoch.begun(*told))
+        if kept.recent.looks_like(job.found, job.lines):
+            return replace(kept, recent=kept.recent.joined(*told))
         before = [*kept.earlier, kept.recent] if kept.recent.jobs >= FEWEST_JOBS else list(kept.earlier)
-        return replace(kept, recent=Epoch.begun(*job), earlier=tuple(before[-MOST_EARLIER:]))
+        return replace(kept, recent=Epoch.begun(*told), earlier=tuple(before[-MOST_EARLIER:]))
 
     @property
     def epochs(self) -> list[Epoch]:
@@ -115,6 +133,7 @@ class CameraMemory:
             "recent": None if self.recent is None else self.recent.to_json(),
             "earlier": [epoch.to_json() for epoch in self.earlier],
             "aside": list(self.aside),
+            "frames": self.frames,
         }
 
     @classmethod
@@ -129,12 +148,21 @@ class CameraMemory:
             tuple(Epoch.from_json(epoch) for epoch in told["earlier"]),
             tuple(told["aside"]),
             told["lines"],
+            told["frames"],
         )
 
 
 def fingerprint(lines: LinePoints) -> str:
     """Names the line points that the numbers of a memory are about: another field has another one."""
     return hashlib.sha256(np.round(lines.position, 4).tobytes()).hexdigest()[:16]
+
+
+def fingerprint_of_frames(frames: Sequence[Frame]) -> str:
+    """Names the frames of a job by every eighth of their rows and columns: no two nights have the same noise."""
+    digest = hashlib.blake2b(digest_size=8)
+    for frame in frames:
+        digest.update(np.ascontiguousarray(frame[::8, ::8]).tobytes())
+    return digest.hexdigest()
 
 
 def fitting(memories: Sequence[CameraMemory | None], lines: LinePoints) -> list[CameraMemory | None]:
