@@ -96,7 +96,7 @@ class Year:
         files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
         task = self.home.attempts.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
         before = self.home.venues.get("v").cameras
-        nights = calibration.Nights(task.last_views, task.memories, task.taken_at)
+        nights = calibration.Nights(task.last_views, task.memories, task.anchors, task.taken_at)
         means = Means.of(self.home.settings)
         found = calibration.solve(task.venue, files, task.options, means, lambda _: None, nights)
         self.home.attempts.finish(task, found.result, [], found.memories)

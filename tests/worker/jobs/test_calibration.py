@@ -376,7 +376,7 @@ def memory_of(camera):
     """A memory of one job, in which the camera was found where it is stored and measured nothing."""
     nothing = np.zeros(0)
     epoch = Epoch(reading.camera_of(camera), nothing.astype(int), nothing, nothing, 1, None, None)
-    return CameraMemory(reading.camera_of(camera), epoch, None, (), "another field")
+    return CameraMemory(reading.camera_of(camera), epoch, None, (), (), "another field")
 
 
 def test_memories_reach_the_engine_and_those_that_it_leaves_come_back(venue, files, asked, means):
@@ -384,7 +384,9 @@ def test_memories_reach_the_engine_and_those_that_it_leaves_come_back(venue, fil
     asked["after"] = {"left": memory_of(left)}
     before = {"left": memory_of(left).to_json(), "right": {"format": 0}}
     at = datetime(2026, 11, 23, 2, tzinfo=UTC)
-    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, Nights({}, before, at))
+    outcome = calibration.solve(
+        venue, files, Options(seed=7), means, lambda _: None, Nights(memories=before, taken_at=at)
+    )
     assert (asked["taken_at"], list(asked["memories"])) == (at, ["left"])
     assert asked["memories"]["left"].to_json() == before["left"]
     assert outcome.memories == {"left": memory_of(left).to_json()}

@@ -79,16 +79,18 @@ def test_a_camera_without_a_refined_pose_or_a_memory_has_nothing_to_tell(found):
     [
         (LensChange(NOVEMBER, 0.006, 0.001), "focal length 0.6 ± 0.1 % longer than on 3 November: zoom ring or focus"),
         (
-            LensChange(NOVEMBER, -0.0005, 0.00012),
-            "focal length 0.05 ± 0.01 % shorter than on 3 November: zoom ring or focus",
+            LensChange(NOVEMBER, -0.0015, 0.00012),
+            "focal length 0.15 ± 0.01 % shorter than on 3 November: zoom ring or focus",
         ),
         (
             LensChange(NOVEMBER.replace(year=2025), 0.02, 0.003),
             "focal length 2.0 ± 0.3 % longer than on 3 November 2025: zoom ring or focus",
         ),
-        (LensChange(None, 0.03, 0.01), "focal length 3 ± 1 % longer than in its first nights: zoom ring or focus"),
+        (LensChange(None, 0.04, 0.01), "focal length 4 ± 1 % longer than in its first nights: zoom ring or focus"),
         (LensChange(NOVEMBER, 0.0029, 0.001), None),
         (LensChange(NOVEMBER, 0.0, 0.0), None),
+        # As much as heat may do, however surely it has.
+        (LensChange(NOVEMBER, -0.0005, 0.00012), None),
     ],
 )
 def test_a_change_of_the_lens_is_put_into_words_once_it_is_no_chance(change, words):

@@ -40,7 +40,7 @@ MOVEMENT_SCALES: Array = 0.3 * 2.0 ** np.arange(7.0)
 FOCAL_SCALES: Array = 2.0 ** np.arange(8.0)
 """A focal length is off by what is expected of it, or by so many times more; never by less: lines that fit say little
 of it. A zoom ring moves it by far more than that, ..."""
-LENS_SCALES: Array = 2.0 ** np.arange(3.0)
+LENS_SCALES: Array = 2.0 ** np.arange(6.0)
 """... and nothing moves the rest of a lens so far."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
 """A measure of the field may have been taken better than expected, or worse."""

@@ -101,9 +101,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Step:
-    """Where a Gauss-Newton step leads, and the `covariance` (U, U) of everything unknown before it."""
+    """Where a Gauss-Newton step leads: the `move` (U,), and the `covariance` (U, U) of everything unknown before it."""
 
     to: Estimate
+    move: Array
     covariance: Array
 
     def unevenness(self, unknowns: Unknowns, before: Belief) -> float:
@@ -120,4 +121,5 @@ def step(
     prior = here.prior(unknowns)
     pull = equations.gradient + prior @ here.away(found)
     covariance = np.asarray(np.linalg.inv(equations.information + prior), dtype=float)
-    return Step(here.moved(-covariance @ pull, unknowns), covariance)
+    move = -covariance @ pull
+    return Step(here.moved(move, unknowns), move, covariance)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.robust import USUAL, Weigh, tukey_weights
 from worker.calibration.scene.camera import Array, Camera
-from worker.calibration.scene.ground import UNEVEN_M
+from worker.calibration.scene.ground import UNEVEN_M, Ground
 from worker.calibration.scene.lens import LENS_NUMBERS
 from worker.calibration.scene.parameters import FieldParameter, LensParameter, Parameter
 from worker.calibration.see.line_measurement import PAINT_M, Measurements
@@ -151,6 +151,22 @@ class Weighted:
         return [slice(first, last) for first, last in pairwise(ends)]
 
     @property
+    def up(self) -> Array:
+        """Pixels (M,) per metre that the ground rises under a row."""
+        return self.local[:, 1]
+
+    @property
+    def drawn_together(self) -> Array:
+        """How much (M, 2) the rows of a shared point give way to each other: the products of two rows say by how much
+        the point, wherever it lies, takes from what they tell apart; 0 of a point that one view alone measures."""
+        drawn = np.zeros((len(self.at), 2))
+        at = self.at[self.shared]
+        root = np.linalg.cholesky(np.linalg.inv(self.precision))[at]
+        heavy = self.local[self.shared] * self.weight[self.shared, None]
+        drawn[self.shared] = np.sum(root * heavy[:, :, None], axis=1)
+        return drawn
+
+    @property
     def left(self) -> Array:
         """What is left (M,) px of the residuals of shared points when those lie where all their rows say together."""
         return self.residual - self.shared * np.sum(self.local * self.beside[self.at], axis=1)
@@ -208,37 +224,58 @@ class NormalEquations:
 
 
 def normal_equations(of: Weighted) -> NormalEquations:
-    """The sums over all rows, paint and roughness of each line point eliminated (docs/model.md, 3)."""
-    size = len(of.unknowns)
-    information, gradient = np.zeros((size, size)), np.zeros(size)
-    shared, number = np.unique(of.at[of.shared], return_inverse=True)
-    coupling = np.zeros((2, len(shared), size))
-    numbers = np.zeros(len(of.at), dtype=np.intp)
-    numbers[of.shared] = number
+    """The sums over all rows, paint and roughness of each line point eliminated (docs/model.md, 3).
+
+    All rows of a line point move with the ground under it, which is summed by points; poses and numbers are summed by
+    views, and by pairs of views that share points.
+    """
+    unknowns, dense = of.unknowns, of.unknowns.dense
+    drawn = of.drawn_together
+    information = np.zeros((len(unknowns), len(unknowns)))
+    gradient = np.zeros(len(unknowns))
+    pull = of.weight * of.left
+    risen = np.stack([_summed(of.at, -of.up * drawn[:, n], len(of.points)) for n in (0, 1)], axis=1)
+    by_ground = -of.weight * of.up - np.sum(drawn * risen[of.at], axis=1)
+    alone = of.weight - np.sum(drawn**2, axis=1)
     for rows, part in zip(of.rows, of.parts(), strict=True):
-        columns, jacobian = _with_ground(rows, of.unknowns)
-        heavy = jacobian * of.weight[part, None]
-        information[np.ix_(columns, columns)] += heavy.T @ jacobian
-        gradient[columns] += heavy.T @ of.residual[part]
-        both = of.shared[part]
-        for which in (0, 1):
-            coupling[which][numbers[part][both][:, None], columns] += heavy[both] * of.local[part][both, which, None]
-    root = np.linalg.cholesky(np.linalg.inv(of.precision[shared]))
-    first = coupling[0] * root[:, 0, :1] + coupling[1] * root[:, 1, :1]
-    reduced = np.concatenate([first, coupling[1] * root[:, 1, 1:]])
-    information -= reduced.T @ reduced
-    gradient -= np.einsum("kpu,pk->u", coupling, of.beside[shared])
+        columns, jacobian = rows.columns, rows.jacobian
+        information[np.ix_(columns, columns)] += (jacobian * alone[part, None]).T @ jacobian
+        gradient[columns] += jacobian.T @ pull[part]
+        across = _by_node(unknowns.ground, rows.point, jacobian * by_ground[part, None])
+        information[columns, dense:] += across.T
+        information[dense:, columns] += across
+    for (one, first), (other, second) in combinations(zip(of.rows, of.parts(), strict=True), 2):
+        _, at, there = np.intersect1d(one.point, other.point, assume_unique=True, return_indices=True)
+        together = np.sum(drawn[first][at] * drawn[second][there], axis=1)
+        coupled = (one.jacobian[at] * together[:, None]).T @ other.jacobian[there]
+        information[np.ix_(one.columns, other.columns)] -= coupled
+        information[np.ix_(other.columns, one.columns)] -= coupled.T
+    level = _summed(of.at, of.weight * of.up**2, len(of.points)) - np.sum(risen**2, axis=1)
+    information[dense:, dense:] = _between_nodes(unknowns.ground, of.points, level)
+    gradient[dense:] = _by_node(unknowns.ground, of.points, -_summed(of.at, of.up * pull, len(of.points))[:, None])[
+        :, 0
+    ]
     return NormalEquations(information, gradient)
 
 
-def pulls(of: Weighted) -> Array:
-    """The part (P, U) of the gradient that each line point has, over all views."""
-    found = np.zeros((len(of.points), len(of.unknowns)))
-    left = of.left
-    for rows, part in zip(of.rows, of.parts(), strict=True):
-        columns, jacobian = _with_ground(rows, of.unknowns)
-        found[of.at[part][:, None], columns] += jacobian * (of.weight[part] * left[part])[:, None]
-    return found
+def _by_node(ground: Ground, points: NDArray[np.intp], values: Array) -> Array:
+    """Values (M, n) at line points (M,), shared out between the nodes (K, n) of the ground under them."""
+    node, share = ground.node[points].ravel(), ground.share[points]
+    by_column = [_summed(node, (share * column[:, None]).ravel(), len(ground)) for column in values.T]
+    return np.stack(by_column, axis=1) if by_column else np.zeros((len(ground), 0))
+
+
+def _between_nodes(ground: Ground, points: NDArray[np.intp], values: Array) -> Array:
+    """The sum (K, K) over line points (P,) of a value (P,) times the outer square of their shares of the nodes."""
+    node, share, size = ground.node[points], ground.share[points], len(ground)
+    pair = node[:, :, None] * size + node[:, None, :]
+    squares = values[:, None, None] * share[:, :, None] * share[:, None, :]
+    return _summed(pair.ravel(), squares.ravel(), size * size).reshape(size, size)
+
+
+def _summed(at: NDArray[np.intp], values: Array, size: int) -> Array:
+    """Values (M,) added up by where (M,) each belongs, (size,)."""
+    return np.asarray(np.bincount(at, values, size), dtype=float)
 
 
 def error_of_measurement(of: Weighted, information: Array) -> Array:
@@ -247,22 +284,26 @@ def error_of_measurement(of: Weighted, information: Array) -> Array:
     Neighbours on a line share the error of its paint and of the lens, so they are not as many as they seem (the
     sandwich of Liang and Zeger, 1986). On top, a fifth of what their expected errors say.
     """
-    clusters, cluster = np.unique(of.points // CLUSTER_POINTS, return_inverse=True)
-    by_cluster = np.zeros((len(clusters), len(of.unknowns)))
-    np.add.at(by_cluster, cluster, pulls(of))
+    by_cluster = _pulls(of)
     usual = float(np.sum(of.belief**2) / max(float(np.sum(of.belief)), 1e-12))
     return np.asarray(by_cluster.T @ by_cluster + LEAST_NOISE * usual * information)
 
 
-def _with_ground(rows: Rows, unknowns: Unknowns) -> tuple[NDArray[np.intp], Array]:
-    """Columns (n + k,) and jacobian (M, n + k) of the rows by dense unknowns and the k heights under their points."""
-    ground, count = unknowns.ground, len(rows.point)
-    nodes, node = np.unique(ground.node[rows.point], return_inverse=True)
-    by_height = np.zeros((count, len(nodes)))
-    # Shares of the four nodes around a point: each is another one.
-    by_height[np.arange(count)[:, None], node.reshape(count, -1)] = -rows.up[:, None] * ground.share[rows.point]
-    columns = np.concatenate([rows.columns, unknowns.dense + nodes])
-    return columns, np.concatenate([rows.jacobian, by_height], axis=1)
+def _pulls(of: Weighted) -> Array:
+    """The part (C, U) of the gradient that each ten metres of line have, over all views."""
+    unknowns, ground = of.unknowns, of.unknowns.ground
+    clusters, cluster_of = np.unique(of.points // CLUSTER_POINTS, return_inverse=True)
+    count, size = len(clusters), len(ground)
+    cluster, pull = cluster_of[of.at], of.weight * of.left
+    found = np.zeros((count, len(unknowns)))
+    for rows, part in zip(of.rows, of.parts(), strict=True):
+        for column, slopes in zip(rows.columns, rows.jacobian.T, strict=True):
+            found[:, column] += _summed(cluster[part], slopes * pull[part], count)
+    node, share = ground.node[of.points], ground.share[of.points]
+    risen = -_summed(of.at, of.up * pull, len(of.points))
+    pair = cluster_of[:, None] * size + node
+    found[:, unknowns.dense :] = _summed(pair.ravel(), (share * risen[:, None]).ravel(), count * size).reshape(-1, size)
+    return found
 
 
 def _joined(parts: Sequence[Array | NDArray[np.intp]]) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.finish.estimate import Estimate, Step, step
 from worker.calibration.finish.least_squares import misfit_px
+from worker.calibration.finish.mixing import MixedSteps
 from worker.calibration.finish.uncertainty import Finished, judged
 from worker.calibration.finish.unknowns import Unknowns
 from worker.calibration.memory.camera_memory import CameraMemory, fitting
@@ -183,12 +184,13 @@ class _Finish:
         for _ in range(MOST_READINGS):
             read_at, this = here, self.around(here)
             this.reader.read_anew()
+            mixed = MixedSteps(this.unknowns)
             for _ in range(MOST_LAST_STEPS):
-                before = here
                 last = this.towards_tukey(here, this.measure(here, LAST_SEARCH_PX))
-                here = last.to
-                if here.farthest_from(before) < ARRIVED_M:
+                if last.to.farthest_from(here) < ARRIVED_M:
+                    here = last.to
                     break
+                here = mixed.step(here, last)
             if here.farthest_from(read_at) < ARRIVED_M:
                 break
         return last
