@@ -44,7 +44,10 @@ MISFIT_FLATTENS_PX = 0.3
 """Error that nothing explains at which the ground is taken for half as uneven as its heights say."""
 SETTLED_M = 2e-4
 """Cameras that a step moves less than this are where these measurements lead."""
-ARRIVED_M = 5e-5
+ARRIVED_M, PATIENCE = 5e-5, 3
+"""The last steps end when cameras move less than this, or when so many steps were no shorter than one before: a line
+point that fits two shifts alike may go to and fro."""
+READ_ALIKE_M = 1e-4
 """Cameras that a whole reading of the frames moves less than this have arrived."""
 
 
@@ -184,14 +187,15 @@ class _Finish:
         for _ in range(MOST_READINGS):
             read_at, this = here, self.around(here)
             this.reader.read_anew()
-            mixed = MixedSteps(this.unknowns)
+            mixed, lengths = MixedSteps(this.unknowns), list[float]()
             for _ in range(MOST_LAST_STEPS):
                 last = this.towards_tukey(here, this.measure(here, LAST_SEARCH_PX))
-                if last.to.farthest_from(here) < ARRIVED_M:
+                lengths.append(last.to.farthest_from(here))
+                if lengths[-1] < ARRIVED_M or min(lengths[-PATIENCE:]) > min(lengths[:-PATIENCE], default=np.inf):
                     here = last.to
                     break
                 here = mixed.step(here, last)
-            if here.farthest_from(read_at) < ARRIVED_M:
+            if here.farthest_from(read_at) < READ_ALIKE_M:
                 break
         return last
 

@@ -27,6 +27,8 @@ WIDTH_CLASSES_PX = ((0.3, 3.0, 0.5), (3.0, 10.0, 0.5), (10.0, 30.0, 1.0), (30.0,
 """Lines from..to px wide share a filter length and a sampling step."""
 BESIDE_PX = 4.0
 """How much of the grass on each side belongs to the filter, beyond a third of the line's width."""
+GRID_PX = 16.0
+"""Between the points of the picture from which places to sample are counted."""
 TOGETHER_PX = 40.0
 """Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one."""
 LEAST_ALONG = 0.5
@@ -40,8 +42,9 @@ class Matches:
     `which` (M,): of the lines that were looked for; `brightness` (M, S + K - 1): profiles across them, NaN outside the
     picture, in steps of `sampling_px`; `expected` (M, K) at `offsets` (K,) from their centres, see `expected_profiles`;
     `correlation` (M, S) of the two at `shifts` (S,) px along their normals, -1..1, positive where a piece is bright or
-    dark as its marking is; `along` (M, S): its mean over the pieces of the same marking around each: high where a ridge
-    goes on along the line, near zero elsewhere; `opposed` (M, S): whether what is there has another paint's colour.
+    dark as its marking is; `base` (M,) px: where the shifts of each begin, within a step of where it is expected;
+    `along` (M, S): the mean correlation of the pieces of the same marking around each: high where a ridge goes on along
+    the line, near zero elsewhere; `opposed` (M, S): whether what is there has another paint's colour.
     """
 
     which: NDArray[np.intp]
@@ -52,6 +55,7 @@ class Matches:
     along: Array
     opposed: NDArray[np.bool_]
     shifts: Array
+    base: Array
     sampling_px: float
 
     def where(self, chosen: NDArray[np.bool_], sign: int) -> Matches:
@@ -64,6 +68,7 @@ class Matches:
             correlation=np.where(self.opposed[chosen], -1.0, sign * self.correlation[chosen]),
             along=np.where(self.opposed[chosen], -1.0, sign * self.along[chosen]),
             opposed=self.opposed[chosen],
+            base=self.base[chosen],
         )
 
     @property
@@ -154,15 +159,27 @@ def _matches_in(
         half_filter = int(np.ceil((high * 0.85 + BESIDE_PX) / sampling))
         half_search = int(np.ceil(reach_px / sampling)) + 1
         reach = half_filter + half_search
-        across = _profiles(brightness, pieces, bend[which], sampling * np.arange(-reach, reach + 1, dtype=float))
+        base = _beside_grid(pieces, sampling)
+        samples = base[:, None] + sampling * np.arange(-reach, reach + 1, dtype=float)
+        across = _profiles(brightness, pieces, bend[which], samples)
         offsets = sampling * np.arange(-half_filter, half_filter + 1, dtype=float)
         expected = expected_profiles(pieces.width_px, offsets)
         correlation = sliding_correlation(across, expected)
         along = _mean_along(correlation, pieces, TOGETHER_PX * relative_size)
         shifts = sampling * np.arange(-half_search, half_search + 1, dtype=float)
         free = np.zeros(correlation.shape, dtype=bool)
-        classes.append(Matches(which, across, expected, offsets, correlation, along, free, shifts, sampling))
+        classes.append(Matches(which, across, expected, offsets, correlation, along, free, shifts, base, sampling))
     return classes
+
+
+def _beside_grid(pieces: SeenLines, sampling_px: float) -> Array:
+    """How far (M,) px along its normal the nearest place is where a piece of line is sampled, wherever it is expected.
+
+    The places stand fast in the picture. Else what is read of a line would depend a little on where it was looked for.
+    """
+    fixed = GRID_PX * np.round(pieces.pixel / GRID_PX)
+    beside = np.sum((pieces.pixel - fixed) * pieces.normal, axis=1)
+    return np.asarray(sampling_px * np.round(beside / sampling_px) - beside)
 
 
 def _mean_along(correlation: Array, pieces: SeenLines, length_px: float) -> Array:
@@ -220,12 +237,12 @@ def _window_sums(values: Array, first: NDArray[np.intp], count: NDArray[np.intp]
 
 
 def _profiles(image: NDArray[np.float32], seen: SeenLines, bend: Array, offsets: Array) -> Array:
-    """Brightness (N, S) across the lines at `offsets` (S,) px, averaged along them; NaN outside the picture.
+    """Brightness (N, S) across the lines at `offsets` (N, S) px, averaged along them; NaN outside the picture.
 
     `bend` (N,): 1 / radius of the lines in the picture, in 1 / px, positive where they turn towards their normals.
     """
     along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1)
-    total = np.zeros((len(seen), len(offsets)))
+    total = np.zeros(offsets.shape)
     across = (offsets * seen.normal[:, :1], offsets * seen.normal[:, 1:])
     for shift in ALONG_PX:
         on_line = seen.pixel + shift * along + (bend * shift**2 / 2)[:, None] * seen.normal

@@ -173,13 +173,13 @@ class LineProfiles:
     def _found(self, centred: _Centred, expected: Array, search_px: float) -> tuple[NDArray[np.intp], Array, Array]:
         """Of one class: which lines were found, how far (px) from where they were read, and how far to trust that."""
         matches = centred.matches
-        shifts, row = matches.shifts, np.arange(len(matches.which))
+        shifts, row = matches.base[:, None] + matches.shifts, np.arange(len(matches.which))
         beside = np.abs(shifts - expected[:, None])
         preference = matches.correlation - OFF_CENTRE_PENALTY * (beside / search_px) ** 2
         preference[~(beside <= search_px + matches.sampling_px)] = -np.inf
         best = np.argmax(preference, axis=1)
         seen = self._seen[matches.which]
-        shift = shifts[best] + centred.at(best)
+        shift = shifts[row, best] + centred.at(best)
         pixel = seen.pixel + shift[:, None] * seen.normal
         marking = np.maximum(_ramp(bilinear(self._response, pixel), *RESPONSE), _ramp(matches.along[row, best], *ALONG))
         trust = (
@@ -188,7 +188,7 @@ class LineProfiles:
             * _ramp(search_px - np.abs(shift - expected), 0.0, SEARCH_EDGE_PX)
             * _ramp(self._to_border(seen, shift, matches), 0.0, PICTURE_EDGE_PX)
         )
-        good = (trust > 0) & (best > 0) & (best < len(shifts) - 1)
+        good = (trust > 0) & (best > 0) & (best < shifts.shape[1] - 1)
         return matches.which[good], shift[good], trust[good]
 
     def _to_border(self, seen: SeenLines, shift: Array, matches: Matches) -> Array:
