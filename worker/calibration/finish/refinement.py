@@ -31,8 +31,9 @@ from worker.calibration.see.line_measurement import LineProfiles, Measurements
 
 SEARCH_PX = (14.0, 8.0, 5.0)
 """How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
-LAST_SEARCH_PX = 3.0
-"""In the last rounds, which go on until the cameras stand still."""
+LAST_SEARCH_PX = 5.0
+"""In the last rounds, which go on until the cameras stand still. Wide enough that it is the robust weights which leave
+out a line point, and not the end of the search, which moves with the cameras."""
 SPARE_PX = 3.0
 """So much farther than it is asked to look a reading of a frame reaches, so that it is good for more than one pose."""
 ASSESSING_SEARCH_PX = 8.0
@@ -127,10 +128,10 @@ def refine(
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     begun = Estimate.at(pitch, cameras, unknowns)
     remembered = fitting(memories or [None] * len(cameras), begun.lines)
-    finish = _Finish(reader or sight.reader(), unknowns, [_aside(memory) for memory in remembered], cameras)
+    finish = _Finish(reader or sight.reader(), unknowns, _aside(remembered), cameras)
     caught = finish.catch(begun, searches_px)
     anew = _painted_anew(caught, remembered, finish)
-    if any(len(a) != len(b) for a, b in zip(anew, finish.anew, strict=True)):
+    if len(anew) != len(finish.anew):
         # They have pulled the cameras away from all other markings.
         finish = replace(finish, anew=anew)
         caught = finish.catch(begun, searches_px)
@@ -144,12 +145,12 @@ def refine(
 class _Finish:
     """What moves cameras from where they were `found` onto the lines that a `reader` measures.
 
-    `anew`: per camera the numbers of the markings that are painted elsewhere and say nothing of its pose.
+    `anew`: the numbers of the markings that are painted elsewhere and say nothing of any pose.
     """
 
     reader: LineReader
     unknowns: Unknowns
-    anew: Sequence[NDArray[np.intp]]
+    anew: NDArray[np.intp]
     found: Sequence[Camera]
 
     def measure(self, here: Estimate, search_px: float) -> list[Measurements]:
@@ -158,10 +159,9 @@ class _Finish:
 
     def but_anew(self, measured: Sequence[Measurements]) -> list[Measurements]:
         """The measurements of all markings that are where they were."""
-        return [
-            found[~np.isin(found.points.marking, markings)] if len(markings) else found
-            for found, markings in zip(measured, self.anew, strict=True)
-        ]
+        if len(self.anew) == 0:
+            return list(measured)
+        return [found[~np.isin(found.points.marking, self.anew)] for found in measured]
 
     def around(self, here: Estimate) -> _Finish:
         """The same on a pitch that has been changed since."""
@@ -218,20 +218,23 @@ class _Finish:
         return replace(made, to=replace(made.to, uneven_m=min(uneven, MOST_UNEVEN_M)))
 
 
-def _aside(memory: CameraMemory | None) -> NDArray[np.intp]:
-    """The markings that a memory says are painted elsewhere."""
-    return np.array(() if memory is None else memory.aside, dtype=np.intp)
+def _aside(remembered: Sequence[CameraMemory | None]) -> NDArray[np.intp]:
+    """The markings that the memory of any camera says are painted elsewhere."""
+    known = [memory.aside for memory in remembered if memory is not None]
+    return np.unique(np.concatenate([np.empty(0), *known])).astype(np.intp)
 
 
-def _painted_anew(here: Estimate, remembered: Sequence[CameraMemory | None], finish: _Finish) -> list[NDArray[np.intp]]:
-    """Per camera the markings that lie elsewhere than its memory has them."""
+def _painted_anew(here: Estimate, remembered: Sequence[CameraMemory | None], finish: _Finish) -> NDArray[np.intp]:
+    """The markings that lie elsewhere than the memory of any camera has them: they are the same paint for all."""
     if not any(remembered):
-        return list(finish.anew)
+        return finish.anew
     measured = finish.reader.measure(here.on_ground(finish.unknowns), here.cameras, SEARCH_PX[0])
-    return [
-        known if memory is None else painted_anew(memory, found, here.lines)
-        for known, memory, found in zip(finish.anew, remembered, measured, strict=True)
+    told = [
+        painted_anew(memory, found, here.lines)
+        for memory, found in zip(remembered, measured, strict=True)
+        if memory is not None
     ]
+    return np.unique(np.concatenate([finish.anew, *told]))
 
 
 def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
@@ -259,7 +262,7 @@ def assess(
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     here = Estimate.at(pitch, cameras, unknowns)
     remembered = fitting(memories or [None] * len(cameras), here.lines)
-    finish = _Finish(sight.reader(), unknowns, [_aside(memory) for memory in remembered], cameras)
+    finish = _Finish(sight.reader(), unknowns, _aside(remembered), cameras)
     finish = replace(finish, anew=_painted_anew(here, remembered, finish))
     return _assessed(here, stored or cameras, remembered, finish)
 
@@ -293,8 +296,8 @@ def _assessed(
     ordinary = replace(here, uneven_m=min(here.uneven_m, UNEVEN_M))
     finished = judged(ordinary, stored, remembered, measured, evidence, finish.unknowns)
     each = [
-        replace(one, measured=its, uneven_m=ordinary.uneven_m, painted_anew=tuple(markings.tolist()))
-        for one, its, markings in zip(finished.each, doubted(here, everything), finish.anew, strict=True)
+        replace(one, measured=its, uneven_m=ordinary.uneven_m, painted_anew=tuple(finish.anew.tolist()))
+        for one, its in zip(finished.each, doubted(here, everything), strict=True)
     ]
     return replace(finished, each=each)
 

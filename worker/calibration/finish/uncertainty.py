@@ -123,7 +123,7 @@ class FinishedCamera:
     which do not change. `zoom`: what the lines say of the focal length, None where it was found with the pose;
     `likelier`: the camera with that focal length, where it then is. `refined`: with all of its lens as the lines have
     it. `lens_change`: since its memory began, if it has one. `measured`: the lines that were measured, and
-    `painted_anew`: which markings of them lie elsewhere than its memory has them, and were not asked; `uneven_m`: how
+    `painted_anew`: which markings lie elsewhere than a memory has them, and were not asked; `uneven_m`: how
     uneven their ground was taken to be.
     """
 

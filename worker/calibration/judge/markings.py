@@ -245,7 +245,9 @@ class _Offsets:
         sigma = measured.sigma_px
         ground = Ground.under(lines)
         rises = _rises(ground, measured)
-        gives = _given_way(ground, rises, measured, slopes, tukey_weights(offset / sigma), found.uneven_m)
+        # The pose has not followed markings that were painted anew.
+        asked = ~np.isin(lines.marking[measured.index], found.painted_anew)
+        gives = _given_way(ground, rises, measured, slopes, asked * tukey_weights(offset / sigma), found.uneven_m)
         swell = found.uneven_m * np.linalg.cholesky(np.linalg.inv(ground.precision))
         by_lens = _by_lens(camera, here[known], measured)
         # The pose follows what a lens has wrong: what of it is left moves lines.

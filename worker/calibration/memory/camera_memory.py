@@ -72,7 +72,8 @@ class CameraMemory:
     @classmethod
     def begun(cls, stored: Camera, job: Job) -> CameraMemory:
         """The memory of the first accepted job, which found a camera that was `stored` before."""
-        return cls(stored, Epoch.begun(*job.for_epoch), None, (), (), fingerprint(job.lines), job.frames)
+        told = job.without(job.painted_anew).for_epoch
+        return cls(stored, Epoch.begun(*told), None, (), job.painted_anew, fingerprint(job.lines), job.frames)
 
     def after(self, job: Job) -> CameraMemory:
         """The memory with one more accepted job; the same frames sent again say nothing new."""
