@@ -8,19 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
-from service.store import movement
 from service.wire.health import Alarms as Rules
-from service.wire.venue import VenueIn
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame
-from tests.worker.stock import Stock, anyway
+from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame
+from tests.worker.duties.year import VENUE, Frames, Year, cameras, fast_motion, frames_of, longer
+from tests.worker.stock import anyway
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
-from worker.duties.alarms import Alarms
-from worker.jobs import calibration
-from worker.message import Means
 
-SIZE, FOCAL, LENS = (640, 360), 400.0, (-0.12, 0.02, 0.0, 0.0, 0.0)
 OTHER_PITCH = Field(92.0, 50.0)
 # Of 640: what of 4K would be 9 px. The lines themselves are 1 to 3 px wide here.
 RIGHT_PX = 1.5
@@ -32,95 +26,58 @@ RULES = Rules(
     not_calibrated_for_h=20 * 24,
     callback_url="https://example.com/alarms",
 )
-Frames = dict[str, np.ndarray]
 
 
-def cameras() -> list[Camera]:
-    return [
-        camera("left", (-1.0, -48.0, 10.0), (-20.0, 0.0), FOCAL, LENS, SIZE),
-        camera("right", (1.0, -48.0, 10.0), (20.0, 0.0), FOCAL, LENS, SIZE),
-    ]
+class CreepingYear(Year):
+    """A year of cameras that creep."""
 
-
-def stored(of: list[Camera], name: str = "v"):
-    return VenueIn.model_validate(
-        {
-            "id": name,
-            "field": {"length_m": 105, "width_m": 68, "line_width_m": 0.12, "ridge": CROWNED.ridge.tolist()},
-            "cameras": [
-                {
-                    "id": c.id,
-                    "image_size": list(SIZE),
-                    "intrinsics": {"matrix": cameras()[0].intrinsics.matrix.tolist(), "distortion": list(LENS)},
-                    "pose": {"rotation": c.pose.rotation.tolist(), "position": c.pose.position.tolist()},
-                }
-                for c in of
-            ],
-            "alarms": RULES.model_dump(),
-        }
-    ).stored()
-
-
-class Year:
-    """The venue as it is in truth, and the service that looks after it."""
-
-    def __init__(self, home: Stock) -> None:
-        self.home = home
-        self.duty = Alarms(home.venues)
+    def __init__(self, *of) -> None:
+        super().__init__(*of, RULES)
         self.rng = np.random.default_rng(2026)
         self.creep = {side: np.zeros(6) for side in ("left", "right")}
         self.rejected: dict[str, str] = {}
-        self.today = ""
-        home.venues.put(stored(cameras()), anyway)
 
     def truth(self) -> list[Camera]:
         return [moved(c, tuple(self.creep[c.id][:3]), tuple(self.creep[c.id][3:])) for c in cameras()]
 
     def pass_(self, days: float) -> None:
-        """Heat and wind have them creep, by some tenths of a pixel; the worker looks after the alarms."""
+        """Heat and wind have them creep, by some tenths of a pixel."""
         for creep in self.creep.values():
             creep[:3] += self.rng.normal(0, 0.0008, 3)
             creep[3:] += self.rng.normal(0, 0.004, 3)
-        self.home.time_passes(days=days)
-        self.duty.look()
+        super().pass_(days)
 
     def storm(self) -> None:
         for creep, sign in zip(self.creep.values(), (1, -1), strict=True):
             creep[:3] += np.array([sign * STORM_RAD, STORM_RAD / 2, 0.0])
 
-    def frames(self, pitch: Field = CROWNED) -> Frames:
-        return {c.id: paint_frame(pitch, c) for c in self.truth()}
+    def frames(self) -> Frames:
+        return frames_of(self.truth())
 
     def day(self, called: str, frames: Frames) -> bool:
         """A calibration; says whether all its poses were taken. Those taken are right, the others what they were."""
-        files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
-        task = self.home.attempts.begin(self.home.submitted("v", generations=40, parents=32, offspring=64))
-        before = self.home.venues.get("v").cameras
-        nights = calibration.Nights(task.last_views, task.memories, task.anchors, task.taken_at)
-        means = Means.of(self.home.settings)
-        found = calibration.solve(task.venue, files, task.options, means, lambda _: None, nights)
-        self.home.attempts.finish(task, found.result, [], found.memories)
-        self.last = found.result
-        if not found.result.accepted:
-            self.rejected[called] = found.result.rejected_because
-        now = self.home.venues.get("v").cameras
-        for result, wrong_px, was, held in zip(found.result.cameras, self.wrong_by(), before, now, strict=True):
+        before = self.venue.cameras
+        self.last = self.calibrate(frames)
+        if not self.last.accepted:
+            self.rejected[called] = self.last.rejected_because
+        checked = zip(self.last.cameras, self.wrong_by_px(self.truth()), before, self.venue.cameras, strict=True)
+        for result, wrong_px, was, held in checked:
             if result.accepted:
                 assert wrong_px < RIGHT_PX, (
                     f"{called}: a pose of {result.id} that is {wrong_px:.1f} px off was accepted"
                 )
             else:
                 assert held == was
-        return found.result.accepted
-
-    def wrong_by(self) -> list[float]:
-        """How far (px) each stored camera is from where it really is."""
-        now = self.home.venues.get("v")
-        pairs = zip(stored(self.truth()).cameras, now.cameras, strict=True)
-        return [movement.moved(now.field, truth, held).pixels for truth, held in pairs]
+        return self.last.accepted
 
     def told(self) -> list[tuple[str, str | None, str]]:
-        return [(e.data.rule, e.data.camera, e.type.removeprefix("alarm.")) for e in self.home.alarms_told()]
+        return [(e.data.rule, e.data.camera, e.type.removeprefix("alarm.")) for e in self.alarms_told()]
+
+
+@pytest.fixture
+def year(stock):
+    with fast_motion() as clock:
+        yield CreepingYear(stock, clock)
 
 
 def smeared(frame: np.ndarray) -> np.ndarray:
@@ -133,17 +90,7 @@ def smeared(frame: np.ndarray) -> np.ndarray:
     return dirty.astype(np.uint8)
 
 
-def exchanged(of: Camera) -> Camera:
-    """Another model in its place: its lens is 5 % longer."""
-    longer = Intrinsics(of.intrinsics.matrix * np.array([[1.05], [1.05], [1.0]]), of.intrinsics.distortion, SIZE)
-    matrix = longer.matrix.copy()
-    matrix[:2, 2] = of.intrinsics.matrix[:2, 2]
-    return Camera(of.id, Intrinsics(matrix, of.intrinsics.distortion, SIZE), of.pose)
-
-
-def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(stock, monkeypatch):
-    monkeypatch.setattr(calibration, "draw", lambda *_: {})
-    year = Year(stock)
+def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(year, stock):
     for night in range(3):
         year.pass_(1)
         assert year.day(f"night {night}", year.frames())
@@ -154,7 +101,7 @@ def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(stock, monkeypa
         # The lens is the one that it is said to be.
         assert abs(refined.longer) < 0.005
         assert refined.differs_m < 0.5
-    adopted = stock.refined.adopt("v", "left", anyway)
+    adopted = stock.refined.adopt(VENUE, "left", anyway)
     assert adopted.cameras[0].pose == year.last.cameras[0].refined.pose
     year.pass_(1)
     assert year.day("the night after", year.frames())
@@ -163,11 +110,7 @@ def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(stock, monkeypa
 
 @pytest.mark.long
 @pytest.mark.timeout(900)
-def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stock, monkeypatch):
-    # Nobody looks at the pictures.
-    monkeypatch.setattr(calibration, "draw", lambda *_: {})
-    year = Year(stock)
-
+def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(year, stock):
     year.pass_(1)
     assert year.day("a first day", year.frames())
     year.pass_(1)
@@ -187,7 +130,7 @@ def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stoc
     year.storm()
     year.pass_(15)
     assert year.day("after a storm", year.frames())
-    assert {camera.rule for camera in stock.venues.health("v").alarms} == {"moved-since-last", "moved-since-first"}
+    assert {camera.rule for camera in stock.venues.health(VENUE).alarms} == {"moved-since-last", "moved-since-first"}
     year.pass_(1)
     assert year.day("the day after", year.frames())
 
@@ -203,16 +146,17 @@ def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stoc
 
     year.pass_(15)
     left, right = year.truth()
-    changed = {"left": paint_frame(CROWNED, left), "right": paint_frame(CROWNED, exchanged(right))}
+    changed = {"left": paint_frame(CROWNED, left), "right": paint_frame(CROWNED, longer(right, 0.05))}
+    # Another model is in its place.
     assert not year.day("a camera was exchanged", changed)
 
-    newest = stock.venues.history("v", None, 1)[0].revision
-    before = stock.venues.get("v")
-    stock.venues.restore("v", newest - 1, anyway)
-    assert stock.venues.get("v") != before
-    stock.venues.restore("v", newest, anyway)
-    assert stock.venues.get("v") == before
-    stock.venues.restore("v", newest - 1, anyway)
+    newest = stock.venues.history(VENUE, None, 1)[0].revision
+    before = stock.venues.get(VENUE)
+    stock.venues.restore(VENUE, newest - 1, anyway)
+    assert stock.venues.get(VENUE) != before
+    stock.venues.restore(VENUE, newest, anyway)
+    assert stock.venues.get(VENUE) == before
+    stock.venues.restore(VENUE, newest - 1, anyway)
     year.pass_(1)
     assert year.day("from poses that were put back", year.frames())
 
@@ -228,6 +172,6 @@ def test_no_bad_pose_holds_on_any_day_of_a_year_and_every_alarm_sounds_once(stoc
     over = [(rule, camera) for rule, camera, what in year.told() if what == "ended"]
     assert len(over) == len(set(over))
     # Where the storm left them, they are still.
-    still = {(alarm.rule, alarm.camera) for alarm in stock.venues.health("v").alarms}
+    still = {(alarm.rule, alarm.camera) for alarm in stock.venues.health(VENUE).alarms}
     assert still == set(begun) - set(over) == {("moved-since-first", "left"), ("moved-since-first", "right")}
     print("\n".join(f"{day}: {why}" for day, why in year.rejected.items()))
