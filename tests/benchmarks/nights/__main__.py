@@ -4,7 +4,8 @@
     python -m tests.benchmarks.nights
 
 Each job begins where the last one ended, with what the venue remembers. `single`: cameras from measured lines without
-pictures, by the hundred; `venues`: several cameras of a venue that does not match its model, over a hundred nights.
+pictures, by the hundred; `venues`: several cameras of a venue that does not match its model, over a hundred nights;
+`rendered`: rendered 4K frames through a real service over HTTP, with a lens that is true, stepping or creeping.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from __future__ import annotations
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 
-from tests.benchmarks.nights import single, venues
+from tests.benchmarks.nights import rendered, single, venues
 
-SECTIONS = {"single": single.table, "venues": venues.table}
+SECTIONS = {"single": single.table, "venues": venues.table, "rendered": rendered.table}
 
 
 def main() -> None:
