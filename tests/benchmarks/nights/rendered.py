@@ -60,18 +60,23 @@ LENSES = {
 
 @dataclass(frozen=True)
 class RenderedJob(Job):
-    """A job that a service computed, and the core-seconds that it took."""
+    """A job that a service computed, and the core-seconds that it took. `change_off`: how far the change of the focal
+    length that it tells is beside the true one, part of it, and `change_sigma`, its sigma; 0 and 1 where it tells none.
+    """
 
     core_s: float
+    change_off: float
+    change_sigma: float
 
 
 def table(executor: Executor, number: int) -> Iterator[str]:
     """A row for each view and lens; `number` cameras of each."""
     yield (
         "| view | lens | jobs | accepted | of these wrong | worst error, cm | worst error / sigma "
-        "| refined: rms, cm | error / sigma, rms | change named, night | error before, cm, most | core-s, median |"
+        "| refined: rms, cm | error / sigma, rms | change named, night | error before, cm, most "
+        "| change off by, %, most (over sigma) | core-s, median |"
     )
-    yield "|---" * 12 + "|"
+    yield "|---" * 13 + "|"
     for view in FOCAL_LENGTHS:
         # Before the sequences, several of which read the same pictures.
         pictures = [(view, n, light) for n in range(number) for light in LIGHTS]
@@ -93,6 +98,8 @@ def _row(view: str, lens: str, sequences: Sequence[Sequence[RenderedJob]]) -> st
         for job in sequence[:first]
         if job.accepted
     ]
+    off = max((job for job in jobs if job.named), key=lambda job: abs(job.change_off), default=None)
+    change = "" if off is None else f"{100 * off.change_off:+.2f} ({off.change_off / off.change_sigma:+.1f})"
     nights = ", ".join("never" if night is None else str(night + 1) for night in named)
     return (
         f"| {view} | {lens} | {len(jobs)} | {len(taken)} | {sum(job.wrong for job in jobs)} "
@@ -100,7 +107,8 @@ def _row(view: str, lens: str, sequences: Sequence[Sequence[RenderedJob]]) -> st
         f"| {max((job.error_m / job.sigma_m for job in taken), default=0.0):.1f} "
         f"| {100 * _rms([job.refined_m for job in refined]):.1f} "
         f"| {_rms([job.refined_m / job.refined_sigma_m for job in refined]):.2f} "
-        f"| {nights} | {100 * max(before, default=0.0):.1f} | {np.median([job.core_s for job in jobs]):.1f} |"
+        f"| {nights} | {100 * max(before, default=0.0):.1f} | {change} "
+        f"| {np.median([job.core_s for job in jobs]):.1f} |"
     )
 
 
@@ -116,8 +124,8 @@ def _sequence(view: str, number: int, lens: str) -> list[RenderedJob]:
     jobs = []
     with kept.open("w", buffering=1) as file, service(Embedded(), **settings) as running:
         running.ready()
-        for real, result in _nights(running, view, number, LENSES[lens]):
-            jobs.append(_job(result, real))
+        for night, (real, result) in enumerate(_nights(running, view, number, LENSES[lens])):
+            jobs.append(_job(result, real, LENSES[lens].longer(night)))
             file.write(json.dumps({"real": real.pose.position.tolist(), **vars(jobs[-1]), "result": result}) + "\n")
     return jobs
 
@@ -210,7 +218,8 @@ def _wire_pose(pose: Pose) -> dict:
     return {"rotation": pose.rotation.tolist(), "position": pose.position.tolist()}
 
 
-def _job(result: dict, real: Camera) -> RenderedJob:
+def _job(result: dict, real: Camera, longer: float) -> RenderedJob:
+    """What a result says beside the real camera, whose focal length is `longer` than at first by a part of it."""
     camera = result["cameras"][0]
     refined, change = camera["refined"], camera["lens_change"]
     return RenderedJob(
@@ -218,9 +227,11 @@ def _job(result: dict, real: Camera) -> RenderedJob:
         _sigma_m(camera),
         _error_m(refined, real) if refined else np.inf,
         _sigma_m(refined) if refined else np.inf,
-        change is not None and change["words"] is not None,
+        bool(change and change["words"]),
         camera["rejected_because"],
         sum(result["cpu_s"].values()),
+        change["longer"] - longer if change else 0.0,
+        change["sigma"] if change else 1.0,
     )
 
 
