@@ -61,10 +61,10 @@ bench-learned: $(VENV)/.bench
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 nice -n 19 $(BIN)/python -m tests.benchmarks.learned
 
 # One BLAS thread, as the worker sets it.
-bench-truth: $(VENV)/.train
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.lenses
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.gate
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.drifts
+# ONLY: some of its parts, for instance `make bench-truth ONLY=nights`.
+ONLY ?= lenses gate drifts nights
+bench-truth: $(VENV)/.bench $(VENV)/.train
+	for part in $(ONLY); do OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.$$part || exit 1; done
 
 # BEFORE: a clone of an earlier release with its .venv; `git worktree add ../esc-before v0.1.0 && make -C ../esc-before setup`.
 bench-cost: setup

@@ -114,7 +114,8 @@ def remember(
         if not result.accepted or result.measured is None:
             continue
         seen = fingerprint_of_frames(frames[before.id])
-        job = Job(result.camera, result.measured, lines, taken_at, result.painted_anew, seen)
+        zoomed = result.lens_change is not None and result.lens_change.notable
+        job = Job(result.camera, result.measured, lines, taken_at, result.painted_anew, seen, zoomed)
         (memory,) = fitting([memories.get(before.id)], lines)
         after[before.id] = CameraMemory.begun(before, job) if memory is None else memory.after(job)
     return after

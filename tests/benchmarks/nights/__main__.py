@@ -5,6 +5,7 @@
 
 Each job begins where the last one ended, with what the venue remembers. `single`: cameras from measured lines without
 pictures, by the hundred; `venues`: several cameras of a venue that does not match its model, over a hundred nights;
+`rendered`: rendered 4K frames through a real service over HTTP, with a lens that is true, stepping or creeping.
 `year`: small painted frames through the service, and what it says on each day on which something happens.
 """
 
@@ -13,9 +14,9 @@ from __future__ import annotations
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 
-from tests.benchmarks.nights import single, venues, year
+from tests.benchmarks.nights import rendered, single, venues, year
 
-SECTIONS = {"single": single.table, "venues": venues.table, "year": year.table}
+SECTIONS = {"single": single.table, "venues": venues.table, "rendered": rendered.table, "year": year.table}
 
 
 def main() -> None:

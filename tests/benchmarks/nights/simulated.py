@@ -135,7 +135,8 @@ class Installation:
                 continue
             lines = self.pitch.line_points()
             frames = str(sight.noise[number].sum())
-            job = Job(result.camera, result.measured, lines, None, result.painted_anew, frames)
+            zoomed = result.lens_change is not None and result.lens_change.notable
+            job = Job(result.camera, result.measured, lines, None, result.painted_anew, frames, zoomed)
             (memory,) = fitting([self.memories[number]], lines)
             self.memories[number] = (
                 CameraMemory.begun(self.stored[number], job) if memory is None else memory.after(job)

@@ -33,7 +33,8 @@ MOST_EARLIER, FEWEST_JOBS = 2, 4
 @dataclass(frozen=True)
 class Job:
     """What an accepted job leaves of a camera: where it was `found`, what was `measured` of the `lines`, `at` what time
-    (None: not known), which markings were `painted_anew`, and the fingerprint of its `frames`.
+    (None: not known), which markings were `painted_anew`, the fingerprint of its `frames`, and whether its focal length
+    has surely changed since the first nights (`zoomed`).
     """
 
     found: Camera
@@ -42,6 +43,7 @@ class Job:
     at: datetime | None
     painted_anew: tuple[int, ...] = ()
     frames: str = ""
+    zoomed: bool = False
 
     @property
     def for_epoch(self) -> tuple[Camera, Measurements, LinePoints, datetime | None]:
@@ -81,7 +83,7 @@ class CameraMemory:
             return self
         kept = replace(self.aware_of(job.painted_anew, job.lines), frames=job.frames)
         told = job.without(kept.aside).for_epoch
-        if kept.recent is None and kept.anchor.jobs < ANCHOR_JOBS and kept.anchor.looks_like(job.found, job.lines):
+        if kept.takes_for_anchor(job):
             return replace(kept, anchor=kept.anchor.joined(*told))
         if kept.recent is None:
             return replace(kept, recent=Epoch.begun(*told))
@@ -89,6 +91,11 @@ class CameraMemory:
             return replace(kept, recent=kept.recent.joined(*told))
         before = [*kept.earlier, kept.recent] if kept.recent.jobs >= FEWEST_JOBS else list(kept.earlier)
         return replace(kept, recent=Epoch.begun(*told), earlier=tuple(before[-MOST_EARLIER:]))
+
+    def takes_for_anchor(self, job: Job) -> bool:
+        """Whether a job is one of the first nights, in which camera and lens were as they were in the very first."""
+        begins = self.recent is None and self.anchor.jobs < ANCHOR_JOBS
+        return begins and not job.zoomed and self.anchor.looks_like(job.found, job.lines)
 
     @property
     def epochs(self) -> list[Epoch]:
@@ -107,8 +114,9 @@ class CameraMemory:
 
     @property
     def since(self) -> datetime | None:
-        """When the first of them was."""
-        return self.anchor.first
+        """The middle of the first nights, which is what a change since then is counted from."""
+        first, last = self.anchor.first, self.anchor.last
+        return first if first is None or last is None else first + (last - first) / 2
 
     def aware_of(self, painted_anew: Sequence[int] | NDArray[np.intp], lines: LinePoints) -> CameraMemory:
         """The memory of a field that has some markings elsewhere: what it knew of them is forgotten."""
