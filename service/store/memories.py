@@ -23,7 +23,7 @@ Memories = Mapping[str, Memory]
 # Documents of a venue that are kept, the newest: a few revisions can be undone with the nights that they had.
 KEPT = 4
 # As JSON. 32 cameras that remember as much as they can have this; what is larger is not what the engine writes.
-LARGEST_BYTES = 2 * 1024 * 1024
+LARGEST_BYTES = 8 * 1024 * 1024
 m = tables.memories.c
 log = structlog.get_logger()
 

@@ -68,7 +68,7 @@ def add_revision(
     changed = _changed(venue, _cameras(before))
     if restored is not None:
         go_back(connection, venue, restored.revision)
-    elif cause == "put":
+    elif cause in ("put", "adopted"):
         begin_anchors(connection, venue, changed, number)
     poses = Poses(
         venue=venue.id,

@@ -97,6 +97,12 @@ def begin_anchors(connection: sa.Connection, venue: Venue, changed: Collection[s
         _add_anchor(connection, venue.id, camera, revision)
 
 
+def forget_trends(connection: sa.Connection, venue_id: str) -> None:
+    """Drop the trends of a venue: on another field, cameras stand elsewhere without having moved."""
+    connection.execute(sa.delete(tables.camera_anchors).where(c.venue == venue_id))
+    connection.execute(sa.delete(tables.camera_trend).where(t.venue == venue_id))
+
+
 def go_back(connection: sa.Connection, venue: Venue, revision: int) -> None:
     """A revision of a venue holds again: what came after it is forgotten, and the trends are those of that time."""
     connection.execute(sa.delete(tables.camera_anchors).where(c.venue == venue.id, c.revision > revision))
@@ -122,9 +128,15 @@ def note_night(
     anchors, at = _newest_anchors(connection, venue.id), clock(connection)
     for result in results:
         moved, anchor = result.displacement, anchors.get(result.id)
+        anew = by_hand and anchor is not None and anchor.revision != revision
         if moved is None:
+            if anew:
+                _add_anchor(connection, venue.id, result.id, revision)
             continue
-        if anchor is None or (by_hand and anchor.revision != revision):
+        if anew:
+            # What is longer than the anchor before says nothing beside the lens that holds now.
+            moved = moved.model_copy(update={"focal_length": None, "sigma_focal_length": None})
+        if anchor is None or anew:
             _add_anchor(connection, venue.id, result.id, revision)
             number, is_new = revision, True
         else:

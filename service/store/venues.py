@@ -22,7 +22,7 @@ from service.store.memories import (
 from service.store.revisions import add_revision, revisions_of, state_at
 from service.store.schedules import plan
 from service.store.told.events import add_venue_event
-from service.store.trends import note_night
+from service.store.trends import forget_trends, note_night
 from service.wire.health import VenueHealth
 from service.wire.history import Cause, Revision
 from service.wire.names import OPEN
@@ -186,6 +186,7 @@ def _note_put(connection: sa.Connection, before: Venue | None, venue: Venue) -> 
     """
     if before is not None and before.field != venue.field:
         forget_memories(connection, venue.id)
+        forget_trends(connection, venue.id)
     if before is None or not venue.stands_like(before):
         memories = newest_memories(connection, venue.id)
         left = {} if before is None else without_those_that_changed(memories, before, venue)

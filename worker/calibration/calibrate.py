@@ -75,7 +75,9 @@ def calibrate(
     after `stop()` turns true.
     """
     method = METHODS[options.preset]
-    pitch = pitch.flat() if options.flat or method.flat else pitch
+    # What is measured beside a field that is not the venue's is nothing to remember.
+    flattened = pitch.ridge is not None and (options.flat or method.flat)
+    pitch = pitch.flat() if flattened else pitch
     journey = Journey(report, stop)
     seen = look(pitch, cameras, frames, segment, journey, usual)
     here = Situation(method, pitch, cameras, seen, options, journey, [memories.get(camera.id) for camera in cameras])
@@ -96,7 +98,7 @@ def calibrate(
         suspicions=suspicions(believable(settled.deviations, answer.cameras, Gate())),
         path=path,
         lights=evened,
-        memories=remember(answer, cameras, frames, memories, taken_at),
+        memories={} if flattened else remember(answer, cameras, frames, memories, taken_at),
     )
 
 

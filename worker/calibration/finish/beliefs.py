@@ -9,8 +9,8 @@ stored pose of the last answer has no part in it: it was found with the same len
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,22 +53,10 @@ ZOOM_SCALES: Array = np.array([1.0, 4.0, 16.0, 64.0])
 """Heat moves a focal length by `HEAT_FOCAL` from one view to the next, a zoom ring by so many times more."""
 AIMED_ANEW_RAD = 1.0
 """How an earlier epoch was turned says nothing of how the camera is turned now."""
+MOVED = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
 FREE = np.array([PRIOR_RAD] * 3 + [PRIOR_M] * 3)
-
-
-@dataclass
-class _Errors:
-    """Independent errors as they are added: their columns (D,) of `mixing`, and the blocks of groups they are in."""
-
-    dense: int
-    columns: list[Array] = field(default_factory=list)
-    blocks: list[list[Group]] = field(default_factory=list)
-
-    def add(self, columns: Array, expected: Array, mean: Array, scales: Array) -> Group:
-        """A group of errors with these columns (D, n) of the mixing; it is not yet in a block."""
-        which = len(self.columns) + np.arange(columns.shape[1])
-        self.columns.extend(columns.T)
-        return Group(which, expected, mean, scales)
+ONCE: Array = np.ones(1)
+"""The scale of what is known well enough."""
 
 
 @dataclass(frozen=True)
@@ -101,168 +89,166 @@ class Beliefs:
         return rows
 
 
-def _heat_number(views: int, view: int) -> int:
-    """The `camera` number of the parameter that is the heat of a view."""
-    return views + view
-
-
 def believe(
     here: Estimate, stored: Sequence[Camera], memories: Sequence[CameraMemory | None], solved: Unknowns
 ) -> Beliefs:
     """What is believed of the cameras of an estimate, found with `solved` unknown, beside where they were `stored`."""
-    count = len(here.cameras)
-    owners = [(number, epoch) for number, memory in enumerate(memories) if memory for epoch in memory.epochs]
-    views = count + len(owners)
-    owner_of = [*range(count), *(number for number, _ in owners)]
-    suspects = _suspects(here, memories, solved)
-    remembered = [view for view, owner in enumerate(owner_of) if memories[owner] is not None]
-    heats: list[Parameter] = [
-        LensParameter(
-            _heat_number(views, view),
-            "focal_length_px",
-            HEAT_FOCAL * here.cameras[owner_of[view]].intrinsics.focal_length_px,
+    errors = _Errors(here, memories, solved)
+    errors.add_solved(here.values)
+    for number, (before, memory) in enumerate(zip(stored, memories, strict=True)):
+        if memory is None:
+            errors.add_camera(number, before)
+        else:
+            errors.add_remembered(number, memory)
+    errors.add_field()
+    return errors.believed()
+
+
+class _Errors:
+    """Independent errors as they are added: their columns (D,) of `mixing`, and the blocks of groups they are in."""
+
+    def __init__(self, here: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> None:
+        self._cameras, self._solved = here.cameras, solved
+        remembered = [number for number, memory in enumerate(memories) if memory for _ in memory.epochs]
+        self._owner_of = [*range(len(here.cameras)), *remembered]
+        aged = {number for number, memory in enumerate(memories) if memory}
+        self._unknowns = _unknowns(here, self._owner_of, aged, solved)
+        self._places = {
+            (parameter.camera, parameter.name): at
+            for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views)
+            if isinstance(parameter, LensParameter)
+        }
+        self._columns: list[Array] = []
+        self._blocks: list[list[Group]] = []
+        self._movements: list[Group] = []
+        self._changes: dict[str, NDArray[np.intp]] = {}
+
+    def believed(self) -> Beliefs:
+        """All of them."""
+        moved = np.concatenate([group.which for group in self._movements])
+        free = np.tile(FREE, len(moved) // POSE_NUMBERS)
+        return Beliefs(self._unknowns, np.stack(self._columns, axis=1), self._blocks, moved, free, self._changes)
+
+    def add_solved(self, values: Array) -> None:
+        """What the finish has found along with the poses: it stands at `values` (E,) from what was given."""
+        first = POSE_NUMBERS * self._unknowns.views
+        for at, (parameter, value) in enumerate(zip(self._solved.parameters, values.tolist(), strict=True), first):
+            self._blocks.append([self._number([at], parameter.expected, ONCE, mean=-value)])
+
+    def add_field(self) -> None:
+        """The measures of the field that were not solved for."""
+        found = {parameter.name for parameter in self._solved.parameters}
+        for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views):
+            if isinstance(parameter, FieldParameter) and parameter.name not in found:
+                self._blocks.append([self._number([at], parameter.expected, FIELD_SCALES)])
+
+    def add_camera(self, number: int, before: Camera) -> None:
+        """A camera without a memory: it has moved since it was where it was stored `before`, and has a lens."""
+        moved = self._move([number], MOVED, MOVEMENT_SCALES, change_between(self._cameras[number], before))
+        self._blocks.append([moved, *self._lens(number, np.zeros(len(LENS_NUMBERS)))])
+
+    def add_remembered(self, number: int, memory: CameraMemory) -> None:
+        """A camera with a memory: its mount and lens, and what has happened between the times of its views."""
+        camera = self._cameras[number]
+        tonight, anchor, *others = (view for view, owner in enumerate(self._owner_of) if owner == number)
+        recent, earlier = (others[:1], others[1:]) if memory.recent else ([], others)
+
+        told = lens_numbers(memory.origin.intrinsics) - lens_numbers(camera.intrinsics)
+        mount = self._move([tonight, anchor, *others], MOVED, MOVEMENT_SCALES, change_between(camera, memory.origin))
+        self._blocks.append([mount, *self._lens(number, told)])
+        self._blocks.append([self._heat([anchor, tonight, *recent], ONCE)])
+        zoomed = [self._since([tonight, *recent])] if recent else []
+        zoomed.append(self._since([tonight]))
+        self._changes[camera.id] = np.concatenate([group.which for group in zoomed])
+        for view, epoch in zip((anchor, *others), memory.epochs, strict=True):
+            wind = WIND * max(epoch.jobs**-0.5, LEAST_WIND)
+            if view in earlier:
+                wind = np.concatenate([[AIMED_ANEW_RAD] * 3, wind[3:]])
+                self._blocks.append([self._heat([view], ZOOM_SCALES)])
+            self._blocks.append([self._move([view], wind, ONCE, change_between(epoch.camera, camera))])
+        self._blocks.append([self._move([tonight], WIND, ONCE, np.zeros(POSE_NUMBERS))])
+
+    def _since(self, views: Sequence[int]) -> Group:
+        """What happened before these views of a camera and holds in all of them: a touch, or a zoom; gives the zoom."""
+        touched = self._move(views, MOVED, TOUCHED_SCALES, np.zeros(POSE_NUMBERS))
+        zoomed = self._heat(views, ZOOM_SCALES)
+        self._blocks.append([touched, zoomed])
+        return zoomed
+
+    def _move(self, views: Sequence[int], expected: Array, scales: Array, mean: Array) -> Group:
+        """A movement (6,) that some views share."""
+        columns = np.zeros((self._unknowns.dense, POSE_NUMBERS))
+        for view in views:
+            columns[self._unknowns.pose(view)] = np.eye(POSE_NUMBERS)
+        self._movements.append(self._group(columns, expected, mean, scales))
+        return self._movements[-1]
+
+    def _heat(self, views: Sequence[int], scales: Array) -> Group:
+        """A change of the focal length that some views share, of the size of what heat does times the scale."""
+        focal = self._cameras[self._owner_of[views[0]]].intrinsics.focal_length_px
+        places = [self._places[_heat_number(self._unknowns.views, view), "focal_length_px"] for view in views]
+        return self._number(places, HEAT_FOCAL * focal, scales)
+
+    def _lens(self, number: int, mean: Array) -> list[Group]:
+        """The focal length of a lens, and the rest of it, of which `mean` (6,) is expected: groups of their own."""
+        known = [
+            (self._places[number, p.name], p.expected, mean[LENS_NUMBERS.index(p.name)], p.name == "focal_length_px")
+            for p in self._unknowns.parameters
+            if isinstance(p, LensParameter) and p.camera == number and not self._is_solved(p)
+        ]
+        groups = []
+        for of_focal, scales in ((True, FOCAL_SCALES), (False, LENS_SCALES)):
+            its = [(at, expected, value) for at, expected, value, focal in known if focal == of_focal]
+            if its:
+                places, expected, means = zip(*its, strict=True)
+                columns = np.eye(self._unknowns.dense)[:, list(places)]
+                groups.append(self._group(columns, np.array(expected), np.array(means), scales))
+        return groups
+
+    def _is_solved(self, parameter: LensParameter) -> bool:
+        return any(
+            isinstance(p, LensParameter) and (p.camera, p.name) == (parameter.camera, parameter.name)
+            for p in self._solved.parameters
         )
-        for view in remembered
+
+    def _number(self, places: Sequence[int], expected: float, scales: Array, mean: float = 0.0) -> Group:
+        """An error that changes some numbers alike."""
+        column = np.zeros((self._unknowns.dense, 1))
+        column[list(places)] = 1.0
+        return self._group(column, np.array([expected]), np.array([mean]), scales)
+
+    def _group(self, columns: Array, expected: Array, mean: Array, scales: Array) -> Group:
+        """A group of errors with these columns (D, n) of the mixing; it is not yet in a block."""
+        which = len(self._columns) + np.arange(columns.shape[1])
+        self._columns.extend(columns.T)
+        return Group(which, expected, mean, scales)
+
+
+def _unknowns(here: Estimate, owner_of: Sequence[int], aged: Collection[int], solved: Unknowns) -> Unknowns:
+    """Everything that may be off: of all views, each of which is of the camera `owner_of` says.
+
+    The focal length of a camera that is remembered (`aged`) has what heat does in a number of each view.
+    """
+    views = len(owner_of)
+    known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
+    fresh, without_heat = lens_parameters(here.cameras), lens_parameters_without_heat(here.cameras)
+    lenses = [b if b.camera in aged else a for a, b in zip(fresh, without_heat, strict=True)]
+    suspects: list[Parameter] = [*lenses, *field_parameters(here.pitch)]
+    heats = [
+        LensParameter(
+            _heat_number(views, view), "focal_length_px", HEAT_FOCAL * here.cameras[owner].intrinsics.focal_length_px
+        )
+        for view, owner in enumerate(owner_of)
+        if owner in aged
     ]
-    unknowns = Unknowns(
+    return Unknowns(
         views,
-        [*solved.parameters, *suspects, *heats],
+        [*solved.parameters, *(p for p in suspects if (getattr(p, "camera", None), p.name) not in known), *heats],
         solved.ground,
         [(owner, _heat_number(views, view)) for view, owner in enumerate(owner_of)],
     ).around(here.pitch, here.lines)
-    errors = _Errors(unknowns.dense)
-    movements: list[Group] = []
-    changes: dict[str, NDArray[np.intp]] = {}
-    first = POSE_NUMBERS * views
-    places = {
-        (parameter.camera, parameter.name): at
-        for at, parameter in enumerate(unknowns.parameters, first)
-        if isinstance(parameter, LensParameter)
-    }
-    for at, parameter in enumerate(solved.parameters, first):
-        mean = -here.values[at - first : at - first + 1]
-        errors.blocks.append([errors.add(_unit(errors, [at]), np.array([parameter.expected]), mean, np.ones(1))])
-    for number, (camera, before, memory) in enumerate(zip(here.cameras, stored, memories, strict=True)):
-        known = [p for p in suspects if isinstance(p, LensParameter) and p.camera == number]
-        lens = [places[number, p.name] for p in known]
-        expected = np.array([p.expected for p in known])
-        own = _views_of(number, owner_of)
-        if memory is None:
-            movement = errors.add(_poses(errors, own), MOVED, change_between(camera, before), MOVEMENT_SCALES)
-            movements.append(movement)
-            errors.blocks.append([movement, *_lens(errors, lens, expected, np.zeros(len(lens)), known)])
-            continue
-        moves, changed = _add_remembered(errors, camera, memory, own, places, views, known, lens, expected)
-        movements += moves
-        changes[camera.id] = changed
-    for at, parameter in enumerate(unknowns.parameters, first):
-        if isinstance(parameter, FieldParameter) and parameter.name not in {p.name for p in solved.parameters}:
-            errors.blocks.append(
-                [errors.add(_unit(errors, [at]), np.array([parameter.expected]), np.zeros(1), FIELD_SCALES)]
-            )
-    moved = np.concatenate([group.which for group in movements])
-    free = np.tile(FREE, len(moved) // POSE_NUMBERS)
-    return Beliefs(unknowns, np.stack(errors.columns, axis=1), errors.blocks, moved, free, changes)
 
 
-MOVED = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
-
-
-def _add_remembered(
-    errors: _Errors,
-    camera: Camera,
-    memory: CameraMemory,
-    own: Sequence[int],
-    places: dict[tuple[int, str], int],
-    views: int,
-    known: Sequence[LensParameter],
-    lens: Sequence[int],
-    expected: Array,
-) -> tuple[list[Group], NDArray[np.intp]]:
-    """The errors of a camera with a memory; gives those that are movements, and those that are changes of its zoom.
-
-    `own`: its views, tonight's first.
-    """
-    tonight, anchor, *others = own
-    recent = others[0] if memory.recent else None
-    earlier = others[1:] if memory.recent else others
-    later = [tonight] if recent is None else [tonight, recent]
-    heat = {view: places[_heat_number(views, view), "focal_length_px"] for view in own}
-    focal = camera.intrinsics.focal_length_px
-    one_heat = np.array([HEAT_FOCAL * focal])
-
-    told = lens_numbers(memory.origin.intrinsics) - lens_numbers(camera.intrinsics)
-    mean = np.array([told[LENS_NUMBERS.index(p.name)] for p in known])
-    mount = errors.add(_poses(errors, own), MOVED, change_between(camera, memory.origin), MOVEMENT_SCALES)
-    errors.blocks.append([mount, *_lens(errors, lens, expected, mean, known)])
-    movements = [mount]
-    zoomed = []
-
-    of_all = [heat[view] for view in (anchor, *later)]
-    errors.blocks.append([errors.add(_unit(errors, of_all), one_heat, np.zeros(1), np.ones(1))])
-    if recent is not None:
-        moved_before = errors.add(_poses(errors, [tonight, recent]), MOVED, np.zeros(6), TOUCHED_SCALES)
-        zoomed_before = errors.add(_unit(errors, [heat[tonight], heat[recent]]), one_heat, np.zeros(1), ZOOM_SCALES)
-        errors.blocks.append([moved_before, zoomed_before])
-        zoomed.append(zoomed_before.which)
-        movements.append(moved_before)
-    moved_since = errors.add(_poses(errors, [tonight]), MOVED, np.zeros(6), TOUCHED_SCALES)
-    zoomed_since = errors.add(_unit(errors, [heat[tonight]]), one_heat, np.zeros(1), ZOOM_SCALES)
-    errors.blocks.append([moved_since, zoomed_since])
-    zoomed.append(zoomed_since.which)
-    movements.append(moved_since)
-
-    for view, epoch in zip((anchor, *others), memory.epochs, strict=True):
-        wind = WIND * max(epoch.jobs**-0.5, LEAST_WIND)
-        if view in earlier:
-            wind = np.concatenate([[AIMED_ANEW_RAD] * 3, wind[3:]])
-            errors.blocks.append([errors.add(_unit(errors, [heat[view]]), one_heat, np.zeros(1), ZOOM_SCALES)])
-        apart = change_between(epoch.camera, camera)
-        blown = errors.add(_poses(errors, [view]), wind, apart, np.ones(1))
-        errors.blocks.append([blown])
-        movements.append(blown)
-    blown = errors.add(_poses(errors, [tonight]), WIND, np.zeros(6), np.ones(1))
-    errors.blocks.append([blown])
-    return [*movements, blown], np.concatenate(zoomed)
-
-
-def _lens(
-    errors: _Errors, places: Sequence[int], expected: Array, mean: Array, known: Sequence[LensParameter]
-) -> list[Group]:
-    """The focal length of a lens, and the rest of it: groups of errors with scales of their own."""
-    focal = np.array([p.name == "focal_length_px" for p in known], dtype=bool)
-    groups = []
-    for its, scales in ((focal, FOCAL_SCALES), (~focal, LENS_SCALES)):
-        if its.any():
-            at = np.asarray(places)[its].tolist()
-            groups.append(errors.add(np.eye(errors.dense)[:, at], expected[its], mean[its], scales))
-    return groups
-
-
-def _suspects(here: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> list[Parameter]:
-    """The numbers of lenses and field that were not solved for."""
-    known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
-    fresh, aged = lens_parameters(here.cameras), lens_parameters_without_heat(here.cameras)
-    lenses = [b if memories[b.camera] is not None else a for a, b in zip(fresh, aged, strict=True)]
-    everything: list[Parameter] = [*lenses, *field_parameters(here.pitch)]
-    return [p for p in everything if (getattr(p, "camera", None), p.name) not in known]
-
-
-def _views_of(number: int, owner_of: Sequence[int]) -> list[int]:
-    """The views of a camera, tonight's first."""
-    return [view for view, owner in enumerate(owner_of) if owner == number]
-
-
-def _poses(errors: _Errors, views: Sequence[int]) -> Array:
-    """Columns (D, 6) that move all of some views alike."""
-    columns = np.zeros((errors.dense, POSE_NUMBERS))
-    for view in views:
-        columns[POSE_NUMBERS * view : POSE_NUMBERS * (view + 1)] = np.eye(POSE_NUMBERS)
-    return columns
-
-
-def _unit(errors: _Errors, places: Sequence[int]) -> Array:
-    """A column (D, 1) that changes some numbers alike."""
-    column = np.zeros((errors.dense, 1))
-    column[list(places)] = 1.0
-    return column
+def _heat_number(views: int, view: int) -> int:
+    """The `camera` number of the parameter that is the heat of a view."""
+    return views + view

@@ -108,6 +108,8 @@ def _remembered(here: Estimate, memories: Sequence[CameraMemory | None], unknown
     for camera, memory in zip(here.cameras, memories, strict=True):
         for epoch in () if memory is None else memory.epochs:
             its = epoch.measurements(here.lines)
+            if camera.ignored is not None:
+                its = its[camera.sees(its.pixel)]
             # An epoch has the lens of its time: what that differs by from tonight's is no error.
             differs = lens_numbers(camera.intrinsics) - lens_numbers(epoch.camera.intrinsics)
             if len(its) >= FEWEST_MEASUREMENTS:

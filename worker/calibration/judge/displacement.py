@@ -111,7 +111,10 @@ def relative_focal_length(anchor: Camera, found: CameraResult) -> Relative | Non
     if found.zoom is None:
         return None
     before = anchor.intrinsics.focal_length_px
-    tonight = found.camera.intrinsics.focal_length_px + found.zoom.value
+    tonight = found.camera.intrinsics.focal_length_px
+    if not found.lens_found:
+        # What the lines say beside the lens that was taken for known; a lens that was found has it already.
+        tonight += found.zoom.value
     return Relative(tonight / before - 1, found.zoom.sigma / before)
 
 

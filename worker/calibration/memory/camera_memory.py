@@ -147,18 +147,22 @@ class CameraMemory:
 
     @classmethod
     def from_json(cls, told: Mapping[str, Any]) -> CameraMemory | None:
-        """What `to_json` wrote; None for what another release wrote otherwise."""
+        """What `to_json` wrote; None for what another release wrote otherwise, or what cannot be read."""
         if told.get("format") != FORMAT:
             return None
-        return cls(
-            camera_from_json(told["origin"]),
-            Epoch.from_json(told["anchor"]),
-            None if told["recent"] is None else Epoch.from_json(told["recent"]),
-            tuple(Epoch.from_json(epoch) for epoch in told["earlier"]),
-            tuple(told["aside"]),
-            told["lines"],
-            told["frames"],
-        )
+        try:
+            return cls(
+                camera_from_json(told["origin"]),
+                Epoch.from_json(told["anchor"]),
+                None if told["recent"] is None else Epoch.from_json(told["recent"]),
+                tuple(Epoch.from_json(epoch) for epoch in told["earlier"]),
+                tuple(told["aside"]),
+                told["lines"],
+                told["frames"],
+            )
+        except (KeyError, TypeError, ValueError):
+            # A camera without its memory can still be calibrated, and begins another one.
+            return None
 
 
 def fingerprint(lines: LinePoints) -> str:

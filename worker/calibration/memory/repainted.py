@@ -52,8 +52,9 @@ def painted_anew(memory: CameraMemory, measured: Measurements, lines: LinePoints
         for number, metres in differ.explained_by(candidates).items()
         if abs(metres) > LEAST_M and abs(metres) * np.median(differ.across[differ.marking == number]) > limit_px
     ]
-    believable = len(anew) <= MOST_MARKINGS * len(candidates)
-    return np.union1d(known, anew if believable else []).astype(np.intp)
+    together = np.union1d(known, anew).astype(np.intp)
+    believable = len(together) <= MOST_MARKINGS * len(np.union1d(known, candidates))
+    return together if believable else known
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ ALONG = (LEAST_ALONG - 0.05, LEAST_ALONG + 0.05)
 """... the mean correlation along the line, likewise: the larger of the two counts."""
 SEARCH_EDGE_PX, PICTURE_EDGE_PX = 1.0, 2.0
 """Over so many pixels a measurement fades towards the end of the search and the border of the picture."""
-CENTRE_STEPS, CLIMBS = 2, 3
+CENTRE_STEPS = 2
 RIDGE = 1e-6
 OFF_CENTRE_PENALTY = 0.15
 """Correlation that a candidate at the end of the search loses against one where the pose expects the line."""
@@ -177,7 +177,7 @@ class LineProfiles:
         beside = np.abs(shifts - expected[:, None])
         preference = matches.correlation - OFF_CENTRE_PENALTY * (beside / search_px) ** 2
         preference[~(beside <= search_px + matches.sampling_px)] = -np.inf
-        best = _peak(matches.correlation, np.argmax(preference, axis=1))
+        best = np.argmax(preference, axis=1)
         seen = self._seen[matches.which]
         shift = shifts[row, best] + centred.at(best)
         pixel = seen.pixel + shift[:, None] * seen.normal
@@ -231,19 +231,6 @@ class _Centred:
             self._centre[new] = _centre(across, self._width_px[new], self.matches.offsets, self.matches.sampling_px)
             self._window[new] = window[new]
         return self._centre
-
-
-def _peak(correlation: Array, near: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Where (N,) the correlations (N, S) are highest around shifts number `near` (N,).
-
-    The peak stays the same where a line is expected a hair elsewhere.
-    """
-    at, row = near.copy(), np.arange(len(near))
-    for _ in range(CLIMBS):
-        before, after = (np.clip(at + step, 0, correlation.shape[1] - 1) for step in (-1, 1))
-        for beside in (before, after):
-            at = np.where(correlation[row, beside] > correlation[row, at], beside, at)
-    return at
 
 
 def _ramp(value: Plane, low: float, high: float) -> Array:
