@@ -15,6 +15,8 @@ from worker.calibration.scene.camera import Camera
 from worker.calibration.settle import Settled, Situation, settle_without
 
 MOST_ROUNDS = 5
+LEAST_SIGMAS = 2.0
+"""A change that is found has to be so many of its sigmas."""
 ARRIVED = 0.25
 """Of its sigma: a focal length that changes less has been found."""
 WHAT_TO_DO = (
@@ -55,6 +57,9 @@ def _refitted(here: Situation, number: int, result: CameraResult) -> CameraResul
             found = _with_lens(here, number, likelier, abs(changed_px))
             continue
         found = _with_lens(here, number, likelier, zoom.sigma)
+        if abs(changed_px) < LEAST_SIGMAS * zoom.sigma:
+            # With another focal length the lines say less of it than they did before.
+            return None
         change = replace(zoom, value=changed_px)
         moved = Refusal("zoomed", f"{zoom_in_words(stored, change)}: {WHAT_TO_DO}")
         refusal = None if here.options.lens_may_drift else moved
