@@ -51,7 +51,7 @@ class Displacement(Wire):
     )
 
     def as_anchor(self) -> Displacement:
-        """The same of a pose that is the anchor itself."""
+        """The displacement of a pose that is the anchor itself."""
         still = {"anchor": None, "across_m": 0.0, "away_m": 0.0, "rotation_deg": 0.0, "position_m": 0.0}
         return self.model_copy(update=still)
 

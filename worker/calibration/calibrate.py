@@ -23,7 +23,7 @@ from worker.calibration.judge.pairs import (
 from worker.calibration.judge.quality import CameraResult, Gate, believable, ridge_rejection
 from worker.calibration.judge.registration import Response
 from worker.calibration.judge.seam import seam_between
-from worker.calibration.memory.camera_memory import CameraMemory, Job, fingerprint_of_frames, fitting
+from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory, fingerprint_of_frames, fitting
 from worker.calibration.nearby import found_nearby
 from worker.calibration.records import Answer, Calibration, CalibrationError, Journey, Options, Path, Progress, Segment
 from worker.calibration.scene.camera import Camera, Frame
@@ -116,8 +116,9 @@ def remember(
         if not result.accepted or result.measured is None:
             continue
         seen = fingerprint_of_frames(frames[before.id])
-        zoomed = result.lens_change is not None and result.lens_change.notable
-        job = Job(result.camera, result.measured, lines, taken_at, result.painted_anew, seen, zoomed)
+        job = AcceptedJob(
+            result.camera, result.measured, lines, taken_at, result.painted_anew, seen, zoomed=result.lens_changed
+        )
         (memory,) = fitting([memories.get(before.id)], lines)
         after[before.id] = CameraMemory.begun(before, job) if memory is None else memory.after(job)
     return after

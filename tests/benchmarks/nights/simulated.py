@@ -16,7 +16,7 @@ from worker.calibration.finish.refinement import refine
 from worker.calibration.finish.uncertainty import Finished
 from worker.calibration.judge.overlap import Overlap
 from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection
-from worker.calibration.memory.camera_memory import CameraMemory, Job, fitting
+from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory, fitting
 from worker.calibration.scene.camera import Camera
 from worker.calibration.scene.field import Field, LinePoints
 from worker.calibration.scene.ground import Ground
@@ -135,8 +135,9 @@ class Installation:
                 continue
             lines = self.pitch.line_points()
             frames = str(sight.noise[number].sum())
-            zoomed = result.lens_change is not None and result.lens_change.notable
-            job = Job(result.camera, result.measured, lines, None, result.painted_anew, frames, zoomed)
+            job = AcceptedJob(
+                result.camera, result.measured, lines, None, result.painted_anew, frames, zoomed=result.lens_changed
+            )
             (memory,) = fitting([self.memories[number]], lines)
             self.memories[number] = (
                 CameraMemory.begun(self.stored[number], job) if memory is None else memory.after(job)

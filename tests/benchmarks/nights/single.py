@@ -110,12 +110,12 @@ def _begun(venue: Installation, night: Night, rng: np.random.Generator) -> Seque
 
 
 def _job(result: CameraResult, real: Camera) -> Job:
-    sigma, refined, change = result.sigma, result.refined, result.lens_change
+    sigma, refined = result.sigma, result.refined
     return Job(
         apart(result.camera, real)[0],
         np.inf if sigma is None else sigma.position_m,
         np.inf if refined is None else apart(refined.camera, real)[0],
         np.inf if refined is None else refined.sigma.position_m,
-        change is not None and change.notable,
+        result.lens_changed,
         None if result.refusal is None else result.refusal.reason,
     )

@@ -48,11 +48,11 @@ class MixedSteps:
         steps = [*self._plain[-last:], plain]
         changes = np.stack([b - a for a, b in pairwise(steps)], axis=1)
         taken = np.stack(self._taken[-last:], axis=1)
-        share = np.linalg.lstsq(self._in_metres(changes), self._in_metres(plain[:, None])[:, 0], rcond=HELD)[0]
+        share = np.linalg.lstsq(self._in_metres(changes), self._in_metres(plain), rcond=HELD)[0]
         mixed: Array = plain - (taken + changes) @ share
-        longest = FARTHEST * np.linalg.norm(self._in_metres(plain[:, None]))
-        return mixed if np.linalg.norm(self._in_metres(mixed[:, None])) <= longest else plain
+        longest = FARTHEST * np.linalg.norm(self._in_metres(plain))
+        return mixed if np.linalg.norm(self._in_metres(mixed)) <= longest else plain
 
     def _in_metres(self, moves: Array) -> Array:
-        """The part (6 V, n) of moves (U, n) that the cameras make, turns as shifts of what they see."""
-        return np.asarray(moves[: self._poses] * self._scale[:, None])
+        """The part (6 V, ...) of moves (U, ...) that the cameras make, turns as shifts of what they see."""
+        return np.asarray((moves[: self._poses].T * self._scale).T)

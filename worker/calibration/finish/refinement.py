@@ -76,7 +76,7 @@ class LineReader:
         self._read = dict(read)
 
     def of(self, numbers: Sequence[int]) -> LineReader:
-        """That of some of the cameras, with what has been read of them."""
+        """A reader for some of the cameras, with what has been read of them."""
         read = {at: self._read[n] for at, n in enumerate(numbers) if n in self._read}
         return LineReader(self._sight.of(numbers), read)
 
@@ -164,7 +164,7 @@ class _Finish:
         return [found[~np.isin(found.points.marking, self.anew)] for found in measured]
 
     def around(self, here: Estimate) -> _Finish:
-        """The same on a pitch that has been changed since."""
+        """This finish on a pitch that has been changed since."""
         return replace(self, unknowns=self.unknowns.around(here.pitch, here.lines))
 
     def catch(self, here: Estimate, searches_px: Sequence[float]) -> Estimate:

@@ -141,6 +141,11 @@ class FinishedCamera:
     uneven_m: float = field(default=UNEVEN_M, kw_only=True)
 
     @property
+    def lens_changed(self) -> bool:
+        """Whether the focal length has surely changed since the first nights of the camera's memory."""
+        return self.lens_change is not None and self.lens_change.notable
+
+    @property
     def elsewhere_m(self) -> float:
         """How far from here the camera is if its lens is what the lines say."""
         there = self.camera if self.likelier is None else self.likelier

@@ -31,7 +31,7 @@ MOST_EARLIER, FEWEST_JOBS = 2, 4
 
 
 @dataclass(frozen=True)
-class Job:
+class AcceptedJob:
     """What an accepted job leaves of a camera: where it was `found`, what was `measured` of the `lines`, `at` what time
     (None: not known), which markings were `painted_anew`, the fingerprint of its `frames`, and whether its focal length
     has surely changed since the first nights (`zoomed`).
@@ -47,11 +47,11 @@ class Job:
 
     @property
     def for_epoch(self) -> tuple[Camera, Measurements, LinePoints, datetime | None]:
-        """What an epoch takes of it."""
+        """What an epoch takes of the job."""
         return self.found, self.measured, self.lines, self.at
 
-    def without(self, markings: Sequence[int]) -> Job:
-        """The same without the measurements of some markings."""
+    def without(self, markings: Sequence[int]) -> AcceptedJob:
+        """The job without the measurements of some markings."""
         return replace(self, measured=self.measured[~np.isin(self.measured.points.marking, markings)])
 
 
@@ -72,12 +72,12 @@ class CameraMemory:
     frames: str = ""
 
     @classmethod
-    def begun(cls, stored: Camera, job: Job) -> CameraMemory:
+    def begun(cls, stored: Camera, job: AcceptedJob) -> CameraMemory:
         """The memory of the first accepted job, which found a camera that was `stored` before."""
         told = job.without(job.painted_anew).for_epoch
         return cls(stored, Epoch.begun(*told), None, (), job.painted_anew, fingerprint(job.lines), job.frames)
 
-    def after(self, job: Job) -> CameraMemory:
+    def after(self, job: AcceptedJob) -> CameraMemory:
         """The memory with one more accepted job; the same frames sent again say nothing new."""
         if job.frames == self.frames:
             return self
@@ -92,7 +92,7 @@ class CameraMemory:
         before = [*kept.earlier, kept.recent] if kept.recent.jobs >= FEWEST_JOBS else list(kept.earlier)
         return replace(kept, recent=Epoch.begun(*told), earlier=tuple(before[-MOST_EARLIER:]))
 
-    def takes_for_anchor(self, job: Job) -> bool:
+    def takes_for_anchor(self, job: AcceptedJob) -> bool:
         """Whether a job is one of the first nights, in which camera and lens were as they were in the very first."""
         begins = self.recent is None and self.anchor.jobs < ANCHOR_JOBS
         return begins and not job.zoomed and self.anchor.looks_like(job.found, job.lines)
@@ -147,7 +147,7 @@ class CameraMemory:
 
     @classmethod
     def from_json(cls, told: Mapping[str, Any]) -> CameraMemory | None:
-        """What `to_json` wrote; None for what another release wrote otherwise, or what cannot be read."""
+        """The memory that `to_json` wrote; None for one that another release wrote otherwise or that cannot be read."""
         if told.get("format") != FORMAT:
             return None
         try:

@@ -73,7 +73,7 @@ class _Differences:
 
     @classmethod
     def between(cls, last: Epoch, measured: Measurements, lines: LinePoints) -> _Differences:
-        """Of the line points that were measured well in both."""
+        """The differences at the line points that were measured well in the epoch and tonight."""
         index, tonight, before = np.intersect1d(measured.index, last.index, return_indices=True)
         measured, camera, positions = measured[tonight], last.camera, lines.position[index]
         offset = measured.offset(camera, positions) - last.offset[before]

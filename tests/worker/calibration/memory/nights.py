@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.benchmarks.nights.simulated import SHARED_PX, Installation, Painted, SimulatedSight
 from worker.calibration.judge.quality import CameraResult
-from worker.calibration.memory.camera_memory import Job
+from worker.calibration.memory.camera_memory import AcceptedJob
 from worker.calibration.scene.camera import Camera, Pose
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.lens import Intrinsics
@@ -38,8 +38,8 @@ def measured(camera: Camera, field: Painted, seed: int = 1, noise_px: float = 0.
     return SimulatedSight(field, [camera], noise).measure(LINES, [camera], 30.0)[0]
 
 
-def job(camera: Camera, its: Measurements, number: int = 0, **other) -> Job:
-    return Job(camera, its, LINES, None, frames=str(number), **other)
+def job(camera: Camera, its: Measurements, number: int = 0, **other) -> AcceptedJob:
+    return AcceptedJob(camera, its, LINES, None, frames=str(number), **other)
 
 
 def nights_of(longer: Callable[[int], float], count: int, seed: int = 0) -> list[tuple[CameraResult, Camera]]:

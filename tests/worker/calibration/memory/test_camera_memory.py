@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.memory.nights import LINES, PITCH, box_camera, job, measured, painted
-from worker.calibration.memory.camera_memory import ANCHOR_JOBS, CameraMemory, Job, fingerprint_of_frames, fitting
+from worker.calibration.memory.camera_memory import (
+    ANCHOR_JOBS,
+    AcceptedJob,
+    CameraMemory,
+    fingerprint_of_frames,
+    fitting,
+)
 from worker.calibration.memory.epoch import MOST_JOBS, Epoch
 from worker.calibration.scene.field import Field
 from worker.calibration.scene.motion import moved
@@ -108,10 +114,10 @@ def test_an_epoch_forgets_so_that_paint_may_wear():
 
 def test_a_memory_comes_back_from_json_as_it_was():
     at = datetime(2026, 11, 3, 2, tzinfo=UTC)
-    memory = CameraMemory.begun(CAMERA, Job(CAMERA, measured(CAMERA, FIELD), LINES, at, frames="a"))
+    memory = CameraMemory.begun(CAMERA, AcceptedJob(CAMERA, measured(CAMERA, FIELD), LINES, at, frames="a"))
     for number in range(1, ANCHOR_JOBS + 3):
         night = at + timedelta(days=number)
-        memory = memory.after(Job(CAMERA, measured(CAMERA, FIELD, number), LINES, night, frames=str(number)))
+        memory = memory.after(AcceptedJob(CAMERA, measured(CAMERA, FIELD, number), LINES, night, frames=str(number)))
     text = json.dumps(memory.to_json())
     back = CameraMemory.from_json(json.loads(text))
     assert len(text) < 60_000
