@@ -25,7 +25,7 @@ from models.training.network.unet import LEAK, PAPER
 from models.training.pitches.crops import CROP_SIZE
 from models.training.pitches.render import Rendering
 from models.training.train import Budget, Recipe, Training, train
-from worker.calibration.see.segmentation import Segmenter
+from worker.calibration.detection.segmentation import Segmenter
 
 FOLDER = Path("runs/ablation")
 STEPS, BATCH, SIZE_PX = 4000, 6, 224

@@ -24,10 +24,10 @@ from models.training.pitches.conditions import NAMED
 from models.training.pitches.crops import random_crop, random_view
 from models.training.pitches.render import Conditions, Rendering
 from models.training.pitches.surface import ground_patch, marking_distance, marking_shares, window_rays
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import LENSES
-from worker.calibration.see.segmentation import Segmenter, whole_frame
+from worker.calibration.detection.segmentation import Segmenter, whole_frame
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import LENSES
 
 TOLERANCE_PX = 3
 AROUND_PITCH_M = 5.0

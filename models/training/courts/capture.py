@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.training.drawing.noise import Plane
-from worker.calibration.scene.camera import Array
+from worker.calibration.geometry.camera import Array
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ from models.training.courts.layouts import PAINTS, Layout, Stripe, field_layout,
 from models.training.courts.views import FieldView, View, Window
 from models.training.drawing.colours import Colour, hsv, random_colour
 from models.training.drawing.noise import Noise, Patch, Plane, smooth_step
-from worker.calibration.scene.camera import Array, Camera
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field
 
 NEAREST_M = 0.3
 FINER = 4

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from fields.shapes import Arc, Line, Spot
 from fields.template import NAMES, load
-from worker.calibration.scene.camera import Array
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.field import Field
 
 PAINTS = 4
 """Colours of paint that a layout tells apart at most."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from models.training.drawing.noise import Patch
 from models.training.pitches.surface import ground_patch, window_rays
-from worker.calibration.scene.camera import Array, Camera
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field
 
 
 class View(Protocol):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.training.drawing.colours import Colour, random_colour
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.field import Field
 
 TEXEL_M = 0.04
 HERSHEY = (

@@ -13,7 +13,7 @@ from models.training.drawing.lettering import writing
 from models.training.drawing.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
 from models.training.pitches.conditions import Conditions
 from models.training.pitches.world import Wall, World
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.field import Field
 
 OUTWARD = {"near": (0.0, -1.0), "far": (0.0, 1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}
 

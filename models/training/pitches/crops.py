@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from models.training.pitches.render import Conditions, Rendering, render_window
 from models.training.pitches.venues import random_camera, random_field
-from worker.calibration.scene.camera import Array, Camera, inside
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Array, Camera, inside
+from worker.calibration.geometry.field import Field
 
 CROP_SIZE = 288
 # How often the middle of a crop is what.

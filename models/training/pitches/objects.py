@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from models.training.drawing.colours import Colour, hsv, random_colour
 from models.training.pitches.conditions import Conditions
 from models.training.pitches.world import World
-from worker.calibration.scene.camera import Array, Camera
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field
 
 SHIFT = 4
 GOAL_HALF_WIDTH_M, GOAL_HEIGHT_M = 3.66, 2.44

@@ -18,8 +18,8 @@ from models.training.pitches.objects import Canvas, draw_objects
 from models.training.pitches.sensor import add_air, expose
 from models.training.pitches.surface import shade_ground, window_rays
 from models.training.pitches.world import World, build_world
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
 
 __all__ = ["Conditions", "Rendering", "render_frame", "render_window"]
 

@@ -12,8 +12,8 @@ from models.training.drawing.lettering import Letters
 from models.training.drawing.noise import Noise, Patch, Plane, band, bands, mix, smooth_step, step
 from models.training.pitches.conditions import Conditions
 from models.training.pitches.world import World
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field, Marking
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field, Marking
 
 FARTHEST_M = 2500.0
 LEARNT_WIDTH_PX = 1.5

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from models.training.pitches.world import SIDES
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
 
 SIZES = ((1280, 720), (1920, 1080), (1920, 1080), (2560, 1440), (2688, 1520), (3072, 1728), (3840, 2160), (3840, 2160))
 

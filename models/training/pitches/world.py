@@ -14,7 +14,7 @@ from models.training.drawing.colours import Colour, hsv, random_colour
 from models.training.drawing.lettering import Letters, random_letters
 from models.training.drawing.noise import Noise
 from models.training.pitches.conditions import Conditions
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.field import Field
 
 SIDES = ("near", "far", "left", "right")
 
