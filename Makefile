@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-rate bench-video bench-follow bench-learned train lock clean
+.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
 
 setup: $(VENV)/.installed
 
@@ -28,11 +28,12 @@ check: setup
 	$(BIN)/mypy --config-file tests/benchmarks/mypy.ini
 	$(BIN)/lint-imports
 	$(BIN)/deptry .
+	$(BIN)/python -m tests.openapi
 
 # What an earlier build left in build/lib would go into the wheel.
 wheel: setup
 	rm -rf build/lib build/bdist.*
-	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist .
+	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist . ./client
 
 bench-real: setup
 	$(BIN)/python -m tests.benchmarks.real_pair
@@ -47,6 +48,14 @@ bench-segmentation: $(VENV)/.train
 
 bench-service: setup
 	$(BIN)/python -m tests.benchmarks.service
+
+# SECONDS: how long each fault lasts.
+SECONDS ?= 20
+bench-faults: setup
+	$(BIN)/python -m tests.benchmarks.faults --seconds $(SECONDS)
+
+bench-hostile: setup
+	$(BIN)/python -m tests.benchmarks.hostile
 
 $(VENV)/.bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
@@ -69,6 +78,9 @@ bench-truth: $(VENV)/.bench $(VENV)/.train
 # BEFORE: a clone of an earlier release with its .venv; `git worktree add ../esc-before v0.1.0 && make -C ../esc-before setup`.
 bench-cost: setup
 	$(BIN)/python -m tests.benchmarks.cost $(if $(BEFORE),--before $(BEFORE))
+
+bench-versions: setup
+	$(BIN)/python -m tests.benchmarks.versions
 
 bench-rate: setup
 	$(BIN)/python -m tests.benchmarks.rate
@@ -95,4 +107,4 @@ lock:
 		-o docker/requirements.lock pyproject.toml
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info
+	rm -rf $(VENV) build dist *.egg-info client/build client/*.egg-info

@@ -1,0 +1,62 @@
+"""A typed client of ESC: `Client` blocks, `AsyncClient` is awaited, and both have the same methods.
+
+from esc_client import Client
+
+with Client("http://127.0.0.1:8000", api_key) as client:
+    print(client.venue("demo").cameras[0].pose.position)
+"""
+
+# Written against the sources of the service, as all modules here; building the package renames what is imported.
+
+from importlib.metadata import version
+
+from service.client import AsyncClient, Client, NotUnderstood, Refused
+from service.schemas.events.venue_event import Event, PosesEvent, VenueEvent
+from service.schemas.events.webhooks import Webhook
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Intrinsics, Pose, PoseIn
+from service.schemas.health import Alarm, AlarmEvent, Alarms, VenueHealth
+from service.schemas.history import Revision
+from service.schemas.job import Job, JobEvent, Progress
+from service.schemas.options import Options
+from service.schemas.results import CameraResult, Result
+from service.schemas.schedule import Schedule
+from service.schemas.trend import Trend
+from service.schemas.venue import Camera, CameraIn, ChangedVenue, Venue, VenueIn
+from service.schemas.view import ViewChoice
+
+__version__ = version("esc-client")
+__all__ = [
+    "Alarm",
+    "AlarmEvent",
+    "Alarms",
+    "AsyncClient",
+    "Camera",
+    "CameraIn",
+    "CameraResult",
+    "ChangedVenue",
+    "Client",
+    "Event",
+    "FieldOfPlay",
+    "Intrinsics",
+    "Job",
+    "JobEvent",
+    "NotUnderstood",
+    "Options",
+    "Pose",
+    "PoseIn",
+    "PosesEvent",
+    "Progress",
+    "Refused",
+    "Result",
+    "Revision",
+    "Schedule",
+    "Trend",
+    "Venue",
+    "VenueEvent",
+    "VenueHealth",
+    "VenueIn",
+    "ViewChoice",
+    "Webhook",
+    "__version__",
+]
