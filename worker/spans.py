@@ -1,4 +1,4 @@
-"""The spans of an attempt: one for all of it, under the request that the job came with, and in it one per stage."""
+"""OpenTelemetry spans of an attempt: one for all of it, below the span of the request, and in it one per stage."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Self
 from opentelemetry import trace
 from opentelemetry.trace import Span, SpanKind, StatusCode
 
-from service.observe import tracing
+from service.observability import tracing
+from service.schemas.results import IntrinsicsResult, Result
 from service.store.jobs.task import Task
-from service.wire.results import IntrinsicsResult, Result
-from worker.message import Message
+from worker.protocol import Message
 
 # Before a job's program says how far it is: it starts, fetches and decodes the frames.
 FIRST_STAGE = "start"
 
 
 class Spans:
-    """Of one attempt; they end with the `with` block."""
+    """The spans of one attempt; they end with the `with` block."""
 
     def __init__(self, task: Task) -> None:
         self._tracer = trace.get_tracer("esc.worker")
@@ -53,7 +53,7 @@ class Spans:
         self._open.__exit__(kind, error, at)
 
     def at(self, stage: str) -> None:
-        """The job is at this stage now."""
+        """Begin the span of a stage, unless the job is there already, and end that of the stage before."""
         if stage == self._name:
             return
         if self._stage is not None:
@@ -61,7 +61,7 @@ class Spans:
         self._stage, self._name = self._tracer.start_span(stage), stage
 
     def end(self, last: Message | None) -> None:
-        """What the attempt came to; None: the job was taken away."""
+        """Set the outcome of the attempt; None: its lease was lost."""
         if last is None:
             self._whole.set_attribute("esc.outcome", "taken away")
         elif isinstance(last.result, IntrinsicsResult):

@@ -1,4 +1,4 @@
-"""What goes into the engine and what comes out of it: options, progress, answers, errors."""
+"""Inputs and outputs of the engine: options, progress, results, errors."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.finish.diagnosis import Suspicion
-from worker.calibration.judge.pairs import Pair
-from worker.calibration.judge.quality import CameraResult
-from worker.calibration.judge.seam import Seam
+from worker.calibration.detection.segmentation import Region
+from worker.calibration.detection.view_condition import ViewCondition
+from worker.calibration.diagnostics.seam import Seam
+from worker.calibration.gate.pairs import Pair
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Array, Camera, Frame
+from worker.calibration.geometry.field import Field
 from worker.calibration.memory.camera_memory import CameraMemory
-from worker.calibration.scene.camera import Frame
-from worker.calibration.scene.field import Field
-from worker.calibration.see.segmentation import Region
-from worker.calibration.stitch.light import Light
+from worker.calibration.refinement.diagnosis import Suspicion
+from worker.calibration.stitching.photometry import Light
 
 Preset = Literal["esc", "paper", "scpr"]
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
@@ -28,23 +29,24 @@ Path = Literal["near", "wide"]
 Verdict = Literal["accepted", "partly", "rejected"]
 
 SHARE_OF_JOB = {"segmentation": (0.0, 0.65), "evolution": (0.65, 0.85), "refinement": (0.85, 0.92)}
-"""Where on the way of a whole job each stage begins and ends; the pictures are the rest."""
+"""Share of a whole job at which each stage begins and ends; drawing the pictures is the rest."""
 
 
 class Segment(Protocol):
     """Probability (H, W) in 0..255 of a marking, see `segmentation.Segmenter`."""
 
     def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
-        """Look at regions of a frame; 0 outside them."""
+        """Return the response (H, W) of the network in regions of a frame, 0 outside them."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """What a caller may choose; in the paper mu, lambda, G and the trade-off lambda of section III.
+    """Options of a calibration; `parents`, `offspring`, `generations` and `stitch_weight` are mu, lambda, G and the
+    trade-off lambda of section III of the paper.
 
-    `search`: `auto` looks first whether the cameras stand almost where they stood, `wide` searches in any case.
-    `fit_focal_length`: of each camera, as heat changes it; `fit_ridge`: its height; `lens_may_drift`: whether a pose
-    may be accepted with another focal length than the stored one. All are for preset `esc`.
+    `search`: `auto` tries the near path before it searches, `wide` always searches. `fit_focal_length`: solve for the
+    focal length of each camera, which heat changes; `fit_ridge`: for the ridge's height; `lens_may_drift`: whether a
+    pose may be accepted with another focal length than the stored one. All are for preset `esc`.
     """
 
     preset: Preset = "esc"
@@ -62,7 +64,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a calibration has come: `fraction` 0..1 of the whole job; the rest during the evolution."""
+    """Progress of a calibration: `fraction` 0..1 of the whole job; `generation` and `loss` during the evolution."""
 
     stage: Stage
     fraction: float
@@ -70,62 +72,62 @@ class Progress:
     loss: float | None = None
 
 
-class Spent:
-    """What stages took: `seconds` by a clock, and `core_seconds` of all threads of the process."""
+class StageTimings:
+    """Times of the stages by name: `seconds` of wall clock, and `core_seconds` of all threads of the process."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         self.core_seconds: dict[str, float] = {}
 
     @contextmanager
-    def measuring(self, stage: str) -> Iterator[None]:
-        """Measure what that takes which is done inside."""
-        begun, spent = time.perf_counter(), time.process_time()
+    def timed(self, stage: str) -> Iterator[None]:
+        """Add the time of the `with` block to a stage."""
+        begun, cores_begun = time.perf_counter(), time.process_time()
         yield
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
-        self.core_seconds[stage] = self.core_seconds.get(stage, 0.0) + time.process_time() - spent
+        self.core_seconds[stage] = self.core_seconds.get(stage, 0.0) + time.process_time() - cores_begun
 
-    def name(self, stage: str) -> None:
-        """Say of a stage that may have been left out that it took nothing."""
+    def ensure(self, stage: str) -> None:
+        """Count a stage that may have been left out as 0 s."""
         self.seconds.setdefault(stage, 0.0)
         self.core_seconds.setdefault(stage, 0.0)
 
-    def add(self, other: Spent) -> None:
-        """What was measured elsewhere, behind what was measured here."""
+    def add(self, other: StageTimings) -> None:
+        """Append the stages of other timings."""
         self.seconds |= other.seconds
         self.core_seconds |= other.core_seconds
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What the engine says of cameras around a pitch. `rejected_because`: all reasons in a sentence, None without any.
+class EngineResult:
+    """Cameras around a pitch with the verdicts of the gate. `rejected_because`: all reasons in a sentence, or None.
 
-    `pitch`: the given one but for what of it was to be found; `spent`: on each stage; `pairs`: of cameras that were
-    compared, each with its seam.
+    `pitch`: the given one, with the measures that were solved for; `timings` of the stages; `pairs`: of
+    cameras that were compared, each with its seam.
     """
 
     pitch: Field
     cameras: Sequence[CameraResult]
     rejected_because: str | None
     stitch_error_px: float | None
-    spent: Spent
+    timings: StageTimings
     pairs: Sequence[tuple[Pair, Seam]] = field(default=(), kw_only=True)
 
     @property
     def accepted(self) -> bool:
-        """Whether the gate lets all that was found replace what is stored."""
+        """True if the gate accepts all that was found."""
         return self.rejected_because is None
 
     @property
     def verdict(self) -> Verdict:
-        """Whether it lets the poses of all cameras, of some or of none."""
+        """Whether the gate accepts the poses of all cameras, of some (`partly`) or of none."""
         accepted = [camera.accepted for camera in self.cameras]
         return "accepted" if all(accepted) else "partly" if any(accepted) else "rejected"
 
 
 @dataclass(frozen=True)
-class Calibration(Answer):
-    """The answer to frames: new poses. `suspicions`: what the lines contradict of what was given.
+class Calibration(EngineResult):
+    """New poses from frames. `suspicions`: given numbers of lenses and field that the lines contradict.
 
     `path`: whether they were found `near` their stored poses, or by a search (`wide`). `lights`: of accepted cameras
     that overlap, by camera. `memories`: of cameras whose poses are accepted, with this job in them, by camera.
@@ -138,6 +140,28 @@ class Calibration(Answer):
     path: Path
     lights: Mapping[str, Light]
     memories: Mapping[str, CameraMemory]
+
+
+class Recorder:
+    """Receives what the stages of a calibration saw, as arrays, for debugging; this one keeps nothing of it."""
+
+    def observed(
+        self,
+        cameras: Sequence[Camera],
+        frames: Mapping[str, Sequence[Frame]],
+        views: Sequence[ViewCondition],
+        responses: Sequence[NDArray[np.float32]],
+    ) -> None:
+        """Receive the view condition and the network's response (H, W) in 0..1 of each camera."""
+
+    def searched(self, cameras: Sequence[Camera], level: int, genomes: Array, best: Sequence[Camera]) -> None:
+        """Receive the poses (P, 6 N) at the end of a level of a search, and the `best` of them."""
+
+    def judged(self, pitch: Field, stored: Sequence[Camera], results: Sequence[CameraResult]) -> None:
+        """Receive the results of the cameras beside their `stored` poses, with the measured lines."""
+
+
+NOT_RECORDED = Recorder()
 
 
 class CalibrationError(Exception):
@@ -154,24 +178,24 @@ class Stopped(Exception):  # noqa: N818  (a request, not an error)
     """The caller asked to stop."""
 
 
-class Journey:
-    """Where a job stands: what each stage took, how far it is, and whether its caller wants it to stop."""
+class ProgressReporter:
+    """Times the stages of a job, reports its progress, and stops it when its caller asks to."""
 
     def __init__(self, report: Callable[[Progress], None], stop: Callable[[], bool]) -> None:
-        self.spent = Spent()
+        self.timings = StageTimings()
         self.report = report
         self.stop = stop
         self.fraction = 0.0
 
-    def unreported(self) -> Journey:
-        """The same journey for what may be done in vain: its time counts, and nobody is told of it."""
-        aside = Journey(lambda _: None, self.stop)
-        aside.spent = self.spent
-        return aside
+    def muted(self) -> ProgressReporter:
+        """Return a reporter for an attempt that may fail: its time counts, its progress is not reported."""
+        muted = ProgressReporter(lambda _: None, self.stop)
+        muted.timings = self.timings
+        return muted
 
-    def measuring(self, stage: str) -> AbstractContextManager[None]:
-        """Measure what that takes which is done inside."""
-        return self.spent.measuring(stage)
+    def timed(self, stage: str) -> AbstractContextManager[None]:
+        """Add the time of the `with` block to a stage."""
+        return self.timings.timed(stage)
 
     def at(self, stage: Stage, share: float, generation: int | None = None, loss: float | None = None) -> None:
         """Report `share` 0..1 of `stage`; raise `Stopped` when asked to stop."""
@@ -183,5 +207,5 @@ class Journey:
         self.report(Progress(stage, self.fraction, generation, loss))
 
     def evolution(self, total: int) -> Callable[[int, float], None]:
-        """What a search of at most `total` generations calls after each one."""
+        """Return the callback that a search of at most `total` generations calls after each one."""
         return lambda number, loss: self.at("evolution", number / total, number, loss)

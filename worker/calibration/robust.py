@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from worker.calibration.scene.camera import Array
+from worker.calibration.geometry.camera import Array
 
 HUBER, TUKEY = 1.345, 4.685
 """Residuals, in standard deviations, where each begins to doubt: 95 % of the efficiency of least squares."""

@@ -1,1 +1,1 @@
-"""What a worker does beside its jobs: tell, tidy up, watch alarms, and begin what is due."""
+"""The duties of a worker beside its jobs: webhook delivery, retention, timed alarms and schedules."""

@@ -1,23 +1,23 @@
-"""Alarms that come of time that passes: all others begin and end with what they are about."""
+"""Timed alarms, such as a venue that was not calibrated for days. All others begin and end with their events."""
 
 from __future__ import annotations
 
-from service.store.venues import Venues
+from service.store.venues import VenueRepository
 
-LOOK_S = 5.0
-# Per look: some milliseconds each.
+POLL_S = 5.0
+# Per poll: some milliseconds each.
 BATCH = 100
 
 
-class Alarms:
-    """Lets them begin. Any number of workers may do it at once: an alarm that rings begins no second time."""
+class AlarmTimer:
+    """Begins timed alarms. Any number of workers may do it at once: an alarm that rings begins no second time."""
 
-    def __init__(self, venues: Venues) -> None:
+    def __init__(self, venues: VenueRepository) -> None:
         self._venues = venues
 
-    def look(self) -> float:
-        """See to the venues that are due; returns the seconds until it is worth looking again."""
+    def poll(self) -> float:
+        """Settle the alarms of the venues that are due; return the seconds until the next poll."""
         due = self._venues.with_alarms_due(BATCH)
         for venue in due:
-            self._venues.settle_alarms(venue)
-        return 0.0 if len(due) == BATCH else LOOK_S
+            self._venues.update_alarms(venue)
+        return 0.0 if len(due) == BATCH else POLL_S

@@ -5,40 +5,43 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
-from typing import Any
+from typing import Any, cast
 
-from service.wire.job import Progress
-from service.wire.options import Options
-from service.wire.results import Provenance, Result, Suspicion, View
-from service.wire.trend import Anchor
-from service.wire.venue import Venue
+from service.schemas.job import Progress
+from service.schemas.names import FieldNumber
+from service.schemas.options import Options
+from service.schemas.results import AdoptableNumber, Provenance, Result, Suspicion, View
+from service.schemas.trend import Anchor
+from service.schemas.venue import Venue
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
-from worker.calibration.judge.quality import Gate
-from worker.calibration.memory.camera_memory import CameraMemory, fitting
-from worker.calibration.scene.field import Field
-from worker.calibration.see.view import UsualView
-from worker.calibration.stitch.light import Light
-from worker.jobs import from_frames
-from worker.jobs.from_frames import Drawn, Given
-from worker.jobs.nights import memories_of, wire_lens_change, wire_refined
-from worker.jobs.pictures import Scene, draw, masks
-from worker.jobs.reading import light_of
-from worker.jobs.wire import (
+from worker.calibration.detection.view_condition import UsualView
+from worker.calibration.gate.quality import Gate
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.parameters import field_parameters
+from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
+from worker.calibration.refinement import diagnosis
+from worker.calibration.stitching.photometry import Light
+from worker.jobs import frames_job
+from worker.jobs.frames_job import EngineInputs, JobPictures
+from worker.jobs.from_schemas import light_of
+from worker.jobs.nights import lens_change_to_schema, read_memories, refined_to_schema
+from worker.jobs.pictures import PictureInputs, draw, masks
+from worker.jobs.to_schemas import (
     Solution,
-    number,
-    to_the_millisecond,
-    wire_camera,
-    wire_displacement,
-    wire_lens,
-    wire_light,
-    wire_pair,
+    camera_to_schema,
+    displacement_to_schema,
+    finite_or_none,
+    lens_to_schema,
+    light_to_schema,
+    pair_to_schema,
+    round_to_ms,
 )
-from worker.message import Means
+from worker.protocol import ComputeResources
 
 
 @dataclass(frozen=True)
-class Nights:
+class NightHistory:
     """What is known of the nights before a job, by camera, and when its frames were taken.
 
     `last_views`: what the frames of the last accepted calibration were like; `memories`: as the engine wrote them;
@@ -56,21 +59,23 @@ class Nights:
         return {camera: UsualView(view.lines_found, view.blur_px) for camera, view in self.last_views.items()}
 
 
-FIRST_NIGHT = Nights()
+NO_HISTORY = NightHistory()
+MILLIMETRE = 3
 
 
 def solve(
     venue: Venue,
     files: Mapping[str, Sequence[bytes]],
     options: Options,
-    means: Means,
+    means: ComputeResources,
     report: Callable[[Progress], None],
-    nights: Nights = FIRST_NIGHT,
+    nights: NightHistory = NO_HISTORY,
+    recorder: engine.Recorder = engine.NOT_RECORDED,
 ) -> Solution[Result]:
     """Calibrate a venue from the files of its cameras, by what is known of its `nights`."""
     asked = _engine_options(venue, options)
-    memories = memories_of(nights.memories)
-    return from_frames.solve(
+    memories = read_memories(nights.memories)
+    return frames_job.solve(
         venue,
         files,
         options,
@@ -86,6 +91,7 @@ def solve(
             usual=nights.usual,
             memories=memories,
             taken_at=nights.taken_at,
+            recorder=recorder,
         ),
         lambda given, found: _drawn(venue, given, found, options),
         lambda found, spent, provenance: _allowed(
@@ -95,9 +101,9 @@ def solve(
     )
 
 
-def _drawn(venue: Venue, given: Given, found: engine.Calibration, options: Options) -> Drawn:
+def _drawn(venue: Venue, given: EngineInputs, found: engine.Calibration, options: Options) -> JobPictures:
     """What only this job can draw; and all the rest at once where somebody asks for it, or will want to see why."""
-    scene = Scene(
+    scene = PictureInputs(
         (given.pitch, given.cameras),
         (found.pitch, [result.camera for result in found.cameras]),
         {camera: several[0] for camera, several in given.frames.items()},
@@ -106,8 +112,8 @@ def _drawn(venue: Venue, given: Given, found: engine.Calibration, options: Optio
     )
     seen = masks(given.cameras, given.network.responses)
     if found.accepted and not options.pictures:
-        return Drawn(seen, scene.names)
-    return Drawn(draw(scene, scene.names) | seen)
+        return JobPictures(seen, scene.names)
+    return JobPictures(draw(scene, scene.names) | seen)
 
 
 def _steadied(venue: Venue, found: engine.Calibration) -> dict[str, Light]:
@@ -127,52 +133,79 @@ def _result(
     venue: Venue,
     found: engine.Calibration,
     options: Options,
-    spent: engine.Spent,
+    spent: engine.StageTimings,
     provenance: Provenance,
     memories: Mapping[str, CameraMemory],
-    nights: Nights,
+    nights: NightHistory,
 ) -> Result:
     remembered = memories if options.dry_run else {**memories, **found.memories}
     ridge = found.pitch.ridge
-    lights = {camera: wire_light(light) for camera, light in _steadied(venue, found).items()}
+    lights = {camera: light_to_schema(light) for camera, light in _steadied(venue, found).items()}
     return Result(
         verdict=found.verdict,
         accepted=found.accepted,
         rejected_because=found.rejected_because,
         cameras=[
-            wire_camera(
+            camera_to_schema(
                 camera,
-                wire_lens(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
+                lens_to_schema(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
                 lights.get(camera.camera.id),
-                wire_displacement(found.pitch, camera, nights.anchors.get(camera.camera.id)),
+                displacement_to_schema(found.pitch, camera, nights.anchors.get(camera.camera.id)),
             ).model_copy(
                 update={
-                    "refined": wire_refined(found.pitch, camera),
-                    "lens_change": wire_lens_change(camera, nights.taken_at),
+                    "refined": refined_to_schema(found.pitch, camera),
+                    "lens_change": lens_change_to_schema(camera, nights.taken_at),
                     "nights": _nights(found.pitch, remembered.get(camera.camera.id)),
                 }
             )
             for camera in found.cameras
         ],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
-        diagnosis=[Suspicion(**vars(suspicion)) for suspicion in found.suspicions],
+        diagnosis=[_suspicion(one) for one in found.suspicions],
+        adoptable=_adoptable(venue, found),
         warnings=venue.lens_warnings,
-        stitch_error_px=number(found.stitch_error_px),
-        stitch_error_before_px=number(found.stitch_error_before_px),
+        stitch_error_px=finite_or_none(found.stitch_error_px),
+        stitch_error_before_px=finite_or_none(found.stitch_error_before_px),
         stitch_error_limit_px=Gate().largest_stitch_error_px,
-        pairs=[wire_pair(*pair) for pair in found.pairs],
-        loss=number(found.loss),
+        pairs=[pair_to_schema(*pair) for pair in found.pairs],
+        loss=finite_or_none(found.loss),
         generations=found.generations,
         path=found.path,
-        timings_s=to_the_millisecond(spent.seconds),
-        cpu_s=to_the_millisecond(spent.core_seconds),
+        timings_s=round_to_ms(spent.seconds),
+        cpu_s=round_to_ms(spent.core_seconds),
         provenance=provenance,
     )
 
 
+def _suspicion(of: diagnosis.Suspicion) -> Suspicion:
+    return Suspicion(camera=of.camera, quantity=of.quantity, deviation=of.deviation, sigma=of.sigma, detail=of.detail)
+
+
+def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]:
+    """The numbers of the field that the lines contradict, in millimetres, which are finer than any sigma.
+
+    None where a venue with a ridge was calibrated as if it were flat: they are numbers of another field.
+    """
+    if found.pitch.ridge is None and venue.field.ridge is not None:
+        return []
+    accepted = {camera.camera.id for camera in found.cameras if camera.accepted}
+    given = {parameter.name: parameter.read(found.pitch) for parameter in field_parameters(found.pitch)}
+    return [
+        AdoptableNumber(
+            name=cast(FieldNumber, one.quantity),
+            given=given[one.quantity],
+            value=round(given[one.quantity] + one.deviation, MILLIMETRE),
+            sigma=one.sigma,
+            moves_m={camera: round(by, MILLIMETRE) for camera, by in one.moves_m.items() if camera in accepted},
+        )
+        for one in found.suspicions
+        if one.camera is None
+    ]
+
+
 def _nights(pitch: Field, memory: CameraMemory | None) -> int:
     """How many jobs a memory is of; one of another field is none."""
-    (fits,) = fitting([memory], pitch.line_points())
+    (fits,) = memories_of_field([memory], pitch.line_points())
     return 0 if fits is None else fits.jobs
 
 

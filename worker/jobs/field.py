@@ -5,19 +5,19 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping, Sequence
 
-from service.wire.field import FieldOfPlay
-from service.wire.job import Progress
-from service.wire.options import FieldOptions
-from service.wire.results import FieldResult, MeasureResult, Provenance
-from service.wire.venue import Venue
-from worker.calibration.draw.overlays import overlay
-from worker.calibration.measures.field_fit import FieldFit, Measure, fit_field
-from worker.calibration.records import Spent
-from worker.jobs import from_frames
-from worker.jobs.from_frames import Drawn, Given
-from worker.jobs.reading import jpeg
-from worker.jobs.wire import Solution, number, to_the_millisecond, wire_camera
-from worker.message import Means
+from service.schemas.field import FieldOfPlay
+from service.schemas.job import Progress
+from service.schemas.options import FieldOptions
+from service.schemas.results import FieldResult, MeasureResult, Provenance
+from service.schemas.venue import Venue
+from worker.calibration.field_fit.measures import FieldFit, Measure, fit_field
+from worker.calibration.records import StageTimings
+from worker.calibration.rendering.overlays import overlay
+from worker.jobs import frames_job
+from worker.jobs.frames_job import EngineInputs, JobPictures
+from worker.jobs.from_schemas import encode_jpeg
+from worker.jobs.to_schemas import Solution, camera_to_schema, finite_or_none, round_to_ms
+from worker.protocol import ComputeResources
 
 MILLIMETRE = 3
 log = logging.getLogger(__name__)
@@ -27,12 +27,12 @@ def solve(
     venue: Venue,
     files: Mapping[str, Sequence[bytes]],
     options: FieldOptions,
-    means: Means,
+    means: ComputeResources,
     report: Callable[[Progress], None],
 ) -> Solution[FieldResult]:
     """The measures of a venue's pitch from the files of its cameras."""
     seed = options.seed or 0
-    return from_frames.solve(
+    return frames_job.solve(
         venue,
         files,
         options,
@@ -44,7 +44,7 @@ def solve(
     )
 
 
-def _draw(given: Given, found: FieldFit) -> Drawn:
+def _draw(given: EngineInputs, found: FieldFit) -> JobPictures:
     pictures = {}
     for old, new in zip(given.cameras, found.cameras, strict=True):
         try:
@@ -53,40 +53,33 @@ def _draw(given: Given, found: FieldFit) -> Drawn:
         except Exception:  # what was rejected may look anywhere; a picture is not worth losing the reason
             log.warning("cannot draw camera %s", old.id, exc_info=True)
             continue
-        pictures[f"overlay_{old.id}"] = jpeg(drawn)
-    return Drawn(pictures)
+        pictures[f"overlay_{old.id}"] = encode_jpeg(drawn)
+    return JobPictures(pictures)
 
 
-def _result(given: FieldOfPlay, found: FieldFit, spent: Spent, provenance: Provenance) -> FieldResult:
+def _result(given: FieldOfPlay, found: FieldFit, spent: StageTimings, provenance: Provenance) -> FieldResult:
     return FieldResult(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
-        field=_wire_field(given, found) if found.accepted else given,
-        measures=[_wire_measure(measure) for measure in found.measures],
-        cameras=[wire_camera(camera) for camera in found.cameras],
-        stitch_error_px=number(found.stitch_error_px),
-        timings_s=to_the_millisecond(spent.seconds),
-        cpu_s=to_the_millisecond(spent.core_seconds),
+        field=_field_to_schema(given, found) if found.accepted else given,
+        measures=[_measure_to_schema(measure) for measure in found.measures],
+        cameras=[camera_to_schema(camera) for camera in found.cameras],
+        stitch_error_px=finite_or_none(found.stitch_error_px),
+        timings_s=round_to_ms(spent.seconds),
+        cpu_s=round_to_ms(spent.core_seconds),
         provenance=provenance,
     )
 
 
-def _wire_field(given: FieldOfPlay, found: FieldFit) -> FieldOfPlay:
+def _field_to_schema(given: FieldOfPlay, found: FieldFit) -> FieldOfPlay:
     """The fitted pitch in millimetres, which are finer than any of its sigmas."""
     pitch = found.pitch
     ridge = None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
-    return FieldOfPlay(
-        template=given.template,
-        length_m=round(pitch.length, MILLIMETRE),
-        width_m=round(pitch.width, MILLIMETRE),
-        line_width_m=given.line_width_m,
-        measures_m=given.measures_m,
-        ridge=ridge,
-        other_markings=given.other_markings,
-    )
+    size = {"length_m": round(pitch.length, MILLIMETRE), "width_m": round(pitch.width, MILLIMETRE)}
+    return given.changed({**size, "ridge": ridge})
 
 
-def _wire_measure(measure: Measure) -> MeasureResult:
+def _measure_to_schema(measure: Measure) -> MeasureResult:
     return MeasureResult(
         name=measure.name,
         given=measure.given,

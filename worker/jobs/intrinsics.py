@@ -8,15 +8,15 @@ from importlib.metadata import version
 
 import cv2
 
-from service.wire import options as wire
-from service.wire.job import Progress
-from service.wire.options import IntrinsicsOptions
-from service.wire.results import CoverageResult, IntrinsicsResult, LensTrial, PhotoResult
-from worker.calibration.draw.inspection import coverage_picture
-from worker.calibration.first.boards import Board, Charuco, find_board, other_size
-from worker.calibration.first.lens_calibration import LensCalibration, NoLens, Photo, calibrate_lens
-from worker.jobs.reading import Failure, Picture, decoded, jpeg
-from worker.jobs.wire import Solution, number, to_the_millisecond, wire_lens
+from service.schemas import options as wire
+from service.schemas.job import Progress
+from service.schemas.options import IntrinsicsOptions
+from service.schemas.results import CoverageResult, IntrinsicsResult, LensTrial, PhotoResult
+from worker.calibration.onboarding.boards import Board, Charuco, find_board, other_size
+from worker.calibration.onboarding.lens_calibration import LensCalibration, Photo, UndeterminedLensError, calibrate_lens
+from worker.calibration.rendering.inspection import coverage_picture
+from worker.jobs.from_schemas import JobFailedError, Picture, decode_image, encode_jpeg
+from worker.jobs.to_schemas import Solution, finite_or_none, lens_to_schema, round_to_ms
 
 DETECTION_FRACTION = 0.8
 
@@ -33,7 +33,7 @@ def solve(
         # One at a time: what is kept of a photo is where the corners are.
         photos.append(_look(name, file, board))
     detected = time.perf_counter()
-    if all(photo.sighting is None for photo in photos):
+    if all(photo.detection is None for photo in photos):
         _require_the_right_board(files, board)
     rest = 1 - DETECTION_FRACTION
     try:
@@ -42,10 +42,10 @@ def solve(
             options.model,
             lambda share: report(Progress(stage="fit", fraction=DETECTION_FRACTION + rest * share)),
         )
-    except NoLens as error:
-        raise Failure("no-lens", _sentence(error)) from error
+    except UndeterminedLensError as error:
+        raise JobFailedError("no-lens", _sentence(error)) from error
     fitted = time.perf_counter()
-    picture = jpeg(coverage_picture(found))
+    picture = encode_jpeg(coverage_picture(found))
     timings = {"detection": detected - begun, "fit": fitted - detected, "picture": time.perf_counter() - fitted}
     return Solution(_result(found, timings), {"coverage": picture})
 
@@ -62,9 +62,9 @@ def _look(name: str, file: bytes, board: Board) -> Photo:
 
 
 def _grey(name: str, file: bytes) -> Picture:
-    grey = decoded(file, cv2.IMREAD_GRAYSCALE)
+    grey = decode_image(file, cv2.IMREAD_GRAYSCALE)
     if grey is None:
-        raise Failure("broken-image", f"Photo {name} cannot be decoded; leave it out or take it again.")
+        raise JobFailedError("broken-image", f"Photo {name} cannot be decoded; leave it out or take it again.")
     return grey
 
 
@@ -73,7 +73,7 @@ def _require_the_right_board(files: Mapping[str, bytes], board: Board) -> None:
     for name, file in list(files.items())[:3]:
         size = other_size(_grey(name, file), board)
         if size is not None:
-            raise Failure(
+            raise JobFailedError(
                 "no-lens",
                 f"No photo shows a board of {board.columns}x{board.rows} inner corners, but {name} one of "
                 f"{size[0]}x{size[1]}: count where four squares meet, not squares.",
@@ -83,7 +83,7 @@ def _require_the_right_board(files: Mapping[str, bytes], board: Board) -> None:
 def _result(found: LensCalibration, timings_s: Mapping[str, float]) -> IntrinsicsResult:
     return IntrinsicsResult(
         image_size=list(found.lens.size),
-        intrinsics=wire_lens(found.lens),
+        intrinsics=lens_to_schema(found.lens),
         terms=list(found.terms),
         rms_px=found.rms_px,
         left_out_px=found.left_out_px,
@@ -92,13 +92,17 @@ def _result(found: LensCalibration, timings_s: Mapping[str, float]) -> Intrinsic
         coverage=CoverageResult(share=found.coverage.share, empty=list(found.coverage.empty)),
         photos=[
             PhotoResult(
-                name=p.name, fate=p.fate, rms_px=number(p.rms_px), left_out_px=number(p.left_out_px), blurred=p.blurred
+                name=p.name,
+                fate=p.fate,
+                rms_px=finite_or_none(p.rms_px),
+                left_out_px=finite_or_none(p.left_out_px),
+                blurred=p.blurred,
             )
             for p in found.photos
         ],
         trials=[LensTrial(terms=list(t.terms), rms_px=t.rms_px, left_out_px=t.left_out_px) for t in found.trials],
         warnings=[_sentence(warning) for warning in found.warnings],
-        timings_s=to_the_millisecond(timings_s),
+        timings_s=round_to_ms(timings_s),
         software=version("esc-calibration"),
     )
 

@@ -10,23 +10,23 @@ from importlib.metadata import version
 import numpy as np
 
 from fields.landmarks import UnknownLandmark
-from service.wire import geometry, results
-from service.wire.field import FieldOfPlay
-from service.wire.job import Progress
-from service.wire.options import ClickedPoint, LocateOptions
-from service.wire.results import LocateResult, LocateSigma, PointResult
-from service.wire.venue import Venue
-from worker.calibration.draw.inspection import clicks_picture
-from worker.calibration.first.clicks import Clicks, NoPose
-from worker.calibration.first.first_pose import first_pose
-from worker.calibration.first.freed_lens import LensGain
-from worker.calibration.first.verdict import FirstPose
-from worker.calibration.scene.camera import Array, Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Lens
-from worker.calibration.scene.rotation import rotation_angles_deg
-from worker.jobs.reading import Failure, decoded_frame, jpeg, lens_of, pitch_of
-from worker.jobs.wire import Solution, number, to_the_millisecond, wire_lens, wire_pose
+from service.schemas import geometry, results
+from service.schemas.field import FieldOfPlay
+from service.schemas.job import Progress
+from service.schemas.options import ClickedPoint, LocateOptions
+from service.schemas.results import LocateResult, LocateSigma, PointResult
+from service.schemas.venue import Venue
+from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Lens
+from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.onboarding.clicks import Clicks, UndeterminedPoseError
+from worker.calibration.onboarding.first_pose import first_pose
+from worker.calibration.onboarding.first_pose_verdict import FirstPose
+from worker.calibration.onboarding.freed_lens import LensGain
+from worker.calibration.rendering.inspection import clicks_picture
+from worker.jobs.from_schemas import JobFailedError, decode_frame, encode_jpeg, lens_of, pitch_of
+from worker.jobs.to_schemas import Solution, finite_or_none, lens_to_schema, pose_to_schema, round_to_ms
 
 SAME_STAND_M, SAME_VIEW_DEG = 2.0, 3.0
 """What careless clicks and a camera that was knocked leave between two poses of one camera, and more."""
@@ -57,13 +57,13 @@ def locate(
     """The first pose of a camera that may belong to no venue yet. `stored`: the poses that are known, by camera."""
     begun = time.perf_counter()
     pitch = pitch_of(field)
-    picture = None if frame is None else decoded_frame(camera, list(lens.size), frame)
+    picture = None if frame is None else decode_frame(camera, list(lens.size), frame)
     clicks = clicks_of(camera, pitch, points)
     report(Progress(stage="fit", fraction=0.0))
     found = pose_of(camera, pitch, lens, clicks)
     found = replace(found, warnings=[*found.warnings, *_stands_elsewhere(found.camera, stored)])
     fitted = time.perf_counter()
-    drawn = jpeg(clicks_picture(pitch, clicks, found, picture))
+    drawn = encode_jpeg(clicks_picture(pitch, clicks, found, picture))
     timings = {"fit": fitted - begun, "picture": time.perf_counter() - fitted}
     return Solution(result_of(found, points, timings), {"points": drawn})
 
@@ -72,8 +72,8 @@ def pose_of(camera: str, pitch: Field, lens: Lens, clicks: Clicks) -> FirstPose:
     """The first pose that fits the clicks."""
     try:
         return first_pose(clicks, lens, pitch.places(), camera)
-    except NoPose as error:
-        raise Failure("no-pose", f"Camera {camera}: {error}.", camera) from error
+    except UndeterminedPoseError as error:
+        raise JobFailedError("no-pose", f"Camera {camera}: {error}.", camera) from error
 
 
 def _stands_elsewhere(found: Camera, stored: Mapping[str, geometry.Pose]) -> list[str]:
@@ -105,7 +105,8 @@ def clicks_of(camera: str, pitch: Field, points: list[ClickedPoint]) -> Clicks:
     try:
         world = np.stack([_world(pitch, point) for point in points])
     except UnknownLandmark as error:
-        raise Failure("unknown-landmark", f"Camera {camera}: {error}.", camera) from error
+        detail = f"Camera {camera}: {error}. `esc pose --points SPORT` lists all names."
+        raise JobFailedError("unknown-landmark", detail, camera) from error
     # The number makes names of equal points differ.
     names = tuple(f"{number}: {_label(point)}" for number, point in enumerate(points, start=1))
     return Clicks(names, world, np.array([point.pixel for point in points], dtype=float))
@@ -130,8 +131,8 @@ def result_of(found: FirstPose, points: list[ClickedPoint], timings_s: dict[str,
         rejected_because=found.rejected_because,
         camera=found.camera.id,
         image_size=list(found.camera.intrinsics.size),
-        intrinsics=wire_lens(found.camera.intrinsics),
-        pose=wire_pose(found.camera.pose),
+        intrinsics=lens_to_schema(found.camera.intrinsics),
+        pose=pose_to_schema(found.camera.pose),
         rms_px=found.rms_px,
         sigma=LocateSigma(
             rotation_deg=found.sigma_rotation_deg, position_m=found.sigma_position_m, pixels=found.sigma_px
@@ -139,7 +140,7 @@ def result_of(found: FirstPose, points: list[ClickedPoint], timings_s: dict[str,
         points=[
             PointResult(
                 world=point.world,
-                residual_px=number(click.residual_px),
+                residual_px=finite_or_none(click.residual_px),
                 doubted=click.doubted,
                 exchanged_with=None if click.exchanged_with is None else given[click.exchanged_with],
                 looks_like=click.looks_like,
@@ -148,14 +149,14 @@ def result_of(found: FirstPose, points: list[ClickedPoint], timings_s: dict[str,
         ],
         lens=None if found.lens is None else _gain(found.lens),
         warnings=list(found.warnings),
-        timings_s=to_the_millisecond(timings_s),
+        timings_s=round_to_ms(timings_s),
         software=version("esc-calibration"),
     )
 
 
 def _gain(gain: LensGain) -> results.LensGain:
     return results.LensGain(
-        given=wire_lens(gain.before.camera.intrinsics),
+        given=lens_to_schema(gain.before.camera.intrinsics),
         free=list(gain.after.free),
         sigma=dict(gain.sigma),
         rms_before_px=gain.before.rms_px,

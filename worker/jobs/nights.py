@@ -13,29 +13,29 @@ from typing import Any
 
 import numpy as np
 
-from service.wire import geometry
-from service.wire.results import LensChange, Refined
-from worker.calibration.finish import uncertainty
-from worker.calibration.judge.quality import CameraResult
+from service.schemas import geometry
+from service.schemas.results import LensChange, Refined
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
+from worker.calibration.geometry.far_marking import far_marking_shift_m
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import LENS_NUMBERS
 from worker.calibration.memory.camera_memory import CameraMemory
-from worker.calibration.scene.camera import Array, Camera
-from worker.calibration.scene.far_marking import far_marking_shift_m
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import LENS_NUMBERS
-from worker.calibration.scene.motion import POSE_NUMBERS
-from worker.jobs.wire import wire_lens, wire_pose, wire_sigma
+from worker.calibration.refinement import uncertainty
+from worker.jobs.to_schemas import lens_to_schema, pose_to_schema, sigma_to_schema
 
 WIRE_NAMES = dict(zip(LENS_NUMBERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
 """What the numbers of a lens are called in `geometry.Intrinsics.sigma`."""
 
 
-def memories_of(told: Mapping[str, Mapping[str, Any]]) -> dict[str, CameraMemory]:
+def read_memories(told: Mapping[str, Mapping[str, Any]]) -> dict[str, CameraMemory]:
     """The memories of cameras, as the engine takes them, but for those that another release wrote otherwise."""
     read = {camera: CameraMemory.from_json(memory) for camera, memory in told.items()}
     return {camera: memory for camera, memory in read.items() if memory is not None}
 
 
-def wire_refined(pitch: Field, found: CameraResult) -> Refined | None:
+def refined_to_schema(pitch: Field, found: CameraResult) -> Refined | None:
     """The refined pose and lens of a camera beside its answer; None where it has none."""
     refined = found.refined
     if refined is None or not _is_a_camera(refined.camera):
@@ -43,10 +43,10 @@ def wire_refined(pitch: Field, found: CameraResult) -> Refined | None:
     focal, focal_refined = (one.intrinsics.focal_length_px for one in (found.camera, refined.camera))
     covariance = refined.covariance if np.isfinite(refined.covariance).all() else None
     return Refined(
-        pose=wire_pose(refined.camera.pose),
-        intrinsics=wire_lens(refined.camera.intrinsics).model_copy(update={"sigma": _lens_sigma(covariance)}),
+        pose=pose_to_schema(refined.camera.pose),
+        intrinsics=lens_to_schema(refined.camera.intrinsics).model_copy(update={"sigma": _lens_sigma(covariance)}),
         covariance=None if covariance is None else covariance.tolist(),
-        sigma=wire_sigma(refined.sigma),
+        sigma=sigma_to_schema(refined.sigma),
         longer=focal_refined / focal - 1,
         differs_m=far_marking_shift_m(pitch, found.camera, refined.camera),
     )
@@ -69,7 +69,7 @@ def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:
     return dict(zip(WIRE_NAMES.values(), sigma.tolist(), strict=True))
 
 
-def wire_lens_change(found: CameraResult, tonight: datetime | None) -> LensChange | None:
+def lens_change_to_schema(found: CameraResult, tonight: datetime | None) -> LensChange | None:
     """How much longer a focal length is than in the first nights of a memory; None where there is no memory."""
     change = found.lens_change
     if change is None or not math.isfinite(change.sigma) or not math.isfinite(change.longer):

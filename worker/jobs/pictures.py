@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED
-from worker.calibration.draw import layers, mosaic
-from worker.calibration.draw.overlays import overlay
-from worker.calibration.judge.markings import MarkingSeen
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
-from worker.calibration.stitch.light import Light
-from worker.calibration.stitch.views import ViewChoice, chosen_view
-from worker.jobs.reading import Picture, jpeg, png
+from worker.calibration.diagnostics.markings import MarkingReport
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.rendering import layers, stitched_pictures
+from worker.calibration.rendering.overlays import overlay
+from worker.calibration.stitching.photometry import Light
+from worker.calibration.stitching.views import ViewChoice, chosen_view
+from worker.jobs.from_schemas import Picture, encode_jpeg, encode_png
 
 # Of the frames that layers are laid over: a wide screen. The overlays have the size of the frames.
 FRAME_WIDTH, PREVIEW_WIDTH = 1920, 1920
@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Scene:
+class PictureInputs:
     """What is drawn: a pitch and cameras as they were `stored` and as they were `found`, and a frame of each camera.
 
     `markings`: what is said of them, by the camera that sees them. `lights`: how cameras are evened out.
@@ -38,7 +38,7 @@ class Scene:
     stored: tuple[Field, Sequence[Camera]]
     found: tuple[Field, Sequence[Camera]]
     frames: Mapping[str, Picture]
-    markings: Mapping[str, Sequence[MarkingSeen]]
+    markings: Mapping[str, Sequence[MarkingReport]]
     lights: Mapping[str, Light]
 
     @property
@@ -47,7 +47,7 @@ class Scene:
         return [*STITCHED, *BIRDSEYE, *(f"{kind}_{camera.id}" for camera in self.stored[1] for kind in OF_CAMERA)]
 
 
-def draw(scene: Scene, names: Sequence[str]) -> dict[str, bytes]:
+def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
     """Files by name, those that are drawn together with the ones that are asked for too."""
     parts: list[Callable[[], dict[str, bytes]]] = []
     if {*names} & {*STITCHED}:
@@ -69,43 +69,43 @@ def draw(scene: Scene, names: Sequence[str]) -> dict[str, bytes]:
 def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.uint8]]) -> dict[str, bytes]:
     """What the network saw (H, W), in 0..255, to be laid over the frames; nothing else can tell it later."""
     return {
-        f"mask_{camera.id}": png(layers.mask_layer(responses[camera.id], _smaller(camera)))
+        f"mask_{camera.id}": encode_png(layers.mask_layer(responses[camera.id], _smaller(camera)))
         for camera in cameras
         if camera.id in responses
     }
 
 
-def _stitched(scene: Scene) -> dict[str, bytes]:
+def _stitched(scene: PictureInputs) -> dict[str, bytes]:
     """One view by the new poses, where one camera hands over to another in it, and the view by the stored poses."""
     view = chosen_view(*scene.found, ViewChoice(width=PREVIEW_WIDTH))
     # Somebody may wait, and each of them keeps a core busy.
     with ThreadPoolExecutor(2) as both:
         after, before = both.map(
-            lambda standing: mosaic.stitched(standing[0], view, standing[1], scene.frames, scene.lights),
+            lambda standing: stitched_pictures.stitched(standing[0], view, standing[1], scene.frames, scene.lights),
             (scene.found, scene.stored),
         )
     return {
-        "preview": jpeg(after.picture),
-        "seam": png(layers.seam_layer(after.owner)),
-        "preview_before": jpeg(before.picture),
+        "preview": encode_jpeg(after.picture),
+        "seam": encode_png(layers.seam_layer(after.owner)),
+        "preview_before": encode_jpeg(before.picture),
     }
 
 
-def _birdseye(scene: Scene) -> dict[str, bytes]:
-    return {"birdseye": jpeg(mosaic.birdseye(*scene.found, scene.frames, evened=scene.lights))}
+def _birdseye(scene: PictureInputs) -> dict[str, bytes]:
+    return {"birdseye": encode_jpeg(stitched_pictures.birdseye(*scene.found, scene.frames, evened=scene.lights))}
 
 
-def _of_camera(scene: Scene, number: int) -> dict[str, bytes]:
+def _of_camera(scene: PictureInputs, number: int) -> dict[str, bytes]:
     """The frame with both fields on it and what is wrong with markings; and smaller, with what is laid over it."""
     stored, new = ((pitch, cameras[number]) for pitch, cameras in (scene.stored, scene.found))
     camera, size = stored[1].id, _smaller(stored[1])
     frame = scene.frames[camera]
     small = np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), np.uint8)
     return {
-        f"overlay_{camera}": jpeg(overlay(stored, new, frame, seen=scene.markings[camera])),
-        f"frame_{camera}": jpeg(small, FRAME_QUALITY),
-        f"stored_{camera}": png(layers.stored_layer(*stored, size)),
-        f"new_{camera}": png(layers.new_layer(*new, size)),
+        f"overlay_{camera}": encode_jpeg(overlay(stored, new, frame, seen=scene.markings[camera])),
+        f"frame_{camera}": encode_jpeg(small, FRAME_QUALITY),
+        f"stored_{camera}": encode_png(layers.stored_layer(*stored, size)),
+        f"new_{camera}": encode_png(layers.new_layer(*new, size)),
     }
 
 

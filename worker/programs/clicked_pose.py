@@ -1,6 +1,6 @@
 """The first pose of a camera while its points are being clicked, in a process of its own: JSON in, JSON out.
 
-`python -m worker.programs.clicked_pose`. What comes is a `service.wire.programs.clicked_pose.ClickedCamera`, what
+`python -m worker.programs.clicked_pose`. What comes is a `ClickedPoseRequest`, what
 leaves a `ClickedPose`.
 """
 
@@ -10,13 +10,13 @@ import sys
 import time
 from math import isfinite
 
-from service import lifeline
-from service.wire.programs.clicked_pose import ClickedCamera, ClickedPose, Polyline
-from worker.calibration.draw.overlays import outline
-from worker.calibration.scene.camera import Camera, inside
-from worker.calibration.scene.field import Field
+from service import child_process
+from service.schemas.programs.clicked_pose import ClickedPose, ClickedPoseRequest, Polyline
+from worker.calibration.geometry.camera import Camera, inside
+from worker.calibration.geometry.field import Field
+from worker.calibration.rendering.overlays import outline
+from worker.jobs.from_schemas import JobFailedError, lens_of, pitch_of
 from worker.jobs.locate import clicks_of, pose_of, result_of
-from worker.jobs.reading import Failure, lens_of, pitch_of
 
 # A line is drawn as far as this beside the picture, in widths of it: what is further out is not worth drawing.
 BESIDE = 0.25
@@ -26,19 +26,19 @@ EVERY = 3
 
 def main() -> None:
     """Read the clicks, write the pose."""
-    lifeline.end_with_parent()
-    asked = ClickedCamera.model_validate_json(sys.stdin.buffer.read())
+    child_process.begin_decoder()
+    asked = ClickedPoseRequest.model_validate_json(sys.stdin.buffer.read())
     sys.stdout.write(answer(asked).model_dump_json())
 
 
-def answer(asked: ClickedCamera) -> ClickedPose:
+def answer(asked: ClickedPoseRequest) -> ClickedPose:
     """The pose, the field as it has it, and where it expects each point; or why there is none."""
     begun = time.perf_counter()
     pitch = pitch_of(asked.field)
     try:
         clicks = clicks_of(asked.id, pitch, asked.points)
         found = pose_of(asked.id, pitch, lens_of(asked.intrinsics, asked.image_size), clicks)
-    except Failure as failure:
+    except JobFailedError as failure:
         return ClickedPose(result=None, error=failure.error, lines=[], expected=[])
     result = result_of(found, asked.points, {"fit": time.perf_counter() - begun})
     expected = [[float(x), float(y)] if isfinite(x + y) else None for x, y in found.camera.project(clicks.world)]

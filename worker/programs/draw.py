@@ -1,6 +1,6 @@
 """Pictures of a calibration when somebody looks at them, in a process of its own.
 
-`python -m worker.programs.draw`. What comes is a `service.wire.programs.drawing.Drawing` and frames, what leaves a
+`python -m worker.programs.draw`. What comes is a `DrawingRequest` and frames, what leaves a
 `Drawn` and the pictures.
 """
 
@@ -14,48 +14,57 @@ from typing import cast
 
 import cv2
 
-from service import lifeline
-from service.wire.programs.drawing import Drawing, Drawn, SeenMarking, Standing, packed, unpacked
-from worker.calibration.judge.markings import OPPOSITE, Direction, MarkingSeen
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
-from worker.jobs.pictures import Scene, draw
-from worker.jobs.reading import decoded_frame, light_of, pitch_of, watching
+from service import child_process
+from service.schemas.programs.drawing import (
+    DrawingRequest,
+    DrawnPictures,
+    FieldAndCameras,
+    MarkingToDraw,
+    decode_files,
+    encode_message,
+)
+from worker.calibration.diagnostics.markings import OPPOSITE, Direction, MarkingReport
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.jobs.from_schemas import camera_with_ignored_areas, decode_frame, light_of, pitch_of
+from worker.jobs.pictures import PictureInputs, draw
 
 
 def main() -> None:
     """Read the frames, write the pictures."""
-    lifeline.end_with_parent()
+    child_process.begin_decoder()
     logging.basicConfig()
     given = sys.stdin.buffer.read()
-    asked = Drawing.model_validate_json(given[: given.index(b"\n")])
+    asked = DrawingRequest.model_validate_json(given[: given.index(b"\n")])
     cv2.setNumThreads(asked.threads)
-    pictures = draw(scene_of(asked, unpacked(asked.sizes, given)), asked.names)
-    drawn = Drawn(sizes={name: len(picture) for name, picture in pictures.items()})
-    sys.stdout.buffer.write(packed(drawn, pictures))
+    pictures = draw(scene_of(asked, decode_files(asked.sizes, given)), asked.names)
+    drawn = DrawnPictures(sizes={name: len(picture) for name, picture in pictures.items()})
+    sys.stdout.buffer.write(encode_message(drawn, pictures))
 
 
-def scene_of(asked: Drawing, files: Mapping[str, bytes]) -> Scene:
+def scene_of(asked: DrawingRequest, files: Mapping[str, bytes]) -> PictureInputs:
     """Frames only of the cameras whose files came."""
     sizes = {camera.id: camera.image_size for camera in asked.stored.cameras}
     with ThreadPoolExecutor(asked.threads) as each:
-        frames = each.map(lambda camera: decoded_frame(camera, sizes[camera], files[camera]), files)
+        frames = each.map(lambda camera: decode_frame(camera, sizes[camera], files[camera]), files)
         decoded = dict(zip(files, frames, strict=True))
     markings = {camera: [_seen(one) for one in seen] for camera, seen in asked.markings.items()}
     lights = {camera: light_of(light) for camera, light in asked.lights.items()}
-    return Scene(_standing(asked.stored, asked), _standing(asked.found, asked), decoded, markings, lights)
+    return PictureInputs(_standing(asked.stored, asked), _standing(asked.found, asked), decoded, markings, lights)
 
 
-def _standing(standing: Standing, asked: Drawing) -> tuple[Field, list[Camera]]:
-    return pitch_of(standing.field), [watching(camera, asked.ignore[camera.id]) for camera in standing.cameras]
+def _standing(standing: FieldAndCameras, asked: DrawingRequest) -> tuple[Field, list[Camera]]:
+    return pitch_of(standing.field), [
+        camera_with_ignored_areas(camera, asked.ignore[camera.id]) for camera in standing.cameras
+    ]
 
 
-def _seen(told: SeenMarking) -> MarkingSeen:
+def _seen(told: MarkingToDraw) -> MarkingReport:
     """The engine's: its offset is positive on one of the two sides, and that is the direction."""
     direction = cast(Direction | None, told.side)
     if told.offset_m is not None and told.offset_m < 0:
         direction = next(one for one, opposite in OPPOSITE.items() if opposite == told.side)
-    return MarkingSeen(told.name, told.expected_m, told.found, told.offset_m, told.sigma_m, direction)
+    return MarkingReport(told.name, told.expected_m, told.found, told.offset_m, told.sigma_m, direction)
 
 
 if __name__ == "__main__":

@@ -11,17 +11,17 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from service import lifeline
+from service import child_process
 from service.formats.archive import archive
-from service.wire.venue import Camera
-from worker.calibration.draw.st_maps import StMap, distorting, undistorting
-from worker.jobs.reading import lens_of
+from service.schemas.venue import Camera
+from worker.calibration.rendering.st_maps import StMap, distorting, undistorting
+from worker.jobs.from_schemas import lens_of
 from worker.programs.exr import end_without_openexr, exr
 
 
 def main(origin: str) -> None:
     """Read the camera, write the maps."""
-    lifeline.end_with_parent()
+    child_process.begin_decoder()
     end_without_openexr()
     camera = Camera.model_validate_json(sys.stdin.buffer.read())
     lens = lens_of(camera.intrinsics, camera.image_size)

@@ -15,8 +15,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from worker.video.faults import VideoFault
-from worker.video.planes import Picture, picture_of
+from worker.video.errors import VideoError
+from worker.video.yuv_planes import Picture, picture_of
 
 if TYPE_CHECKING:
     import av
@@ -35,7 +35,7 @@ NO_PYAV = "Video needs PyAV: pip install 'esc-calibration[video]'"
 
 
 @dataclass(frozen=True)
-class Shot:
+class ClipPicture:
     """A picture of a clip at its time.
 
     `sound`: packets of the sound that came since the shot before; `broken`: frames since then that could not be
@@ -49,7 +49,7 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Facts:
+class ClipProperties:
     """What is known of a clip before it is read. `seconds`: how long it is, None for a live stream."""
 
     size: tuple[int, int]
@@ -65,7 +65,7 @@ class Clip:
     address: str
     container: InputContainer
     video: VideoStream
-    facts: Facts
+    facts: ClipProperties
     since: float
     broken: int = field(default=0, init=False)
     sound: AudioStream | None = field(default=None, init=False)
@@ -73,29 +73,29 @@ class Clip:
 
     @classmethod
     def open(cls, camera: str, address: str, since: float = 0.0) -> Self:
-        """A clip as it is; `since`, of `time.monotonic`, is for live streams. `VideoFault` where none can be read."""
+        """A clip as it is; `since`, of `time.monotonic`, is for live streams. `VideoError` where none can be read."""
         if find_spec("av") is None:
-            raise VideoFault(NO_PYAV)
+            raise VideoError(NO_PYAV)
         import av
 
         live = is_live(address)
         if not live and not Path(address).is_file():
-            raise VideoFault(f"camera {camera}: there is no file {address}")
+            raise VideoError(f"camera {camera}: there is no file {address}")
         options = {"rtsp_transport": "tcp"} if address.startswith("rtsp") else {}
         try:
             container = av.open(address, "r", options=options, timeout=(OPENING_S, WAITING_S) if live else None)
         except (av.FFmpegError, OSError) as error:
-            raise VideoFault(f"camera {camera}: {without_login(address)} is no clip: {_words(error)}") from None
+            raise VideoError(f"camera {camera}: {without_login(address)} is no clip: {_words(error)}") from None
         if not container.streams.video:
             container.close()
-            raise VideoFault(f"camera {camera}: there is no video in {without_login(address)}")
+            raise VideoError(f"camera {camera}: there is no video in {without_login(address)}")
         video = container.streams.video[0]
         video.thread_type = "AUTO"
         told = (rate for rate in (video.average_rate, video.guessed_rate) if rate and rate <= HIGHEST_RATE)
         rate = next(told, USUAL_RATE)
         seconds = None if live or container.duration is None else container.duration / av.time_base
         size = video.codec_context.width, video.codec_context.height
-        return cls(camera, address, container, video, Facts(size, Fraction(rate), seconds), since)
+        return cls(camera, address, container, video, ClipProperties(size, Fraction(rate), seconds), since)
 
     @property
     def live(self) -> bool:
@@ -111,8 +111,8 @@ class Clip:
         """Read the sound along with the pictures."""
         self.sound = self.container.streams.audio[0]
 
-    def shots(self, begin_s: float = 0.0) -> Iterator[Shot]:
-        """The pictures from about a time on, to the end; `VideoFault` where a picture is not as the first one."""
+    def shots(self, begin_s: float = 0.0) -> Iterator[ClipPicture]:
+        """The pictures from about a time on, to the end; `VideoError` where a picture is not as the first one."""
         self._zero = self._enter(begin_s)
         sound: list[Packet[AudioStream]] = []
         broken, at = 0, 0.0
@@ -135,7 +135,7 @@ class Clip:
                     self._zero = at - self._lateness()
                 self._check(frame, at - self._zero)
                 self.broken += broken
-                yield Shot(at - self._zero, picture_of(frame), sound, broken)
+                yield ClipPicture(at - self._zero, picture_of(frame), sound, broken)
                 sound, broken = [], 0
         self.broken += broken
 
@@ -179,17 +179,17 @@ class Clip:
         except (av.FFmpegError, OSError) as error:
             # A stream that breaks off and a file that is cut off end here: what there was is kept.
             if not self.live and not isinstance(error, av.InvalidDataError):
-                raise VideoFault(f"camera {self.camera}: {self.address} cannot be read: {_words(error)}") from None
+                raise VideoError(f"camera {self.camera}: {self.address} cannot be read: {_words(error)}") from None
 
     def _check(self, frame: av.VideoFrame, at_s: float) -> None:
         if (frame.width, frame.height) != self.facts.size:
             width, height = self.facts.size
-            raise VideoFault(
+            raise VideoError(
                 f"camera {self.camera}: at {at_s:.2f} s its picture changes from {width}x{height} to "
                 f"{frame.width}x{frame.height} pixels; cut the clip there"
             )
         if frame.rotation:
-            raise VideoFault(
+            raise VideoError(
                 f"camera {self.camera}: the clip says that players are to turn it by {frame.rotation} degrees, and its "
                 "lens was measured in frames that may have been turned or not. Store it as it was calibrated: "
                 "ffmpeg -display_rotation 0 -i CLIP -c copy OTHER leaves the frames as they are (before version 6: "

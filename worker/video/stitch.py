@@ -14,21 +14,21 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import takewhile
 from math import inf
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
-from worker.calibration.stitch.evening import evened_out
-from worker.calibration.stitch.light import Light
-from worker.calibration.stitch.panorama import Panorama, panorama
-from worker.calibration.stitch.views import View, ViewChoice, chosen_view
-from worker.video.clips import Clip, Shot
-from worker.video.faults import VideoFault
-from worker.video.planes import Picture, planes_of
-from worker.video.render import Renderer
-from worker.video.sync import FARTHEST_S, LOOKED_AT_S, Found, Places, chained
-from worker.video.timing import Reading, Track
-from worker.video.write import Encoding, Sound, Writer
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.stitching.panorama import Panorama, panorama
+from worker.calibration.stitching.photometric_alignment import evened_out
+from worker.calibration.stitching.photometry import Light
+from worker.calibration.stitching.views import View, ViewChoice, chosen_view
+from worker.video.clips import Clip, ClipPicture
+from worker.video.encoding import Encoding, Sound, Writer
+from worker.video.errors import VideoError
+from worker.video.frame_timing import ClipTrack, FrameReader
+from worker.video.renderer import Renderer
+from worker.video.synchronisation import FARTHEST_S, LOOKED_AT_S, CoarseView, OffsetEstimate, chain_offsets
+from worker.video.yuv_planes import Picture, planes_of
 
 if TYPE_CHECKING:
     from av.audio.stream import AudioStream
@@ -40,11 +40,11 @@ SILENT = "none"
 # A clip that ends this much before the others has ended early.
 EARLY_S = 0.25
 ROUNDING_S = 1e-6
-Told = Callable[[str, float], None]
+Report = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
-class Scene:
+class StitchScene:
     """What is filmed and what is to be seen of it. `lights`: of all cameras, None: as their first pictures say."""
 
     pitch: Field
@@ -66,8 +66,10 @@ class Geometry(Protocol):
 
 
 @dataclass
-class Standing:
+class StaticGeometry:
     """Cameras that do not move: a panorama for each set of cameras that have pictures. `rate`: of moments, a second."""
+
+    border: ClassVar[float] = 0.0
 
     pitch: Field
     view: View
@@ -85,9 +87,20 @@ class Standing:
         return self._made[shown]
 
 
-Follow = Callable[[Field, View, Sequence[Camera], Mapping[str, Light], Fraction], Geometry]
-"""Makes the geometry of a pitch, a view, the cameras of the clips (lenses for their frames), their lights, and the rate
-of moments."""
+class GeometryFactory(Protocol):
+    """Makes the geometry of a pitch, a view, the cameras of the clips (lenses for their frames), their lights, and the
+    rate of moments."""
+
+    @property
+    def border(self) -> float:
+        """How much of each frame, in parts of its width from its border inwards, the view should do without."""
+        ...
+
+    def __call__(
+        self, pitch: Field, view: View, cameras: Sequence[Camera], lights: Mapping[str, Light], rate: Fraction, /
+    ) -> Geometry:
+        """The geometry of these cameras."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -123,7 +136,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Stitched:
+class StitchReport:
     """What was made. `seconds`: of video; `took_s`: until it was whole.
 
     `found`: what the clips said of offsets that were not given; `ended`: when clips ended before the others did, in the
@@ -136,7 +149,7 @@ class Stitched:
     frames: int
     took_s: float
     offsets: Mapping[str, float]
-    found: Mapping[str, Found]
+    found: Mapping[str, OffsetEstimate]
     ended: Mapping[str, float]
     broken: Mapping[str, int]
     repeated: Mapping[str, int]
@@ -147,8 +160,10 @@ class Stitched:
         return float(self.frames / self.rate)
 
 
-def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, follow: Follow = Standing) -> Stitched:
-    """Make the clip; `VideoFault` says why there is none. `told`: what is done, and which part of it is."""
+def stitch(
+    scene: StitchScene, addresses: Mapping[str, str], plan: Plan, told: Report, follow: GeometryFactory = StaticGeometry
+) -> StitchReport:
+    """Make the clip; `VideoError` says why there is none. `told`: what is done, and which part of it is."""
     started = time.monotonic()
     _check_cameras(scene, addresses, plan)
     with ExitStack() as stack:
@@ -162,9 +177,9 @@ def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, f
         offsets, found = _offsets(scene, clips, fitted, plan, told)
         rate = plan.rate or next(iter(clips.values())).facts.rate
         tracks = {camera: _track(stack, clip, offsets[camera], plan.begin_s, rate) for camera, clip in clips.items()}
-        moments = Moments(tracks, rate, plan.begin_s, plan.end_s, plan.allow_missing)
+        moments = ClipMoments(tracks, rate, plan.begin_s, plan.end_s, plan.allow_missing)
         first = moments.first()
-        view = chosen_view(scene.pitch, list(fitted.values()), scene.choice)
+        view = chosen_view(scene.pitch, list(fitted.values()), scene.choice, follow.border)
         shown = [fitted[camera] for camera in clips]
         light = scene.lights
         if light is None:
@@ -180,7 +195,7 @@ def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, f
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
             for count in _rendered(moments, geometry, view.size, writer, plan.threads):
                 told(f"{count / (time.monotonic() - started):.1f} fps", min(1.0, count / expected))
-    return Stitched(
+    return StitchReport(
         view.size,
         rate,
         moments.count,
@@ -194,7 +209,7 @@ def stitch(scene: Scene, addresses: Mapping[str, str], plan: Plan, told: Told, f
 
 
 def _rendered(
-    moments: Moments, geometry: Geometry, size: tuple[int, int], writer: Writer, threads: int
+    moments: ClipMoments, geometry: Geometry, size: tuple[int, int], writer: Writer, threads: int
 ) -> Iterator[int]:
     """Make and write the view of each moment; how many there are so far."""
     import av
@@ -223,10 +238,10 @@ def _rendered(
 
 
 @dataclass
-class Moments:
+class ClipMoments:
     """The pictures of one moment after the other, by camera: `count`ed so far; `ended`: when clips did."""
 
-    tracks: Mapping[str, Track]
+    tracks: Mapping[str, ClipTrack]
     rate: Fraction
     from_s: float | None
     end_s: float | None
@@ -245,9 +260,9 @@ class Moments:
             yield pictures
 
     def first(self) -> Mapping[str, Picture]:
-        """The pictures of the first moment; `VideoFault` if there is none."""
+        """The pictures of the first moment; `VideoError` if there is none."""
         if not (pictures := self._now()):
-            raise VideoFault(
+            raise VideoError(
                 "The clips have no moment in common, of what --from and --to leave of them: "
                 + ", ".join(f"{camera} begins at {track.begin_s:.2f} s" for camera, track in self.tracks.items())
             )
@@ -279,7 +294,7 @@ class Moments:
         return {camera: at for camera, at in self.ended.items() if max(ends.values(), default=0.0) > at + EARLY_S}
 
 
-def _check_cameras(scene: Scene, addresses: Mapping[str, str], plan: Plan) -> None:
+def _check_cameras(scene: StitchScene, addresses: Mapping[str, str], plan: Plan) -> None:
     known = [camera.id for camera in scene.cameras]
     for what, cameras in (
         ("clip", addresses),
@@ -288,12 +303,12 @@ def _check_cameras(scene: Scene, addresses: Mapping[str, str], plan: Plan) -> No
     ):
         for camera in cameras:
             if camera not in known:
-                raise VideoFault(f"{what}: the venue has no camera {camera}; it has {', '.join(known)}")
+                raise VideoError(f"{what}: the venue has no camera {camera}; it has {', '.join(known)}")
             if camera not in addresses:
-                raise VideoFault(f"{what}: there is no clip of camera {camera}")
+                raise VideoError(f"{what}: there is no clip of camera {camera}")
     missing = [camera for camera in known if camera not in addresses]
     if missing and not plan.allow_missing:
-        raise VideoFault(
+        raise VideoError(
             f"No clip of camera {', '.join(missing)}. --allow-missing makes the view of what the others see."
         )
 
@@ -305,7 +320,7 @@ def _heard(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
     if wanted is None:
         return next((clip for clip in clips.values() if clip.has_sound), None)
     if not clips[wanted].has_sound:
-        raise VideoFault(f"--audio: the clip of camera {wanted} has no sound; --audio none makes a silent one")
+        raise VideoError(f"--audio: the clip of camera {wanted} has no sound; --audio none makes a silent one")
     return clips[wanted]
 
 
@@ -315,7 +330,7 @@ def _fitted(camera: Camera, clip: Clip | None) -> Camera:
         return camera
     (width, height), (expected_width, expected_height) = clip.facts.size, camera.intrinsics.size
     if not width or abs(width * expected_height / (height * expected_width) - 1) > SAME_ASPECT:
-        raise VideoFault(
+        raise VideoError(
             f"camera {camera.id}: its clip has {width}x{height} pixels, its lens was measured for "
             f"{expected_width}x{expected_height}. The same picture at another size would do; this one is of another "
             "shape: cut, or from another mode of the camera. Record in the mode in which the lens was measured"
@@ -325,8 +340,8 @@ def _fitted(camera: Camera, clip: Clip | None) -> Camera:
 
 
 def _offsets(
-    scene: Scene, clips: Mapping[str, Clip], fitted: Mapping[str, Camera], plan: Plan, told: Told
-) -> tuple[dict[str, float], dict[str, Found]]:
+    scene: StitchScene, clips: Mapping[str, Clip], fitted: Mapping[str, Camera], plan: Plan, told: Report
+) -> tuple[dict[str, float], dict[str, OffsetEstimate]]:
     """When each clip began in the time of the first one, and what was found of it."""
     first = next(iter(clips))
     offsets = {first: 0.0} | {
@@ -337,37 +352,36 @@ def _offsets(
         return offsets, {}
     live = [camera for camera, clip in clips.items() if clip.live]
     if live:
-        raise VideoFault(
+        raise VideoError(
             f"camera {live[0]} is a live stream, which cannot be read twice: say with --offset how much later "
             f"{' and '.join(wanting)} comes; --offset {wanting[0]}=0 takes pictures as they arrive"
         )
-    places = Places(scene.pitch, [fitted[camera] for camera in clips])
+    places = CoarseView(scene.pitch, [fitted[camera] for camera in clips])
     motions = {}
     for number, (camera, clip) in enumerate(clips.items()):
         told(f"sync {camera}", number / len(clips))
         begin_s = max(0.0, (plan.begin_s or 0.0) - offsets.get(camera, 0.0))
         with Clip.open(camera, clip.address) as again:
             motions[camera] = places.motion(camera, _until(begin_s + LOOKED_AT_S, again.shots(begin_s)))
-    offsets, found = chained(places, motions, offsets)
+    offsets, found = chain_offsets(places, motions, offsets)
     for camera, answer in found.items():
         if answer.second_s is None:
-            raise VideoFault(
+            raise VideoError(
                 f"The offset of camera {camera} was not found within {FARTHEST_S:g} s: {answer.why} (likeness "
-                f"{answer.strength:.2f}, at the next best offset {answer.rival:.2f}). Say how much later its clip "
-                f"began: --offset {camera}=0.120, or --offset {camera}=0 if they began together; without --offset none "
-                "is assumed"
+                f"{answer.strength:.2f}, at the next best offset {answer.rival:.2f}). Nothing was made: say how "
+                f"much later its clip began, --offset {camera}=0.120, or --offset {camera}=0 if they began together"
             )
     return offsets, found
 
 
-def _until(end_s: float, shots: Iterator[Shot]) -> Iterator[Shot]:
+def _until(end_s: float, shots: Iterator[ClipPicture]) -> Iterator[ClipPicture]:
     return takewhile(lambda shot: shot.time_s < end_s, shots)
 
 
-def _track(stack: ExitStack, clip: Clip, offset_s: float, begin_s: float | None, rate: Fraction) -> Track:
-    reading = Reading(clip, max(0.0, (begin_s or 0.0) - offset_s))
+def _track(stack: ExitStack, clip: Clip, offset_s: float, begin_s: float | None, rate: Fraction) -> ClipTrack:
+    reading = FrameReader(clip, max(0.0, (begin_s or 0.0) - offset_s))
     stack.callback(reading.close)
-    return Track(clip.camera, iter(reading), offset_s, max(float(1 / clip.facts.rate), float(1 / rate)), clip.live)
+    return ClipTrack(clip.camera, iter(reading), offset_s, max(float(1 / clip.facts.rate), float(1 / rate)), clip.live)
 
 
 def _ends(clips: Mapping[str, Clip], offsets: Mapping[str, float]) -> dict[str, float]:

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.field import LinePoints
 from worker.calibration.memory.epoch import Epoch, camera_from_json, camera_to_json
-from worker.calibration.scene.camera import Camera, Frame
-from worker.calibration.scene.field import LinePoints
-from worker.calibration.see.line_measurement import Measurements
 
 FORMAT = 1
 WIND_RAD, WIND_M = 0.003, 0.03
@@ -32,16 +32,19 @@ MOST_EARLIER, FEWEST_JOBS = 2, 4
 
 @dataclass(frozen=True)
 class AcceptedJob:
-    """What an accepted job leaves of a camera: where it was `found`, what was `measured` of the `lines`, `at` what time
-    (None: not known), which markings were `painted_anew`, the fingerprint of its `frames`, and whether its focal length
-    has surely changed since the first nights (`zoomed`).
+    """What an accepted job hands to the memory of a camera.
+
+    `found`: the camera with its accepted pose; `measured`: its line measurements, of the `lines` of the pitch; `at`:
+    when the frames were taken, None if not known; `repainted_markings`: numbers of the markings that lie elsewhere than
+    remembered; `frames`: the fingerprint of the job's frames; `zoomed`: whether the focal length has surely changed
+    since the first nights.
     """
 
     found: Camera
     measured: Measurements
     lines: LinePoints
     at: datetime | None
-    painted_anew: tuple[int, ...] = ()
+    repainted_markings: tuple[int, ...] = ()
     frames: str = ""
     zoomed: bool = False
 
@@ -57,40 +60,42 @@ class AcceptedJob:
 
 @dataclass(frozen=True)
 class CameraMemory:
-    """`origin`: the camera as it was stored before its first job; `anchor`: the first jobs, `recent`: those since, and
-    `earlier` ones that looked another way or had another lens; `aside`: markings that have been painted elsewhere, of
-    which nothing is remembered since; `lines`: the fingerprint of the field's line points; `frames`: of the last job's
-    frames.
+    """The memory of one camera: where it was stored at first, and the epochs of its accepted jobs.
+
+    `origin`: the camera as it was stored before its first job; `anchor`: the first jobs, `recent`: those since, and
+    `earlier` ones that looked another way or had another lens; `repainted_markings`: numbers of the markings that have
+    been painted elsewhere since, of which nothing is remembered; `lines`: the fingerprint of the field's line points;
+    `frames`: of the last job's frames.
     """
 
     origin: Camera
     anchor: Epoch
     recent: Epoch | None
     earlier: tuple[Epoch, ...]
-    aside: tuple[int, ...]
+    repainted_markings: tuple[int, ...]
     lines: str
     frames: str = ""
 
     @classmethod
-    def begun(cls, stored: Camera, job: AcceptedJob) -> CameraMemory:
+    def from_first_job(cls, stored: Camera, job: AcceptedJob) -> CameraMemory:
         """The memory of the first accepted job, which found a camera that was `stored` before."""
-        told = job.without(job.painted_anew).for_epoch
-        return cls(stored, Epoch.begun(*told), None, (), job.painted_anew, fingerprint(job.lines), job.frames)
+        told = job.without(job.repainted_markings).for_epoch
+        return cls(stored, Epoch.from_job(*told), None, (), job.repainted_markings, fingerprint(job.lines), job.frames)
 
     def after(self, job: AcceptedJob) -> CameraMemory:
         """The memory with one more accepted job; the same frames sent again say nothing new."""
         if job.frames == self.frames:
             return self
-        kept = replace(self.aware_of(job.painted_anew, job.lines), frames=job.frames)
-        told = job.without(kept.aside).for_epoch
+        kept = replace(self.aware_of(job.repainted_markings, job.lines), frames=job.frames)
+        told = job.without(kept.repainted_markings).for_epoch
         if kept.takes_for_anchor(job):
             return replace(kept, anchor=kept.anchor.joined(*told))
         if kept.recent is None:
-            return replace(kept, recent=Epoch.begun(*told))
+            return replace(kept, recent=Epoch.from_job(*told))
         if kept.recent.looks_like(job.found, job.lines):
             return replace(kept, recent=kept.recent.joined(*told))
         before = [*kept.earlier, kept.recent] if kept.recent.jobs >= FEWEST_JOBS else list(kept.earlier)
-        return replace(kept, recent=Epoch.begun(*told), earlier=tuple(before[-MOST_EARLIER:]))
+        return replace(kept, recent=Epoch.from_job(*told), earlier=tuple(before[-MOST_EARLIER:]))
 
     def takes_for_anchor(self, job: AcceptedJob) -> bool:
         """Whether a job is one of the first nights, in which camera and lens were as they were in the very first."""
@@ -118,15 +123,15 @@ class CameraMemory:
         first, last = self.anchor.first, self.anchor.last
         return first if first is None or last is None else first + (last - first) / 2
 
-    def aware_of(self, painted_anew: Sequence[int] | NDArray[np.intp], lines: LinePoints) -> CameraMemory:
+    def aware_of(self, repainted_markings: Sequence[int] | NDArray[np.intp], lines: LinePoints) -> CameraMemory:
         """The memory of a field that has some markings elsewhere: what it knew of them is forgotten."""
-        aside = np.union1d(self.aside, painted_anew).astype(int)
-        if len(aside) == len(self.aside):
+        aside = np.union1d(self.repainted_markings, repainted_markings).astype(int)
+        if len(aside) == len(self.repainted_markings):
             return self
         gone = np.flatnonzero(np.isin(lines.marking, aside))
         return replace(
             self,
-            aside=tuple(aside.tolist()),
+            repainted_markings=tuple(aside.tolist()),
             anchor=self.anchor.without(gone),
             recent=self.recent and self.recent.without(gone),
             earlier=tuple(epoch.without(gone) for epoch in self.earlier),
@@ -141,7 +146,7 @@ class CameraMemory:
             "anchor": self.anchor.to_json(),
             "recent": None if self.recent is None else self.recent.to_json(),
             "earlier": [epoch.to_json() for epoch in self.earlier],
-            "aside": list(self.aside),
+            "aside": list(self.repainted_markings),
             "frames": self.frames,
         }
 
@@ -178,7 +183,7 @@ def fingerprint_of_frames(frames: Sequence[Frame]) -> str:
     return digest.hexdigest()
 
 
-def fitting(memories: Sequence[CameraMemory | None], lines: LinePoints) -> list[CameraMemory | None]:
+def memories_of_field(memories: Sequence[CameraMemory | None], lines: LinePoints) -> list[CameraMemory | None]:
     """The memories that are about these line points, None in place of any other."""
     here = fingerprint(lines)
     return [memory if memory is not None and memory.lines == here else None for memory in memories]

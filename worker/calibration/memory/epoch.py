@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry.derivatives import change_between, moved
+from worker.calibration.geometry.field import LinePoints
+from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.robust import tukey_weights
-from worker.calibration.scene.camera import Array, Camera, Pose
-from worker.calibration.scene.field import LinePoints
-from worker.calibration.scene.lens import LENSES
-from worker.calibration.scene.motion import change_between, moved
-from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.line_measurement import Measurements
 
 MOST_JOBS = 100
 """The mean of a point forgets as if it were of so many jobs at most."""
@@ -50,7 +50,7 @@ class Epoch:
     last: datetime | None
 
     @classmethod
-    def begun(cls, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> Epoch:
+    def from_job(cls, camera: Camera, measured: Measurements, lines: LinePoints, at: datetime | None) -> Epoch:
         """The epoch of one job, whose answer was `camera`; `lines` of its pitch."""
         index, offset = _trusted(camera, measured, lines)
         return cls(camera, index, offset, np.ones(len(index)), 1, at, at)
@@ -77,7 +77,7 @@ class Epoch:
 
     def measurements(self, lines: LinePoints) -> Measurements:
         """What `camera` measured on average of the `lines`."""
-        seen = SeenLines.from_camera(lines, self.camera)
+        seen = VisibleLines.from_camera(lines, self.camera)
         seen = seen[np.isin(seen.index, self.index)]
         where = np.searchsorted(self.index, seen.index)
         pixel = seen.pixel + self.offset[where, None] * seen.normal

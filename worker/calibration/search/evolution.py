@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from worker.calibration.scene.camera import Array
+from worker.calibration.geometry.camera import Array
 
 Schedule = Callable[[int], float]
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from worker.calibration.scene.camera import Array, Camera, Pose
-from worker.calibration.scene.rotation import rotation_matrices
+from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry.rotation import rotation_matrices
 
 GENES = 6
 """Numbers per camera."""

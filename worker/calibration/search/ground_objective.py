@@ -24,11 +24,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.rotation import rotation_matrices
-from worker.calibration.see.line_profile import blurred_line
-from worker.calibration.see.sampling import bilinear
+from worker.calibration.detection.line_profile import blurred_line
+from worker.calibration.detection.sampling import bilinear
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.rotation import rotation_matrices
 
 PIXELS_PER_METRE = 10.0
 COARSEST = 32

@@ -20,12 +20,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, Plane, project_planes
-from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.lens import Lens
-from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.line_profile import blurred_line
-from worker.calibration.see.sampling import bilinear_planes
+from worker.calibration.detection.line_profile import blurred_line
+from worker.calibration.detection.sampling import bilinear_planes
+from worker.calibration.geometry.camera import Array, Camera, Plane, project_planes
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.lens import Lens
+from worker.calibration.geometry.visibility import VisibleLines
 
 Response = NDArray[np.float32]
 
@@ -138,7 +138,7 @@ class SingleTerm:
     @classmethod
     def build(cls, lines: LinePoints, camera: Camera, band: BlurredResponse, sigma: float) -> SingleTerm:
         """The term for the markings that `camera` sees where it stands, against its band-passed response."""
-        seen = SeenLines.from_camera(lines, camera).thinned(max(sigma / 2, 2.0))
+        seen = VisibleLines.from_camera(lines, camera).thinned(max(sigma / 2, 2.0))
         height = blurred_line(seen.width_px, sigma) - blurred_line(seen.width_px, SURROUND * sigma)
         weight = seen.length_px / max(float(np.sum(height * seen.length_px)), 1e-12)
         return cls(
@@ -180,8 +180,8 @@ class StitchTerm:
             first.camera.sees(first.camera.project(lines.position))
             & second.camera.sees(second.camera.project(lines.position))
         ]
-        seen = SeenLines.from_camera(both, first.camera).thinned(max(first.sigma, 2.0))
-        other = SeenLines.from_camera(seen.points, second.camera)
+        seen = VisibleLines.from_camera(both, first.camera).thinned(max(first.sigma, 2.0))
+        other = VisibleLines.from_camera(seen.points, second.camera)
         seen = seen[other.index]
         if len(seen) < FEWEST_STITCH_POINTS:
             return None

@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field
 from worker.calibration.search.evolution import EvolutionStrategy, exponential_decay
 from worker.calibration.search.genome import GENES, from_swinging, genome_of, looked_at, swinging, with_genome
 from worker.calibration.search.ground_objective import BROAD, NARROW, GroundObjective
@@ -97,18 +97,20 @@ def search(
     strategy: Strategy,
     rng: np.random.Generator,
     on_generation: Callable[[int, float], None],
+    on_level: Callable[[int, Array, list[Camera]], None] = lambda *_: None,
 ) -> Found:
     """Evolve the poses of all cameras together, level by level.
 
     `responses` (H, W): segmentations in 0..1. `on_generation(number, loss)` is called after each generation and may
-    raise to stop.
+    raise to stop; `on_level(level, population, best)` after each level, with the genomes (parents, 6 N) at its end.
     """
     decay = exponential_decay(DECAY)
     everyone = EvolutionStrategy(strategy.parents, strategy.offspring, _mutation(len(cameras)), rng)
     population = everyone.first_parents(genome_of(cameras), levels[0].mutation)
     here = list(cameras)
     done = 0
-    for level, generations in zip(levels, _shares(strategy.generations, len(levels)), strict=True):
+    shares = _shares(strategy.generations, len(levels))
+    for at, (level, generations) in enumerate(zip(levels, shares, strict=True)):
         groups = _groups(pitch, here, responses, level, strategy, population, rng)
         best = [_mean_loss(groups)]
         for generation in range(generations):
@@ -121,6 +123,7 @@ def search(
                 break
         population = np.concatenate([group.population for group in groups], axis=1)
         here = with_genome(cameras, np.concatenate([group.best for group in groups]))
+        on_level(at, population, here)
     return Found(here, best[-1], done)
 
 

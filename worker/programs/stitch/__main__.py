@@ -1,6 +1,7 @@
 """A stitched view's package or its picture, in a process of its own: `python -m worker.programs.stitch`.
 
-What comes is a `service.wire.programs.stitching.Stitching` and, for a picture, frames; what leaves is a zip or a JPEG.
+What comes is a `StitchRequest` and, for a picture, frames; what leaves is a zip or a
+JPEG.
 """
 
 from __future__ import annotations
@@ -13,13 +14,22 @@ from dataclasses import replace
 
 import cv2
 
-from service import lifeline
-from service.wire.programs.files import files_in
-from service.wire.programs.stitching import Stitching
-from worker.calibration.draw.layers import seam_layer
-from worker.calibration.stitch.panorama import Panorama, Part, panorama
-from worker.calibration.stitch.views import chosen_view
-from worker.jobs.reading import Picture, camera_of, choice_of, decoded, decoded_frame, jpeg, light_of, pitch_of
+from service import child_process
+from service.schemas.programs.files import split_files
+from service.schemas.programs.stitching import StitchRequest
+from worker.calibration.rendering.layers import seam_layer
+from worker.calibration.stitching.panorama import Panorama, Part, panorama
+from worker.calibration.stitching.views import chosen_view
+from worker.jobs.from_schemas import (
+    Picture,
+    camera_of,
+    choice_of,
+    decode_frame,
+    decode_image,
+    encode_jpeg,
+    light_of,
+    pitch_of,
+)
 from worker.programs.stitch.package import package
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
@@ -29,20 +39,20 @@ MOST_PLACES = 40_000_000
 
 def main() -> None:
     """Read what is wanted, write it."""
-    lifeline.end_with_parent()
+    child_process.begin_decoder()
     given = sys.stdin.buffer.read()
     end = given.index(b"\n")
-    asked = Stitching.model_validate_json(given[:end])
+    asked = StitchRequest.model_validate_json(given[:end])
     cv2.setNumThreads(asked.threads)
     made = stitched(asked)
     if asked.wanted == "picture":
-        answer = jpeg(picture(asked, made, files_in(given[end + 1 :], asked.sizes)))
+        answer = encode_jpeg(picture(asked, made, split_files(given[end + 1 :], asked.sizes)))
     else:
         answer = package(asked, made)
     sys.stdout.buffer.write(answer)
 
 
-def stitched(asked: Stitching) -> Panorama:
+def stitched(asked: StitchRequest) -> Panorama:
     """How frames become the view that was chosen."""
     pitch, cameras = pitch_of(asked.field), [camera_of(camera) for camera in asked.cameras]
     view = chosen_view(pitch, cameras, choice_of(asked.view))
@@ -53,7 +63,7 @@ def stitched(asked: Stitching) -> Panorama:
     return panorama(pitch, view, cameras, {camera: light_of(light) for camera, light in asked.lights.items()})
 
 
-def picture(asked: Stitching, made: Panorama, files: Mapping[str, bytes]) -> Picture:
+def picture(asked: StitchRequest, made: Panorama, files: Mapping[str, bytes]) -> Picture:
     """What the view makes of frames. Somebody waits for it: they are read no larger than it shows them."""
     with ThreadPoolExecutor(asked.threads) as each:
         read = [*each.map(lambda part: _read(part, files[part.camera]), made.parts)]
@@ -70,10 +80,10 @@ def _read(part: Part, file: bytes) -> tuple[Part, Picture]:
     """A camera's frame, and what it gives to the view as it was read: of half the size where that is enough."""
     width, height = part.frame_size
     if width % 2 or height % 2 or scaled_size(part)[0] > width // 2:
-        return part, decoded_frame(part.camera, [width, height], file)
-    half = decoded(file, cv2.IMREAD_REDUCED_COLOR_2)
+        return part, decode_frame(part.camera, [width, height], file)
+    half = decode_image(file, cv2.IMREAD_REDUCED_COLOR_2)
     if half is None or half.shape[:2] != (height // 2, width // 2):
-        return part, decoded_frame(part.camera, [width, height], file)
+        return part, decode_frame(part.camera, [width, height], file)
     size = width // 2, height // 2
     return replace(part, frame_size=size, source=in_scaled(part, size)), half
 

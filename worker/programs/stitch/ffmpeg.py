@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.look import box
-from worker.calibration.stitch.light import MIDDLE, Light
-from worker.calibration.stitch.panorama import BACKDROP, Panorama, Part
+from worker.calibration.geometry.ground_view import box
+from worker.calibration.stitching.panorama import BACKDROP, Panorama, Part
+from worker.calibration.stitching.photometry import MIDDLE, Light
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
 # What `remap` fills in for.
@@ -117,7 +117,7 @@ def _script(cameras: Sequence[_Camera], maps: Sequence[str], size: tuple[int, in
         lines.append(f"[{camera.id} even]pad={size[0]}:{size[1]}:{x}:{y}:{_hex([BACKDROP] * 3)}[{camera.id}]")
         if number > 0:
             lines += [
-                f"{own['mask']}mergeplanes=0x000000:gbrp[{camera.id} mask]",
+                f"{own['mask']}mergeplanes=format=gbrp[{camera.id} mask]",
                 f"[{merged}][{camera.id}][{camera.id} mask]maskedmerge[up to {camera.id}]",
             ]
             merged = f"up to {camera.id}"
@@ -142,8 +142,8 @@ def _sampled(camera: _Camera, video: str, maps: Mapping[str, str]) -> list[str]:
             f"[from {one}][x {one}][y {one}]remap=fill={_fill(camera)}[at {one}]"
             for one, (x, y) in zip(four, begins, strict=True)
         ),
-        f"{maps['dx']}mergeplanes=0x000000:gbrp,split[{camera.id} dx above][{camera.id} dx below]",
-        f"{maps['dy']}mergeplanes=0x000000:gbrp[{camera.id} dy]",
+        f"{maps['dx']}mergeplanes=format=gbrp,split[{camera.id} dx above][{camera.id} dx below]",
+        f"{maps['dy']}mergeplanes=format=gbrp[{camera.id} dy]",
         f"[at {four[0]}][at {four[1]}][{camera.id} dx above]maskedmerge[{camera.id} above]",
         f"[at {four[2]}][at {four[3]}][{camera.id} dx below]maskedmerge[{camera.id} below]",
         f"[{camera.id} above][{camera.id} below][{camera.id} dy]maskedmerge[{camera.id} seen]",
@@ -161,7 +161,7 @@ def _evened_out(camera: _Camera, maps: Mapping[str, str]) -> list[str]:
         f"[{camera.id} seen]split[{camera.id} one][{camera.id} other]",
         f"[{camera.id} one]{_tones(camera.light, least / headroom)}[{camera.id} least]",
         f"[{camera.id} other]{_tones(camera.light, largest / headroom)}[{camera.id} most]",
-        f"{maps['falloff']}mergeplanes=0x000000:gbrp[{camera.id} falloff]",
+        f"{maps['falloff']}mergeplanes=format=gbrp[{camera.id} falloff]",
         f"[{camera.id} least][{camera.id} most][{camera.id} falloff]maskedmerge,"
         f"{_each(f'val*{headroom:.6f}+0.5')}[{camera.id} even]",
     ]
@@ -217,7 +217,7 @@ def _command(cameras: Sequence[str], maps: Sequence[str]) -> str:
             f'case "${{{count + 1}}}" in *.png | *.PNG) pixels=yuv444p ;; *) pixels={PIXELS} ;; esac',
             f'graph=$(sed -e "s/in_color_matrix={VIDEO}/in_color_matrix=${{MATRIX:-$still}}/" \\',
             f'  -e "s/format={PIXELS}/format=${{PIXELS:-$pixels}}/" "$here/{SCRIPT}")',
-            "exec ffmpeg -hide_banner \\",
+            "exec ffmpeg -hide_banner -loglevel warning -stats \\",
             *(f"  {'${FFMPEG_IN:-} ' if number < count else ''}{one} \\" for number, one in enumerate(inputs)),
             f'  -filter_complex "$graph" -map "[stitched]" ${{FFMPEG_OUT:-}} "${{{count + 1}}}"',
             "",

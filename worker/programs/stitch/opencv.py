@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.look import box
-from worker.calibration.stitch.panorama import BACKDROP, Panorama
+from worker.calibration.geometry.ground_view import box
+from worker.calibration.stitching.panorama import BACKDROP, Panorama
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
 USER = Path(__file__).with_name("with_opencv.py")

@@ -8,9 +8,9 @@ from functools import partial
 from typing import Any
 
 from service.formats.archive import archive
-from service.wire.names import StitchFormat
-from service.wire.programs.stitching import Stitching
-from worker.calibration.stitch.panorama import BACKDROP, Panorama
+from service.schemas.names import StitchFormat
+from service.schemas.programs.stitching import StitchRequest
+from worker.calibration.stitching.panorama import BACKDROP, Panorama
 from worker.programs.exr import end_without_openexr
 from worker.programs.stitch import ffmpeg, opencv, st_maps
 
@@ -61,7 +61,7 @@ maps.npz  per camera: size (width, height) to scale its frames to; corner, the c
 """
 
 
-def package(asked: Stitching, made: Panorama) -> bytes:
+def package(asked: StitchRequest, made: Panorama) -> bytes:
     """The zip."""
     assert asked.wanted != "picture"
     if asked.wanted.startswith("st-map"):
@@ -75,7 +75,7 @@ def package(asked: Stitching, made: Panorama) -> bytes:
     return archive(about | files, compressed=asked.wanted == "ffmpeg", executable=[ffmpeg.COMMAND])
 
 
-def _view(asked: Stitching, made: Panorama) -> dict[str, Any]:
+def _view(asked: StitchRequest, made: Panorama) -> dict[str, Any]:
     return {
         "venue": asked.venue,
         "revision": asked.revision,
@@ -95,7 +95,7 @@ def _view(asked: Stitching, made: Panorama) -> dict[str, Any]:
     }
 
 
-def _readme(asked: Stitching, made: Panorama) -> str:
+def _readme(asked: StitchRequest, made: Panorama) -> str:
     ids = [camera.id for camera in asked.cameras]
     how = {
         "ffmpeg": OF_FFMPEG.format(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.look import level_of_detail
-from worker.calibration.stitch.panorama import Part
+from worker.calibration.geometry.ground_view import level_of_detail
+from worker.calibration.stitching.panorama import Part
 
 
 def scaled_size(part: Part) -> tuple[int, int]:

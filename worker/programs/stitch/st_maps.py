@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from worker.calibration.draw.st_maps import NOWHERE
-from worker.calibration.stitch.panorama import Panorama, Part
+from worker.calibration.rendering.st_maps import NOWHERE
+from worker.calibration.stitching.panorama import Panorama, Part
 from worker.programs.exr import exr
 
 Origin = Literal["top-left", "bottom-left"]

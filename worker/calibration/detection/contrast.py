@@ -1,0 +1,71 @@
+"""In which colour channel a marking stands out from its ground, and whether it is the brighter or the darker one there.
+
+Green is looked at first: lenses put blue and red elsewhere, up to some pixels towards the edges of the picture (the
+violet side of white lines), and the intrinsics are those of green. But blue paint on wood and orange paint on turf can
+be as bright in green as their ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fields.shapes import WHITE
+from worker.calibration.detection.frame_fusion import Sway, median
+from worker.calibration.geometry.camera import Frame
+
+BLUE, GREEN, RED = range(3)
+CONTRASTS = tuple((channel, sign) for channel in (GREEN, RED, BLUE) for sign in (1, -1))
+"""A marking is brighter (1) or darker (-1) than its ground in a channel; the first that its paint allows is usual."""
+PAINT = {
+    "yellow": (0.1, 0.8, 0.9),
+    "black": (0.1, 0.1, 0.1),
+    "blue": (0.7, 0.3, 0.1),
+    "red": (0.1, 0.1, 0.8),
+    "green": (0.2, 0.6, 0.1),
+    "orange": (0.1, 0.5, 0.9),
+}
+"""How much (blue, green, red) paint of a name reflects, 0..1."""
+DEEP = 0.25
+"""What reflects less in a channel is hardly ever brighter than its ground there; on ice anything can be darker."""
+CLEARLY = 0.2
+"""By so much correlation another contrast has to be better than bright in green."""
+OPPOSES = 0.33
+"""What stands out so much, beside how it stands out where it does most, as its paint cannot is of another paint."""
+
+
+class Channels:
+    """The colour channels of the frames of one camera: of several frames their median, without what walks by.
+
+    `swayed`: how each of several lies beside that still view.
+    """
+
+    def __init__(self, frames: Sequence[Frame], swayed: Sequence[Sway] = ()) -> None:
+        self._frames = frames
+        self._swayed = swayed
+        self._read: dict[int, NDArray[np.float32]] = {}
+
+    def __getitem__(self, channel: int) -> NDArray[np.float32]:
+        """Brightness (H, W) 0..255 in one channel, read when it is first asked for."""
+        if channel not in self._read:
+            self._read[channel] = median([frame[..., channel] for frame in self._frames], self._swayed)
+        return self._read[channel]
+
+
+def possible_signs(colour: str, channel: int) -> tuple[int, ...]:
+    """Whether paint of a colour may be brighter (1) or darker (-1) than its ground in a channel; white says nothing.
+
+    White is what a marking is called unless somebody has said otherwise.
+    """
+    if colour == WHITE:
+        return (1, -1)
+    return (-1,) if _reflectance(colour)[channel] < DEEP else (1, -1)
+
+
+def _reflectance(colour: str) -> tuple[float, float, float]:
+    if colour.startswith("#"):
+        red, green, blue = (int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5))
+        return blue, green, red
+    return PAINT[colour]

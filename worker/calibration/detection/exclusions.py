@@ -1,0 +1,48 @@
+"""What of a frame does not count: areas that are ignored, and lines that are painted and not the venue's."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.visibility import VisibleLines
+
+BESIDE_PX = 6.0
+"""How far from where the pose puts them other lines do not count, in pixels of a 4K frame; 2 px at least."""
+
+
+def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
+    """Where (H, W) the frame of a camera does not count, by its pose; None where all of it does.
+
+    Where a line of the venue and another one meet, or are the same, the frame counts.
+    """
+    ignored = None if camera.ignored is None else camera.ignored.area
+    others = pitch.other_points()
+    if others is None:
+        return ignored
+    tolerance = max(BESIDE_PX * camera.intrinsics.relative_size, 2.0)
+    other, own = (
+        line_band(VisibleLines.from_camera(lines, camera), camera.intrinsics.size, tolerance) > 0
+        for lines in (others, pitch.line_points())
+    )
+    band = other & ~own
+    return band if ignored is None else band | ignored
+
+
+def of_use(camera: Camera, response: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A response (H, W) to the frame of a camera, 0 where it is ignored."""
+    return response if camera.ignored is None else np.where(camera.ignored.area, np.float32(0), response)
+
+
+def line_band(seen: VisibleLines, size: tuple[int, int], tolerance: float) -> NDArray[np.uint8]:
+    """1 where a pixel (H, W) is on a line or within `tolerance` of one."""
+    band = np.zeros((size[1], size[0]), dtype=np.uint8)
+    along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1) * seen.length_px[:, None] * 0.6
+    thickness = np.rint(seen.width_px + 2 * tolerance).astype(int)
+    starts, ends = (np.rint(16 * (seen.pixel + sign * along)).astype(int) for sign in (-1, 1))
+    for start, end, thick in zip(starts.tolist(), ends.tolist(), thickness.tolist(), strict=True):
+        cv2.line(band, start, end, 1, min(max(thick, 1), 255), shift=4)
+    return band

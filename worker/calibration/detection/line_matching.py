@@ -1,0 +1,273 @@
+"""How well a frame fits the expected lines at every shift across them: correlation with the profile of a painted line.
+
+The profile is the one that a line of the expected width should have after the blur of lens and sensor, bright or dark,
+in the channel in which the marking stands out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fields.shapes import WHITE
+from worker.calibration.detection.contrast import (
+    BLUE,
+    CLEARLY,
+    CONTRASTS,
+    GREEN,
+    OPPOSES,
+    RED,
+    Channels,
+    possible_signs,
+)
+from worker.calibration.detection.line_profile import blurred_line
+from worker.calibration.detection.sampling import bilinear_planes
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.visibility import VisibleLines
+
+LENS_BLUR_PX = 0.9
+"""Standard deviation of lens, sensor and compression together: it softens the edges of the expected profile."""
+ALONG_PX = (-3.0, -1.5, 0.0, 1.5, 3.0)
+"""Parallel profiles averaged for one measurement: the noise of grass falls, and a line hardly bends over 6 px."""
+WIDTH_CLASSES_PX = ((0.3, 3.0, 0.5), (3.0, 10.0, 0.5), (10.0, 30.0, 1.0), (30.0, 90.0, 2.0))
+"""Lines from..to px wide share a filter length and a sampling step."""
+BESIDE_PX = 4.0
+"""How much of the grass on each side belongs to the filter, beyond a third of the line's width."""
+GRID_PX = 16.0
+"""Between the points of the picture from which places to sample are counted."""
+TOGETHER_PX = 40.0
+"""Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one."""
+LEAST_ALONG = 0.5
+"""Mean correlation with the expected profile, over that length, from which a ridge is a line for itself."""
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Pieces of line of about one width, and how well they fit at shifts across themselves.
+
+    `which` (M,): of the lines that were looked for; `brightness` (M, S + K - 1): profiles across them, NaN outside the
+    picture, in steps of `sampling_px`; `expected` (M, K) at `offsets` (K,) from their centres, see `expected_profiles`;
+    `correlation` (M, S) of the two at `shifts` (S,) px along their normals, -1..1, positive where a piece is bright or
+    dark as its marking is; `base` (M,) px: where the shifts of each begin, within a step of where it is expected;
+    `along` (M, S): the mean correlation of the pieces of the same marking around each: high where a ridge goes on along
+    the line, near zero elsewhere; `opposed` (M, S): whether what is there has another paint's colour.
+    """
+
+    which: NDArray[np.intp]
+    brightness: Array
+    expected: Array
+    offsets: Array
+    correlation: Array
+    along: Array
+    opposed: NDArray[np.bool_]
+    shifts: Array
+    base: Array
+    sampling_px: float
+
+    def where(self, chosen: NDArray[np.bool_], sign: int) -> Matches:
+        """Those of some pieces, as lines that are brighter (1) or darker (-1) than their ground."""
+        return replace(
+            self,
+            which=self.which[chosen],
+            brightness=self.brightness[chosen],
+            expected=self.expected[chosen],
+            correlation=np.where(self.opposed[chosen], -1.0, sign * self.correlation[chosen]),
+            along=np.where(self.opposed[chosen], -1.0, sign * self.along[chosen]),
+            opposed=self.opposed[chosen],
+            base=self.base[chosen],
+        )
+
+    @property
+    def contrast(self) -> Array:
+        """How much (M, S) the pieces stand out as lines at each shift: grey levels, but for the filter's norm."""
+        windows = np.lib.stride_tricks.sliding_window_view(self.brightness, self.expected.shape[1], axis=1)
+        return np.asarray(np.einsum("nsk,nk->ns", windows, self.expected))
+
+
+def match_lines(seen: VisibleLines, channels: Channels, reach_px: float, relative_size: float) -> list[Matches]:
+    """The matches of all lines that are wide enough to be seen, for shifts up to `reach_px`, by class of width.
+
+    Each marking is looked for where it stands out most: in another channel than green only if green does not show it.
+    What has another colour than a marking that is known not to be white is no match.
+    """
+    everywhere, bend = np.ones(len(seen), dtype=bool), _bend(seen)
+    looked = {GREEN: _matches_in(channels[GREEN], seen, bend, everywhere, reach_px, relative_size)}
+    strength = _strengths(looked, seen)
+    wanted = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
+    if wanted.any():
+        looked |= {c: _matches_in(channels[c], seen, bend, wanted, reach_px, relative_size) for c in (RED, BLUE)}
+        looked = _without_other_paint(looked, seen.points.colour)
+        strength = _strengths(looked, seen)
+    usual = np.argmax(strength > -np.inf, axis=0)
+    strength[usual, np.arange(strength.shape[1])] += CLEARLY
+    chosen = np.argmax(strength, axis=0)[seen.points.marking]
+    return [
+        of_class.where(chosen[of_class.which] == number, sign)
+        for number, (channel, sign) in enumerate(CONTRASTS)
+        if number == 0 or number in chosen
+        for of_class in looked[channel]
+    ]
+
+
+def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np.str_]) -> dict[int, list[Matches]]:
+    """The matches in three channels with what has another colour than the paint (N,) of the lines opposed."""
+    freed = {channel: list(classes) for channel, classes in looked.items()}
+    for number, (green, red, blue) in enumerate(zip(*(looked[c] for c in (GREEN, RED, BLUE)), strict=True)):
+        named = colour[red.which] != WHITE
+        everywhere = np.isin(green.which, red.which[named])
+        contrast = {GREEN: green.contrast[everywhere], RED: red.contrast[named], BLUE: blue.contrast[named]}
+        most = np.abs(np.stack(list(contrast.values()))).max(axis=0)
+        opposed = np.zeros(most.shape, dtype=bool)
+        for channel, sign in CONTRASTS:
+            impossible = np.array([sign not in possible_signs(str(c), channel) for c in colour[red.which[named]]], bool)
+            opposed |= impossible[:, None] & (sign * contrast[channel] >= OPPOSES * most)
+        for channel, of_class, rows in ((GREEN, green, everywhere), (RED, red, named), (BLUE, blue, named)):
+            there = of_class.opposed.copy()
+            there[rows] = opposed
+            freed[channel][number] = replace(of_class, opposed=there)
+    return freed
+
+
+def _strengths(looked: Mapping[int, Sequence[Matches]], seen: VisibleLines) -> Array:
+    """How well markings (K,) match in each of `CONTRASTS`, -1..1: where most of a marking is shifted by as much.
+
+    Minus infinity where their paint cannot look so, or where nobody has looked.
+    """
+    marking, colour = seen.points.marking, seen.points.colour
+    count = int(marking.max(initial=-1)) + 1
+    strength = np.full((len(CONTRASTS), count), -np.inf)
+    pieces = np.maximum(np.bincount(marking, minlength=count), 1)
+    for number, (channel, sign) in enumerate(CONTRASTS):
+        possible = [name for name in np.unique(colour) if sign in possible_signs(str(name), channel)]
+        may_be = np.unique(marking[np.isin(colour, possible)])
+        total = np.zeros(count)
+        for of_class in looked.get(channel, []):
+            members = marking[of_class.which] == np.arange(count)[:, None]
+            total += (sign * (members.astype(float) @ of_class.along)).max(axis=1)
+        if channel in looked:
+            strength[number, may_be] = (total / pieces)[may_be]
+    return strength
+
+
+def _matches_in(
+    brightness: NDArray[np.float32],
+    seen: VisibleLines,
+    bend: Array,
+    wanted: NDArray[np.bool_],
+    reach_px: float,
+    relative_size: float,
+) -> list[Matches]:
+    """The matches of the `wanted` lines (N,), which `bend` (N,) so, in one channel, by class of width."""
+    classes = []
+    for low, high, sampling in WIDTH_CLASSES_PX:
+        which = np.flatnonzero(wanted & (seen.width_px >= low) & (seen.width_px < high))
+        pieces = seen[which]
+        half_filter = int(np.ceil((high * 0.85 + BESIDE_PX) / sampling))
+        half_search = int(np.ceil(reach_px / sampling)) + 1
+        reach = half_filter + half_search
+        base = _beside_grid(pieces, sampling)
+        samples = base[:, None] + sampling * np.arange(-reach, reach + 1, dtype=float)
+        across = _profiles(brightness, pieces, bend[which], samples)
+        offsets = sampling * np.arange(-half_filter, half_filter + 1, dtype=float)
+        expected = expected_profiles(pieces.width_px, offsets)
+        correlation = sliding_correlation(across, expected)
+        along = _mean_along(correlation, pieces, TOGETHER_PX * relative_size)
+        shifts = sampling * np.arange(-half_search, half_search + 1, dtype=float)
+        free = np.zeros(correlation.shape, dtype=bool)
+        classes.append(Matches(which, across, expected, offsets, correlation, along, free, shifts, base, sampling))
+    return classes
+
+
+def _beside_grid(pieces: VisibleLines, sampling_px: float) -> Array:
+    """How far (M,) px along its normal the nearest place is where a piece of line is sampled, wherever it is expected.
+
+    The places stand fast in the picture. Else what is read of a line would depend a little on where it was looked for.
+    """
+    fixed = GRID_PX * np.round(pieces.pixel / GRID_PX)
+    beside = np.sum((pieces.pixel - fixed) * pieces.normal, axis=1)
+    return np.asarray(sampling_px * np.round(beside / sampling_px) - beside)
+
+
+def _mean_along(correlation: Array, pieces: VisibleLines, length_px: float) -> Array:
+    """Correlations (M, S) averaged along each marking over about `length_px`, as many pieces to each side."""
+    half = np.ceil(length_px / 2 / np.maximum(pieces.length_px, 1e-6)).astype(int)
+    breaks = (np.diff(pieces.index) != 1) | (np.diff(pieces.points.marking) != 0)
+    stretch = np.concatenate([[0], np.cumsum(breaks)])[: len(pieces)]
+    first = np.searchsorted(stretch, stretch, side="left")
+    last = np.searchsorted(stretch, stretch, side="right")
+    at = np.arange(len(pieces))
+    low, high = np.maximum(at - half, first), np.minimum(at + half + 1, last)
+    total = np.concatenate([np.zeros((1, correlation.shape[1])), np.cumsum(np.nan_to_num(correlation), axis=0)])
+    return np.asarray((total[high] - total[low]) / (high - low)[:, None])
+
+
+def expected_profiles(width_px: Array, offsets_px: Array) -> Array:
+    """Zero-mean, unit-norm profiles (N, K) of lines `width_px` (N,) wide at `offsets_px` (K,) from their centre.
+
+    A filter reaches a third of the width (and `BESIDE_PX`) beyond each edge and is zero farther out.
+    """
+    profile = blurred_line(width_px[:, None], LENS_BLUR_PX, offsets_px)
+    inside = np.abs(offsets_px) <= filter_reach(width_px)[:, None]
+    mean = np.sum(profile * inside, axis=1, keepdims=True) / np.sum(inside, axis=1, keepdims=True)
+    profile = (profile - mean) * inside
+    return profile / np.linalg.norm(profile, axis=1, keepdims=True)
+
+
+def filter_reach(width_px: Array) -> Array:
+    """How far (N,) from the centre of a line its filter reaches, in px."""
+    return width_px / 2 + width_px / 3 + BESIDE_PX
+
+
+def sliding_correlation(profiles: Array, filters: Array) -> Array:
+    """Normalised correlation (N, S - K + 1) of profiles (N, S) with their filters (N, K) at every shift.
+
+    Mean and norm of a window are taken over the filter's support, so that far surroundings do not count. NaN where any
+    of a window is.
+    """
+    windows = np.lib.stride_tricks.sliding_window_view(profiles, filters.shape[1], axis=1)
+    product = np.einsum("nsk,nk->ns", windows, filters)
+    first, count = (filters != 0).argmax(axis=1), (filters != 0).sum(axis=1)
+    values = np.nan_to_num(profiles)
+    total, squares = (_window_sums(of, first, count, product.shape[1]) for of in (values, values**2))
+    spread = np.sqrt(np.maximum(squares - total**2 / count[:, None], 1e-6))
+    return product / np.maximum(spread, np.sqrt(count)[:, None])
+
+
+def _window_sums(values: Array, first: NDArray[np.intp], count: NDArray[np.intp], shifts: int) -> Array:
+    """Sums (N, `shifts`) of `count` (N,) neighbours in rows (N, S), from `first` (N,) on, shift by shift."""
+    up_to = np.zeros((len(values), values.shape[1] + 1))
+    np.cumsum(values, axis=1, out=up_to[:, 1:])
+    begin = first[:, None] + np.arange(shifts)
+    end = begin + count[:, None]
+    return np.asarray(np.take_along_axis(up_to, end, axis=1) - np.take_along_axis(up_to, begin, axis=1))
+
+
+def _profiles(image: NDArray[np.float32], seen: VisibleLines, bend: Array, offsets: Array) -> Array:
+    """Brightness (N, S) across the lines at `offsets` (N, S) px, averaged along them; NaN outside the picture.
+
+    `bend` (N,): 1 / radius of the lines in the picture, in 1 / px, positive where they turn towards their normals.
+    """
+    along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1)
+    total = np.zeros(offsets.shape)
+    across = (offsets * seen.normal[:, :1], offsets * seen.normal[:, 1:])
+    for shift in ALONG_PX:
+        on_line = seen.pixel + shift * along + (bend * shift**2 / 2)[:, None] * seen.normal
+        column, row = (on_line[:, axis : axis + 1] + across[axis] for axis in (0, 1))
+        total += bilinear_planes(image, column, row, outside=np.nan)
+    return total / len(ALONG_PX)
+
+
+def _bend(seen: VisibleLines) -> Array:
+    """1 / radius (N,) of the lines in the picture (see `_profiles`), from the neighbours on the same marking."""
+    rise, run = np.zeros(len(seen)), np.zeros(len(seen))
+    together = (np.diff(seen.index) == 1) & (np.diff(seen.points.marking) == 0)
+    step = np.diff(seen.pixel, axis=0)[together]
+    here, there = np.flatnonzero(together), np.flatnonzero(together) + 1
+    for at, sign in ((here, 1), (there, -1)):
+        across = sign * np.sum(step * seen.normal[at], axis=1)
+        rise[at] += across
+        run[at] += np.sum(step**2, axis=1) - across**2
+    return np.divide(2 * rise, run, out=np.zeros(len(seen)), where=run > 0)

@@ -1,0 +1,265 @@
+"""Where the painted lines are in a frame: sub-pixel centres, measured across each line with a matched filter.
+
+That a ridge is a marking is said by one of two witnesses: the segmentation, or the ridge itself, where it goes on along
+the line as noise and things beside the line do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.line_matching import LEAST_ALONG, LENS_BLUR_PX, Matches, filter_reach, match_lines
+from worker.calibration.detection.line_profile import blurred_point, blurred_step
+from worker.calibration.detection.sampling import bilinear
+from worker.calibration.geometry.camera import Array, Camera, Plane
+from worker.calibration.geometry.derivatives import lens_slopes, pixel_slopes
+from worker.calibration.geometry.field import LinePoints
+from worker.calibration.geometry.visibility import VisibleLines
+
+CORRELATION = (0.55, 0.65)
+"""Correlation with the expected profile from which a measurement counts at all, and from which it counts in full.
+
+Every limit is a ramp: with a step, a measurement beside it would come and go as the pose moves by a hair.
+"""
+RESPONSE = (0.25, 0.35)
+"""The network's probability of a marking, and ..."""
+ALONG = (LEAST_ALONG - 0.05, LEAST_ALONG + 0.05)
+"""... the mean correlation along the line, likewise: the larger of the two counts."""
+SEARCH_EDGE_PX, PICTURE_EDGE_PX = 1.0, 2.0
+"""Over so many pixels a measurement fades towards the end of the search and the border of the picture."""
+CENTRE_STEPS = 2
+RIDGE = 1e-6
+OFF_CENTRE_PENALTY = 0.15
+"""Correlation that a candidate at the end of the search loses against one where the pose expects the line."""
+NOISE_PX = 0.2
+"""Error of one measurement of a perfect line."""
+PAINT_M = 0.006
+"""Lines are painted to about a centimetre."""
+
+SHARED_NOISE = 0.1
+"""Part of the variance of `NOISE_PX` that is the same in every frame of a camera that stands still."""
+MISFIT_ALIKE_PX = 10.0
+"""Length of line over which what lens and field have wrong is the same."""
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Line centres found in one frame, M of them.
+
+    `index` (M,): which of the pitch's line points; `points`: those points; `pixel` (M, 2): where the line was found;
+    `normal` (M, 2): across it in the picture, towards `points.normal`; `px_per_metre` and `px_per_metre_up` (M,): how
+    far it moves along that when the line or the ground under it does (see `VisibleLines`); `trust` (M,) in 0..1: how
+    much of a measurement it is; `jobs` (M,): the mean of so many frames of separate jobs.
+    """
+
+    index: NDArray[np.intp]
+    points: LinePoints
+    pixel: Array
+    normal: Array
+    px_per_metre: Array
+    px_per_metre_up: Array
+    length_px: Array
+    trust: Array
+    misfit_px: float = 0.0
+    jobs: Array | float = 1.0
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def offset(self, camera: Camera, positions: Array) -> Array:
+        """Pixels (M,) along the normals from where `camera` puts points (M, 3) to where the lines were measured."""
+        return np.asarray(np.sum((self.pixel - camera.project(positions)) * self.normal, axis=1))
+
+    def slopes(self, camera: Camera, positions: Array) -> Array:
+        """The derivative (M, 6) of `offset` by the camera's pose, per rad and metre (see `motion`)."""
+        return -np.einsum("mij,mi->mj", pixel_slopes(camera, positions), self.normal)
+
+    def lens_slopes(self, camera: Camera, positions: Array) -> Array:
+        """The derivative (M, 6) of `offset` by `LENS_NUMBERS` of the camera's lens, px per unit of each."""
+        return -np.einsum("mij,mi->mj", lens_slopes(camera, positions), self.normal)
+
+    @property
+    def sigma_px(self) -> Array:
+        """Expected error (M,) along the normal: of the measurement, of paint and ground, and what nothing explains."""
+        of_model = np.hypot(PAINT_M * self.px_per_metre, self.points.uneven_m * self.px_per_metre_up)
+        return np.hypot(self.noise_px, of_model)
+
+    @property
+    def noise_px(self) -> Array:
+        """Expected error (M,) of a measurement when paint and ground are where the model has them.
+
+        What nothing explains is alike over `MISFIT_ALIKE_PX`: so much of a line counts as one measurement of it.
+        The mean of many jobs keeps the part of the noise that all of them share.
+        """
+        noise = NOISE_PX * np.sqrt(SHARED_NOISE + (1 - SHARED_NOISE) / np.asarray(self.jobs))
+        return np.hypot(noise, self.misfit_px * np.sqrt(self.alike))
+
+    @property
+    def alike(self) -> Array:
+        """How many (M,) neighbours share what nothing explains, 1 at least."""
+        return np.maximum(MISFIT_ALIKE_PX / self.length_px, 1.0)
+
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Measurements:
+        return Measurements(
+            self.index[chosen],
+            self.points[chosen],
+            self.pixel[chosen],
+            self.normal[chosen],
+            self.px_per_metre[chosen],
+            self.px_per_metre_up[chosen],
+            self.length_px[chosen],
+            self.trust[chosen],
+            self.misfit_px,
+            self.jobs if isinstance(self.jobs, float) else self.jobs[chosen],
+        )
+
+
+class LineProfiles:
+    """Brightness across the expected lines of one frame, read once and matched from any pose that is near."""
+
+    def __init__(
+        self,
+        lines: LinePoints,
+        camera: Camera,
+        channels: Channels,
+        response: NDArray[np.float32],
+        reach_px: float,
+    ) -> None:
+        """Read it up to `reach_px` to each side of where `camera` expects the `lines`.
+
+        `channels` of the frame; `response` (H, W) the segmentation in 0..1.
+        """
+        self._camera, self._response, self._reach_px = camera, response, reach_px
+        self._seen = VisibleLines.from_camera(lines, camera)
+        matches = match_lines(self._seen, channels, reach_px, camera.intrinsics.relative_size)
+        self._classes = [_Centred(of_class, self._seen.width_px[of_class.which]) for of_class in matches]
+
+    def measure(self, camera: Camera, lines: LinePoints, search_px: float) -> Measurements:
+        """The lines within `search_px` of where `camera` expects them: `lines` are those that were read.
+
+        What either the network or the ridge along a line calls a marking is measured.
+        """
+        expected = self._expected(camera, lines)
+        found = [self._found(of_class, expected[of_class.matches.which], search_px) for of_class in self._classes]
+        which, shift, trust = map(np.concatenate, zip(*found, strict=True))
+        seen = self._seen[which]
+        measured = Measurements(
+            seen.index,
+            lines[seen.index],
+            seen.pixel + shift[:, None] * seen.normal,
+            seen.normal,
+            seen.px_per_metre,
+            seen.px_per_metre_up,
+            seen.length_px,
+            trust,
+        )
+        return measured if camera.ignored is None else measured[camera.sees(measured.pixel)]
+
+    def cover(self, camera: Camera, lines: LinePoints, search_px: float) -> bool:
+        """Whether all that was read reaches `search_px` beyond where `camera` expects the lines."""
+        farthest = np.nanmax(np.abs(self._expected(camera, lines)), initial=0.0)
+        return bool(farthest + search_px <= self._reach_px)
+
+    def _expected(self, camera: Camera, lines: LinePoints) -> Array:
+        """Pixels (N,) along their normals by which `camera` expects the lines beside where they were read."""
+        moved = camera.project(lines.position[self._seen.index]) - self._seen.pixel
+        return np.asarray(np.sum(moved * self._seen.normal, axis=1))
+
+    def _found(self, centred: _Centred, expected: Array, search_px: float) -> tuple[NDArray[np.intp], Array, Array]:
+        """Of one class: which lines were found, how far (px) from where they were read, and how far to trust that."""
+        matches = centred.matches
+        shifts = matches.base[:, None] + matches.shifts
+        beside = np.abs(shifts - expected[:, None])
+        preference = matches.correlation - OFF_CENTRE_PENALTY * (beside / search_px) ** 2
+        preference[~(beside <= search_px + matches.sampling_px)] = -np.inf
+        best = np.argmax(preference, axis=1)
+        every = np.arange(len(best))
+        like_a_line = matches.correlation[every, best] > CORRELATION[0]
+        row = np.flatnonzero(like_a_line & (best > 0) & (best < shifts.shape[1] - 1))
+        best, seen = best[row], self._seen[matches.which[row]]
+        shift = shifts[row, best] + centred.at(row, best)
+        pixel = seen.pixel + shift[:, None] * seen.normal
+        marking = np.maximum(_ramp(bilinear(self._response, pixel), *RESPONSE), _ramp(matches.along[row, best], *ALONG))
+        trust = (
+            marking
+            * _ramp(matches.correlation[row, best], *CORRELATION)
+            * _ramp(search_px - np.abs(shift - expected[row]), 0.0, SEARCH_EDGE_PX)
+            * _ramp(self._to_border(seen, shift, matches), 0.0, PICTURE_EDGE_PX)
+        )
+        good = trust > 0
+        return matches.which[row[good]], shift[good], trust[good]
+
+    def _to_border(self, seen: VisibleLines, shift: Array, matches: Matches) -> Array:
+        """Pixels (N,) from what was read of each line to the border of the picture, negative beyond it."""
+        width, height = self._camera.intrinsics.size
+        reach = np.abs(shift) + matches.offsets[-1]
+        nearest = np.full(len(seen), np.inf)
+        for sign in (1, -1):
+            end = seen.pixel + sign * reach[:, None] * seen.normal
+            for axis, last in ((0, width - 1), (1, height - 1)):
+                nearest = np.minimum(nearest, np.minimum(end[:, axis], last - end[:, axis]))
+        return nearest
+
+
+def measure_lines(
+    lines: LinePoints,
+    camera: Camera,
+    channels: Channels,
+    response: NDArray[np.float32],
+    search_px: float,
+) -> Measurements:
+    """The lines of `camera` found within `search_px` of where its pose expects them (see `LineProfiles`)."""
+    return LineProfiles(lines, camera, channels, response, search_px).measure(camera, lines, search_px)
+
+
+class _Centred:
+    """Matches of one class of width, and where in their windows the lines' centres are: computed once for each."""
+
+    def __init__(self, matches: Matches, width_px: Array) -> None:
+        self.matches, self._width_px = matches, width_px
+        self._window = np.full(len(width_px), -1)
+        self._centre = np.zeros(len(width_px))
+
+    def at(self, row: NDArray[np.intp], window: NDArray[np.intp]) -> Array:
+        """Pixels (M,) from the middles of windows `window` (M,) of rows `row` (M,) to the centres of their lines."""
+        new = window != self._window[row]
+        if new.any():
+            there, begins = row[new], window[new]
+            reach = np.arange(self.matches.expected.shape[1])
+            across = np.take_along_axis(self.matches.brightness[there], begins[:, None] + reach, axis=1)
+            centre = _centre(across, self._width_px[there], self.matches.offsets, self.matches.sampling_px)
+            self._centre[there], self._window[there] = centre, begins
+        return self._centre[row]
+
+
+def _ramp(value: Plane, low: float, high: float) -> Array:
+    """0 below `low`, 1 above `high`, straight between them; 0 for NaN."""
+    return np.nan_to_num(np.clip((np.asarray(value, dtype=float) - low) / (high - low), 0.0, 1.0))
+
+
+def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) -> Array:
+    """Centres (N,) of the lines in windows (N, K) of brightness at `offsets` (K,), at most `reach_px` from 0.
+
+    Least squares of what is there: ground, paint, ground. Ground on one side of a line is seldom as bright as on the
+    other, and that must not pull the line.
+    """
+    inside = np.abs(offsets) <= filter_reach(width_px)[:, None]
+    windows = np.nan_to_num(windows) * inside
+    centre, move = np.zeros(len(windows)), np.zeros((len(windows), len(offsets)))
+    for _ in range(1 + CENTRE_STEPS):
+        begin, end = (offsets - centre[:, None] + side * width_px[:, None] / 2 for side in (1, -1))
+        first, second = blurred_step(begin, LENS_BLUR_PX), blurred_step(end, LENS_BLUR_PX)
+        model = np.stack([1 - first, first - second, second, move], axis=1) * inside[:, None]
+        normal = np.einsum("nak,nbk->nab", model, model) + RIDGE * np.eye(4)
+        before, paint, behind, by = np.linalg.solve(normal, np.einsum("nak,nk->na", model, windows)[..., None])[
+            ..., 0
+        ].T
+        centre = np.clip(centre + by, -reach_px, reach_px)
+        edges = [blurred_point(edge, LENS_BLUR_PX) for edge in (begin, end)]
+        # How the brightness changes when the line moves, which the first time round is not yet known.
+        move = (before - paint)[:, None] * edges[0] + (paint - behind)[:, None] * edges[1]
+    return centre

@@ -1,0 +1,40 @@
+"""Reading pictures between pixels."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array, Plane
+
+MOST_ROWS = 32766
+"""And columns too: cv2.remap takes maps of no more."""
+ROW = 1024
+"""Any number of points is laid out in rows of this length."""
+FAR_OUTSIDE = -1e6
+
+
+def bilinear(image: NDArray[np.float32], pixels: Array, outside: float = 0.0) -> NDArray[np.float32]:
+    """Values (...) of an image (H, W) at pixels (..., 2); `outside` where a pixel is not in the picture or NaN."""
+    flat = pixels.reshape(-1, 2)
+    rows = -(-len(flat) // ROW)
+    where = np.full((2, rows * ROW), FAR_OUTSIDE, dtype=np.float32)
+    where[:, : len(flat)] = flat.T
+    values = bilinear_planes(image, where[0].reshape(rows, ROW), where[1].reshape(rows, ROW), outside)
+    return values.reshape(-1)[: len(flat)].reshape(pixels.shape[:-1])
+
+
+def bilinear_planes(image: NDArray[np.float32], column: Plane, row: Plane, outside: float = 0.0) -> NDArray[np.float32]:
+    """The same for columns and rows (P, N) apart, N at most `MOST_ROWS`."""
+    if column.size == 0:
+        return np.empty(column.shape, dtype=np.float32)
+    # fmax and fmin take the number where the other one is NaN.
+    x, y = (
+        np.fmin(np.fmax(plane, FAR_OUTSIDE), -FAR_OUTSIDE).astype(np.float32, copy=False) for plane in (column, row)
+    )
+    parts = [
+        cv2.remap(image, x[some], y[some], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=outside)
+        for some in (slice(first, first + MOST_ROWS) for first in range(0, len(x), MOST_ROWS))
+    ]
+    return np.asarray(parts[0] if len(parts) == 1 else np.concatenate(parts), dtype=np.float32)

@@ -1,0 +1,178 @@
+"""The segmentation of the paper, section III: which pixels of a frame are field markings, by the exported U-Net.
+
+The network sees the frame as the camera took it. Undistorting first would stretch the edges of a wide picture to twice
+as many pixels and blur what it stretches; the lens model is in the projection instead.
+
+It sees frames of more than about 2.5K shrunk to half: a quarter of the work, and on a real pair of 3072 x 1728 pixels
+the same poses to 0.01 px on clicked points. What the last pixel knows, the finish reads from the frame itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+import onnxruntime as ort
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array, Camera, Frame
+from worker.calibration.geometry.field import Field
+
+HALO_PX = 96
+"""Context that answers depend on (three poolings of 2 x 2 px reach 92 px beyond a region), a multiple of the pooled."""
+GRID_PX = 32
+"""Regions begin and end on this grid: then the network pools the same pixels together as in the whole frame."""
+REGION_PX = 1920
+"""Largest width and height of a region: bounds the memory, whatever the size of the frame.
+
+As large as memory allows, one after the other: small ones pay for their halos, and batches of them gain nothing.
+"""
+WORKING_WIDTH_PX = 1920
+"""About the width that the network sees frames at; the three lengths above are in pixels as it sees them."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A rectangle of a frame, in pixels; `right` and `bottom` are the first column and row outside."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    def shrunk(self, factor: int) -> Region:
+        """The same rectangle of the frame shrunk by `factor`."""
+        return Region(self.left // factor, self.top // factor, self.right // factor, self.bottom // factor)
+
+
+class Segmenter:
+    """The exported U-Net: `models/unet.onnx`, RGB 0..1 in, probability of a marking out.
+
+    `provider`: what computes, by its name in ONNX Runtime; raises `ProviderMissing` where it is not installed.
+    """
+
+    def __init__(self, model: Path, threads: int, provider: str = "CPUExecutionProvider") -> None:
+        if provider not in ort.get_available_providers():
+            raise ProviderMissing(provider, ort.get_available_providers())
+        options = ort.SessionOptions()
+        options.intra_op_num_threads = threads
+        options.inter_op_num_threads = 1
+        # Regions differ in size: memory planned for one does not fit the next.
+        options.enable_mem_pattern = False
+        self._begin = partial(ort.InferenceSession, model, options, providers=[provider])
+        self.session: ort.InferenceSession | None = self._begin()
+        self.sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
+        self.input_name = self.session.get_inputs()[0].name
+
+    def release(self) -> None:
+        """Give back what runs have taken, hundreds of megabytes; who asks again waits until the network is loaded."""
+        self.session = None
+
+    def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
+        """Probabilities of a BGR frame (H, W, 3) as (H, W) in 0..255; 0 outside the regions.
+
+        Steps of 1/255 are finer than the network knows, and take away what threads change in the last digits.
+        """
+        height, width = frame.shape[:2]
+        factor = shrinking((width, height))
+        if factor == 1:
+            return self._response(frame, regions)
+        small = _resized(frame, (width // factor, height // factor), cv2.INTER_AREA)
+        response = self._response(small, [region.shrunk(factor) for region in regions])
+        return _resized(response, (width, height), cv2.INTER_LINEAR)
+
+    def _response(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
+        response = np.zeros(frame.shape[:2], dtype=np.uint8)
+        beyond = HALO_PX + GRID_PX
+        padded = np.pad(frame, ((HALO_PX, beyond), (HALO_PX, beyond), (0, 0)), mode="reflect")
+        for region in regions:
+            seen = padded[region.top : region.bottom + 2 * HALO_PX, region.left : region.right + 2 * HALO_PX]
+            inner = self._probabilities(seen)[HALO_PX:-HALO_PX, HALO_PX:-HALO_PX]
+            there = response[region.top : region.bottom, region.left : region.right]
+            there[...] = np.rint(inner[: there.shape[0], : there.shape[1]] * 255)
+        return response
+
+    def _probabilities(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
+        rgb = picture[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
+        self.session = self.session or self._begin()
+        (answer,) = self.session.run(None, {self.input_name: rgb})
+        return np.asarray(answer, dtype=np.float32)[0, 0]
+
+
+def _resized(picture: NDArray[np.uint8], size: tuple[int, int], interpolation: int) -> NDArray[np.uint8]:
+    return np.asarray(cv2.resize(picture, size, interpolation=interpolation), dtype=np.uint8)
+
+
+class ProviderMissing(Exception):  # noqa: N818
+    """ONNX Runtime as installed cannot compute on what was asked for."""
+
+    def __init__(self, provider: str, available: Sequence[str]) -> None:
+        super().__init__(f"ONNX Runtime here has no {provider}, only {', '.join(available)}.")
+
+
+def shrinking(size: tuple[int, int]) -> int:
+    """How many pixels of a frame of `size` (width, height) become one, each way, before the network sees it."""
+    return max(1, round(size[0] / WORKING_WIDTH_PX))
+
+
+def whole_frame(size: tuple[int, int]) -> list[Region]:
+    """Regions that cover all of a frame of `size` (width, height)."""
+    grid, largest = _grid(size)
+    width, height = (_up_to(grid, side) for side in size)
+    return [
+        Region(left, top, min(left + largest, width), min(top + largest, height))
+        for left in range(0, width, largest)
+        for top in range(0, height, largest)
+    ]
+
+
+def reachable_regions(pitch: Field, camera: Camera, reach_px: float) -> list[Region]:
+    """Where in the frame a marking can be that is at most `reach_px` from where the pose puts it.
+
+    Columns of a region's largest width, each cut to the rows that lines can reach there.
+    """
+    size = camera.intrinsics.size
+    grid, largest = _grid(size)
+    pixels = camera.project(pitch.line_points().position)
+    pixels = pixels[np.isfinite(pixels).all(axis=1)]
+    return [
+        Region(left, top, min(left + largest, _up_to(grid, size[0])), bottom)
+        for left in range(0, size[0], largest)
+        for top, bottom in _rows(_near_columns(pixels, left, left + largest, reach_px), size, reach_px)
+    ]
+
+
+def _grid(size: tuple[int, int]) -> tuple[int, int]:
+    """Step and largest side of regions, in pixels of a frame of `size`."""
+    return GRID_PX * shrinking(size), REGION_PX * shrinking(size)
+
+
+def _near_columns(pixels: Array, left: int, right: int, reach_px: float) -> Array:
+    """Rows (K,) of the pixels (N, 2) that can come between two columns."""
+    return pixels[(pixels[:, 0] >= left - reach_px) & (pixels[:, 0] < right + reach_px), 1]
+
+
+def _rows(y: Array, size: tuple[int, int], reach_px: float) -> Iterator[tuple[int, int]]:
+    """Stretches of rows within `reach_px` of any of `y`, on the grid, each at most a region's largest height."""
+    height = size[1]
+    grid, largest = _grid(size)
+    y = np.sort(y[(y >= -reach_px) & (y <= height - 1 + reach_px)])
+    if len(y) == 0:
+        return
+    # Two stretches nearer to each other than their halos cost more apart than together.
+    halo = HALO_PX * shrinking(size)
+    for stretch in np.split(y, np.flatnonzero(np.diff(y) > 2 * (reach_px + halo)) + 1):
+        top = max(0, int(stretch[0] - reach_px)) // grid * grid
+        end = _up_to(grid, min(height, int(np.ceil(stretch[-1] + reach_px)) + 1))
+        count = -(-(end - top) // largest)
+        step = _up_to(grid, -(-(end - top) // count))
+        yield from ((row, min(row + step, end)) for row in range(top, end, step))
+
+
+def _up_to(grid: int, pixels: int) -> int:
+    return -(-pixels // grid) * grid

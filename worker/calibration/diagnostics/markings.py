@@ -1,0 +1,352 @@
+"""What is seen of each marking: how much of it is found, and how far its paint lies from where the venue has it.
+
+The pose follows all lines, so one that is elsewhere pulls it along and looks nearer than it is. How far the pose gives
+way is known, and put back. Sigma has what makes the pieces of a line differ, how far the ground under all of it may
+swell, and what the lens may have wrong; what moves all of a line by more is its offset: paint, a measure of the venue,
+its crown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.line_measurement import Measurements, measure_lines
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.parameters import lens_parameters
+from worker.calibration.refinement.estimate import PRIOR_M, PRIOR_RAD
+from worker.calibration.refinement.least_squares import CLUSTER_POINTS, LEAST_NOISE
+from worker.calibration.refinement.uncertainty import RefinedPose
+from worker.calibration.robust import tukey_weights
+
+Direction = Literal["outside", "inside", "right", "left", "far", "near"]
+OPPOSITE: dict[Direction, Direction] = {"outside": "inside", "right": "left", "far": "near"}
+FEWEST_MEASURED = 6
+"""Points of a marking, 25 cm apart, that an offset needs."""
+HARDLY, FARTHER_PX, MOST = 0.5, 30.0, 0.5
+"""A marking of which less is found is looked for so far around its place, in pixels of a 4K frame; if so much of it is
+seen there, that is it."""
+MEASURED = ("index", "pixel", "normal", "px_per_metre", "px_per_metre_up", "length_px", "trust")
+LEAST_FREE = 0.1
+"""What must be left of an offset when the pose has given way to it: a line that the pose hangs on has none."""
+PUT_BACK_ERROR = 0.3
+"""Of how far the pose gave way: lens and ground do so as well, by how much is known roughly."""
+LEAST_AGREEMENT = 0.6
+"""Where a pose finds less of its lines beyond chance, what lies beside them is not their paint."""
+SURE, LEAST_OFF_M = 3.0, 0.03
+"""Of its sigma, and metres: a marking further off than both is elsewhere."""
+STRAIGHT = 0.97
+"""Length of the mean of the unit normals of a marking from which it is straight."""
+EDGE_M = 0.3
+"""A line that is so near to the outermost one of its direction bounds the field."""
+USUAL_COUNTS = 1.0
+"""Patches of line that how patches usually differ counts as, beside those of the marking itself."""
+
+HALF_ARE_NEARER = 0.6745
+"""Than so many sigma, of errors that are normal."""
+
+
+@dataclass(frozen=True)
+class MarkingReport:
+    """A marking as one camera sees it: `expected_m` of it in view, and the share 0..1 of that which is `found`.
+
+    `offset_m` ± `sigma_m`: how far its paint lies from where the venue has it, across it on the ground, on the side
+    that `direction` names if positive and on the opposite one if negative. None where that cannot be told.
+    """
+
+    name: str
+    expected_m: float
+    found: float
+    offset_m: float | None = None
+    sigma_m: float | None = None
+    direction: Direction | None = None
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether its paint surely is not where the venue has it."""
+        if self.offset_m is None or self.sigma_m is None:
+            return False
+        return abs(self.offset_m) > max(LEAST_OFF_M, SURE * self.sigma_m)
+
+    @property
+    def side(self) -> Direction | None:
+        """On which side of its place the paint is."""
+        if self.direction is None or self.offset_m is None or self.offset_m >= 0:
+            return self.direction
+        return OPPOSITE[self.direction]
+
+
+def report_markings(
+    pitch: Field, found: RefinedPose, channels: Channels, response: NDArray[np.float32]
+) -> list[MarkingReport]:
+    """What a camera sees of each marking of the `pitch` that it should see; dashes and rows are one marking.
+
+    `channels` of its frame and `response` (H, W), where markings that are not in their places are looked for.
+    """
+    lines = pitch.line_points()
+    names = pitch.whole_names()
+    whole = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    group = np.array([whole[name] for name in names])
+    told = {}
+    if found.evidence.agreement >= LEAST_AGREEMENT:
+        told = _offsets(lines, group, found, _farther_away(lines, group, found, channels, response))
+    pieces = group[found.evidence.marking]
+    seen = []
+    for name, number in whole.items():
+        its = pieces == number
+        if not its.any():
+            continue
+        expected_m, share = float(its.sum() * lines.spacing), float(found.evidence.found[its].mean())
+        if number not in told:
+            seen.append(MarkingReport(name, expected_m, share))
+            continue
+        offset, sigma = told[number]
+        direction, sign = direction_of(lines, np.flatnonzero(group[lines.marking] == number))
+        seen.append(MarkingReport(name, expected_m, share, sign * offset, sigma, direction))
+    return seen
+
+
+def _farther_away(
+    lines: LinePoints,
+    group: NDArray[np.intp],
+    found: RefinedPose,
+    channels: Channels,
+    response: NDArray[np.float32],
+) -> Measurements | None:
+    """The measurements that the camera was judged by, and of markings that it hardly finds those farther away."""
+    measured, evidence, camera = found.measured, found.evidence, found.camera
+    if measured is None:
+        return None
+    pieces = group[evidence.marking]
+    lost = [n for n in np.unique(pieces) if evidence.found[pieces == n].mean() < HARDLY]
+    its = np.flatnonzero(np.isin(group[lines.marking], lost))
+    if len(its) == 0:
+        return measured
+    farther = measure_lines(lines[its], camera, channels, response, FARTHER_PX * camera.intrinsics.relative_size)
+    farther = replace(farther, index=its[farther.index], misfit_px=measured.misfit_px)
+    of_group = group[farther.points.marking]
+    # Something that is seen here and there beside a marking is not it.
+    whole = [n for n in lost if np.sum(of_group == n) >= MOST * np.sum(pieces == n)]
+    elsewhere = ~np.isin(group[measured.points.marking], whole)
+    return _together(lines, measured[elsewhere], farther[np.isin(of_group, whole)])
+
+
+def _together(lines: LinePoints, one: Measurements, other: Measurements) -> Measurements:
+    """The measurements of both."""
+    both = {name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in MEASURED}
+    return Measurements(points=lines[both["index"]], misfit_px=one.misfit_px, **both)
+
+
+def _offsets(
+    lines: LinePoints, group: NDArray[np.intp], found: RefinedPose, seen: Measurements | None
+) -> dict[int, tuple[float, float]]:
+    """Offset and sigma in metres, along their normals, of those groups of markings of which they can be told.
+
+    Markings that are elsewhere beyond doubt are let go one after the other, the surest first: what they did to the pose
+    says nothing of the others. Where most of the rest is still further off than its sigmas say, no line can be better
+    known (the ratio of Birge, 1932, by the median).
+    """
+    measured = None if seen is None else _Offsets.of(lines, group, found, seen)
+    if measured is None:
+        return {}
+    means = measured.means()
+    free: list[int] = []
+    while True:
+        told = _told(means, free)
+        off = {n: abs(offset) / sigma for n, (offset, sigma) in told.items() if n not in free}
+        sure = {n: sigmas for n, sigmas in off.items() if sigmas > SURE and abs(told[n][0]) > LEAST_OFF_M}
+        if not sure or len(free) >= len(told) / 3:
+            break
+        free.append(max(sure, key=lambda n: sure[n]))
+    worse = max(1.0, float(np.median(list(off.values()))) / HALF_ARE_NEARER) if off else 1.0
+    return {number: (offset, worse * sigma) for number, (offset, sigma) in told.items()}
+
+
+def _told(means: _Means, free: Sequence[int]) -> dict[int, tuple[float, float]]:
+    """Offset and sigma of each group where it and the `free` ones may be elsewhere, and all others are in place."""
+    told = {}
+    for row, number in enumerate(means.group):
+        rows = [row, *(means.group.index(other) for other in free if other != number)]
+        left = np.eye(len(rows)) - means.carried[np.ix_(rows, rows)]
+        if np.linalg.svd(left, compute_uv=False)[-1] < LEAST_FREE:
+            continue
+        back = np.linalg.inv(left)[0]
+        offset = float(back @ means.mean[rows])
+        of_means = float(np.sqrt(back**2 @ means.variance[rows]))
+        told[number] = offset, float(np.hypot(of_means, PUT_BACK_ERROR * (offset - means.mean[row])))
+    return told
+
+
+def direction_of(lines: LinePoints, its: NDArray[np.intp]) -> tuple[Direction, float]:
+    """What to call the side of a marking (its line points) that is positive, and the sign its normals have there.
+
+    Lines that bound the field and those that bend have an outside; else it is right (x) or far (y).
+    """
+    normal, place = lines.normal[its, :2], lines.position[its, :2]
+    mean = normal.mean(axis=0)
+    if np.linalg.norm(mean) < STRAIGHT:
+        return "outside", float(np.sign(np.sum(normal * (place - place.mean(axis=0))))) or 1.0
+    axis = int(np.argmax(np.abs(mean)))
+    sign, at = float(np.sign(mean[axis])), float(place[:, axis].mean())
+    if abs(at) > np.abs(lines.position[:, axis]).max() - EDGE_M:
+        return "outside", sign * float(np.sign(at))
+    return ("right" if axis == 0 else "far"), sign
+
+
+@dataclass(frozen=True)
+class _Means:
+    """Where groups of markings G are: `mean` (G,) m along their normals with its `variance` (G,).
+
+    `carried` (G, G): how far the pose carries each along when another is one metre elsewhere.
+    """
+
+    group: list[int]
+    mean: Array
+    variance: Array
+    carried: Array
+
+
+@dataclass(frozen=True)
+class _Offsets:
+    """Measured points M of one camera: which `group` of markings they are of and which `patch` of line.
+
+    `offset` (M,) px along their normals, `scale` (M,) px per metre, `sigma` (M,) px; `slopes` (M, 6) of the offset by
+    the pose, and what the pose `gives` (6, M): how it moves for an offset of one sigma there; `alike` (M, C): how far
+    they seem to move across their lines, m, by one standard deviation of what moves many of them: parts of the ground
+    and numbers of the lens.
+    """
+
+    group: NDArray[np.intp]
+    patch: NDArray[np.intp]
+    offset: Array
+    scale: Array
+    sigma: Array
+    slopes: Array
+    gives: Array
+    alike: Array
+
+    @classmethod
+    def of(
+        cls, lines: LinePoints, group: NDArray[np.intp], found: RefinedPose, measured: Measurements
+    ) -> _Offsets | None:
+        """None where nothing can be told."""
+        camera = found.camera
+        here = lines.position[measured.index]
+        offset = np.sum((measured.pixel - camera.project(here)) * measured.normal, axis=1)
+        slopes = np.einsum("mij,mi->mj", pixel_slopes(camera, here), measured.normal)
+        known = np.isfinite(offset) & np.isfinite(slopes).all(axis=1)
+        if known.sum() < FEWEST_MEASURED:
+            return None
+        measured, offset, slopes = measured[known], offset[known], slopes[known]
+        sigma = measured.sigma_px
+        ground = Ground.under(lines)
+        rises = _rises(ground, measured)
+        # The pose has not followed markings that were painted anew.
+        asked = ~np.isin(lines.marking[measured.index], found.repainted_markings)
+        gives = _given_way(ground, rises, measured, slopes, asked * tukey_weights(offset / sigma), found.uneven_m)
+        swell = found.uneven_m * np.linalg.cholesky(np.linalg.inv(ground.precision))
+        by_lens = _by_lens(camera, here[known], measured)
+        # The pose follows what a lens has wrong: what of it is left moves lines.
+        by_lens = by_lens - slopes @ (gives @ (by_lens / sigma[:, None]))
+        alike = np.concatenate([rises @ swell, by_lens], axis=1) / measured.px_per_metre[:, None]
+        of_group = group[lines.marking[measured.index]]
+        patch = np.unique(np.stack([of_group, measured.index // CLUSTER_POINTS]), axis=1, return_inverse=True)[1]
+        return cls(of_group, patch.ravel(), offset, measured.px_per_metre, sigma, slopes, gives, alike)
+
+    def means(self) -> _Means:
+        """Where the paint of each group is by what is measured of it."""
+        numbers = [n for n in np.unique(self.group).tolist() if np.sum(self.group == n) >= FEWEST_MEASURED]
+        usual, mean, variance, says = self._usual(), [], [], []
+        for number in numbers:
+            its = self.group == number
+            middle, weight = self._mean(its)
+            told = float(weight.sum())
+            pulls = _by_patch(self.patch[its], weight * (self.offset[its] / self.scale[its] - middle))
+            further = len(pulls) - 1
+            own = float(np.sum(pulls**2)) * (further + 1)
+            spread = (own + USUAL_COUNTS * usual * told) / (further + USUAL_COUNTS)
+            spread += LEAST_NOISE * float(np.sum(weight**2 * (self.sigma[its] / self.scale[its]) ** 2))
+            alike = weight @ self.alike[its] / told
+            mean.append(middle)
+            variance.append(spread / told**2 + float(alike @ alike))
+            says.append((weight / self.scale[its]) @ self.slopes[its] / told)
+        moves = [self.gives[:, self.group == n] @ (self.scale / self.sigma)[self.group == n] for n in numbers]
+        carried = np.array(says).reshape(-1, POSE_NUMBERS) @ np.array(moves).reshape(-1, POSE_NUMBERS).T
+        return _Means(numbers, np.array(mean), np.array(variance), carried)
+
+    def _mean(self, its: NDArray[np.bool_]) -> tuple[float, Array]:
+        """Where the points of a marking are by most of them, m, and how much each of them has a say in it."""
+        metres, sigma_m = self.offset[its] / self.scale[its], self.sigma[its] / self.scale[its]
+        mean = float(np.median(metres))
+        weight = np.ones(len(metres))
+        for _ in range(3):
+            weight = tukey_weights((metres - mean) / sigma_m) / sigma_m**2
+            mean = float(np.sum(weight * metres) / max(float(weight.sum()), 1e-12))
+        return mean, weight
+
+    def _usual(self) -> float:
+        """By how much more than single points the patches of a marking differ, over all markings of the camera."""
+        squares, informed, spare = 0.0, 0, 0
+        for number in np.unique(self.group):
+            its = self.group == number
+            mean, weight = self._mean(its)
+            pulls = _by_patch(self.patch[its], weight * (self.offset[its] / self.scale[its] - mean))
+            told = _by_patch(self.patch[its], weight)
+            counted = told > 0
+            squares += float(np.sum(pulls[counted] ** 2 / told[counted]))
+            informed += int(counted.sum())
+            spare += 1
+        together = float(np.bincount(self.patch).max())
+        return max(squares / (informed - spare), 1.0) if informed > spare else together
+
+
+def _rises(ground: Ground, measured: Measurements) -> Array:
+    """How far (M, K), in px along their normals, measured points move when a node of the ground rises by a metre."""
+    heights = np.zeros((len(measured), len(ground)))
+    row = np.arange(len(measured))[:, None]
+    np.add.at(heights, (row, ground.node[measured.index]), ground.share[measured.index])
+    return np.asarray(measured.px_per_metre_up[:, None] * heights)
+
+
+def _by_lens(camera: Camera, points: Array, measured: Measurements) -> Array:
+    """How far (M, 6), in px along their normals, points (M, 3) move for one sigma of each number of the lens."""
+    expected = np.array([number.expected for number in lens_parameters([camera])])
+    return np.nan_to_num(-measured.lens_slopes(camera, points) * expected)
+
+
+def _given_way(
+    ground: Ground, rises: Array, measured: Measurements, slopes: Array, weight: Array, uneven_m: float
+) -> Array:
+    """How the pose (6, M) moves for an offset of one sigma at each measured point, where the ground gives way as well.
+
+    `slopes` (M, 6) of the offsets by the pose; `weight` (M,) that the finish gave them.
+    """
+    by_sigma = np.concatenate([slopes, rises], axis=1) / measured.sigma_px[:, None]
+    weighted = by_sigma * weight[:, None]
+    information = weighted.T @ by_sigma
+    information[:POSE_NUMBERS, :POSE_NUMBERS] += np.diag([PRIOR_RAD**-2] * 3 + [PRIOR_M**-2] * 3)
+    information[POSE_NUMBERS:, POSE_NUMBERS:] += ground.precision / uneven_m**2
+    return np.asarray(np.linalg.solve(information, weighted.T)[:POSE_NUMBERS])
+
+
+def _by_patch(patch: NDArray[np.intp], values: Array) -> Array:
+    """Sums of values (M,) by patch."""
+    return np.asarray(np.bincount(np.unique(patch, return_inverse=True)[1], values), dtype=float)
+
+
+def in_words(seen: MarkingReport) -> str:
+    """`far touchline: 62 % found, 10 +- 1 cm outside`, in the letters that OpenCV can draw."""
+    words = f"{seen.name}: {seen.found:.0%} found"
+    if seen.offset_m is None or seen.sigma_m is None:
+        return words
+    places = 0 if seen.sigma_m >= 0.01 else 1
+    offset, sigma = 100 * abs(seen.offset_m), 100 * seen.sigma_m
+    return f"{words}, {offset:.{places}f} +- {sigma:.{places}f} cm {seen.side}"

@@ -1,0 +1,99 @@
+"""How far apart two cameras put the same paint, all along what both see: beside the stitch error at the centre a curve.
+
+It is measured across lines, where both cameras have measured the same piece of one. Along a line nothing tells: each
+place says in which direction it holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.refinement.uncertainty import RefinedPose
+
+PIECE_POINTS = (20, 40, 80, 160)
+"""Line points (25 cm apart) that make a place of the curve: the fewest with which it has not too many."""
+MOST_PLACES = 24
+FEWEST_POINTS = 4
+LARGEST_SIGMA_M = 0.2
+"""Where lines are seen less well than this, they do not tell."""
+
+WELL_KNOWN = 2.0
+"""Times the usual sigma: places that are known less well are not asked for the worst."""
+
+
+@dataclass(frozen=True)
+class SeamPlace:
+    """A piece of line that two cameras have measured around a point `at` (2,) of the pitch.
+
+    The second puts its paint `error_m` ± `sigma_m` beside where the first does, `across` (2,) the line.
+    """
+
+    at: Array
+    across: Array
+    error_m: float
+    sigma_m: float
+
+
+@dataclass(frozen=True)
+class Seam:
+    """Places along what two cameras see, in the order of the longer way through them."""
+
+    places: Sequence[SeamPlace]
+
+    @property
+    def worst(self) -> SeamPlace | None:
+        """Where the error is largest, but for places that are measured clearly less well than most."""
+        usual = float(np.median([place.sigma_m for place in self.places])) if self.places else 0.0
+        known = [place for place in self.places if place.sigma_m <= WELL_KNOWN * usual]
+        return max(known, key=lambda place: place.error_m, default=None)
+
+
+def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
+    """The seam of two cameras as they stand; without places where they have measured nothing in common."""
+    if first.measured is None or second.measured is None:
+        return Seam([])
+    lines = pitch.line_points()
+    index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
+    put_first, sigma_first = _put(lines, first.camera, first.measured, a)
+    put_second, sigma_second = _put(lines, second.camera, second.measured, b)
+    apart, sigma = put_second - put_first, np.hypot(sigma_first, sigma_second)
+    known = np.isfinite(apart) & (sigma < LARGEST_SIGMA_M)
+    index, apart, sigma = index[known], apart[known], sigma[known]
+    for points in PIECE_POINTS:
+        piece = np.stack([lines.marking[index], index // points], axis=1)
+        pieces, which, count = np.unique(piece, axis=0, return_inverse=True, return_counts=True)
+        if len(pieces) <= MOST_PLACES:
+            break
+    which = which.ravel()
+    places = []
+    for number in np.flatnonzero(count >= FEWEST_POINTS):
+        its = which == number
+        normal = lines.normal[index[its], :2].mean(axis=0)
+        error = float(np.median(apart[its]))
+        across = np.sign(error or 1.0) * normal / np.linalg.norm(normal)
+        at = lines.position[index[its], :2].mean(axis=0)
+        places.append(SeamPlace(at, across, abs(error), float(np.median(sigma[its]))))
+    return Seam(_in_order(places[:MOST_PLACES]))
+
+
+def _put(lines: LinePoints, camera: Camera, measured: Measurements, its: NDArray[np.intp]) -> tuple[Array, Array]:
+    """How far (M,) m along the normals of the lines a camera puts their paint beside them, and the error of that."""
+    chosen = measured[its]
+    offset = chosen.offset(camera, lines.position[chosen.index])
+    return offset / chosen.px_per_metre, chosen.noise_px / chosen.px_per_metre
+
+
+def _in_order(places: Sequence[SeamPlace]) -> list[SeamPlace]:
+    if len(places) < 2:
+        return list(places)
+    at = np.array([place.at for place in places])
+    _, _, axes = np.linalg.svd(at - at.mean(axis=0), full_matrices=False)
+    along = axes[0] * (np.sign(axes[0][np.argmax(np.abs(axes[0]))]) or 1.0)
+    return [places[n] for n in np.argsort(at @ along, kind="stable")]

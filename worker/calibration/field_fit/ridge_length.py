@@ -1,0 +1,120 @@
+"""How long a ridge may be: each length tried, because it moves the lines in kinks that no tangent foretells.
+
+A length is believed by how well the lines fit with it once poses, measures and the swells of the ground are found anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.parameters import Parameter
+from worker.calibration.refinement.estimate import Estimate, gauss_newton_step
+from worker.calibration.refinement.least_squares import CLUSTER_POINTS, WeightedRows, weigh_rows
+from worker.calibration.refinement.refine import EVALUATION_SEARCH_PX, Observations
+from worker.calibration.refinement.uncertainty import RefinedPoses
+from worker.calibration.refinement.unknowns import Unknowns
+from worker.calibration.robust import TUKEY, robust_scale, tukey_loss, tukey_weights
+
+SPACING_M = 10.0
+STEPS = 4
+"""Per length, for everything that is found with it."""
+ALIKE = 4.0
+"""Lengths whose costs are this near to the least fit alike: two standard deviations."""
+
+
+@dataclass(frozen=True)
+class TriedRidge:
+    """A pitch with a ridge of some length, everything else found for it; `cost`: -2 log likelihood, from any zero."""
+
+    pitch: Field
+    cost: float
+
+
+@dataclass(frozen=True)
+class TriedRidges:
+    """`held`: the pitch with the length that it came with; `tried`: every `SPACING_M` from none to the whole pitch."""
+
+    held: Field
+    tried: Sequence[TriedRidge]
+
+    @property
+    def lengths(self) -> Array:
+        """Of the ridges tried (T,)."""
+        return np.array([ridge.pitch.ridge_length for ridge in self.tried])
+
+    @property
+    def credence(self) -> Array:
+        """How probable each of the tried lengths is (T,), if all were before."""
+        likelihood = np.exp((self._costs.min() - self._costs) / 2)
+        return np.asarray(likelihood / likelihood.sum())
+
+    @property
+    def best(self) -> float:
+        """The expected length."""
+        return float(self.credence @ self.lengths)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the length; not less than the grid can tell."""
+        variance = float(self.credence @ (self.lengths - self.best) ** 2)
+        return float(np.sqrt(variance + SPACING_M**2 / 12))
+
+    @property
+    def alike(self) -> tuple[float, float]:
+        """The shortest and the longest that fit about as well as the best."""
+        lengths = self.lengths[self._costs < self._costs.min() + ALIKE]
+        return float(lengths.min()), float(lengths.max())
+
+    def spread(self, read: Callable[[Field], float]) -> float:
+        """How far (rms) another measure is off because the ridge is not as long as it was held."""
+        off = np.array([read(ridge.pitch) for ridge in self.tried]) - read(self.held)
+        return float(np.sqrt(self.credence @ off**2))
+
+    @property
+    def _costs(self) -> Array:
+        return np.array([ridge.cost for ridge in self.tried])
+
+
+def try_ridges(base: RefinedPoses, free: Sequence[Parameter], sight: Observations) -> TriedRidges:
+    """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
+    lines = base.pitch.line_points()
+    measured = sight.reader().measure(lines, base.cameras, EVALUATION_SEARCH_PX)
+    unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
+    held, rows = _fitted(base.pitch, base.cameras, measured, unknowns)
+    scale = robust_scale(rows.value)
+    together = _together(rows, scale)
+    tried = []
+    for length in np.arange(0.0, base.pitch.length, SPACING_M).tolist():
+        there, left = _fitted(base.pitch.with_ridge_length(length), base.cameras, measured, unknowns)
+        away = there.change_from(base.cameras)
+        loss = float(np.sum(tukey_loss(left.value, scale))) + float(away @ there.prior(unknowns) @ away)
+        tried.append(TriedRidge(there.pitch, loss / together))
+    return TriedRidges(held.pitch, tried)
+
+
+def _fitted(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    measured: Sequence[Measurements],
+    unknowns: Unknowns,
+) -> tuple[Estimate, WeightedRows]:
+    """Everything else found for a pitch, and what is left of the lines then."""
+    here = Estimate.at(pitch, cameras, unknowns)
+    for _ in range(STEPS):
+        unknowns = unknowns.around(here.pitch, here.lines)
+        here = gauss_newton_step(here, cameras, measured, unknowns, tukey_weights).to
+    return here, weigh_rows(here.rows(measured, unknowns), here.heights, unknowns, tukey_weights)
+
+
+def _together(rows: WeightedRows, scale: float) -> float:
+    """As many residuals that neighbours on a line err alike count as one."""
+    good = np.abs(rows.value) < TUKEY * scale
+    sums = np.bincount(rows.points[rows.at[good]] // CLUSTER_POINTS, rows.value[good])
+    return max(float(np.sum(sums**2) / np.sum(rows.value[good] ** 2)), 1.0)

@@ -1,0 +1,163 @@
+"""What cameras say of each other: whether two of them put the same markings in the same place, and who is to blame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.diagnostics.registration import (
+    Registration,
+    Response,
+    pair_error_px,
+    pairs_in_common,
+    register_pair,
+    shares_plenty,
+)
+from worker.calibration.gate.quality import Gate, Reason, Refusal
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+
+MOST = 0.6
+"""Of the line that two cameras share, that both see: they do see it."""
+
+
+@dataclass(frozen=True)
+class CameraResponse:
+    """A camera, the segmentation (H, W) of its frame in 0..1, and how much of the lines is seen where it puts them."""
+
+    camera: Camera
+    response: Response
+    evidence: Evidence
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two cameras, by their ids, that should show some of the same markings.
+
+    `error_px`: how far apart they put them, 1 px = 10 cm; None where their views cannot be brought together, and then
+    there is no `registration`. `plenty`: they share so much that this tells something; `confirmed`: whether it
+    registers or not, both see what they share where their poses put it.
+    """
+
+    first: str
+    second: str
+    error_px: float | None
+    plenty: bool
+    confirmed: bool
+    registration: Registration | None = None
+
+    @property
+    def cameras(self) -> tuple[str, str]:
+        """Both."""
+        return self.first, self.second
+
+    def agrees(self, gate: Gate) -> bool:
+        """Whether they confirm each other."""
+        return self.error_px is not None and self.error_px <= gate.largest_stitch_error_px
+
+    @property
+    def missed(self) -> bool:
+        """Whether their views cannot be brought together though they should be."""
+        return self.error_px is None and self.plenty and not self.confirmed
+
+    def disagrees(self, gate: Gate) -> bool:
+        """Whether they contradict each other. Two that share too little to be compared do neither."""
+        return self.missed or (self.error_px is not None and self.error_px > gate.largest_stitch_error_px)
+
+    def words(self, gate: Gate) -> str:
+        """What contradicts what, and what to do."""
+        both = f"{self.first} and {self.second}"
+        if self.error_px is None:
+            return (
+                f"the views of {both} should show the same markings but cannot be brought together; look at the preview"
+            )
+        return (
+            f"the cameras {both} do not fit each other: stitch error {self.error_px:.2f} px, at most "
+            f"{gate.largest_stitch_error_px} allowed; look at the preview, and check intrinsics and ridge"
+        )
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A pair of which at least one camera is wrong. `blamed`: which, or both where nothing tells."""
+
+    pair: Pair
+    blamed: Sequence[str]
+
+    def words(self, gate: Gate) -> str:
+        """What contradicts what, naming who is to blame where it is one of them."""
+        whose = f"camera {self.blamed[0]}: " if len(self.blamed) == 1 else ""
+        return whose + self.pair.words(gate)
+
+
+def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]:
+    """What those pairs of cameras say that should show some of the same markings."""
+    by_id = {one.camera.id: one for one in cameras}
+    found = []
+    for pair in pairs_in_common(pitch, [one.camera for one in cameras]):
+        first, second = (by_id[camera.id] for camera in pair)
+        registered = register_pair(pitch, *pair, first.response, second.response)
+        error_px = None if registered is None else registered.error_px
+        confirmed = _both_see(first.evidence, second.evidence)
+        found.append(Pair(pair[0].id, pair[1].id, error_px, shares_plenty(pitch, *pair), confirmed, registered))
+    return found
+
+
+def compare_pairs_before(
+    pitch: Field, stored: Mapping[str, CameraResponse], found: Mapping[str, Camera], pairs: Sequence[Pair]
+) -> list[Pair]:
+    """What the same pairs said by the poses that were `stored`, by those that were `found` where these register."""
+    before = []
+    for pair in pairs:
+        seeing = [stored[camera] for camera in pair.cameras]
+        if pair.registration is None:
+            before += compare_pairs(pitch, seeing)
+        else:
+            now = (found[pair.first], found[pair.second])
+            error_px = pair_error_px(pitch, pair.registration, now, (seeing[0].camera, seeing[1].camera))
+            confirmed = _both_see(seeing[0].evidence, seeing[1].evidence)
+            before.append(Pair(pair.first, pair.second, error_px, pair.plenty, confirmed))
+    return before
+
+
+def _both_see(first: Evidence, second: Evidence) -> bool:
+    """Whether both find most of the line that both should see, each where its pose puts it."""
+    _, a, b = np.intersect1d(first.index, second.index, return_indices=True)
+    return len(a) > 0 and float(np.mean(first.found[a] & second.found[b])) >= MOST
+
+
+def find_contradictions(pairs: Sequence[Pair], gate: Gate) -> list[Contradiction]:
+    """Who is to blame for pairs that disagree: whoever agrees with nobody, or else both.
+
+    Two that both agree with others contradict each other only where they share plenty and can be compared.
+    """
+    held = {camera for pair in pairs if pair.agrees(gate) for camera in pair.cameras}
+    found = []
+    for pair in pairs:
+        loose = [camera for camera in pair.cameras if camera not in held]
+        if pair.disagrees(gate) and (loose or (pair.plenty and pair.error_px is not None)):
+            found.append(Contradiction(pair, loose or pair.cameras))
+    return found
+
+
+def refusal_by_pairs(camera: str, against: Sequence[Contradiction], gate: Gate) -> Refusal | None:
+    """Why a camera is refused that pairs are against, None where none is."""
+    its = [one.pair for one in against if camera in one.blamed]
+    if not its:
+        return None
+    reason: Reason = "not-together" if its[0].error_px is None else "disagree"
+    return Refusal(reason, "; ".join(pair.words(gate) for pair in its))
+
+
+def stitch_error_px(pairs: Sequence[Pair], gate: Gate) -> float | None:
+    """The worst disagreement of pairs that confirm or contradict each other.
+
+    None if none does, or if one cannot be brought together that should be.
+    """
+    telling = [pair for pair in pairs if pair.agrees(gate)] + [one.pair for one in find_contradictions(pairs, gate)]
+    if any(pair.missed for pair in telling):
+        return None
+    return max((pair.error_px for pair in telling if pair.error_px is not None), default=None)

@@ -1,0 +1,264 @@
+"""What a result is worth without ground truth, and the gate that a bad one does not pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from worker.calibration.detection.evidence import LEAST_ROOM, Evidence
+from worker.calibration.detection.view_condition import ViewCondition
+from worker.calibration.diagnostics.markings import MarkingReport
+from worker.calibration.diagnostics.overlap import Overlap
+from worker.calibration.geometry.camera import Camera, inside
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.plausible_pose import films_a_field
+from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.refinement.diagnosis import is_sure
+from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS
+from worker.calibration.refinement.uncertainty import Deviation, RefinedPose
+
+MUCH_UNEXPECTED = 0.4
+"""Of the segmentation on the pitch: so much of it beside all lines of the venue are lines of something else."""
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Limits a result has to keep to replace the stored poses. Pixels are those of a 4K frame, unless said.
+
+    `least_agreement`: right poses find 0.8 and more of the lines beyond chance on fields of every kind, poses that have
+    settled on other lines up to 0.5. `residual_floor_px`: of the frame itself; lines of a small frame are no sharper.
+    `largest_sigma_deg`: a principal point that is off turns a camera by as much and harms nothing. `largest_zoomed_m`:
+    how far from here a camera may be whose focal length the lines contradict.
+    """
+
+    least_agreement: float = 0.6
+    agreement_loss: float = 0.1
+    largest_residual_px: float = 2.5
+    residual_floor_px: float = 1.25
+    largest_sigma_deg: float = 1.5
+    largest_sigma_m: float = 0.5
+    largest_zoomed_m: float = 0.2
+    largest_rotation_deg: float = 8.0
+    largest_shift_m: float = 1.5
+    largest_stitch_error_px: float = 1.5
+    highest_ridge_m: float = 3.0
+
+    def least_share(self, seen: Evidence) -> float:
+        """Of the markings that has to be seen, 0..1, where chance finds as much as it does."""
+        return seen.by_chance + self.least_agreement * max(1 - seen.by_chance, LEAST_ROOM)
+
+
+Reason = Literal[
+    "view",
+    "other-camera",
+    "no-markings-in-view",
+    "lines",
+    "few-lines",
+    "residual",
+    "zoomed",
+    "undetermined",
+    "moved",
+    "stored-better",
+    "not-together",
+    "disagree",
+    "ridge",
+]
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a pose must not replace the stored one: the `reason` in a word, and in words with numbers and what to do."""
+
+    reason: Reason
+    words: str
+
+
+@dataclass(frozen=True)
+class Movement:
+    """From the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in pixels."""
+
+    rotation_deg: float
+    position_m: float
+    pixels: float
+
+    @classmethod
+    def between(cls, pitch: Field, before: Camera, after: Camera) -> Movement:
+        """How far a camera moved."""
+        lines = pitch.line_points().position
+        was = before.project(lines)
+        shift = np.linalg.norm(after.project(lines) - was, axis=1)[inside(was, before.intrinsics.size)]
+        shift = shift[np.isfinite(shift)]
+        return cls(
+            float(rotation_angles_deg(before.pose.rotation, after.pose.rotation)),
+            float(np.linalg.norm(after.pose.position - before.pose.position)),
+            float(shift.mean()) if len(shift) else 0.0,
+        )
+
+    def beyond(self, gate: Gate) -> bool:
+        """Whether it is more than a camera may move without somebody storing a new pose."""
+        return self.rotation_deg > gate.largest_rotation_deg or self.position_m > gate.largest_shift_m
+
+    def words(self, gate: Gate) -> str:
+        """How far it moved, and the limits."""
+        return (
+            f"turned by {self.rotation_deg:.1f} degrees (at most {gate.largest_rotation_deg} allowed) and moved by "
+            f"{self.position_m:.2f} m (at most {gate.largest_shift_m})"
+        )
+
+
+@dataclass(frozen=True)
+class CameraResult(RefinedPose):
+    """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
+
+    `view`: whether its frame could be used, and what is wrong with it if not; `overlap`: of expected lines and the
+    segmentation; `refusal`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
+    camera's lens is not the stored one but what the lines say; `markings`: what is seen of each; `moved_in_all`: since
+    its memory began, None without one.
+    """
+
+    view: ViewCondition
+    overlap: Overlap
+    evidence_before: Evidence
+    moved: Movement
+    refusal: Refusal | None = None
+    lens_found: bool = False
+    markings: Sequence[MarkingReport] = field(default=(), kw_only=True)
+    moved_in_all: Movement | None = field(default=None, kw_only=True)
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the gate lets its pose replace the stored one."""
+        return self.refusal is None
+
+    @property
+    def rejected_because(self) -> str | None:
+        """The words of its refusal."""
+        return None if self.refusal is None else self.refusal.words
+
+
+def in_one_sentence(reasons: Sequence[str]) -> str:
+    """Join reasons, some of which are sentences of their own: only the last one keeps its full stop."""
+    *before, last = reasons or [""]
+    return "; ".join([*(reason.removesuffix(".") for reason in before), last])
+
+
+def credible_deviations(
+    deviations: Sequence[Deviation], results: Sequence[CameraResult], gate: Gate
+) -> list[Deviation]:
+    """Those deviations that were read off cameras which see the pitch where they expect it."""
+    lost = {result.camera.id for result in results if result.evidence.agreement < gate.least_agreement}
+    of_field = not lost or any(result.accepted for result in results)
+    return [d for d in deviations if (of_field if d.camera is None else d.camera not in lost)]
+
+
+def ridge_rejection(pitch: Field, gate: Gate) -> Refusal | None:
+    """Why a pitch whose ridge was found along with the poses cannot be one; None when it can."""
+    height = 0.0 if pitch.ridge is None else float(pitch.ridge[0, 2])
+    if 0 <= height <= gate.highest_ridge_m:
+        return None
+    return Refusal(
+        "ridge",
+        f"the lines fit best with a ridge at {height:.3f} m, and a pitch has one between 0 and "
+        f"{gate.highest_ridge_m:.0f} m; calibrate without fit_ridge",
+    )
+
+
+def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
+    """Why a camera's pose must not replace the stored one whatever the others say, and what to do; None when it may."""
+    if not result.view.usable:
+        return Refusal(_reason_of(result.view), result.view.words)
+    moved, seen = result.moved, result.evidence
+    if seen.agreement < gate.least_agreement:
+        return Refusal(
+            "lines",
+            f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it ought "
+            f"to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen anywhere); "
+            "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
+            f"{_other_lines(result)}",
+        )
+    if result.residual_px is None or result.sigma is None:
+        return Refusal(
+            "few-lines",
+            f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?",
+        )
+    limit = max(gate.largest_residual_px * result.camera.intrinsics.relative_size, gate.residual_floor_px)
+    if result.residual_px > limit:
+        return Refusal(
+            "residual",
+            f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
+            f"check intrinsics and the field's measures{_other_lines(result)}",
+        )
+    if result.zoom is not None and zoomed_beyond_doubt(result, gate):
+        return Refusal(
+            "zoomed",
+            f"{zoom_in_words(result.camera, result.zoom)}, which puts the camera {result.zoom_shift_m:.2f} m from "
+            "where it seems to be: zoom or focus have moved, or the lens is not this one; calibrate the lens again",
+        )
+    sigma = result.sigma
+    if sigma.rotation_deg > gate.largest_sigma_deg or sigma.position_m > gate.largest_sigma_m:
+        return Refusal(
+            "undetermined",
+            f"the visible lines do not determine the pose: sigma {sigma.rotation_deg:.2f} degrees (at most "
+            f"{gate.largest_sigma_deg} allowed), {sigma.position_m:.2f} m (at most {gate.largest_sigma_m}); let the "
+            "camera see lines in more than one direction, or calibrate its lens again",
+        )
+    if moved.beyond(gate):
+        return Refusal(
+            "moved",
+            f"{moved.words(gate)}; if somebody moved the camera, store a new first pose",
+        )
+    if result.moved_in_all is not None and result.moved_in_all.beyond(gate):
+        return Refusal(
+            "moved",
+            f"{result.moved_in_all.words(gate)}, over all jobs since its pose was last stored by hand: its mount may "
+            "be giving way; look at it, then store this pose, or accept the job by hand",
+        )
+    if seen.agreement < result.evidence_before.agreement - gate.agreement_loss:
+        return Refusal(
+            "stored-better",
+            f"the stored pose fits the frame better: {result.evidence_before.share:.0%} of the markings' length is "
+            f"seen where it puts them, with the new pose {seen.share:.0%}",
+        )
+    return None
+
+
+def _reason_of(view: ViewCondition) -> Reason:
+    """What the picture shows is one reason, whatever it is; what it is of, and where its pose looks, are others."""
+    match view.cause:
+        case "other-camera" | "no-markings-in-view" as reason:
+            return reason
+        case _:
+            return "view"
+
+
+def _other_lines(result: CameraResult) -> str:
+    """What to do about lines that are not the venue's, where there are many."""
+    if not films_a_field(result.camera.pose):
+        return (
+            "; from such a pose no field is filmed (it hangs upside down, or far away): was it written in another "
+            "convention, camera to world or in centimetres?"
+        )
+    overlap = result.overlap
+    if overlap.unexpected < MUCH_UNEXPECTED:
+        return ""
+    return (
+        f"; the network finds {overlap.found:.0%} of the lines, and {overlap.unexpected:.0%} of what it takes for "
+        "lines on the pitch lies beside all of them: if another sport is painted there, list it in the field's "
+        "other_markings"
+    )
+
+
+def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:
+    """Whether the lines contradict the focal length, and the pose with it: either alone may be chance."""
+    sure = result.zoom is not None and is_sure(result.zoom)
+    return sure and result.zoom_shift_m > gate.largest_zoomed_m
+
+
+def zoom_in_words(camera: Camera, zoom: Deviation) -> str:
+    """By how much the focal length is not what the venue says."""
+    focal = camera.intrinsics.focal_length_px
+    by = f"{abs(zoom.value) / focal:.2%} ± {zoom.sigma / focal:.2%}"
+    return f"the lines fit a focal length {by} {'longer' if zoom.value > 0 else 'shorter'} than the venue says"

@@ -1,0 +1,50 @@
+"""How far apart two cameras put the same pixels on the ground, at the marking that is farthest away.
+
+Two poses with their lenses may agree to a pixel everywhere and still disagree by decimetres where the ground is far
+away and seen at a flat angle. A length there says what a focal length in per cent does not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.visibility import VisibleLines
+
+LEAST_SHARE = 0.1
+"""A marking counts of which so much is in view, as a share of that of the marking that is seen most: arcs in the far
+corners are farther than the far touchline, and a metre long."""
+
+
+def far_marking_shift_m(pitch: Field, camera: Camera, other: Camera) -> float | None:
+    """How far apart (m, on the ground) two cameras put the pixels of the farthest marking that `camera` sees.
+
+    The median over its points in view, each on the level plane through it; None if there are none, or if most of
+    their pixels meet the ground nowhere by the pose and lens of `other`.
+    """
+    points = farthest_marking(pitch, camera)
+    if len(points) == 0:
+        return None
+    shift = np.linalg.norm(on_the_ground(other, camera.project(points), points[:, 2]) - points[:, :2], axis=1)
+    median = float(np.median(np.where(np.isfinite(shift), shift, np.inf)))
+    return median if np.isfinite(median) else None
+
+
+def farthest_marking(pitch: Field, camera: Camera) -> Array:
+    """The line points (N, 3) in view of the marking that is farthest from a camera on average."""
+    seen = VisibleLines.from_camera(pitch.line_points(), camera).points
+    away = np.linalg.norm(seen.position - camera.pose.position, axis=1)
+    which, count = np.unique(seen.marking, return_counts=True)
+    long_enough = which[count >= LEAST_SHARE * count.max(initial=0)]
+    farthest = max(long_enough, key=lambda number: float(away[seen.marking == number].mean()), default=None)
+    return seen.position[seen.marking == farthest]
+
+
+def on_the_ground(camera: Camera, pixels: Array, height: Array) -> Array:
+    """Where (N, 2) the rays through pixels (N, 2) meet the planes z = height (N,); NaN where they do not."""
+    ray = camera.rays(pixels)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (height - camera.pose.position[2]) / ray[:, 2]
+        along = np.where(along > 0, along, np.nan)
+        return np.asarray(camera.pose.position[:2] + along[:, None] * ray[:, :2])

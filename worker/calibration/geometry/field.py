@@ -1,0 +1,279 @@
+"""The pitch: its markings by the template of its sport, and the roof they lie on.
+
+Everything here describes the *centres* of lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fields.landmarks import find
+from fields.shapes import WHITE, Arc, Line, Shape
+from fields.template import TURF_M, Template, load
+from worker.calibration.geometry.camera import Array
+
+FOOTBALL = load("football")
+
+ARC_STEP_M = 0.05
+LEAST_HIP_M = 0.5
+"""A ridge ends so far from the goal lines at least: a roof has no upright sides."""
+
+
+@dataclass(frozen=True)
+class Marking:
+    """A painted line of constant width: its name and the polyline (n, 2) of its centre, metres on the pitch.
+
+    `colour`: of the paint, one of `fields.shapes.COLOURS` or `#rrggbb`.
+    """
+
+    name: str
+    centre: Array
+    width: float
+    colour: str = WHITE
+
+    @property
+    def closed(self) -> bool:
+        """Whether the line ends where it begins."""
+        return bool(np.allclose(self.centre[0], self.centre[-1]))
+
+    @property
+    def spot(self) -> bool:
+        """Whether it is a disc: wider than it is long."""
+        return bool(np.linalg.norm(self.centre[-1] - self.centre[0]) < self.width and not self.closed)
+
+
+@dataclass(frozen=True)
+class LinePoints:
+    """Points on the centres of markings, N of them.
+
+    `position` (N, 3) metres; unit `tangent` (N, 3) along the line and unit `normal` (N, 3) across it in the surface;
+    `width` (N,) of the line; `marking` (N,) which of `Field.markings()`; `colour` (N,) of its paint; `spacing` along
+    the line; `uneven_m`: how far a usual ground of the sport is above or below the surface, a standard deviation.
+    """
+
+    position: Array
+    tangent: Array
+    normal: Array
+    width: Array
+    marking: NDArray[np.intp]
+    colour: NDArray[np.str_]
+    spacing: float
+    uneven_m: float = TURF_M
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> LinePoints:
+        return LinePoints(
+            self.position[chosen],
+            self.tangent[chosen],
+            self.normal[chosen],
+            self.width[chosen],
+            self.marking[chosen],
+            self.colour[chosen],
+            self.spacing,
+            self.uneven_m,
+        )
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a sport, a football pitch unless said; `measures`: what else its template leaves open, in metres.
+
+    `ridge`: the paper's p and p', (2, 3), same y and same z; None = flat. `dashed`: the size whose dashes its broken
+    lines have, as many and stretched with them; None = its own. `others`: what else is painted there, of no use.
+    """
+
+    length: float
+    width: float
+    line_width: float = 0.12
+    ridge: Array | None = None
+    template: Template = FOOTBALL
+    measures: Mapping[str, float] = field(default_factory=dict)
+    dashed: Mapping[str, float] | None = None
+    others: Sequence[Shape] = ()
+
+    def resized(self, *, length: float | None = None, width: float | None = None) -> Field:
+        """The same pitch with another length or width, point by point: with as many dashes."""
+        return replace(
+            self,
+            length=self.length if length is None else length,
+            width=self.width if width is None else width,
+            dashed=self._size if self.dashed is None else self.dashed,
+        )
+
+    def dashed_anew(self) -> Field:
+        """The same pitch with the dashes that fit on its lines."""
+        return replace(self, dashed=None)
+
+    def flat(self) -> Field:
+        """The same pitch on a plane."""
+        return replace(self, ridge=None)
+
+    def raised(self, by: float) -> Field:
+        """The same pitch with a ridge that is higher by so many metres; a flat one gets a ridge between hips of 45°."""
+        if self.ridge is not None:
+            return replace(self, ridge=self.ridge + [0.0, 0.0, by])
+        end = max((self.length - self.width) / 2, 0.0)
+        return replace(self, ridge=np.array([[-end, 0.0, by], [end, 0.0, by]]))
+
+    @property
+    def ridge_height(self) -> float:
+        """Of the ridge above the corners; 0 of a flat pitch."""
+        return 0.0 if self.ridge is None else float(self.ridge[0, 2])
+
+    @property
+    def ridge_length(self) -> float:
+        """Between the ends of the ridge; of a flat pitch, of the ridge that `raised` would give it."""
+        ridge = self.raised(0.0).ridge
+        assert ridge is not None
+        return float(abs(ridge[1, 0] - ridge[0, 0]))
+
+    def with_ridge_length(self, length: float) -> Field:
+        """The same pitch with the ends of its ridge so far apart, as far as the pitch has room, around where it was."""
+        raised = self.raised(0.0)
+        assert raised.ridge is not None
+        (start, end) = raised.ridge[np.argsort(raised.ridge[:, 0])]
+        middle = (start[0] + end[0]) / 2
+        half = min(max(length / 2, 0.0), self.length / 2 - abs(middle) - LEAST_HIP_M)
+        return replace(raised, ridge=np.array([[middle - half, *start[1:]], [middle + half, *end[1:]]]))
+
+    def height(self, xy: Array) -> Array:
+        """Height (...) of the surface at (..., 2): the paper's four-plane hip roof; 0 off the pitch."""
+        if self.ridge is None:
+            return np.zeros(xy.shape[:-1])
+        start, end = self.ridge[np.argsort(self.ridge[:, 0])]
+        top, ridge_y = start[2], start[1]
+        half_length, half_width = self.length / 2, self.width / 2
+        x, y = xy[..., 0], xy[..., 1]
+        # Each plane goes through two corners at z = 0 and the ridge (or one of its ends): relative height 0..1.
+        planes = np.stack(
+            [
+                (half_width + y) / (half_width + ridge_y),
+                (half_width - y) / (half_width - ridge_y),
+                (half_length + x) / (half_length + start[0]),
+                (half_length - x) / (half_length - end[0]),
+            ]
+        )
+        return top * np.clip(planes.min(axis=0), 0.0, 1.0)
+
+    def lift(self, xy: Array) -> Array:
+        """Points (..., 2) on the pitch to the surface (..., 3)."""
+        return np.concatenate([xy, self.height(xy)[..., None]], axis=-1)
+
+    def markings(self) -> list[Marking]:
+        """All markings of the template, as centre lines."""
+        return list(self._markings)
+
+    @cached_property
+    def _markings(self) -> list[Marking]:
+        return [_marking(shape) for shape in self.template.markings(self._size, self.dashed)]
+
+    @property
+    def _size(self) -> dict[str, float]:
+        return {"length": self.length, "width": self.width, "line": self.line_width, **self.measures}
+
+    def whole_names(self) -> list[str]:
+        """Of each of the markings the name of what is painted: the same for all dashes of a broken line."""
+        return [self.template.whole(marking.name) for marking in self.markings()]
+
+    def places(self) -> dict[str, Array]:
+        """Where the named points of the template are, (3,) each, on the surface."""
+        return {name: self.lift(np.array(point)) for name, point in self.template.places(self._size).items()}
+
+    def place(self, name: str) -> Array:
+        """The point (3,) that somebody calls so, on the surface. Raises `fields.landmarks.UnknownLandmark`."""
+        return self.lift(np.array(find(name, self.template, self._size)))
+
+    def line_points(self, spacing: float = 0.25) -> LinePoints:
+        """Points every `spacing` metres on the centres of all markings, on the surface, with directions."""
+        if spacing not in self._drawn:
+            markings = self.markings()
+            counts = [fitting(marking.centre, spacing) for marking in markings]
+            self._drawn[spacing] = self._line_points(markings, counts, spacing)
+        return self._drawn[spacing]
+
+    @cached_property
+    def _drawn(self) -> dict[float, LinePoints]:
+        """The line points that have been asked for, by their spacing: dozens of times in a calibration."""
+        return {}
+
+    def other_points(self, spacing: float = 0.25) -> LinePoints | None:
+        """The same of what else is painted there, None where nothing is."""
+        others = [_marking(shape) for shape in self.others]
+        if not others:
+            return None
+        return self._line_points(others, [fitting(marking.centre, spacing) for marking in others], spacing)
+
+    def same_line_points(self, others: LinePoints) -> LinePoints:
+        """The points that are those of the pitch before it was `resized`: as many on each marking, as far along it."""
+        counts: list[int] = np.bincount(others.marking).tolist()
+        return self._line_points(self.markings(), counts, others.spacing)
+
+    def _line_points(self, markings: Sequence[Marking], counts: Sequence[int], spacing: float) -> LinePoints:
+        positions, tangents, widths, index = [], [], [], []
+        for number, (marking, count) in enumerate(zip(markings, counts, strict=True)):
+            xy, along = equal_pieces(marking.centre, count)
+            positions.append(xy)
+            tangents.append(along)
+            widths.append(np.full(len(xy), marking.width))
+            index.append(np.full(len(xy), number))
+        xy, along, which = np.concatenate(positions), np.concatenate(tangents), np.concatenate(index)
+        across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
+        return LinePoints(
+            self.lift(xy),
+            self._in_surface(xy, along),
+            self._in_surface(xy, across),
+            np.concatenate(widths),
+            which,
+            np.array([marking.colour for marking in markings])[which],
+            spacing,
+            self.template.uneven,
+        )
+
+    def _in_surface(self, xy: Array, direction: Array, step: float = 0.01) -> Array:
+        """Unit vectors (N, 3) that follow the surface from xy (N, 2) in horizontal directions (N, 2)."""
+        move = self.lift(xy + step * direction) - self.lift(xy - step * direction)
+        return move / np.linalg.norm(move, axis=-1, keepdims=True)
+
+
+def resample(polyline: Array, spacing: float) -> tuple[Array, Array]:
+    """Points about every `spacing` along a polyline (n, 2), in the middle of equal pieces, and unit tangents there."""
+    return equal_pieces(polyline, fitting(polyline, spacing))
+
+
+def fitting(polyline: Array, spacing: float) -> int:
+    """How many pieces of about `spacing` a polyline (n, 2) has, at least one."""
+    return max(1, round(float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum()) / spacing))
+
+
+def equal_pieces(polyline: Array, count: int) -> tuple[Array, Array]:
+    """The middles (count, 2) of equal pieces of a polyline (n, 2), and unit tangents there."""
+    pieces = np.diff(polyline, axis=0)
+    lengths = np.linalg.norm(pieces, axis=1)
+    reached = np.concatenate([[0.0], np.cumsum(lengths)])
+    at = (np.arange(count) + 0.5) * reached[-1] / count
+    piece = np.clip(np.searchsorted(reached, at, side="right") - 1, 0, len(pieces) - 1)
+    unit = pieces[piece] / lengths[piece, None]
+    return polyline[piece] + (at - reached[piece])[:, None] * unit, unit
+
+
+def _marking(shape: Shape) -> Marking:
+    match shape:
+        case Line():
+            return Marking(shape.name, np.array(shape.points), shape.width, shape.colour)
+        case Arc():
+            count = max(8, int(np.ceil((shape.end - shape.start) * shape.radius / ARC_STEP_M)))
+            angle = np.linspace(shape.start, shape.end, count + 1)
+            around = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+            return Marking(shape.name, shape.centre + around, shape.width, shape.colour)
+        case _:
+            # A spot is a line as wide as itself and next to nothing long.
+            offset = np.array([shape.diameter / 8, 0.0])
+            across = np.array([shape.centre - offset, shape.centre + offset])
+            return Marking(shape.name, across, shape.diameter, shape.colour)

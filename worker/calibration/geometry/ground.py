@@ -1,0 +1,94 @@
+"""The ground as it really is: heights above the model that the finish finds along with the poses.
+
+A pitch swells by centimetres, over metres, and from a low camera that moves a far line by decimetres. All lines on a
+swell move alike, in all cameras, so no number of measurements averages it out: it has to be an unknown of its own.
+Heights are a Gaussian process with a Matérn covariance (Rasmussen and Williams, 2006, section 4.2), held at the nodes
+of a grid and bilinear between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.field import LinePoints
+
+NODE_M = 7.0
+CORRELATION_M = 10.0
+MOST_UNEVEN = 4 / 3
+"""More than that times as usual is not taken for a swell: a ground that may do anything explains any pose."""
+NUGGET = 1e-6
+EVEN_SHARE, EVEN_NODES = 4 / 15, 2.0
+ORDINARY_NODES = 8.0
+
+
+@dataclass(frozen=True)
+class Belief:
+    """How uneven a pitch is thought to be before it is seen, and how many nodes of evidence that is worth."""
+
+    uneven_m: float
+    nodes: float
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Nodes under the markings, K of them.
+
+    `node` (N, 4) and `share` (N, 4): between which nodes each line point lies, and what it takes of each;
+    `precision` (K, K): the inverse covariance of heights that have a standard deviation of 1; `usual_m`: what that is
+    on a ground of this kind.
+    """
+
+    node: NDArray[np.intp]
+    share: Array
+    precision: Array
+    usual_m: float
+
+    @classmethod
+    def under(cls, lines: LinePoints) -> Ground:
+        """The ground that carries some line points."""
+        at = lines.position[:, :2] / NODE_M
+        low = np.floor(at).astype(int)
+        right, up = (at - low).T
+        corners = np.stack([low, low + [1, 0], low + [0, 1], low + [1, 1]], axis=1)
+        share = np.stack([(1 - right) * (1 - up), right * (1 - up), (1 - right) * up, right * up], axis=1)
+        nodes, node = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+        apart = np.sqrt(3) * NODE_M * np.linalg.norm(nodes[:, None] - nodes[None], axis=-1) / CORRELATION_M
+        covariance = (1 + apart) * np.exp(-apart) + NUGGET * np.eye(len(nodes))
+        return cls(node.reshape(-1, 4), share, np.linalg.inv(covariance), lines.uneven_m)
+
+    def __len__(self) -> int:
+        return len(self.precision)
+
+    @property
+    def most_m(self) -> float:
+        """The most uneven that this ground is taken for."""
+        return self.usual_m * MOST_UNEVEN
+
+    @property
+    def even(self) -> Belief:
+        """Finds poses: what a flat ground explains is not owed to swells."""
+        return Belief(self.usual_m * EVEN_SHARE, EVEN_NODES)
+
+    @property
+    def ordinary(self) -> Belief:
+        """Says how sure they are: a few lines that fit a flat ground do not show that it has not sunk as a whole."""
+        return Belief(self.usual_m, ORDINARY_NODES)
+
+    def under_points(self, heights: Array, point: NDArray[np.intp]) -> Array:
+        """Heights (M,) under line points (M,), from those of the nodes (K,)."""
+        return np.asarray(np.sum(self.share[point] * heights[self.node[point]], axis=1))
+
+    def unevenness(self, heights: Array, covariance: Array, believed: float, before: Belief) -> float:
+        """The standard deviation that heights (K,) speak for, known to a covariance (K, K) under a `believed` one.
+
+        `before`: what was thought of it before.
+        MacKay's evidence update (Bayesian Interpolation, 1992): what the data determined counts, the rest does not.
+        """
+        determined = len(self) - np.sum(self.precision * covariance) / believed**2
+        power = heights @ self.precision @ heights
+        uneven = np.sqrt((power + before.nodes * before.uneven_m**2) / (max(determined, 0.0) + before.nodes))
+        return float(uneven)

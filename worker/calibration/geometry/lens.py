@@ -1,0 +1,361 @@
+"""Lenses: OpenCV's two models, what each makes of a ray, and the derivatives of that.
+
+A lens bends a ray, given by its undistorted image coordinates at depth 1 (x right, y down), to distorted ones, and its
+matrix makes pixels of those (pixel centres at integers). The models differ in how they bend alone.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from worker.calibration.geometry.arrays import Array, Plane
+
+LensModel = Literal["opencv", "fisheye"]
+DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+FISHEYE_DISTORTION_LENGTHS = (0, 4)
+WIDEST_FISHEYE_RAD = np.radians(89.0)
+"""How far off its axis a fisheye is used: beyond a right angle there are no image coordinates at depth 1."""
+IN_PIXELS = ("fx", "fy", "cx", "cy")
+LENS_NUMBERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
+"""The numbers of a lens that lines are asked for: fx, with which fy changes in proportion; cx and cy; fy / fx, which
+changes fy alone; the first two coefficients of the distortion."""
+
+
+@dataclass(frozen=True)
+class Lens(ABC):
+    """A lens of one of OpenCV's models.
+
+    `matrix` (3, 3) in pixels, `distortion` in OpenCV's order for the model, `size` (width, height); `sigma`: one
+    standard deviation of its numbers by name (fx, fy, cx, cy in pixels, aspect = fy/fx, k1 ...), of those of which it
+    is known.
+    """
+
+    matrix: Array
+    distortion: Array
+    size: tuple[int, int]
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    model: ClassVar[LensModel]
+    terms: ClassVar[int]
+    """How many coefficients the model has."""
+
+    def distort(self, rays: Array) -> Array:
+        """Undistorted image coordinates at depth 1, (..., 2), to pixels (..., 2); NaN beyond `largest_radius`."""
+        return np.stack(self.distort_planes(rays[..., 0], rays[..., 1]), axis=-1)
+
+    def distort_planes(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
+        """`distort` for columns and rows (...) apart, in their own precision: what large populations take."""
+        xd, yd = self._bent(x, y)
+        (fx, skew, cx), (_, fy, cy) = self.matrix[:2].tolist()
+        return fx * xd + skew * yd + cx, fy * yd + cy
+
+    def slopes(self, rays: Array) -> Array:
+        """The derivative (..., 2, 2) of the pixels of rays (..., 2) by the rays; NaN beyond `largest_radius`."""
+        return self.matrix[:2, :2] @ self._bent_by_ray(rays)
+
+    def slopes_by_numbers(self, rays: Array) -> Array:
+        """The derivative (..., 2, 6) of the pixels of rays (..., 2) by `LENS_NUMBERS`; NaN beyond `largest_radius`."""
+        xd, yd = self._bent(rays[..., 0], rays[..., 1])
+        (fx, _), (_, fy) = self.matrix[:2, :2].tolist()
+        slopes = np.zeros((*rays.shape, len(LENS_NUMBERS)))
+        slopes[..., 0, 0], slopes[..., 1, 0] = xd, fy / fx * yd
+        slopes[..., 0, 1] = slopes[..., 1, 2] = 1.0
+        slopes[..., 1, 3] = fx * yd
+        slopes[..., 4:] = self.matrix[:2, :2] @ self._bent_by_terms(rays)
+        slopes[np.isnan(xd)] = np.nan
+        return slopes
+
+    @abstractmethod
+    def undistort(self, pixels: ArrayLike) -> Array:
+        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2); NaN where the model has no ray."""
+
+    @property
+    @abstractmethod
+    def largest_radius(self) -> float:
+        """Undistorted radius (at depth 1) up to which the model grows.
+
+        Beyond it the polynomial folds back and would put points from far outside the view into the picture.
+        """
+
+    @abstractmethod
+    def _bent(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
+        """Distorted coordinates (...) of rays (...), in their own precision; NaN beyond `largest_radius`."""
+
+    @abstractmethod
+    def _bent_by_ray(self, rays: Array) -> Array:
+        """The derivative (..., 2, 2) of the distorted coordinates of rays (..., 2) by the rays."""
+
+    @abstractmethod
+    def _bent_by_terms(self, rays: Array) -> Array:
+        """The derivative (..., 2, 2) of the distorted coordinates of rays (..., 2) by k1 and k2."""
+
+    @property
+    def focal_length_px(self) -> float:
+        """The horizontal one."""
+        return float(self.matrix[0, 0])
+
+    @property
+    def relative_size(self) -> float:
+        """The longer side of the picture relative to a 4K frame's: what is given in 4K pixels scales by it."""
+        return max(self.size) / 3840
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """The coefficients (`terms`,) of the model in OpenCV's order, absent ones zero."""
+        padded = np.zeros(self.terms)
+        padded[: len(self.distortion)] = self.distortion
+        return padded
+
+    def scaled(self, factor: float) -> Self:
+        """The same lens on a picture resized by `factor`, pixel centres at integers before and after."""
+        width, height = round(self.size[0] * factor), round(self.size[1] * factor)
+        matrix = self.matrix.copy()
+        for axis, ratio in ((0, width / self.size[0]), (1, height / self.size[1])):
+            matrix[axis] *= ratio
+            matrix[axis, 2] = (self.matrix[axis, 2] + 0.5) * ratio - 0.5
+        sigma = {name: value * (factor if name in IN_PIXELS else 1.0) for name, value in self.sigma.items()}
+        return replace(self, matrix=matrix, size=(width, height), sigma=sigma)
+
+    def _within_model(self, rays: Array) -> Array:
+        """Rays (..., 2), NaN beyond `largest_radius`."""
+        beyond = np.sum(rays * rays, axis=-1, keepdims=True) > self.largest_radius**2
+        return np.where(beyond, np.nan, rays)
+
+
+class Intrinsics(Lens):
+    """A lens of OpenCV's calib3d: pinhole with radial, tangential, thin prism and tilt terms (Brown and Conrady).
+
+    `distortion` (`DISTORTION_LENGTHS`): k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y. The formulae are those of
+    OpenCV's documentation of calib3d.
+    """
+
+    model: ClassVar[LensModel] = "opencv"
+    terms: ClassVar[int] = 14
+
+    def undistort(self, pixels: ArrayLike, iterations: int = 20) -> Array:
+        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
+
+        NaN where no ray of the model ends at the pixel.
+        """
+        target = np.asarray(pixels, dtype=float)
+        linear = self.matrix[:2, :2]
+        rays = (target - self.matrix[:2, 2]) @ np.linalg.inv(linear).T
+        rays = self._pulled_back(rays * self._undistorted_scale(np.linalg.norm(rays, axis=-1))[..., None])
+        for _ in range(iterations):
+            jacobian, miss = self.slopes(rays), target - self.distort(rays)
+            determinant = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+            move = np.stack(
+                [
+                    jacobian[..., 1, 1] * miss[..., 0] - jacobian[..., 0, 1] * miss[..., 1],
+                    jacobian[..., 0, 0] * miss[..., 1] - jacobian[..., 1, 0] * miss[..., 0],
+                ],
+                axis=-1,
+            )
+            with np.errstate(divide="ignore", invalid="ignore"):
+                move = move / determinant[..., None]
+            rays = self._pulled_back(rays + move)
+            if np.nanmax(np.abs(move), initial=0.0) < 1e-12:
+                break
+        with np.errstate(invalid="ignore"):
+            off = ~(np.linalg.norm(self.distort(rays) - target, axis=-1) < 1e-3)
+        rays[off] = np.nan
+        return rays
+
+    @cached_property
+    def largest_radius(self) -> float:
+        """Undistorted radius (at depth 1) up to which the radial model grows."""
+        k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8]
+        radii = np.linspace(0.0, 20.0, 20001)
+        r2 = radii**2
+        denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / np.where(denominator > 0, denominator, np.nan)
+        growing = np.diff(radii * radial) > 0
+        return float(radii[-1] if growing.all() else radii[np.argmin(growing)])
+
+    @cached_property
+    def tilt(self) -> Array:
+        """Homography (3, 3) of a tilted sensor (tau_x, tau_y), identity without tilt; as in OpenCV's documentation."""
+        tau_x, tau_y = self.coefficients[12:]
+        if tau_x == 0 and tau_y == 0:
+            return np.eye(3)
+        cx, sx, cy, sy = np.cos(tau_x), np.sin(tau_x), np.cos(tau_y), np.sin(tau_y)
+        rot = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+        return np.array([[rot[2, 2], 0, -rot[0, 2]], [0, rot[2, 2], -rot[1, 2]], [0, 0, 1]]) @ rot
+
+    def _bent(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
+        xd, yd = self._tilted(*self._bent_upright(x, y))
+        beyond = x * x + y * y > self.largest_radius**2
+        return np.where(beyond, np.nan, xd), np.where(beyond, np.nan, yd)
+
+    def _bent_upright(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
+        """Distorted coordinates (...) of rays (...) on a sensor that is not tilted."""
+        k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = self.coefficients[:12].tolist()
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        if k4 or k5 or k6:
+            radial = radial / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        xd = x * radial
+        yd = y * radial
+        if p1 or p2 or s1 or s2 or s3 or s4:
+            xd = xd + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (s1 + s2 * r2)
+            yd = yd + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (s3 + s4 * r2)
+        return xd, yd
+
+    def _tilted(self, xd: Plane, yd: Plane) -> tuple[Plane, Plane]:
+        """Coordinates (...) on the tilted sensor of those (...) on one that is not."""
+        if not self._is_tilted:
+            return xd, yd
+        (a, b, c), (d, e, f), (g, h, i) = self.tilt.tolist()
+        depth = g * xd + h * yd + i
+        return (a * xd + b * yd + c) / depth, (d * xd + e * yd + f) / depth
+
+    def _bent_by_ray(self, rays: Array) -> Array:
+        x, y = np.moveaxis(self._within_model(rays), -1, 0)
+        _, _, p1, p2, _, _, _, _, s1, s2, s3, s4 = self.coefficients[:12].tolist()
+        r2 = x * x + y * y
+        radial, by_r2, _ = self._radial(r2)
+        xd_by_r2, yd_by_r2 = x * by_r2 + s1 + 2 * s2 * r2, y * by_r2 + s3 + 2 * s4 * r2
+        aside = 2 * (p1 * x + p2 * y)
+        slopes = np.stack(
+            [
+                radial + 2 * x * xd_by_r2 + 2 * p1 * y + 6 * p2 * x,
+                2 * y * xd_by_r2 + aside,
+                2 * x * yd_by_r2 + aside,
+                radial + 2 * y * yd_by_r2 + 6 * p1 * y + 2 * p2 * x,
+            ],
+            axis=-1,
+        )
+        return self._on_tilted(x, y, slopes.reshape(*x.shape, 2, 2))
+
+    def _bent_by_terms(self, rays: Array) -> Array:
+        x, y = np.moveaxis(self._within_model(rays), -1, 0)
+        r2 = x * x + y * y
+        _, _, denominator = self._radial(r2)
+        by_k1 = rays * (r2 / denominator)[..., None]
+        return self._on_tilted(x, y, np.stack([by_k1, by_k1 * r2[..., None]], axis=-1))
+
+    def _radial(self, r2: Array) -> tuple[Array, Array, Array]:
+        """Of rays of squared radius `r2` (...): the radial factor, its derivative by `r2`, and its denominator."""
+        k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8].tolist()
+        denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / denominator
+        by_r2 = k1 + r2 * (2 * k2 + r2 * 3 * k3) - radial * (k4 + r2 * (2 * k5 + r2 * 3 * k6))
+        return radial, by_r2 / denominator, denominator
+
+    def _on_tilted(self, x: Array, y: Array, slopes: Array) -> Array:
+        """Slopes (..., 2, n) of distorted coordinates of rays (...) as they are on the tilted sensor."""
+        if not self._is_tilted:
+            return slopes
+        xd, yd = self._bent_upright(x, y)
+        there = np.stack(self._tilted(xd, yd), axis=-1)
+        depth = self.tilt[2, 0] * xd + self.tilt[2, 1] * yd + self.tilt[2, 2]
+        by_upright = (self.tilt[:2, :2] - there[..., None] * self.tilt[2, :2]) / depth[..., None, None]
+        return by_upright @ slopes
+
+    @property
+    def _is_tilted(self) -> bool:
+        return bool(self.coefficients[12:].any())
+
+    def _pulled_back(self, rays: Array) -> Array:
+        """Rays (..., 2) pulled back to where the radial model still grows: Newton must not jump over its end."""
+        radius = np.linalg.norm(rays, axis=-1, keepdims=True)
+        limit = 0.9999 * self.largest_radius
+        return np.where(radius > limit, rays * (limit / np.maximum(radius, limit)), rays)
+
+    def _undistorted_scale(self, distorted_radius: Array) -> Array:
+        """Ratio of undistorted to distorted radius by the radial terms alone: a start for Newton."""
+        radii = np.linspace(1e-6, min(self.largest_radius, 20.0), 4000)
+        radial, _, _ = self._radial(radii**2)
+        return np.interp(distorted_radius, radii * radial, radii) / np.maximum(distorted_radius, 1e-6)
+
+
+class Fisheye(Lens):
+    """A lens of OpenCV's fisheye module: Kannala and Brandt, "A generic camera model", PAMI 2006, with four terms.
+
+    A ray at the angle t off the axis ends at the distance t (1 + k1 t² + k2 t⁴ + k3 t⁶ + k4 t⁸) from the centre, for
+    `matrix` = 1. `distortion` (`FISHEYE_DISTORTION_LENGTHS`) are k1 to k4.
+    """
+
+    model: ClassVar[LensModel] = "fisheye"
+    terms: ClassVar[int] = 4
+
+    def undistort(self, pixels: ArrayLike, iterations: int = 6) -> Array:
+        """Pixels (..., 2) to undistorted image coordinates at depth 1 (..., 2), by Newton's method from a table.
+
+        NaN where no ray of the model ends at the pixel.
+        """
+        linear = self.matrix[:2, :2]
+        rays = (np.asarray(pixels, dtype=float) - self.matrix[:2, 2]) @ np.linalg.inv(linear).T
+        distorted = np.linalg.norm(rays, axis=-1)
+        table = np.linspace(0.0, self._largest_angle, 4000)
+        angle = np.interp(distorted, self._distorted_angle(table), table)
+        for _ in range(iterations):
+            # At its very end the model may stand still.
+            step = (distorted - self._distorted_angle(angle)) / np.maximum(self._angle_slope(angle), 1e-6)
+            angle = np.clip(angle + step, 0.0, self._largest_angle)
+        known = np.abs(distorted - self._distorted_angle(angle)) * linear[0, 0] < 1e-3
+        scale = np.where(distorted > 1e-9, np.tan(angle) / np.maximum(distorted, 1e-9), 1.0)
+        return np.where(known, scale, np.nan)[..., None] * rays
+
+    @cached_property
+    def largest_radius(self) -> float:
+        """Undistorted radius (at depth 1) up to which the model grows; that of `WIDEST_FISHEYE_RAD` at most."""
+        return float(np.tan(self._largest_angle))
+
+    @cached_property
+    def _largest_angle(self) -> float:
+        """Up to which angle (rad) the model grows; `WIDEST_FISHEYE_RAD` at most."""
+        angles = np.linspace(0.0, WIDEST_FISHEYE_RAD, 8901)
+        growing = np.diff(self._distorted_angle(angles)) > 0
+        return float(angles[-1] if growing.all() else angles[np.argmin(growing)])
+
+    def _distorted_angle(self, angle: Plane) -> Plane:
+        k1, k2, k3, k4 = self.coefficients.tolist()
+        t2 = angle * angle
+        return angle * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
+
+    def _angle_slope(self, angle: Array) -> Array:
+        """The derivative of `_distorted_angle`."""
+        k1, k2, k3, k4 = self.coefficients.tolist()
+        t2 = angle * angle
+        return 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
+
+    def _bent(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
+        radius = np.sqrt(x * x + y * y)
+        scale = np.where(radius > self.largest_radius, np.nan, self._scale(radius, np.arctan(radius)))
+        scale = scale.astype(radius.dtype, copy=False)
+        return x * scale, y * scale
+
+    def _scale(self, radius: Plane, angle: Plane) -> Plane:
+        """Ratio (...) of the distorted radius to the undistorted one."""
+        # On the axis it is 1, and this far off it still is.
+        return np.where(radius > 1e-6, self._distorted_angle(angle) / np.maximum(radius, 1e-6), 1)
+
+    def _bent_by_ray(self, rays: Array) -> Array:
+        radius, angle, outwards = self._polar(rays)
+        across = self._scale(radius, angle)[..., None, None]
+        along = (self._angle_slope(angle) / (1 + radius * radius))[..., None, None]
+        return across * np.eye(2) + (along - across) * outwards[..., :, None] * outwards[..., None, :]
+
+    def _bent_by_terms(self, rays: Array) -> Array:
+        _, angle, outwards = self._polar(rays)
+        by_k1 = outwards * (angle * angle * angle)[..., None]
+        return np.stack([by_k1, by_k1 * (angle * angle)[..., None]], axis=-1)
+
+    def _polar(self, rays: Array) -> tuple[Array, Array, Array]:
+        """Of rays (..., 2): the radius (...), the angle (...) off the axis, and the direction (..., 2), 0 on the axis.
+
+        NaN beyond `largest_radius`.
+        """
+        rays = self._within_model(rays)
+        radius = np.linalg.norm(rays, axis=-1)
+        return radius, np.arctan(radius), rays / np.maximum(radius, 1e-12)[..., None]
+
+
+LENSES: Mapping[LensModel, type[Lens]] = {"opencv": Intrinsics, "fisheye": Fisheye}

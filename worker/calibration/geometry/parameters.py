@@ -1,0 +1,200 @@
+"""Numbers that a calibration takes for known and that may be wrong: those of each lens, and of the field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.lens import LENS_NUMBERS, Lens
+
+FIELD_STEP_M = 1e-3
+BOARD_FOCAL, BOARD_ASPECT, BOARD_RADIAL = 3e-4, 2e-4, 5e-4
+"""What the photos of a good board leave uncertain: part of the focal length, ratio of the two, k1 and k2; and of the
+principal point a pixel of a 4K frame."""
+HEAT_FOCAL = 3e-4
+"""What day and night do to a focal length since the photos of the board, part of it: metal grows by 23 millionths a
+kelvin, and summer noon and a winter's night are 13 K to either side of the mean."""
+FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
+"""How far off what is left free may be: a focus ring that was touched, a crown of up to half a metre."""
+FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
+"""Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
+
+
+@dataclass(frozen=True)
+class LensParameter:
+    """A number of the lens of camera number `camera`. `expected`: how far off it may be."""
+
+    camera: int
+    name: str
+    expected: float
+
+    def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
+        """Cameras and pitch with this number changed."""
+        changed = list(cameras)
+        changed[self.camera] = self.changed(changed[self.camera], by)
+        return changed, pitch
+
+    def changed(self, camera: Camera, by: float) -> Camera:
+        """The camera with this number changed."""
+        numbers = lens_numbers(camera.intrinsics)
+        numbers[LENS_NUMBERS.index(self.name)] += by
+        return camera.with_lens(with_lens_numbers(camera.intrinsics, numbers))
+
+
+@dataclass(frozen=True)
+class FieldParameter:
+    """A measure of the field, metres. `expected`: how far off one that was taken with care is; `read` and `write`: of a
+    pitch, and one with another; `shift` (N, 3): how a pitch's line points move, metres per metre.
+    """
+
+    name: str
+    expected: float
+    read: Callable[[Field], float]
+    write: Callable[[Field, float], Field]
+    shift: Array
+
+    @classmethod
+    def of(
+        cls,
+        pitch: Field,
+        name: str,
+        expected: float,
+        read: Callable[[Field], float],
+        write: Callable[[Field, float], Field],
+    ) -> FieldParameter:
+        """A measure of this pitch."""
+        return cls(name, expected, read, write, np.empty((0, 3))).around(pitch, pitch.line_points())
+
+    def around(self, pitch: Field, lines: LinePoints) -> FieldParameter:
+        """The same measure as it moves `lines` of a pitch that has been changed since."""
+        ahead, behind = (
+            self.write(pitch, self.read(pitch) + step).same_line_points(lines).position
+            for step in (FIELD_STEP_M, -FIELD_STEP_M)
+        )
+        return replace(self, shift=(ahead - behind) / (2 * FIELD_STEP_M))
+
+    def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
+        """Cameras and pitch with this measure changed, as far as it can be."""
+        return list(cameras), self.write(pitch, self.read(pitch) + by)
+
+
+Parameter = LensParameter | FieldParameter
+
+
+def lens_numbers(lens: Lens) -> Array:
+    """`LENS_NUMBERS` (6,) of a lens."""
+    (fx, _, cx), (_, fy, cy) = lens.matrix[:2].tolist()
+    k1, k2 = (*lens.distortion.tolist(), 0.0, 0.0)[:2]
+    return np.array([fx, cx, cy, fy / fx, k1, k2])
+
+
+def with_lens_numbers(lens: Lens, numbers: Array) -> Lens:
+    """The lens with other `LENS_NUMBERS` (6,)."""
+    fx, cx, cy, aspect, k1, k2 = numbers.tolist()
+    matrix = np.array([[fx, lens.matrix[0, 1], cx], [0.0, aspect * fx, cy], [0.0, 0.0, 1.0]])
+    distortion = lens.distortion
+    if k1 or k2 or len(distortion):
+        distortion = np.array([k1, k2, *(lens.distortion[2:] if len(distortion) else (0.0, 0.0))])
+    return replace(lens, matrix=matrix, distortion=distortion)
+
+
+def with_lens_changed(camera: Camera, changes: Array) -> Camera:
+    """The camera with `LENS_NUMBERS` changed by (6,)."""
+    return camera.with_lens(with_lens_numbers(camera.intrinsics, lens_numbers(camera.intrinsics) + changes))
+
+
+def lens_parameters(cameras: Sequence[Camera]) -> list[LensParameter]:
+    """The numbers of each lens, as uncertain as the lens says (`Lens.sigma`), or as a good board leaves them, and
+    the focal length as heat moves it besides."""
+    return [
+        replace(p, expected=hypot(p.expected, HEAT_FOCAL * cameras[p.camera].intrinsics.focal_length_px))
+        if p.name == "focal_length_px"
+        else p
+        for p in lens_parameters_without_heat(cameras)
+    ]
+
+
+def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParameter]:
+    """The same on the day of the photos of the board."""
+    found: list[LensParameter] = []
+    for number, camera in enumerate(cameras):
+        lens, known = camera.intrinsics, camera.intrinsics.sigma
+        pixel = lens.relative_size
+        expected = {
+            "focal_length_px": _focal_sigma(lens),
+            "principal_point_x_px": known.get("cx", pixel),
+            "principal_point_y_px": known.get("cy", pixel),
+            "aspect": known.get("aspect", BOARD_ASPECT),
+            "k1": known.get("k1", BOARD_RADIAL),
+            "k2": known.get("k2", BOARD_RADIAL),
+        }
+        found += [LensParameter(number, name, expected[name]) for name in LENS_NUMBERS]
+    return found
+
+
+def _focal_sigma(lens: Lens) -> float:
+    """Of fx, with which fy changes: by what is known of either, the worse of both."""
+    fx, fy = float(lens.matrix[0, 0]), float(lens.matrix[1, 1])
+    known = {"fx": 1.0, "fy": fx / fy}
+    return max(
+        (lens.sigma[name] * scale for name, scale in known.items() if name in lens.sigma), default=BOARD_FOCAL * fx
+    )
+
+
+def field_parameters(pitch: Field) -> list[FieldParameter]:
+    """What is measured once when a venue is set up."""
+    return [
+        _ridge_height(pitch, 0.02),
+        _length(pitch, 0.03),
+        _width(pitch, 0.03),
+    ]
+
+
+def with_focal_length(camera: Camera, longer_px: float) -> Camera:
+    """The camera with a focal length that is so much longer."""
+    return with_lens_changed(camera, longer_px * np.eye(len(LENS_NUMBERS))[0])
+
+
+def free_focal_lengths(cameras: Sequence[Camera]) -> list[LensParameter]:
+    """The focal length of each camera, to be found along with its pose."""
+    lengths = [p for p in lens_parameters(cameras) if p.name == "focal_length_px"]
+    return [
+        replace(p, expected=FREE_FOCAL_LENGTH * camera.intrinsics.focal_length_px)
+        for p, camera in zip(lengths, cameras, strict=True)
+    ]
+
+
+def free_ridge(pitch: Field) -> list[FieldParameter]:
+    """The height of the ridge, to be found along with the poses."""
+    return [_ridge_height(pitch, FREE_RIDGE_M)]
+
+
+def free_field(pitch: Field) -> list[FieldParameter]:
+    """Length, width and height of a field of which next to nothing is known."""
+    return [_length(pitch, FREE_LENGTH_M), _width(pitch, FREE_WIDTH_M), _ridge_height(pitch, FREE_RIDGE_M)]
+
+
+def _ridge_height(pitch: Field, expected: float) -> FieldParameter:
+    return FieldParameter.of(
+        pitch,
+        "ridge_height_m",
+        expected,
+        lambda one: one.ridge_height,
+        lambda one, now: one.raised(now - one.ridge_height),
+    )
+
+
+def _length(pitch: Field, expected: float) -> FieldParameter:
+    """Of the pitch; its ridge keeps its own."""
+    return FieldParameter.of(
+        pitch, "length_m", expected, lambda one: one.length, lambda one, now: one.resized(length=now)
+    )
+
+
+def _width(pitch: Field, expected: float) -> FieldParameter:
+    return FieldParameter.of(pitch, "width_m", expected, lambda one: one.width, lambda one, now: one.resized(width=now))

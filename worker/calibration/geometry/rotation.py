@@ -1,0 +1,57 @@
+"""Rotations: vectors (axis times angle, rad) and matrices, many at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from worker.calibration.geometry.arrays import Array
+
+
+def rotation_matrices(vectors: ArrayLike) -> Array:
+    """Rodrigues: rotation vectors (..., 3) in radians to matrices (..., 3, 3)."""
+    v = np.asarray(vectors, dtype=float)
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    cross = cross_matrices(v)
+    # sin(a)/a and (1-cos(a))/a², both finite at a = 0; np.sinc(x) is sin(pi x)/(pi x).
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    return np.eye(3) + a * cross + b * (cross @ cross)
+
+
+def rotation_vectors(matrices: ArrayLike) -> Array:
+    """Inverse Rodrigues: matrices (..., 3, 3) to vectors (..., 3) of length 0..pi.
+
+    Goes through the unit quaternion of largest component, which stays exact near 0 and near pi.
+    """
+    m = np.asarray(matrices, dtype=float)
+    trace = np.trace(m, axis1=-2, axis2=-1)
+    # Four times the outer product of the quaternion (w, x, y, z) with itself; its best-conditioned row is taken.
+    q = np.empty((*m.shape[:-2], 4, 4))
+    q[..., 0, 0] = 1 + trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q[..., i + 1, i + 1] = 1 + 2 * m[..., i, i] - trace
+        q[..., 0, i + 1] = q[..., i + 1, 0] = m[..., k, j] - m[..., j, k]
+        q[..., j + 1, k + 1] = q[..., k + 1, j + 1] = m[..., k, j] + m[..., j, k]
+    best = np.argmax(np.diagonal(q, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(q, best[..., None, None], axis=-2)[..., 0, :]
+    row = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    row = np.where(row[..., :1] < 0, -row, row)
+    sine = np.linalg.norm(row[..., 1:], axis=-1, keepdims=True)
+    half = np.arctan2(sine, row[..., :1])
+    # half / sin(half) -> 1 for small angles.
+    return 2 * row[..., 1:] * np.where(sine > 1e-12, half / np.maximum(sine, 1e-300), 1.0)
+
+
+def cross_matrices(vectors: Array) -> Array:
+    """Matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors.shape, 3)
+
+
+def rotation_angles_deg(a: ArrayLike, b: ArrayLike) -> Array:
+    """Angle in degrees of the rotation between rotation vectors (..., 3) and (..., 3)."""
+    relative = rotation_matrices(a) @ np.swapaxes(rotation_matrices(b), -1, -2)
+    return np.degrees(np.linalg.norm(rotation_vectors(relative), axis=-1))

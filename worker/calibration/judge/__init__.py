@@ -1,1 +1,0 @@
-"""What a result is worth, measured without ground truth, and the gate before it is taken."""

@@ -1,0 +1,134 @@
+"""As many free numbers of a lens as clicks can justify, and what freeing them is worth.
+
+A lens measured badly and a wrong label can pass for each other. So a lens is touched only where the fit's cost falls by
+what is very strong evidence, and clicks left out of it are foretold better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
+from worker.calibration.geometry.lens import Lens
+from worker.calibration.onboarding.point_fit import STRONG, PointFit, fit, refit
+
+LENS_LADDER: tuple[tuple[str, ...], ...] = (
+    ("focal length",),
+    ("focal length", "k1", "k2"),
+    ("focal length", "centre x", "centre y", "k1", "k2"),
+)
+FEWEST_SPARE = 6
+"""Coordinates beyond the numbers of a fit without which its lens is not touched."""
+FOLDS = 10
+SQUARE_WITHIN = 0.02
+"""Pixels this near to square are square: a board that says otherwise by less was misread."""
+OF_THE_MATRIX = ("fx", "fy", "aspect", "cx", "cy")
+
+
+@dataclass(frozen=True)
+class LensGain:
+    """What freeing numbers of the lens is worth: the fits `before` and `after`, and how well each foretells clicks.
+
+    `left_out_px`: rms of clicks where a fit to the others puts them.
+    """
+
+    before: PointFit
+    after: PointFit
+    left_out_before_px: float
+    left_out_px: float
+
+    @property
+    def evidence(self) -> float:
+        """By how much the cost falls (a difference of BIC: above 10 is very strong evidence)."""
+        return self.before.cost - self.after.cost
+
+    @property
+    def sigma(self) -> Mapping[str, float]:
+        """One standard deviation per free number; of the focal length and of the centre in pixels."""
+        deviations = np.sqrt(np.maximum(np.diag(self.after.covariance)[POSE_NUMBERS:], 0.0))
+        # Its logarithm is what was fitted.
+        focal = self.after.camera.intrinsics.focal_length_px
+        scale = [focal if name == "focal length" else 1.0 for name in self.after.free]
+        return {name: float(s * k) for name, s, k in zip(self.after.free, deviations, scale, strict=True)}
+
+    @property
+    def found(self) -> PointFit:
+        """The fit `after`, whose lens has the `sigma` of what was freed and of what it keeps of the lens before."""
+        lens, told = self.after.camera.intrinsics, dict(self.sigma)
+        names = {"centre x": "cx", "centre y": "cy"}
+        one = told.pop("focal length")
+        both = {"fx": one, "fy": one * float(lens.matrix[1, 1] / lens.matrix[0, 0])}
+        known = {**lens.sigma, **both, **{names.get(name, name): value for name, value in told.items()}}
+        return replace(self.after, camera=self.after.camera.with_lens(replace(lens, sigma=known)))
+
+
+def free_lens(found: PointFit) -> LensGain | None:
+    """What the fit gains from as many free numbers of its lens as its clicks justify; None: they justify none."""
+    lens = found.camera.intrinsics
+    believed = int((~found.doubted).sum())
+    rungs = [free for free in LENS_LADDER if 2 * believed >= POSE_NUMBERS + len(free) + FEWEST_SPARE]
+    tried = [
+        fit(found.clicks, found.camera.with_lens(two_terms(lens)) if "k1" in free else found.camera, free)
+        for free in rungs
+    ]
+    best = min(tried, key=lambda candidate: candidate.cost, default=found)
+    if best.cost > found.cost - STRONG:
+        return None
+    gain = LensGain(found, best, left_out_px(found), left_out_px(best))
+    return gain if gain.left_out_px < gain.left_out_before_px else None
+
+
+def left_out_px(found: PointFit) -> float:
+    """Rms of believed clicks, each where a fit to the others puts it."""
+    believed = found.clicks[~found.doubted]
+    squared = []
+    for number in range(min(FOLDS, len(believed))):
+        out = np.arange(len(believed)) % min(FOLDS, len(believed)) == number
+        without = refit(found, believed[~out])
+        off = without.camera.project(believed.world[out]) - believed.pixel[out]
+        squared.append(np.sum(off**2, axis=1))
+    return float(np.sqrt(np.nanmean(np.concatenate(squared)))) if squared else float("inf")
+
+
+def two_terms(lens: Lens) -> Lens:
+    """The lens of the same kind with k1 and k2 alone, and square pixels, that comes nearest to `lens`.
+
+    How well the matrix is known stays; k1 and k2 are others, of which nothing is known yet.
+    """
+    matrix = lens.matrix.copy()
+    matrix[0, 1] = 0.0
+    if abs(matrix[1, 1] / matrix[0, 0] - 1) < SQUARE_WITHIN:
+        matrix[0, 0] = matrix[1, 1] = np.sqrt(matrix[0, 0] * matrix[1, 1])
+    farthest = np.nanmax(np.linalg.norm(lens.undistort(_border(lens)), axis=1))
+    radius = np.linspace(0.0, farthest, 50)[1:-1]
+    across = np.stack([radius, np.zeros_like(radius)], axis=1)
+    plain = type(lens)(np.eye(3), np.zeros(0), lens.size)
+    bent = type(lens)(np.eye(3), _radial_only(lens), lens.size).distort(across)[:, 0]
+    straight = plain.distort(across)[:, 0]
+    terms = np.stack([straight**3, straight**5], axis=1)
+    (k1, k2), *_ = np.linalg.lstsq(terms, bent - straight, rcond=None)
+    distortion = np.zeros(4 if lens.model == "fisheye" else 5)
+    distortion[:2] = k1, k2
+    sigma = {name: value for name, value in lens.sigma.items() if name in OF_THE_MATRIX}
+    return type(lens)(matrix, distortion, lens.size, sigma)
+
+
+def _radial_only(lens: Lens) -> Array:
+    """The distortion of a lens without what is not the same all around its axis."""
+    distortion = np.array(lens.distortion, dtype=float)
+    if lens.model == "opencv":
+        distortion[2:4] = 0.0
+        distortion[8:] = 0.0
+    return distortion
+
+
+def _border(lens: Lens) -> Array:
+    """Pixels (M, 2) along the border of the picture."""
+    width, height = lens.size
+    x, y = np.linspace(0, width - 1, 20), np.linspace(0, height - 1, 20)
+    sides = [(x, 0 * x), (x, 0 * x + height - 1), (0 * y, y), (0 * y + width - 1, y)]
+    return np.concatenate([np.stack(side, axis=1) for side in sides])

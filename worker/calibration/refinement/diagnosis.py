@@ -1,0 +1,62 @@
+"""What a calibration says of the numbers it was given: a lens or a field that the lines contradict, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from worker.calibration.refinement.uncertainty import Deviation
+
+SURE = 3.0
+"""A number is suspected when it is off by this many of the estimate's sigma..."""
+NOTABLE = 3.0
+"""...and by this many times what is left after a good calibration."""
+MORE_OR_LESS = {
+    "focal_length_px": ("a focal length", "px longer", "px shorter"),
+    "principal_point_x_px": ("a principal point", "px farther right", "px farther left"),
+    "principal_point_y_px": ("a principal point", "px lower", "px higher"),
+    "aspect": ("a ratio of vertical to horizontal focal length", "larger", "smaller"),
+    "k1": ("a first radial coefficient", "larger", "smaller"),
+    "k2": ("a second radial coefficient", "larger", "smaller"),
+    "ridge_height_m": ("a ridge", "m higher", "m lower"),
+    "length_m": ("a pitch", "m longer", "m shorter"),
+    "width_m": ("a pitch", "m wider", "m narrower"),
+}
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """A number of a camera's lens, or of the field (`camera` None), that seems wrong by `deviation` ± `sigma`.
+
+    `moves_m`: of a number of the field, how far each camera's position would move (m) with the field put right, by id.
+    """
+
+    camera: str | None
+    quantity: str
+    deviation: float
+    sigma: float
+    detail: str
+    moves_m: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+
+
+def find_suspicions(deviations: Sequence[Deviation]) -> list[Suspicion]:
+    """What the lines contradict, each with its numbers and what to do."""
+    return [
+        Suspicion(d.camera, d.name, d.value, d.sigma, _detail(d), moves_m=d.moves_m) for d in deviations if is_sure(d)
+    ]
+
+
+def is_sure(deviation: Deviation) -> bool:
+    """Whether the lines contradict a number that was given."""
+    return abs(deviation.value) > max(SURE * deviation.sigma, NOTABLE * deviation.expected)
+
+
+def _detail(found: Deviation) -> str:
+    what, more, less = MORE_OR_LESS[found.name]
+    by = f"{abs(found.value):.3g} ± {found.sigma:.2g} {more if found.value > 0 else less}"
+    if found.camera is None:
+        return f"the lines fit best on {what} {by} than the venue says; measure it again"
+    return (
+        f"the lines of camera {found.camera} fit best with {what} {by} than the venue says; calibrate its lens again, "
+        "or check whether zoom, focus or resolution have changed"
+    )

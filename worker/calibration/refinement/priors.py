@@ -1,0 +1,254 @@
+"""What is believed of cameras before tonight's lines are asked: movement, lenses, field, and what is remembered.
+
+Dense unknowns x of the least squares (poses of all views, numbers of lenses and field) are sums of independent errors
+z: x = `mixing` z (docs/model.md, 5). A camera without a memory has two: how far it moved since its pose was stored,
+and its lens. One with a memory has a mount that stands where it was put, wind around it in every view, moves of the
+mount before the recent nights and before tonight, a lens, and heat or a zoom ring between one view and the next. The
+stored pose of the last answer has no part in it: it was found with the same lens, and would confirm it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, change_between
+from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.parameters import (
+    HEAT_FOCAL,
+    FieldParameter,
+    LensParameter,
+    Parameter,
+    field_parameters,
+    lens_numbers,
+    lens_parameters,
+    lens_parameters_without_heat,
+)
+from worker.calibration.memory.camera_memory import WIND, CameraMemory
+from worker.calibration.refinement.estimate import PRIOR_M, PRIOR_RAD, Estimate
+from worker.calibration.refinement.unknowns import Unknowns
+from worker.calibration.refinement.variance_components import Group
+
+MOVED_RAD, MOVED_M = 0.01, 0.1
+"""How far a camera that has moved is expected to be from where it was, per axis, ..."""
+MOVEMENT_SCALES: Array = 0.3 * 2.0 ** np.arange(7.0)
+"""...times one of these: wind and heat move every camera a little."""
+FOCAL_SCALES: Array = 2.0 ** np.arange(8.0)
+"""A focal length is off by what is expected of it, or by so many times more; never by less: lines that fit say little
+of it. A zoom ring moves it by far more than that, ..."""
+LENS_SCALES: Array = 2.0 ** np.arange(6.0)
+"""... and nothing moves the rest of a lens so far."""
+FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
+"""A measure of the field may have been taken better than expected, or worse."""
+LEAST_WIND = 1 / 3
+"""Of that is left in the mean of many nights: some of it is the season and not the wind."""
+TOUCHED_SCALES: Array = np.array([[s] * 6 for s in (0.01, 1.0, 4.0, 16.0)] + [[s] * 3 + [0.1] * 3 for s in (4.0, 16.0)])
+"""A mount stays as it is, or somebody touched it: it then moves by `MOVED_RAD` and `MOVED_M` times one of these, or is
+only turned."""
+ZOOM_SCALES: Array = np.array([1.0, 4.0, 16.0, 64.0])
+"""Heat moves a focal length by `HEAT_FOCAL` from one view to the next, a zoom ring by so many times more."""
+AIMED_ANEW_RAD = 1.0
+"""How an earlier epoch was turned says nothing of how the camera is turned now."""
+MOVED = np.array([MOVED_RAD] * 3 + [MOVED_M] * 3)
+FREE = np.array([PRIOR_RAD] * 3 + [PRIOR_M] * 3)
+ONCE: Array = np.ones(1)
+"""The scale of what is known well enough."""
+
+
+@dataclass(frozen=True)
+class Priors:
+    """`mixing` (D, A) and `blocks` of A independent errors; `unknowns` of all views.
+
+    `movements` (W,): which of the errors are movements of a camera, and `free` (W,) how far it may have moved if
+    nothing is known of it; `changes`: by camera with a memory, see `changes_of`.
+    """
+
+    unknowns: Unknowns
+    mixing: Array
+    blocks: list[list[Group]]
+    movements: NDArray[np.intp]
+    free: Array
+    changes: dict[str, NDArray[np.intp]]
+
+    def changes_of(self, camera: str) -> NDArray[np.intp]:
+        """Which of the errors are changes of a camera's focal length since the first nights of its memory."""
+        return self.changes[camera]
+
+    def lens_tonight(self, number: int) -> Array:
+        """Which errors (6, A) make up how far the lens of camera `number` is from the one it is taken to have."""
+        first = POSE_NUMBERS * self.unknowns.views
+        rows = np.zeros((len(LENS_NUMBERS), self.mixing.shape[1]))
+        tonight = {number, _heat_number(self.unknowns.views, number)}
+        for at, parameter in enumerate(self.unknowns.parameters, first):
+            if isinstance(parameter, LensParameter) and parameter.camera in tonight:
+                rows[LENS_NUMBERS.index(parameter.name)] += self.mixing[at]
+        return rows
+
+
+def build_priors(
+    here: Estimate, stored: Sequence[Camera], memories: Sequence[CameraMemory | None], solved: Unknowns
+) -> Priors:
+    """What is believed of the cameras of an estimate, found with `solved` unknown, beside where they were `stored`."""
+    errors = _Errors(here, memories, solved)
+    errors.add_solved(here.values)
+    for number, (before, memory) in enumerate(zip(stored, memories, strict=True)):
+        if memory is None:
+            errors.add_camera(number, before)
+        else:
+            errors.add_remembered(number, memory)
+    errors.add_field()
+    return errors.believed()
+
+
+class _Errors:
+    """Independent errors as they are added: their columns (D,) of `mixing`, and the blocks of groups they are in."""
+
+    def __init__(self, here: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> None:
+        self._cameras, self._solved = here.cameras, solved
+        remembered = [number for number, memory in enumerate(memories) if memory for _ in memory.epochs]
+        self._owner_of = [*range(len(here.cameras)), *remembered]
+        aged = {number for number, memory in enumerate(memories) if memory}
+        self._unknowns = _unknowns(here, self._owner_of, aged, solved)
+        self._places = {
+            (parameter.camera, parameter.name): at
+            for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views)
+            if isinstance(parameter, LensParameter)
+        }
+        self._columns: list[Array] = []
+        self._blocks: list[list[Group]] = []
+        self._movements: list[Group] = []
+        self._changes: dict[str, NDArray[np.intp]] = {}
+
+    def believed(self) -> Priors:
+        """All of them."""
+        moved = np.concatenate([group.which for group in self._movements])
+        free = np.tile(FREE, len(moved) // POSE_NUMBERS)
+        return Priors(self._unknowns, np.stack(self._columns, axis=1), self._blocks, moved, free, self._changes)
+
+    def add_solved(self, values: Array) -> None:
+        """What the finish has found along with the poses: it stands at `values` (E,) from what was given."""
+        first = POSE_NUMBERS * self._unknowns.views
+        for at, (parameter, value) in enumerate(zip(self._solved.parameters, values.tolist(), strict=True), first):
+            self._blocks.append([self._number([at], parameter.expected, ONCE, mean=-value)])
+
+    def add_field(self) -> None:
+        """The measures of the field that were not solved for."""
+        found = {parameter.name for parameter in self._solved.parameters}
+        for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views):
+            if isinstance(parameter, FieldParameter) and parameter.name not in found:
+                self._blocks.append([self._number([at], parameter.expected, FIELD_SCALES)])
+
+    def add_camera(self, number: int, before: Camera) -> None:
+        """A camera without a memory: it has moved since it was where it was stored `before`, and has a lens."""
+        moved = self._move([number], MOVED, MOVEMENT_SCALES, change_between(self._cameras[number], before))
+        self._blocks.append([moved, *self._lens(number, np.zeros(len(LENS_NUMBERS)))])
+
+    def add_remembered(self, number: int, memory: CameraMemory) -> None:
+        """A camera with a memory: its mount and lens, and what has happened between the times of its views."""
+        camera = self._cameras[number]
+        tonight, anchor, *others = (view for view, owner in enumerate(self._owner_of) if owner == number)
+        recent, earlier = (others[:1], others[1:]) if memory.recent else ([], others)
+
+        told = lens_numbers(memory.origin.intrinsics) - lens_numbers(camera.intrinsics)
+        mount = self._move([tonight, anchor, *others], MOVED, MOVEMENT_SCALES, change_between(camera, memory.origin))
+        self._blocks.append([mount, *self._lens(number, told)])
+        self._blocks.append([self._heat([anchor, tonight, *recent], ONCE)])
+        zoomed = [self._since([tonight, *recent])] if recent else []
+        zoomed.append(self._since([tonight]))
+        self._changes[camera.id] = np.concatenate([group.which for group in zoomed])
+        for view, epoch in zip((anchor, *others), memory.epochs, strict=True):
+            wind = WIND * max(epoch.jobs**-0.5, LEAST_WIND)
+            if view in earlier:
+                wind = np.concatenate([[AIMED_ANEW_RAD] * 3, wind[3:]])
+                self._blocks.append([self._heat([view], ZOOM_SCALES)])
+            self._blocks.append([self._move([view], wind, ONCE, change_between(epoch.camera, camera))])
+        self._blocks.append([self._move([tonight], WIND, ONCE, np.zeros(POSE_NUMBERS))])
+
+    def _since(self, views: Sequence[int]) -> Group:
+        """What happened before these views of a camera and holds in all of them: a touch, or a zoom; gives the zoom."""
+        touched = self._move(views, MOVED, TOUCHED_SCALES, np.zeros(POSE_NUMBERS))
+        zoomed = self._heat(views, ZOOM_SCALES)
+        self._blocks.append([touched, zoomed])
+        return zoomed
+
+    def _move(self, views: Sequence[int], expected: Array, scales: Array, mean: Array) -> Group:
+        """A movement (6,) that some views share."""
+        columns = np.zeros((self._unknowns.dense, POSE_NUMBERS))
+        for view in views:
+            columns[self._unknowns.pose(view)] = np.eye(POSE_NUMBERS)
+        self._movements.append(self._group(columns, expected, mean, scales))
+        return self._movements[-1]
+
+    def _heat(self, views: Sequence[int], scales: Array) -> Group:
+        """A change of the focal length that some views share, of the size of what heat does times the scale."""
+        focal = self._cameras[self._owner_of[views[0]]].intrinsics.focal_length_px
+        places = [self._places[_heat_number(self._unknowns.views, view), "focal_length_px"] for view in views]
+        return self._number(places, HEAT_FOCAL * focal, scales)
+
+    def _lens(self, number: int, mean: Array) -> list[Group]:
+        """The focal length of a lens, and the rest of it, of which `mean` (6,) is expected: groups of their own."""
+        known = [
+            (self._places[number, p.name], p.expected, mean[LENS_NUMBERS.index(p.name)], p.name == "focal_length_px")
+            for p in self._unknowns.parameters
+            if isinstance(p, LensParameter) and p.camera == number and not self._is_solved(p)
+        ]
+        groups = []
+        for of_focal, scales in ((True, FOCAL_SCALES), (False, LENS_SCALES)):
+            its = [(at, expected, value) for at, expected, value, focal in known if focal == of_focal]
+            if its:
+                places, expected, means = zip(*its, strict=True)
+                columns = np.eye(self._unknowns.dense)[:, list(places)]
+                groups.append(self._group(columns, np.array(expected), np.array(means), scales))
+        return groups
+
+    def _is_solved(self, parameter: LensParameter) -> bool:
+        return any(
+            isinstance(p, LensParameter) and (p.camera, p.name) == (parameter.camera, parameter.name)
+            for p in self._solved.parameters
+        )
+
+    def _number(self, places: Sequence[int], expected: float, scales: Array, mean: float = 0.0) -> Group:
+        """An error that changes some numbers alike."""
+        column = np.zeros((self._unknowns.dense, 1))
+        column[list(places)] = 1.0
+        return self._group(column, np.array([expected]), np.array([mean]), scales)
+
+    def _group(self, columns: Array, expected: Array, mean: Array, scales: Array) -> Group:
+        """A group of errors with these columns (D, n) of the mixing; it is not yet in a block."""
+        which = len(self._columns) + np.arange(columns.shape[1])
+        self._columns.extend(columns.T)
+        return Group(which, expected, mean, scales)
+
+
+def _unknowns(here: Estimate, owner_of: Sequence[int], aged: Collection[int], solved: Unknowns) -> Unknowns:
+    """Everything that may be off: of all views, each of which is of the camera `owner_of` says.
+
+    The focal length of a camera that is remembered (`aged`) has what heat does in a number of each view.
+    """
+    views = len(owner_of)
+    known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
+    fresh, without_heat = lens_parameters(here.cameras), lens_parameters_without_heat(here.cameras)
+    lenses = [b if b.camera in aged else a for a, b in zip(fresh, without_heat, strict=True)]
+    suspects: list[Parameter] = [*lenses, *field_parameters(here.pitch)]
+    heats = [
+        LensParameter(
+            _heat_number(views, view), "focal_length_px", HEAT_FOCAL * here.cameras[owner].intrinsics.focal_length_px
+        )
+        for view, owner in enumerate(owner_of)
+        if owner in aged
+    ]
+    return Unknowns(
+        views,
+        [*solved.parameters, *(p for p in suspects if (getattr(p, "camera", None), p.name) not in known), *heats],
+        solved.ground,
+        [(owner, _heat_number(views, view)) for view, owner in enumerate(owner_of)],
+    ).around(here.pitch, here.lines)
+
+
+def _heat_number(views: int, view: int) -> int:
+    """The `camera` number of the parameter that is the heat of a view."""
+    return views + view

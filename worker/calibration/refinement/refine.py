@@ -1,0 +1,345 @@
+"""The finish: all cameras at once onto the measured lines, by a robust Gauss-Newton, and how sure that is.
+
+Found with the poses: how the ground swells, and whatever number of lens or field is left free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.evidence import Evidence, evidence_of
+from worker.calibration.detection.exclusions import left_out
+from worker.calibration.detection.line_measurement import LineProfiles, Measurements
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.parameters import Parameter, field_parameters
+from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
+from worker.calibration.memory.repainted_markings import find_repainted_markings
+from worker.calibration.refinement.anderson_mixing import MixedSteps
+from worker.calibration.refinement.diagnosis import is_sure
+from worker.calibration.refinement.estimate import Estimate, GaussNewtonStep, gauss_newton_step
+from worker.calibration.refinement.least_squares import misfit_px
+from worker.calibration.refinement.uncertainty import Deviation, RefinedPoses, estimate_uncertainty
+from worker.calibration.refinement.unknowns import Unknowns
+from worker.calibration.robust import huber_weights, tukey_weights
+
+SEARCH_PX = (14.0, 8.0, 5.0)
+"""How far from where the pose expects it a line is looked for, round by round, in pixels of a 4K frame."""
+LAST_SEARCH_PX = 5.0
+"""In the last rounds, which go on until the cameras stand still. Wide enough that it is the robust weights which leave
+out a line point, and not the end of the search, which moves with the cameras."""
+SPARE_PX = 3.0
+"""So much farther than it is asked to look a reading of a frame reaches, so that it is good for more than one pose."""
+EVALUATION_SEARCH_PX = 8.0
+MOST_STEPS = 4
+"""Of a coarse round."""
+MOST_READINGS, MOST_LAST_STEPS = 6, 12
+"""How often the frames are read again in the last rounds, and how many steps each reading is good for."""
+MISFIT_FLATTENS_PX = 0.3
+"""Error that nothing explains at which the ground is taken for half as uneven as its heights say."""
+SETTLED_M = 2e-4
+"""Cameras that a step moves less than this are where these measurements lead."""
+ARRIVED_M, NEARER, PATIENCE = 5e-5, 0.1, 3
+"""The last steps end when cameras move less than this, or than such a part of the first step on the same reading, or
+when so many steps were no shorter than one before: a line point that fits two shifts alike may go to and fro."""
+READ_ALIKE_M, LEAST_NEARER = 1e-4, 0.2
+"""Cameras that the next reading of the frames would move less than this have arrived. Each moves them by about the same
+part of what the one before did, and by no less than this part of it."""
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What a finish looks at: per camera the `channels` of its frame and `responses` (H, W), the segmentation 0..1."""
+
+    channels: Sequence[Channels]
+    responses: Sequence[NDArray[np.float32]]
+
+    def of(self, numbers: Sequence[int]) -> Observations:
+        """That of some of the cameras."""
+        return Observations([self.channels[n] for n in numbers], [self.responses[n] for n in numbers])
+
+    def reader(self) -> LineReader:
+        """What measures the lines in it."""
+        return LineReader(self)
+
+
+class LineReader:
+    """Measures the lines of several cameras around any poses; reads a frame again only where it has to."""
+
+    def __init__(self, sight: Observations, read: Mapping[int, LineProfiles] = MappingProxyType({})) -> None:
+        self._sight = sight
+        self._read = dict(read)
+
+    def of(self, numbers: Sequence[int]) -> LineReader:
+        """A reader for some of the cameras, with what has been read of them."""
+        read = {at: self._read[n] for at, n in enumerate(numbers) if n in self._read}
+        return LineReader(self._sight.of(numbers), read)
+
+    def measure(self, lines: LinePoints, cameras: Sequence[Camera], search_px: float) -> list[Measurements]:
+        """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
+        measured = []
+        for number, camera in enumerate(cameras):
+            search = search_px * camera.intrinsics.relative_size
+            profiles = self._read.get(number)
+            if profiles is None or not profiles.cover(camera, lines, search):
+                channels, response = self._sight.channels[number], self._sight.responses[number]
+                profiles = LineProfiles(lines, camera, channels, response, search + SPARE_PX)
+                self._read[number] = profiles
+            measured.append(profiles.measure(camera, lines, search))
+        return measured
+
+    def evidence(self, pitch: Field, lines: LinePoints, cameras: Sequence[Camera]) -> list[Evidence]:
+        """How much of the lines the frames show where the cameras put them."""
+        return [
+            evidence_of(lines, camera, channels, response, left_out(pitch, camera))
+            for camera, channels, response in zip(cameras, self._sight.channels, self._sight.responses, strict=True)
+        ]
+
+    def read_anew(self) -> None:
+        """Read every frame again when it is measured next."""
+        self._read.clear()
+
+
+def refine(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    sight: Observations,
+    stitch_weight: float,
+    free: Sequence[Parameter] = (),
+    searches_px: Sequence[float] = SEARCH_PX,
+    stored: Sequence[Camera] | None = None,
+    memories: Sequence[CameraMemory | None] | None = None,
+    reader: LineReader | None = None,
+) -> RefinedPoses:
+    """Measure the lines and move the cameras onto them, round by round with a narrower search.
+
+    `stored`: where the cameras stood when that was last known, if not where they begin. `free`: numbers of lenses and
+    field to be found along with the poses; pitch and cameras come back with them. `memories`: of the earlier nights of
+    each camera. `reader`: of the `sight`, if it has been measured before. `stitch_weight` 0: each camera on a ground of
+    its own; any other has no effect, since what cameras know of each other is weighed by its errors alone.
+    """
+    if stitch_weight == 0 and len(cameras) > 1 and not free:
+        return _each_alone(pitch, cameras, sight, stored or cameras, memories)
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
+    begun = Estimate.at(pitch, cameras, unknowns)
+    remembered = memories_of_field(memories or [None] * len(cameras), begun.lines)
+    finish = _Finish(reader or sight.reader(), unknowns, _aside(remembered), cameras)
+    caught = finish.catch(begun, searches_px)
+    anew = _painted_anew(caught, remembered, finish)
+    if len(anew) != len(finish.anew):
+        # They have pulled the cameras away from all other markings.
+        finish = replace(finish, anew=anew)
+        caught = finish.catch(begun, searches_px)
+    last = finish.settle(caught)
+    uneven = last.unevenness(unknowns, unknowns.ground.ordinary)
+    here = replace(last.to, uneven_m=uneven)
+    # Judged by a wider search than the last round's, which could not see an error larger than itself.
+    return _with_moves(_assessed(here, stored or cameras, remembered, finish), here, finish)
+
+
+@dataclass(frozen=True)
+class _Finish:
+    """What moves cameras from where they were `found` onto the lines that a `reader` measures.
+
+    `anew`: the numbers of the markings that are painted elsewhere and say nothing of any pose.
+    """
+
+    reader: LineReader
+    unknowns: Unknowns
+    anew: NDArray[np.intp]
+    found: Sequence[Camera]
+
+    def measure(self, here: Estimate, search_px: float) -> list[Measurements]:
+        """The lines within `search_px` (of a 4K frame) of where the cameras expect them, on their ground."""
+        return self.but_anew(self.reader.measure(here.on_ground(self.unknowns), here.cameras, search_px))
+
+    def but_anew(self, measured: Sequence[Measurements]) -> list[Measurements]:
+        """The measurements of all markings that are where they were."""
+        if len(self.anew) == 0:
+            return list(measured)
+        return [found[~np.isin(found.points.marking, self.anew)] for found in measured]
+
+    def around(self, here: Estimate) -> _Finish:
+        """Return the finish for the pitch of an estimate, which steps may have changed."""
+        return replace(self, unknowns=self.unknowns.around(here.pitch, here.lines))
+
+    def catch(self, here: Estimate, searches_px: Sequence[float]) -> Estimate:
+        """Where the cameras are when they have caught the lines, round by round with a narrower search."""
+        for search in searches_px:
+            this = self.around(here)
+            measured = this.measure(here, search)
+            # Huber's loss has one minimum, wherever one begins; Tukey's, which outliers do not move, has several. One
+            # step towards the nearest of those drops the outliers and still ends in one place (Bickel, 1975).
+            here = this.down_huber(here, measured)
+            here = this.towards_tukey(here, measured).to
+        return here
+
+    def settle(self, here: Estimate) -> GaussNewtonStep:
+        """The step that leads to where the cameras stand still.
+
+        What is read of a frame depends a little on where its pixels lie beside the lines. So the frames are read anew
+        at the poses that the last reading led to, until that moves nothing: the end does not depend on the beginning.
+        """
+        moves = list[float]()
+        self.reader.read_anew()
+        for _ in range(MOST_READINGS):
+            last = self.around(here).follow(here)
+            moves.append(last.to.largest_move_m(here))
+            here = last.to
+            nearer = moves[-1] / moves[-2] if len(moves) > 1 else 1.0
+            if moves[-1] * max(nearer, LEAST_NEARER) < READ_ALIKE_M:
+                break
+            self.reader.read_anew()
+        return last
+
+    def follow(self, here: Estimate) -> GaussNewtonStep:
+        """The last of the steps to where the lines are as the frames have been read."""
+        mixed, lengths = MixedSteps(self.unknowns), list[float]()
+        for _ in range(MOST_LAST_STEPS):
+            last = self.towards_tukey(here, self.measure(here, LAST_SEARCH_PX))
+            lengths.append(last.to.largest_move_m(here))
+            if lengths[-1] < max(ARRIVED_M, NEARER * lengths[0]) or min(lengths[-PATIENCE:]) > min(
+                lengths[:-PATIENCE], default=np.inf
+            ):
+                break
+            here = mixed.step(here, last)
+        return last
+
+    def down_huber(self, here: Estimate, measured: Sequence[Measurements]) -> Estimate:
+        """Where Huber's loss of the same measurements is least."""
+        for _ in range(MOST_STEPS):
+            before = here
+            here = gauss_newton_step(here, self.found, doubted(here, measured), self.unknowns, huber_weights).to
+            if here.largest_move_m(before) < SETTLED_M:
+                break
+        return here
+
+    def towards_tukey(self, here: Estimate, measured: Sequence[Measurements]) -> GaussNewtonStep:
+        """One step towards the least of Tukey's loss, and how uneven the ground is there."""
+        measured = doubted(here, measured)
+        made = gauss_newton_step(here, self.found, measured, self.unknowns, tukey_weights)
+        uneven = made.unevenness(self.unknowns, self.unknowns.ground.even)
+        # A lens or a field that is wrong bends lines as a swelling ground does: the more of it, the flatter the ground.
+        uneven /= 1 + (max(found.misfit_px for found in measured) / MISFIT_FLATTENS_PX) ** 2
+        return replace(made, to=replace(made.to, uneven_m=min(uneven, self.unknowns.ground.most_m)))
+
+
+def _aside(remembered: Sequence[CameraMemory | None]) -> NDArray[np.intp]:
+    """The markings that the memory of any camera says are painted elsewhere."""
+    known = [memory.repainted_markings for memory in remembered if memory is not None]
+    return np.unique(np.concatenate([np.empty(0), *known])).astype(np.intp)
+
+
+def _painted_anew(here: Estimate, remembered: Sequence[CameraMemory | None], finish: _Finish) -> NDArray[np.intp]:
+    """The markings that lie elsewhere than the memory of any camera has them: they are the same paint for all."""
+    if not any(remembered):
+        return finish.anew
+    measured = finish.reader.measure(here.on_ground(finish.unknowns), here.cameras, SEARCH_PX[0])
+    told = [
+        find_repainted_markings(memory, found, here.lines)
+        for memory, found in zip(remembered, measured, strict=True)
+        if memory is not None
+    ]
+    return np.unique(np.concatenate([finish.anew, *told]))
+
+
+def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measurements]:
+    """The measurements with the error that neither noise nor paint nor ground explains where the finish stands.
+
+    Lens and field are never quite what they are said to be, by pixels alike near and far. Without it, a far line that a
+    wrong lens puts beside itself by ten of its small sigmas would outweigh all near ones.
+    """
+    return [
+        replace(found, misfit_px=misfit_px(found.offset(camera, here.lines.position[found.index]), found))
+        for camera, found in zip(here.cameras, measured, strict=True)
+    ]
+
+
+def evaluate_poses(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    sight: Observations,
+    stitch_weight: float,  # noqa: ARG001  (every finish of a preset is asked alike)
+    free: Sequence[Parameter] = (),
+    stored: Sequence[Camera] | None = None,
+    memories: Sequence[CameraMemory | None] | None = None,
+) -> RefinedPoses:
+    """What the lines say of poses that are left as they are, with everything else; arguments as for `refine`."""
+    unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
+    here = Estimate.at(pitch, cameras, unknowns)
+    remembered = memories_of_field(memories or [None] * len(cameras), here.lines)
+    finish = _Finish(sight.reader(), unknowns, _aside(remembered), cameras)
+    finish = replace(finish, anew=_painted_anew(here, remembered, finish))
+    return _assessed(here, stored or cameras, remembered, finish)
+
+
+def _each_alone(
+    pitch: Field,
+    cameras: Sequence[Camera],
+    sight: Observations,
+    stored: Sequence[Camera],
+    memories: Sequence[CameraMemory | None] | None,
+) -> RefinedPoses:
+    """Cameras that need not agree, each on a ground of its own."""
+    ends = [
+        refine(pitch, [camera], sight.of([n]), 0.0, stored=[stored[n]], memories=memories and [memories[n]])
+        for n, camera in enumerate(cameras)
+    ]
+    deviations = [deviation for end in ends for deviation in end.deviations if deviation.camera is not None]
+    return RefinedPoses(pitch, [end.each[0] for end in ends], deviations, [])
+
+
+def _assessed(
+    here: Estimate, stored: Sequence[Camera], remembered: Sequence[CameraMemory | None], finish: _Finish
+) -> RefinedPoses:
+    finish = finish.around(here)
+    lines, reader = here.on_ground(finish.unknowns), finish.reader
+    evidence = reader.evidence(here.pitch, lines, here.cameras)
+    reader.read_anew()
+    everything = _of_seen(reader.measure(lines, here.cameras, EVALUATION_SEARCH_PX), evidence)
+    measured = doubted(here, finish.but_anew(everything))
+    # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.
+    ordinary = replace(here, uneven_m=min(here.uneven_m, finish.unknowns.ground.usual_m))
+    finished = estimate_uncertainty(ordinary, stored, remembered, measured, evidence, finish.unknowns)
+    each = [
+        replace(one, measured=its, repainted_markings=tuple(finish.anew.tolist()))
+        for one, its in zip(finished.each, doubted(here, everything), strict=True)
+    ]
+    return replace(finished, each=each)
+
+
+def _with_moves(finished: RefinedPoses, here: Estimate, finish: _Finish) -> RefinedPoses:
+    """The same, and of each number of the field that the lines contradict how far it moves the cameras, put right."""
+    measured = finish.but_anew([one.measured for one in finished.each if one.measured is not None])
+    deviations = [
+        replace(one, moves_m=_moves_m(one, here, measured, finish)) if one.camera is None and is_sure(one) else one
+        for one in finished.deviations
+    ]
+    return replace(finished, deviations=deviations)
+
+
+def _moves_m(wrong: Deviation, here: Estimate, measured: Sequence[Measurements], finish: _Finish) -> dict[str, float]:
+    """How far each camera's position moves (m) on the same measurements with a number of the field put right, by id."""
+    parameter = next(one for one in field_parameters(here.pitch) if one.name == wrong.name)
+    _, pitch = parameter.applied(here.cameras, here.pitch, wrong.value)
+    there = replace(here, pitch=pitch, lines=pitch.same_line_points(here.lines))
+    finish = finish.around(there)
+    there = finish.down_huber(there, measured)
+    for _ in range(MOST_STEPS):
+        there = finish.towards_tukey(there, measured).to
+    return {
+        before.id: float(np.linalg.norm(after.pose.position - before.pose.position))
+        for before, after in zip(here.cameras, there.cameras, strict=True)
+    }
+
+
+def _of_seen(measured: Sequence[Measurements], evidence: Sequence[Evidence]) -> list[Measurements]:
+    """The measurements of markings that are seen: ridges found where a line should be and is not fix no pose."""
+    return [found[np.isin(found.points.marking, seen.seen())] for found, seen in zip(measured, evidence, strict=True)]

@@ -1,0 +1,376 @@
+"""How sure the finish is, and what the lines say of what it takes for known: lenses and field.
+
+Poses are found for the lenses and the field as they are given, because that is how they are used. If those are a
+little off, the poses are off with them, and no residual need show it. So the lines are asked once more, with the
+numbers of every lens and of the field unknown: the poses that are then best are nearer the truth, and how far they are
+from the poses that are answered belongs to their error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from functools import partial
+
+import numpy as np
+
+from fields.template import TURF_M
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, moved
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.parameters import (
+    HEAT_FOCAL,
+    LensParameter,
+    Parameter,
+    lens_parameters,
+    with_focal_length,
+    with_lens_changed,
+)
+from worker.calibration.memory.camera_memory import CameraMemory
+from worker.calibration.refinement.cross_check import CrossCheck, CrossChecks
+from worker.calibration.refinement.estimate import Estimate
+from worker.calibration.refinement.information import LineLikelihood, MarginalInformation
+from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS, rms_px
+from worker.calibration.refinement.priors import Priors, build_priors
+from worker.calibration.refinement.unknowns import Unknowns
+from worker.calibration.refinement.variance_components import Posterior, posterior
+
+SURE_CHANGE = 3.0
+"""A focal length has changed when it differs by so many times its sigma and what heat does together."""
+ASKED_AGAIN = 2
+"""How often lines are weighed again by where everything seems to be by then."""
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far a number of a lens (`camera`) or of the field (None) seems to be from what it is taken for.
+
+    `sigma`: of that estimate; `expected`: how far off it is after a good calibration. In the unit that `name` ends on.
+    `moves_m`: of a number of the field, how far each camera's position would move (m) with the field put right, by id.
+    """
+
+    camera: str | None
+    name: str
+    value: float
+    sigma: float
+    expected: float
+    moves_m: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+
+
+@dataclass(frozen=True)
+class ParameterUncertainty:
+    """How well the lines fix a number of lens or field that was solved for.
+
+    `sigma`: one standard deviation, in the unit that the parameter's name ends on, with what lenses and field may be
+    off; before any line it was the parameter's `expected`. `most_correlated`: which other number correlates most with
+    it, and their correlation.
+    """
+
+    sigma: float
+    most_correlated: tuple[Parameter, float] | None
+
+
+@dataclass(frozen=True)
+class Sigma:
+    """One standard deviation of a pose: of the rotation's angle in degrees, of the position in metres."""
+
+    rotation_deg: float
+    position_m: float
+
+    @classmethod
+    def from_covariance(cls, covariance: Array) -> Sigma:
+        """From (6, 6) of (rotation rad, position m): root of the summed variances of each three."""
+        variances = np.diag(covariance)
+        return cls(float(np.degrees(np.sqrt(variances[:3].sum()))), float(np.sqrt(variances[3:].sum())))
+
+
+@dataclass(frozen=True)
+class PoseAndLens:
+    """Pose and lens of a camera as the lines have both: for whoever measures in the world.
+
+    `covariance` (12, 12): of the rotation in the camera's frame (rad), the position (m) and `LENS_NUMBERS`.
+    """
+
+    camera: Camera
+    covariance: Array
+
+    @property
+    def sigma(self) -> Sigma:
+        """How sure the pose is."""
+        return Sigma.from_covariance(self.covariance[:POSE_NUMBERS, :POSE_NUMBERS])
+
+
+@dataclass(frozen=True)
+class LensChange:
+    """How much longer a focal length is than in the first nights of a memory: part of it, and its `sigma`.
+
+    `since`: when those were, None where that is not known.
+    """
+
+    since: datetime | None
+    longer: float
+    sigma: float
+
+    @property
+    def notable(self) -> bool:
+        """Whether it is more than heat does to a lens, beyond doubt."""
+        return abs(self.longer) > SURE_CHANGE * float(np.hypot(self.sigma, HEAT_FOCAL))
+
+
+def _not_cross_checked() -> CrossCheck | None:
+    """Of a camera with too few measurements for two halves of them."""
+    return None
+
+
+@dataclass(frozen=True)
+class RefinedPose:
+    """A camera where the refinement ended: its pose for the lens as given, with uncertainty and evidence.
+
+    `evidence`: how much of the expected lines is seen. None where fewer than `FEWEST_MEASUREMENTS` points were
+    measured: `residual_px`, the rms offset of its lines in px of its own frame; `covariance` (6, 6) of (rotation in the
+    camera's frame rad, position in the world m), with what lens, field and ground may be off; and `repeatability`, the
+    part of sigma that another night's frames would draw anew. `zoom`: how much longer than given the lines have the
+    focal length, None where it was solved for; `with_fitted_zoom`: the camera with that focal length, and the pose that
+    goes with it. `refined`: pose and all of the lens as the lines have them. `lens_change`: of the focal length since
+    the camera's memory began, None without a memory. `cross_checked`: computes the cross-check, lazily, since only the
+    answer that is kept is asked. `measured`: the line measurements; `repainted_markings`: numbers of the markings that
+    lie elsewhere than a memory has them, and were left out; `uneven_m`: standard deviation of the ground's heights.
+    """
+
+    camera: Camera
+    evidence: Evidence
+    residual_px: float | None
+    covariance: Array | None
+    repeatability: Sigma | None
+    zoom: Deviation | None
+    with_fitted_zoom: Camera | None
+    refined: PoseAndLens | None = field(default=None, kw_only=True)
+    lens_change: LensChange | None = field(default=None, kw_only=True)
+    cross_checked: Callable[[], CrossCheck | None] = field(default=_not_cross_checked, kw_only=True)
+    measured: Measurements | None = field(default=None, kw_only=True)
+    repainted_markings: tuple[int, ...] = field(default=(), kw_only=True)
+    uneven_m: float = field(default=TURF_M, kw_only=True)
+
+    @property
+    def lens_changed(self) -> bool:
+        """Whether the focal length has surely changed since the first nights of the camera's memory."""
+        return self.lens_change is not None and self.lens_change.notable
+
+    @property
+    def zoom_shift_m(self) -> float:
+        """How far from here the camera is if its lens is what the lines say."""
+        there = self.camera if self.with_fitted_zoom is None else self.with_fitted_zoom
+        return float(np.linalg.norm(there.pose.position - self.camera.pose.position))
+
+    @property
+    def sigma(self) -> Sigma | None:
+        """How sure the pose is."""
+        return None if self.covariance is None else Sigma.from_covariance(self.covariance)
+
+
+@dataclass(frozen=True)
+class RefinedPoses:
+    """The cameras on their pitch. `deviations`: what the lines say of lenses and field that were taken for known.
+
+    `parameter_uncertainties`: what was left free, in that order.
+    """
+
+    pitch: Field
+    each: list[RefinedPose]
+    deviations: list[Deviation]
+    parameter_uncertainties: list[ParameterUncertainty]
+
+    @property
+    def cameras(self) -> list[Camera]:
+        """Where they stand."""
+        return [one.camera for one in self.each]
+
+
+def estimate_uncertainty(
+    here: Estimate,
+    stored: Sequence[Camera],
+    memories: Sequence[CameraMemory | None],
+    measured: Sequence[Measurements],
+    evidence: Sequence[Evidence],
+    solved: Unknowns,
+) -> RefinedPoses:
+    """The answer `here` and what it is worth, found with `solved` unknown.
+
+    `stored`: where the cameras stood when their poses were last known; `memories`: of their earlier nights.
+    """
+    memories = [
+        memory if memory is not None and len(found) >= FEWEST_MEASUREMENTS else None
+        for memory, found in zip(memories, measured, strict=True)
+    ]
+    believed = build_priors(here, stored, memories, solved)
+    lines = LineLikelihood(here, measured, memories, believed.unknowns)
+    information = lines.information()
+    for _ in range(ASKED_AGAIN):
+        changes = believed.mixing @ _posterior(believed, information).value
+        information = lines.information_at(changes, information.heights(changes))
+    judgement = _Judgement.of(here, believed, information)
+    heights = information.heights(believed.mixing @ judgement.found.value)
+    checks = CrossChecks(here, measured, believed, judgement.found, heights)
+    return judgement.finished(memories, measured, evidence, checks, solved)
+
+
+def _posterior(believed: Priors, information: MarginalInformation) -> Posterior:
+    """What the independent errors are by what is believed of them and by what the lines say."""
+    mixing = believed.mixing
+    return posterior(mixing.T @ information.known @ mixing, mixing.T @ information.pull, believed.blocks)
+
+
+@dataclass(frozen=True)
+class _Judgement:
+    """What is known of everything in the end: what was `found` (A,) of the independent errors.
+
+    `by_lines` (A, A): their covariance if nothing is known of how far cameras moved. `repeated`:
+    see `MarginalInformation`.
+    """
+
+    here: Estimate
+    believed: Priors
+    found: Posterior
+    by_lines: Array
+    repeated: Array
+
+    @property
+    def value(self) -> Array:
+        """The errors (A,)."""
+        return self.found.value
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (A, A) of the errors."""
+        return self.found.covariance
+
+    @classmethod
+    def of(cls, here: Estimate, believed: Priors, information: MarginalInformation) -> _Judgement:
+        known = believed.mixing.T @ information.known @ believed.mixing
+        found = _posterior(believed, information)
+        # How far a camera moved helps to tell a zoom from a move. That it has not is no measurement of where it is: if
+        # the lenses are what they are said to be, lines alone have to determine it.
+        certainty = found.certainty.copy()
+        for group in (group for block in believed.blocks for group in block):
+            certainty[group.which] = np.maximum(certainty[group.which], group.certainty(1.0))
+        certainty[believed.movements] = np.minimum(found.certainty[believed.movements], believed.free**-2)
+        by_lines = np.asarray(np.linalg.inv(known + np.diag(certainty)), dtype=float)
+        return cls(here, believed, found, by_lines, information.repeated)
+
+    def finished(
+        self,
+        memories: Sequence[CameraMemory | None],
+        measured: Sequence[Measurements],
+        evidence: Sequence[Evidence],
+        checks: CrossChecks,
+        solved: Unknowns,
+    ) -> RefinedPoses:
+        """Everything that is answered."""
+        cameras = self.here.cameras
+        each = [
+            self._camera(number, memories[number], seen, its, checks, solved)
+            for number, (seen, its) in enumerate(zip(evidence, measured, strict=True))
+        ]
+        parameter_uncertainties = [
+            self._parameter_uncertainty(number) for number in range(POSE_NUMBERS * len(cameras), solved.dense)
+        ]
+        return RefinedPoses(self.here.pitch, each, self._deviations(solved), parameter_uncertainties)
+
+    def _camera(
+        self,
+        number: int,
+        memory: CameraMemory | None,
+        seen: Evidence,
+        its: Measurements,
+        checks: CrossChecks,
+        solved: Unknowns,
+    ) -> RefinedPose:
+        camera = self.here.cameras[number]
+        residual = rms_px(self.here.lines.position, camera, its)
+        if len(its) < FEWEST_MEASUREMENTS:
+            return RefinedPose(camera, seen, residual, None, None, None, None, uneven_m=self.here.uneven_m)
+        pose = self.believed.mixing[POSE_NUMBERS * number : POSE_NUMBERS * (number + 1)]
+        lens = self.believed.lens_tonight(number)
+        away = pose @ self.value
+        covariance = max(
+            (pose @ one @ pose.T for one in (self.by_lines, self.covariance)),
+            key=lambda one: float(np.trace(one[3:, 3:])),
+        )
+        zoom = next((d for d in self._of_lens(number, solved) if d.name == "focal_length_px"), None)
+        own = slice(POSE_NUMBERS * number, POSE_NUMBERS * (number + 1))
+        return RefinedPose(
+            camera,
+            seen,
+            residual,
+            covariance + np.outer(away, away),
+            Sigma.from_covariance(self.repeated[own, own]),
+            zoom,
+            None if zoom is None else moved(with_focal_length(camera, zoom.value), away),
+            refined=self._refined(camera, pose, lens),
+            lens_change=None if memory is None else self._lens_change(camera, memory),
+            cross_checked=partial(checks.of, number),
+            uneven_m=self.here.uneven_m,
+        )
+
+    def _refined(self, camera: Camera, pose: Array, lens: Array) -> PoseAndLens:
+        both = np.concatenate([pose, lens])
+        covariance = max(
+            (both @ one @ both.T for one in (self.by_lines, self.covariance)),
+            key=lambda one: float(np.trace(one[3:6, 3:6])),
+        )
+        return PoseAndLens(moved(with_lens_changed(camera, lens @ self.value), pose @ self.value), covariance)
+
+    def _lens_change(self, camera: Camera, memory: CameraMemory) -> LensChange:
+        """Beside what the focal length was in the first nights: what has changed since is an error of its own."""
+        since = np.zeros(len(self.value))
+        since[self.believed.changes_of(camera.id)] = 1.0
+        focal = camera.intrinsics.focal_length_px
+        sigma = float(np.sqrt(since @ self.covariance @ since)) / focal
+        return LensChange(memory.since, float(since @ self.value) / focal, sigma)
+
+    def _deviations(self, solved: Unknowns) -> list[Deviation]:
+        """What the lines say of lenses and field that were not solved for."""
+        of_lenses = [one for number in range(len(self.here.cameras)) for one in self._of_lens(number, solved)]
+        return [*of_lenses, *self._of_field(solved)]
+
+    def _of_lens(self, number: int, solved: Unknowns) -> list[Deviation]:
+        camera = self.here.cameras[number]
+        lens = self.believed.lens_tonight(number)
+        value, variance = lens @ self.value, np.einsum("ia,ab,ib->i", lens, self.covariance, lens)
+        free = {(p.camera, p.name) for p in solved.parameters if isinstance(p, LensParameter)}
+        return [
+            Deviation(camera.id, p.name, float(value[at]), float(np.sqrt(variance[at])), p.expected)
+            for at, p in enumerate(lens_parameters([camera]))
+            if (number, p.name) not in free
+        ]
+
+    def _of_field(self, solved: Unknowns) -> list[Deviation]:
+        first, free = POSE_NUMBERS * self.believed.unknowns.views, {p.name for p in solved.parameters}
+        told = []
+        for at, parameter in enumerate(self.believed.unknowns.parameters, first):
+            if isinstance(parameter, LensParameter) or parameter.name in free:
+                continue
+            row = self.believed.mixing[at]
+            value, sigma = float(row @ self.value), float(np.sqrt(row @ self.covariance @ row))
+            told.append(Deviation(None, parameter.name, value, sigma, parameter.expected))
+        return told
+
+    def _parameter_uncertainty(self, number: int) -> ParameterUncertainty:
+        """What is known of the free parameter that is this number of those that were solved for."""
+        unknowns = self.believed.unknowns
+        first = POSE_NUMBERS * unknowns.views
+        at = number - POSE_NUMBERS * len(self.here.cameras)
+        rows = self.believed.mixing[first : first + len(unknowns.parameters)]
+        covariance = rows @ self.by_lines @ rows.T
+        variance = np.diag(covariance)
+        together = np.sqrt(variance * variance[at])
+        correlation = np.divide(covariance[at], together, out=np.zeros_like(together), where=together > 0)
+        correlation[at] = 0.0
+        most = int(np.argmax(np.abs(correlation)))
+        return ParameterUncertainty(
+            float(np.hypot(np.sqrt(variance[at]), rows[at] @ self.value)),
+            None if most == at else (unknowns.parameters[most], float(correlation[most])),
+        )

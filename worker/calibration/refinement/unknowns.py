@@ -1,0 +1,52 @@
+"""What the least squares of the finish asks for, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.parameters import FieldParameter, LensParameter, Parameter
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """The poses of V views, E numbers of lenses and field, and K heights of the ground, in this order: U in all.
+
+    A view is a camera at one time: tonight, or in a memory of earlier nights. `lenses[v]`: the `camera` numbers of the
+    `LensParameter`s that the lens of view v has; by default its own number alone.
+    """
+
+    views: int
+    parameters: Sequence[Parameter]
+    ground: Ground
+    lenses: Sequence[Sequence[int]] = ()
+
+    @property
+    def dense(self) -> int:
+        """6 V + E: the poses and numbers, each of which touches many lines. A height touches those around its node."""
+        return POSE_NUMBERS * self.views + len(self.parameters)
+
+    def pose(self, view: int) -> slice:
+        """Where the pose of a view stands among the unknowns."""
+        return slice(POSE_NUMBERS * view, POSE_NUMBERS * (view + 1))
+
+    def parameters_of(self, view: int) -> list[tuple[int, Parameter]]:
+        """The numbers that move lines in a view, each with where it stands among the unknowns."""
+        lenses = self.lenses[view] if self.lenses else (view,)
+        first = POSE_NUMBERS * self.views
+        return [
+            (number, parameter)
+            for number, parameter in enumerate(self.parameters, first)
+            if not isinstance(parameter, LensParameter) or parameter.camera in lenses
+        ]
+
+    def around(self, pitch: Field, lines: LinePoints) -> Unknowns:
+        """The same unknowns on a pitch that has been changed since."""
+        parameters = [p.around(pitch, lines) if isinstance(p, FieldParameter) else p for p in self.parameters]
+        return replace(self, parameters=parameters)
+
+    def __len__(self) -> int:
+        return self.dense + len(self.ground)

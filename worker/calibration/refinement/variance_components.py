@@ -1,0 +1,104 @@
+"""What numbers are when nobody knows how far off they may be: the lines choose the scale of their errors.
+
+Numbers are thought to be off by what is expected of them times the scale of their group: one for how far each camera
+moved, one for each focal length, one for the rest of each lens, one for each measure of the field. Scales are those
+that make the lines likeliest (type-II maximum likelihood; MacKay, "Bayesian Interpolation", 1992). A zoom and a move
+along the view look alike to the lines of a far camera; but a camera that moved would have moved in other directions
+too, and so one that has not has zoomed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+
+SWEEPS = 3
+
+
+@dataclass(frozen=True)
+class Group:
+    """Numbers whose errors are of one scale: `which` (n,) of those asked for, `expected` (n,) errors at scale 1 around
+    `mean` (n,), and the `scales` (S,), or (S, n) where they differ within the group, that may be theirs.
+    """
+
+    which: NDArray[np.intp]
+    expected: Array
+    mean: Array
+    scales: Array
+
+    def certainty(self, scale: Array | float) -> Array:
+        """Prior information (n,) on the numbers at one of the scales."""
+        return np.asarray((self.expected * scale) ** -2)
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What the numbers (A,) are: their mean `value` and `covariance` (A, A).
+
+    Before any line: their `mean` (A,), and the information `certainty` (A,) on it.
+    """
+
+    value: Array
+    covariance: Array
+    certainty: Array
+    mean: Array
+
+
+def posterior(information: Array, pull: Array, blocks: Sequence[Sequence[Group]]) -> Posterior:
+    """What lines say of numbers of unknown scales: those of a block are chosen together, one block after the other.
+
+    `information` (A, A) and `pull` (A,) of the lines: about changes of the numbers from where they stand.
+    """
+    mean = np.zeros(len(pull))
+    certainty = np.empty(len(pull))
+    for group in chain.from_iterable(blocks):
+        mean[group.which] = group.mean
+        certainty[group.which] = group.certainty(group.scales[0])
+    choices = [block for block in blocks if any(len(group.scales) > 1 for group in block)]
+    for _ in range(SWEEPS):
+        before = certainty.copy()
+        for block in choices:
+            which = np.concatenate([group.which for group in block])
+            certainty[which] = _likeliest(information, pull, certainty, mean, block, which)
+        if np.array_equal(certainty, before):
+            break
+    covariance = np.asarray(np.linalg.inv(information + np.diag(certainty)), dtype=float)
+    return Posterior(covariance @ (pull + certainty * mean), covariance, certainty, mean)
+
+
+def _likeliest(
+    information: Array,
+    pull: Array,
+    certainty: Array,
+    mean: Array,
+    block: Sequence[Group],
+    which: NDArray[np.intp],
+) -> Array:
+    """The prior information (n,) on the numbers of a block that makes the lines likeliest, all others as they are."""
+    rest = np.setdiff1d(np.arange(len(pull)), which)
+    of_rest = information[np.ix_(rest, rest)] + np.diag(certainty[rest])
+    coupling = information[np.ix_(rest, which)]
+    effect = np.linalg.solve(of_rest, coupling) if len(rest) else np.zeros((0, len(which)))
+    alone = information[np.ix_(which, which)] - coupling.T @ effect
+    drawn = pull[which] - effect.T @ (pull[rest] + certainty[rest] * mean[rest])
+    tried = np.stack(
+        [
+            np.concatenate([group.certainty(scale) for group, scale in zip(block, scales, strict=True)])
+            for scales in product(*(group.scales for group in block))
+        ]
+    )
+    return np.asarray(tried[np.argmax(_log_evidence(alone, drawn, tried, mean[which]))], dtype=float)
+
+
+def _log_evidence(information: Array, pull: Array, certainty: Array, mean: Array) -> Array:
+    """How likely (T,) the lines are (log, but for a constant) at each prior information (T, n) on the numbers."""
+    together = information + certainty[:, :, None] * np.eye(len(pull))
+    drawn = pull + certainty * mean
+    fit = np.sum(drawn * np.linalg.solve(together, drawn[..., None])[..., 0], axis=1) - certainty @ mean**2
+    return np.asarray(0.5 * (np.log(certainty).sum(axis=1) - np.linalg.slogdet(together)[1] + fit), dtype=float)

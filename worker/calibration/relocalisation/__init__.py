@@ -1,0 +1,1 @@
+"""A camera found from nothing: pose, and focal length where it is unknown, from one frame and the field's markings."""

@@ -1,0 +1,88 @@
+"""How well hypotheses agree with a view, both ways: is the expected seen, and is the seen expected?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.hypotheses import Hypotheses
+from worker.calibration.relocalisation.line_view import LineView
+
+AT_ONCE = 1024
+NEAREST_M = 0.3
+LONGEST_STEP_PX = 25.0
+"""Two points of a marking that are farther apart in the view count as so far, view pixels."""
+UNSEEN_PX = 40.0
+"""Of line that is taken for missing from every view, so that little in view is not all in view."""
+FEWEST_POINTS = 30
+"""Points of markings that have to be in view for an agreement to count in full."""
+USUAL_ROLL = np.sin(np.radians(6.0))
+ROLLED = 0.04
+"""What a roll of 6° takes from an agreement: cameras stand about upright."""
+LOWEST_M = 1.2
+
+
+def agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: float) -> Array:
+    """Return for each hypothesis (P,) how much of the lines is found both ways, 0..1, less what its roll costs.
+
+    Dice's coefficient in view pixels: line that is expected and painted, and paint that is expected, out of both; a
+    distance of `tolerance_px` counts for 1/e.
+    """
+    parts = [
+        _agreement(field, view, cameras[start : start + AT_ONCE], tolerance_px)
+        for start in range(0, len(cameras), AT_ONCE)
+    ]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
+    expected, found, points = _expected_and_found(field, view, cameras, tolerance)
+    explained = _explained(field, view, cameras, tolerance) * view.painted_px
+    dice = (found + explained) / (expected + view.painted_px + UNSEEN_PX) * np.minimum(1.0, points / FEWEST_POINTS)
+    upright = ROLLED * (cameras.rotations[:, 0, 2] / USUAL_ROLL) ** 2
+    return np.where(cameras.positions[:, 2] > LOWEST_M, dice - upright, 0.0)
+
+
+def _expected_and_found(
+    field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float
+) -> tuple[Array, Array, Array]:
+    """Of each hypothesis the length of line in view, how much of it is painted (view pixels), and its points."""
+    rotations = cameras.rotations.astype(np.float32)
+    focal = cameras.focal_px.astype(np.float32)[:, None]
+    moved = rotations @ field.points.T - (rotations @ cameras.positions[..., None].astype(np.float32))
+    depth = moved[:, 2]
+    ahead = depth > NEAREST_M
+    depth = np.where(ahead, depth, 1)
+    x, y = focal * moved[:, 0] / depth, focal * moved[:, 1] / depth
+    height, width = view.distance.shape
+    column = np.clip(np.rint(x - view.corner[0]), -1, width).astype(np.int32)
+    row = np.clip(np.rint(y - view.corner[1]), -1, height).astype(np.int32)
+    seen = ahead & (column >= 0) & (row >= 0) & (column < width) & (row < height)
+    row, column = np.where(seen, row, 0), np.where(seen, column, 0)
+    counted = seen & view.covered[row, column] & field.joined
+    steps = np.hypot(np.diff(x, axis=1, append=x[:, -1:]), np.diff(y, axis=1, append=y[:, -1:]))
+    lengths = np.minimum(steps, LONGEST_STEP_PX) * counted
+    near = np.exp(-((view.distance[row, column] / tolerance) ** 2))
+    return lengths.sum(axis=1), (lengths * near).sum(axis=1), counted.sum(axis=1)
+
+
+def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
+    """Of each hypothesis the share of the places on paint that lie on a marking, 0..1."""
+    rotations = cameras.rotations.astype(np.float32)
+    positions = cameras.positions.astype(np.float32)
+    focal = cameras.focal_px.astype(np.float32)[:, None]
+    x, y = view.places[None, :, 0] / focal, view.places[None, :, 1] / focal
+    rays = np.stack([x, y, np.ones_like(x)], axis=-1) @ rotations
+    down = rays[..., 2] < -1e-3
+    depth = np.where(down, -positions[:, None, 2] / np.where(down, rays[..., 2], -1), 0)
+    row, column = field.cells(
+        positions[:, None, 0] + depth * rays[..., 0], positions[:, None, 1] + depth * rays[..., 1]
+    )
+    on_map = down & (row >= 0)
+    beside = field.nearest[np.where(on_map, row, 0), np.where(on_map, column, 0)]
+    # From metres on the ground to pixels: the derivative of the projection along the way to the nearest paint.
+    turned = rotations[:, None, :, 0] * beside[..., :1] + rotations[:, None, :, 1] * beside[..., 1:]
+    scale = focal / np.maximum(depth, 0.1)
+    off = np.hypot(scale * (turned[..., 0] - x * turned[..., 2]), scale * (turned[..., 1] - y * turned[..., 2]))
+    return np.asarray(np.where(on_map, np.exp(-((off / tolerance) ** 2)), 0).mean(axis=1))

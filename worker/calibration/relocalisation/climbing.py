@@ -1,0 +1,100 @@
+"""An evolution strategy that climbs from many hypotheses to few: narrower tolerances, smaller steps, the best apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.relocalisation.agreement import LOWEST_M, agreement
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.hypotheses import Hypotheses, small_rotations
+from worker.calibration.relocalisation.line_view import LineView
+
+OFFSPRING = 12
+TURN_RAD = np.array([0.05, 0.05, 0.02])
+STEP = 0.06
+"""Of the distance to the ground that a camera looks at."""
+FARTHEST_M = 120.0
+FOCAL_STEP = 0.08
+COOLING = 0.9
+AIMING = 0.3
+"""Half of the offspring go on looking at the same ground, and turn by this part besides."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """Generations at one tolerance (view px), with steps `scale` as wide as at first; `survivors` go on from it."""
+
+    tolerance_px: float
+    generations: int
+    scale: float
+    survivors: int
+
+
+LEVELS = (Level(8.0, 8, 1.0, 40), Level(5.0, 10, 0.5, 20), Level(3.0, 10, 0.25, 12), Level(2.0, 12, 0.1, 6))
+
+
+def climb(
+    field: FieldMap, view: LineView, start: Hypotheses, frees_focal: bool, rng: np.random.Generator
+) -> tuple[Hypotheses, Array]:
+    """Return the best hypotheses that lie apart, and their agreements at the last tolerance, best first."""
+    cameras, scores = start, np.zeros(len(start))
+    for level in LEVELS:
+        scores = agreement(field, view, cameras, level.tolerance_px)
+        for generation in range(level.generations):
+            scale = level.scale * COOLING**generation
+            offspring = _mutated(cameras, scale, frees_focal, rng)
+            of_offspring = agreement(field, view, offspring, level.tolerance_px).reshape(len(cameras), OFFSPRING)
+            best = of_offspring.argmax(axis=1)
+            rows = np.arange(len(cameras))
+            better = of_offspring[rows, best] > scores
+            chosen = np.where(better, len(cameras) + rows * OFFSPRING + best, rows)
+            cameras = Hypotheses.joined([cameras, offspring])[chosen]
+            scores = np.maximum(scores, of_offspring[rows, best])
+        kept = _apart(cameras, scores, level)
+        cameras, scores = cameras[kept], scores[kept]
+    return cameras, scores
+
+
+def _mutated(cameras: Hypotheses, scale: float, frees_focal: bool, rng: np.random.Generator) -> Hypotheses:
+    """`OFFSPRING` of each camera: a turn, a step and a change of focal length, drawn independently."""
+    count, half = len(cameras), OFFSPRING // 2
+    forward = cameras.rotations[:, 2]
+    reach = np.minimum(np.maximum(cameras.positions[:, 2], 1) / np.maximum(-forward[:, 2], 0.05), FARTHEST_M)
+    turns = rng.normal(size=(count, OFFSPRING, 3)) * TURN_RAD * scale
+    places = cameras.positions[:, None] + rng.normal(size=(count, OFFSPRING, 3)) * (STEP * scale * reach)[:, None, None]
+    focal = np.repeat(cameras.focal_px[:, None], OFFSPRING, axis=1)
+    if frees_focal:
+        focal = focal * np.exp(FOCAL_STEP * scale * rng.normal(size=focal.shape))
+        # A longer lens from farther back shows nearly the same.
+        back = (focal / cameras.focal_px[:, None] - 1) * reach[:, None]
+        places[:, :half] -= back[:, :half, None] * forward[:, None]
+    places[..., 2] = np.maximum(places[..., 2], LOWEST_M)
+    rotations = np.repeat(cameras.rotations[:, None], OFFSPRING, axis=1)
+    aim = (cameras.positions + reach[:, None] * forward)[:, None] - places[:, :half]
+    aim /= np.linalg.norm(aim, axis=-1, keepdims=True)
+    towards = np.einsum("nij,nkj->nki", cameras.rotations, np.cross(forward[:, None], aim))
+    turns[:, :half] *= AIMING
+    rotations[:, :half] = small_rotations(-towards) @ rotations[:, :half]
+    rotations = small_rotations(turns) @ rotations
+    return Hypotheses(rotations.reshape(-1, 3, 3), places.reshape(-1, 3), focal.reshape(-1))
+
+
+def _apart(cameras: Hypotheses, scores: Array, level: Level) -> NDArray[np.intp]:
+    """The numbers of the best cameras no two of which are alike."""
+    kept = list[int]()
+    for n in np.argsort(-scores):
+        far = level.scale * (0.2 + 0.03 * float(np.linalg.norm(cameras.positions[n])))
+        alike = (
+            float(np.linalg.norm(cameras.positions[n] - cameras.positions[m])) < far
+            and float(np.trace(cameras.rotations[n] @ cameras.rotations[m].T)) > 3 - (0.1 * level.scale) ** 2
+            for m in kept
+        )
+        if not any(alike):
+            kept.append(int(n))
+        if len(kept) == level.survivors:
+            break
+    return np.array(kept, dtype=np.intp)

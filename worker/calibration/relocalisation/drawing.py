@@ -1,0 +1,39 @@
+"""Hypotheses drawn at random from where cameras stand beside fields, where too few straight lines are seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_of
+
+NEAREST_M, LOWEST_M, HIGHEST_M = 0.5, 2.0, 35.0
+FARTHEST_BESIDE_M, FARTHEST_BEHIND_M = 60.0, 40.0
+"""Beside the long sides, and behind the ends; a field that is larger is looked at from as far as it is large."""
+BESIDE, AIMED_AT = 1.3, 1.1
+"""In half sizes of the field: how far along a side cameras stand, and where on the field they look."""
+USUAL_ROLL_DEG = 2.0
+
+
+def draw(field: FieldMap, focal_px: Array, count: int, rng: np.random.Generator) -> Hypotheses:
+    """Draw so many cameras that look at the field, two thirds of them beside a long side; focal lengths evenly."""
+    half_x, half_y = field.half_size.tolist()
+    behind_an_end = rng.integers(0, 3, count) == 2
+    beside = half_y + _log_uniform(NEAREST_M, max(FARTHEST_BESIDE_M, half_y), count, rng)
+    behind = half_x + _log_uniform(NEAREST_M, max(FARTHEST_BEHIND_M, half_x), count, rng)
+    x = np.where(behind_an_end, -behind, rng.uniform(-BESIDE * half_x, BESIDE * half_x, count))
+    y = np.where(behind_an_end, rng.uniform(-BESIDE * half_y, BESIDE * half_y, count), -beside)
+    if not field.is_symmetric:
+        side = rng.choice([-1.0, 1.0], count)
+        x, y = x * side, y * side
+    z = _log_uniform(LOWEST_M, HIGHEST_M, count, rng)
+    to_x = rng.uniform(-AIMED_AT * half_x, AIMED_AT * half_x, count) - x
+    to_y = rng.uniform(-AIMED_AT * half_y, AIMED_AT * half_y, count) - y
+    roll = np.radians(USUAL_ROLL_DEG) * rng.normal(size=count)
+    rotations = rotations_of(np.arctan2(to_y, to_x), np.arctan2(z, np.hypot(to_x, to_y)), roll)
+    return Hypotheses(rotations, np.stack([x, y, z], axis=1), rng.choice(focal_px, count))
+
+
+def _log_uniform(low: float, high: float, count: int, rng: np.random.Generator) -> Array:
+    return np.asarray(np.exp(rng.uniform(np.log(low), np.log(high), count)))

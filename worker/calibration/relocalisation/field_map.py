@@ -1,0 +1,112 @@
+"""The markings of a field as a search over all poses needs them: points to project, and distances on the ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.field import Field, Marking
+
+POINTS = 420
+"""About so many points on the markings are projected by each pose of a population."""
+FINE_M = 0.1
+BEYOND_M = 6.0
+"""How far beside the markings of the field the map of distances reaches."""
+CELLS_A_SIDE = 700
+"""About so many cells the map of distances has along the field; never finer than 5 cm."""
+SHORTEST_LINE = 0.03
+"""Of the longer side of the field: shorter straight pieces (ticks, dashes) name no line that an image line could be."""
+SAME_LINE_M = 0.3
+"""Two places of a field turned by half a turn are the same marking when they are no farther apart."""
+
+
+@dataclass(frozen=True)
+class FieldMap:
+    """`points` (N, 3) m along the markings; `joined` (N,): whether the next point continues the same marking.
+
+    `nearest` (rows, columns, 2): from the nearest paint to each cell of the ground, m; the cell of row 0, column 0 has
+    its centre at `origin` (2,) m and cells are `cell_m` wide. `lines_along_x`: y (m) of the straight lines that run
+    along x; `lines_along_y`: x (m) of those along y.
+    """
+
+    points: NDArray[np.float32]
+    joined: NDArray[np.bool_]
+    nearest: NDArray[np.float32]
+    origin: Array
+    cell_m: float
+    lines_along_x: Array
+    lines_along_y: Array
+    half_size: Array
+
+    @classmethod
+    def of(cls, field: Field) -> FieldMap:
+        """Return the map of a field, its roof included; spots are too small to be seen from afar."""
+        lines = [marking for marking in field.markings() if not marking.spot]
+        fine = [_resampled(line, FINE_M) for line in lines]
+        step = max(FINE_M, FINE_M * sum(len(points) for points in fine) / POINTS)
+        coarse = [_resampled(line, step) for line in lines]
+        everywhere = np.concatenate(fine)
+        half = np.abs(everywhere).max(axis=0)
+        cell = max(0.05, 2 * float(half.max()) / CELLS_A_SIDE)
+        shortest = SHORTEST_LINE * 2 * float(half.max())
+        return cls(
+            field.lift(np.concatenate(coarse)).astype(np.float32),
+            np.concatenate([np.arange(len(points)) < len(points) - 1 for points in coarse]),
+            _from_nearest(everywhere, -half - BEYOND_M, half + BEYOND_M, cell),
+            -half - BEYOND_M,
+            cell,
+            _straight(lines, 0, shortest),
+            _straight(lines, 1, shortest),
+            half,
+        )
+
+    def cells(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Row and column of the cells of ground places; -1 for both where the map does not reach."""
+        rows, columns = self.nearest.shape[:2]
+        column = np.floor((x - self.origin[0]) / self.cell_m + 0.5)
+        row = np.floor((y - self.origin[1]) / self.cell_m + 0.5)
+        within = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+        return np.where(within, row, -1).astype(np.intp), np.where(within, column, -1).astype(np.intp)
+
+    @cached_property
+    def is_symmetric(self) -> bool:
+        """Whether the field turned by half a turn looks the same, so that each view has a twin."""
+        turned = -self.points[:, :2]
+        row, column = self.cells(turned[:, 0], turned[:, 1])
+        return bool(np.linalg.norm(self.nearest[row, column], axis=-1).max() < SAME_LINE_M)
+
+
+def _resampled(line: Marking, step: float) -> Array:
+    """Points (n, 2) about every `step` metres on the centre of a marking, both ends included."""
+    along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line.centre, axis=0), axis=1))]
+    at = np.linspace(0.0, along[-1], max(2, round(along[-1] / step) + 1))
+    return np.stack([np.interp(at, along, line.centre[:, axis]) for axis in (0, 1)], axis=1)
+
+
+def _from_nearest(paint: Array, low: Array, high: Array, cell: float) -> NDArray[np.float32]:
+    """From the nearest of the painted places (n, 2) to each cell between two corners, m."""
+    columns, rows = (np.ceil((high - low) / cell).astype(int) + 1).tolist()
+    free = np.ones((rows, columns), np.uint8)
+    column, row = np.rint((paint - low) / cell).astype(int).T
+    free[row, column] = 0
+    _, label = cv2.distanceTransformWithLabels(free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    painted_rows, painted_columns = np.nonzero(free == 0)
+    nearest = np.zeros((int(label.max()) + 1, 2), np.float32)
+    nearest[label[painted_rows, painted_columns]] = np.stack([painted_columns, painted_rows], axis=1)
+    here = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1)
+    return ((here - nearest[label]) * cell).astype(np.float32)
+
+
+def _straight(lines: list[Marking], axis: int, shortest: float) -> Array:
+    """Where the straight pieces that run along an axis cross the other one, each value once."""
+    found = set()
+    for line in lines:
+        for start, end in zip(line.centre[:-1], line.centre[1:], strict=True):
+            if abs(end[1 - axis] - start[1 - axis]) < 1e-6 and abs(end[axis] - start[axis]) >= shortest:
+                found.add(round(float(start[1 - axis]), 3))
+    return np.array(sorted(found))

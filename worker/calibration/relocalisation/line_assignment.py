@@ -1,0 +1,120 @@
+"""Positions by hypotheses of the kind "this line is that marking", for a camera whose rotation is known.
+
+A line along x of the field at y = m is seen, from C, in the plane through C whose normal n (world frame) is
+perpendicular to x: n_y (m - C_y) = n_z C_z. So each image line along x measures a = n_z / n_y = (m - C_y) / C_z, and
+those along y measure b = (m - C_x) / C_z: to find the position is to match numbers on two axes with one scale.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, permutations
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_of
+from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.rotation_voting import Direction
+
+ALONG = 0.012
+"""How far, rad, the plane of a segment may be from a direction that it is taken to run along."""
+LOWEST_M, HIGHEST_M, HEIGHTS = 1.2, 50.0, 22
+TOGETHER = 0.01
+"""Segments whose measures differ by less than such a part are pieces of one line."""
+MOST_LINES = 9
+OFF_M, OFF_OF_HEIGHT = 0.1, 0.02
+"""How far a line may be from its marking and still count: so much, and such a part of the height of the camera."""
+TRIED_FIRST, TRIED_SECOND = 40, 6
+"""Matches on the first axis that are gone on with, and on the second for each of them."""
+ALONG_THE_FIELD = 14
+"""Where nothing measures the second axis, so many places along the field are tried."""
+BESIDE = 1.3
+
+
+def positions(field: FieldMap, view: LineView, direction: Direction, most: int) -> Hypotheses:
+    """Return at most so many hypotheses for each way that the field may be turned under the camera."""
+    found = []
+    for turn in range(2 if field.is_symmetric else 4):
+        rotation = rotations_of(*(direction.pan_tilt_roll + [turn * np.pi / 2, 0, 0]))
+        places = _positions(field, view, rotation, direction.focal_px)[:most]
+        count = len(places)
+        found.append(Hypotheses(np.repeat(rotation[None], count, axis=0), places, np.full(count, direction.focal_px)))
+    return Hypotheses.joined(found)
+
+
+def _positions(field: FieldMap, view: LineView, rotation: Array, focal: float) -> Array:
+    """Positions (n, 3), the best matched first."""
+    normal = view.normals(focal) @ rotation
+    along_x = (np.abs(normal[:, 0]) < ALONG) & (np.abs(normal[:, 0]) < np.abs(normal[:, 1]))
+    along_y = (np.abs(normal[:, 1]) < ALONG) & ~along_x
+    lengths = view.lengths
+    on_y = _lines(normal[along_x, 2] / normal[along_x, 1], lengths[along_x])
+    on_x = _lines(normal[along_y, 2] / normal[along_y, 0], lengths[along_y])
+    found = [
+        ((x, y, height), score)
+        for height, y, x, score in _matched(on_y, field.lines_along_x, on_x, field.lines_along_y, field.half_size[0])
+    ] + [
+        ((x, y, height), score)
+        for height, x, y, score in _matched(on_x, field.lines_along_y, on_y, field.lines_along_x, field.half_size[1])
+    ]
+    found.sort(key=lambda one: -one[1])
+    return np.array([place for place, _ in found]).reshape(-1, 3)
+
+
+def _lines(measures: Array, lengths: Array) -> tuple[Array, Array]:
+    """Measures (n,) of lines and their lengths, out of those of their segments; the longest lines alone."""
+    order = np.argsort(measures)
+    measures, lengths = measures[order], lengths[order]
+    if len(measures) == 0:
+        return measures, lengths
+    new = np.diff(measures, prepend=measures[0]) >= TOGETHER * (1 + np.abs(measures))
+    line = np.cumsum(new)
+    weight = np.bincount(line, lengths)
+    mean = np.bincount(line, lengths * measures) / weight
+    longest = np.argsort(-weight)[:MOST_LINES]
+    return mean[longest], weight[longest]
+
+
+def _matched(
+    first: tuple[Array, Array], first_markings: Array, second: tuple[Array, Array], second_markings: Array, half: float
+) -> list[tuple[float, float, float, float]]:
+    """Height and place on the first axis by matches there, and a place on the second; each with a score."""
+    scaled = _heights_and_places(first[0], first_markings)
+    scores = _score(first, first_markings, *scaled.T)
+    found = []
+    for n in np.argsort(-scores)[:TRIED_FIRST]:
+        height, place = scaled[n].tolist()
+        if len(second[0]) and len(second_markings):
+            places = (second_markings[None] - height * second[0][:, None]).ravel()
+            others = _score(second, second_markings, np.full(len(places), height), places)
+            best = np.argsort(-others)[:TRIED_SECOND]
+            found += [(height, place, float(places[m]), float(scores[n] + others[m])) for m in best]
+        else:
+            places = np.linspace(-BESIDE * half, BESIDE * half, ALONG_THE_FIELD)
+            found += [(height, place, float(other), float(scores[n])) for other in places]
+    return found
+
+
+def _heights_and_places(measures: Array, markings: Array) -> Array:
+    """Heights and places (n, 2) that put two lines on two markings, or one line on one marking from a usual height."""
+    found = []
+    for one, other in combinations(measures, 2):
+        for marking, another in permutations(markings, 2):
+            height = (marking - another) / (one - other)
+            if LOWEST_M < height < HIGHEST_M:
+                found.append((height, marking - height * one))
+    for height in np.geomspace(LOWEST_M, HIGHEST_M, HEIGHTS):
+        found += [(height, marking - height * measure) for measure in measures[:2] for marking in markings]
+    return np.array(found).reshape(-1, 2)
+
+
+def _score(lines: tuple[Array, Array], markings: Array, heights: Array, places: Array) -> Array:
+    """Of each height and place (n,) the share of the length of lines that lie on markings."""
+    if len(heights) == 0:
+        return np.zeros(0)
+    measures, lengths = lines
+    at = heights[:, None] * measures + places[:, None]
+    off = np.abs(at[..., None] - markings).min(axis=-1)
+    near = np.exp(-((off / (OFF_M + OFF_OF_HEIGHT * heights[:, None])) ** 2))
+    return np.asarray(near @ lengths / lengths.sum())

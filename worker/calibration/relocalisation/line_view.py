@@ -1,0 +1,127 @@
+"""What a frame shows of lines, without the distortion of its lens: segments, places on paint, distances to paint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.lens import Lens
+
+WIDTH_PX = 480
+"""Width of a frame in view pixels: half a pixel of it is what hypotheses are told apart by."""
+WIDEST = 1.3
+"""Undistorted views are cut where they reach farther from the principal point, in widths of a frame."""
+PAINT = 110
+"""Response, 0..255, from which a pixel of the shrunk response is paint."""
+FARTHEST_PX = 60.0
+"""Distances to paint are cut here, view pixels."""
+MOST_SEGMENTS, SHORTEST_SEGMENT_PX = 140, 10.0
+PLACES = 320
+"""So many places on paint are projected to the ground by each pose of a population."""
+BORDER_POINTS = 60
+
+
+@dataclass(frozen=True)
+class LineView:
+    """Lines of one frame in view pixels: undistorted, origin in the principal point, x right, y down.
+
+    `focal_px`: of the lens that undistorted it, in view pixels; another focal length f sees the same picture along rays
+    (x / f, y / f, 1). `places` (M, 2) on the middles of paint; `painted_px`: their length in all; `distance` (H, W) to
+    the nearest of them, and `covered` (H, W) what the frame covers, from `corner` (2,) on; `starts`, `ends` (S, 2) of
+    straight segments.
+    """
+
+    focal_px: float
+    frame_px: float
+    places: NDArray[np.float32]
+    painted_px: float
+    distance: NDArray[np.float32]
+    covered: NDArray[np.bool_]
+    corner: Array
+    starts: Array
+    ends: Array
+
+    @classmethod
+    def of(cls, response: NDArray[np.uint8], lens: Lens) -> LineView:
+        """Return the view of a response (height, width), 0..255, of the network through `lens`."""
+        width, height = lens.size
+        scale = WIDTH_PX / width
+        focal = lens.focal_length_px * scale
+        small = cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA)
+        border = _undistorted(_border(width, height), lens, focal)
+        low = np.maximum(border.min(axis=0), -WIDEST * WIDTH_PX)
+        high = np.minimum(border.max(axis=0), WIDEST * WIDTH_PX)
+        shape = tuple(np.floor(high - low).astype(int)[::-1] + 1)
+        cells = _cells(_undistorted(_middles_of_paint(small) / (2 * scale), lens, focal) - low, shape)
+        free = np.ones(shape, np.uint8)
+        free[cells[:, 1], cells[:, 0]] = 0
+        covered = np.zeros(shape, np.uint8)
+        cv2.fillPoly(covered, [np.rint(border - low).astype(np.int32)], 1)
+        chosen = np.random.default_rng(1).permutation(len(cells))[:PLACES]
+        starts, ends = _segments(small, lens, focal, 2 * scale)
+        return cls(
+            focal,
+            1 / scale,
+            (cells[chosen] + low).astype(np.float32),
+            float(len(cells)),
+            np.minimum(cv2.distanceTransform(free, cv2.DIST_L2, 5), FARTHEST_PX).astype(np.float32),
+            covered.astype(bool),
+            low,
+            starts,
+            ends,
+        )
+
+    @property
+    def lengths(self) -> Array:
+        """Of the segments (S,), view pixels."""
+        return np.asarray(np.linalg.norm(self.ends - self.starts, axis=1))
+
+    def normals(self, focal_px: float) -> Array:
+        """Unit normals (S, 3), in the camera's frame, of the planes through the camera and each segment."""
+        one = np.ones((len(self.starts), 1))
+        normal = np.cross(np.c_[self.starts / focal_px, one], np.c_[self.ends / focal_px, one])
+        return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+def _undistorted(pixels: Array, lens: Lens, focal: float) -> Array:
+    """Pixels (n, 2) of a frame in view pixels; those without a ray are left out."""
+    plane = lens.undistort(pixels) * focal
+    return np.asarray(plane[np.isfinite(plane).all(axis=-1)])
+
+
+def _border(width: int, height: int) -> Array:
+    """Pixels around the frame, in order."""
+    across, down = np.linspace(0, width - 1, BORDER_POINTS), np.linspace(0, height - 1, BORDER_POINTS)
+    top, right = np.c_[across, 0 * across], np.c_[0 * down + width - 1, down]
+    bottom, left = np.c_[across[::-1], 0 * across + height - 1], np.c_[0 * down, down[::-1]]
+    return np.concatenate([top, right, bottom, left])
+
+
+def _middles_of_paint(small: NDArray[np.uint8]) -> Array:
+    """Pixels (n, 2) of the shrunk response on the middles of what is painted."""
+    depth = cv2.distanceTransform((small > PAINT).astype(np.uint8), cv2.DIST_L2, 5)
+    middle = (depth > 0) & (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)) - 0.25)
+    row, column = np.nonzero(middle)
+    return np.stack([column, row], axis=1).astype(float)
+
+
+def _cells(places: Array, shape: tuple[int, ...]) -> NDArray[np.intp]:
+    """The cells (n, 2), column and row, that places lie in, each once."""
+    cells = np.rint(places).astype(np.intp)
+    within = (cells >= 0).all(axis=1) & (cells < shape[::-1]).all(axis=1)
+    return np.unique(cells[within], axis=0)
+
+
+def _segments(small: NDArray[np.uint8], lens: Lens, focal: float, scale: float) -> tuple[Array, Array]:
+    """Starts and ends (S, 2) of the longest straight segments, view pixels (von Gioi et al., LSD, 2012)."""
+    found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD).detect(small)[0]
+    pixels = (np.zeros((0, 4)) if found is None else found.reshape(-1, 4)) / scale
+    starts, ends = (lens.undistort(pixels[:, part]) * focal for part in (slice(0, 2), slice(2, 4)))
+    length = np.linalg.norm(ends - starts, axis=1)
+    longest = np.argsort(-np.nan_to_num(length))[:MOST_SEGMENTS]
+    longest = longest[np.nan_to_num(length[longest]) >= SHORTEST_SEGMENT_PX]
+    return starts[longest], ends[longest]

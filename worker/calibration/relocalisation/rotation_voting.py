@@ -1,0 +1,125 @@
+"""Rotations, and focal lengths where they are unknown, under which segments run along the field's two directions.
+
+A segment of a line that runs along x of the field lies in a plane, through the camera, that contains x: the normal of
+the plane is perpendicular to it. Long segments vote for rotations whose x or y is perpendicular to their normals. That
+is what vanishing points say, without having to choose which segments meet in one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.relocalisation.hypotheses import rotations_of
+from worker.calibration.relocalisation.line_view import WIDTH_PX, LineView
+
+STEP_DEG = 2.0
+STEEPEST_DEG, MOST_ROLL_DEG, ROLL_STEP_DEG = 78.0, 8.0, 2.0
+COARSE, FINE = 0.02, 0.006
+"""How far, rad, a direction may be from the plane of a segment that votes for it: on the grid, and after."""
+APART_DEG = 4.0
+USUAL_ROLL_DEG, ROLLED = 3.0, 0.02
+"""What a roll of so many degrees takes from the votes."""
+ROUNDS, OFFSPRING, SPREAD_DEG, NARROWER = 7, 48, 1.4, 0.6
+FOCAL_SPREAD, FOCAL_OFFSPRING = 0.06, 5
+SHORTEST_FOCAL, LONGEST_FOCAL, FOCAL_LENGTHS = 0.4, 4.5, 15
+"""Of unknown lenses, in widths of the frame: views of 103° to 13°."""
+QUARTER = np.pi / 2
+
+
+@dataclass(frozen=True)
+class Direction:
+    """How a camera may look: pan (rad, up to quarter turns), tilt and roll, its focal length in view px, its votes."""
+
+    pan_tilt_roll: Array
+    focal_px: float
+    votes: float
+
+    def is_like(self, other: Direction, apart_deg: float) -> bool:
+        """Whether both differ by less than so much, and by 4 % of focal length."""
+        if abs(np.log(self.focal_px / other.focal_px)) > 0.04:
+            return False
+        return bool(_turned(self.pan_tilt_roll, other.pan_tilt_roll) < np.radians(apart_deg))
+
+
+def focal_lengths(view: LineView, is_known: bool) -> Array:
+    """The focal lengths to be tried, view pixels."""
+    if is_known:
+        return np.array([view.focal_px])
+    return WIDTH_PX * np.geomspace(SHORTEST_FOCAL, LONGEST_FOCAL, FOCAL_LENGTHS)
+
+
+def vote(view: LineView, focal_px: Array, most: int, rng: np.random.Generator) -> list[Direction]:
+    """Return at most so many directions, the most voted for first, each with the focal length that suits it."""
+    if len(view.starts) == 0:
+        return []
+    each = max(5, most // len(focal_px))
+    found = [
+        _climbed(view, one, len(focal_px) > 1, rng) for focal in focal_px for one in _peaks(view, float(focal), each)
+    ]
+    found.sort(key=lambda one: -one.votes)
+    distinct = list[Direction]()
+    for one in found:
+        if not any(one.is_like(other, APART_DEG / 3) for other in distinct):
+            distinct.append(one)
+    return distinct[:most]
+
+
+def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
+    """The peaks of the votes on a grid."""
+    pan, tilt, roll = np.radians(
+        np.stack(
+            np.meshgrid(
+                np.arange(0, 90, STEP_DEG),
+                np.arange(1, STEEPEST_DEG, STEP_DEG),
+                np.arange(-MOST_ROLL_DEG, MOST_ROLL_DEG + 1, ROLL_STEP_DEG),
+                indexing="ij",
+            )
+        ).reshape(3, -1)
+    )
+    votes = _votes(view, np.stack([pan, tilt, roll], axis=1), focal, COARSE)
+    peaks = list[Direction]()
+    for n in np.argsort(-votes)[: 60 * count]:
+        here = Direction(np.array([pan[n], tilt[n], roll[n]]), focal, float(votes[n]))
+        if not any(here.is_like(peak, APART_DEG) for peak in peaks):
+            peaks.append(here)
+        if len(peaks) == count:
+            break
+    return peaks
+
+
+def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random.Generator) -> Direction:
+    """The best direction near a peak, by narrower votes."""
+    best = Direction(
+        start.pan_tilt_roll, start.focal_px, float(_votes(view, start.pan_tilt_roll[None], start.focal_px, FINE)[0])
+    )
+    for number in range(ROUNDS):
+        narrower = NARROWER**number
+        spread = np.radians(SPREAD_DEG) * narrower
+        offspring = best.pan_tilt_roll + spread * rng.normal(size=(OFFSPRING, 3))
+        focal_lengths = [best.focal_px]
+        if frees_focal:
+            focal_lengths += list(best.focal_px * np.exp(FOCAL_SPREAD * narrower * rng.normal(size=FOCAL_OFFSPRING)))
+        for focal in focal_lengths:
+            votes = _votes(view, offspring, focal, FINE)
+            if votes.max() > best.votes:
+                best = Direction(offspring[votes.argmax()], focal, float(votes.max()))
+    return best
+
+
+def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float) -> Array:
+    """Of each direction (P, 3) the share of the length of all segments that runs along x or y, less for its roll."""
+    rotations = rotations_of(*pan_tilt_roll.T).astype(np.float32)
+    normals = view.normals(focal).astype(np.float32)
+    lengths = view.lengths
+    off = np.minimum(np.abs(rotations[:, :, 0] @ normals.T), np.abs(rotations[:, :, 1] @ normals.T))
+    rolled = ROLLED * (pan_tilt_roll[:, 2] / np.radians(USUAL_ROLL_DEG)) ** 2
+    return np.asarray(np.exp(-((off / tolerance) ** 2)) @ lengths / lengths.sum() - rolled)
+
+
+def _turned(one: Array, other: Array) -> float:
+    """The largest of the differences of pan, tilt and roll, rad; a quarter turn of the pan is none."""
+    pan, tilt, roll = one - other
+    return float(max(abs((pan + QUARTER / 2) % QUARTER - QUARTER / 2), abs(tilt), abs(roll)))

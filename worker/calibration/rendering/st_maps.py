@@ -1,0 +1,59 @@
+"""ST maps: per pixel of one picture, where to sample the other. One is the frame, the other has no distortion.
+
+The picture without distortion has the size and the camera matrix of the frame. Maps hold the lens alone, not the pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.lens import Lens
+
+StMap = NDArray[np.float32]
+# Of pixels that nothing is behind: outside of every picture, and no NaN, which compositors spread.
+NOWHERE = -1.0
+# Rows at a time: memory is bounded by the stripe, not by the picture.
+STRIPE = 64
+
+
+def undistorting(lens: Lens) -> StMap:
+    """Per pixel of the picture without distortion, where to sample the frame: (height, width, 2), see `_st_map`."""
+    inverse = np.linalg.inv(lens.matrix)
+
+    def sample(pixels: Array) -> Array:
+        return lens.distort(_linear(inverse, pixels))
+
+    return _st_map(lens.size, sample)
+
+
+def distorting(lens: Lens) -> StMap:
+    """Per pixel of the frame, where to sample the picture without distortion: (height, width, 2), see `_st_map`."""
+
+    def sample(pixels: Array) -> Array:
+        return _linear(lens.matrix, lens.undistort(pixels))
+
+    return _st_map(lens.size, sample)
+
+
+def _st_map(size: tuple[int, int], sample: Callable[[Array], Array]) -> StMap:
+    """(x + 0.5) / width and (y + 0.5) / height of the pixel to sample: 0..1 from the outer corner at the top left.
+
+    Pixel centres are at integers, as everywhere in the engine.
+    """
+    width, height = size
+    found = np.empty((height, width, 2), np.float32)
+    for top in range(0, height, STRIPE):
+        rows = np.arange(top, min(top + STRIPE, height))
+        pixels = np.stack(np.meshgrid(np.arange(width), rows), axis=-1).astype(float)
+        found[rows] = np.nan_to_num((sample(pixels) + 0.5) / [width, height], nan=NOWHERE)
+    return found
+
+
+def _linear(matrix: NDArray[np.floating[Any]], points: Array) -> Array:
+    """Points (..., 2) through an upper triangular matrix (3, 3) with last row 0, 0, 1."""
+    return points @ matrix[:2, :2].T + matrix[:2, 2]

@@ -1,0 +1,358 @@
+"""Search and joint refinement: from stored poses to refined ones, in which a bad camera drags no other along.
+
+All cameras whose frames can be used are searched for and refined together. A camera that then fails the gate is tried
+on its own. If it passes there, the others get it back once, at the pose from which it passed; if not, or if it fails
+again, it stays by itself, and the others are refined without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import cv2
+import numpy as np
+
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.evidence import evidence_of
+from worker.calibration.detection.exclusions import left_out, of_use
+from worker.calibration.detection.ridge_response import ridge_response
+from worker.calibration.detection.view_condition import ViewCondition
+from worker.calibration.diagnostics.markings import report_markings
+from worker.calibration.diagnostics.overlap import overlap_of
+from worker.calibration.diagnostics.registration import Response
+from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
+from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.memory.camera_memory import CameraMemory
+from worker.calibration.records import NOT_RECORDED, Options, Preset, ProgressReporter, Recorder
+from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
+from worker.calibration.refinement.uncertainty import Deviation, RefinedPoses
+from worker.calibration.search.genome import genome_of
+from worker.calibration.search.search import (
+    ALONE_ON_THE_GROUND,
+    COARSE_TO_FINE,
+    ON_THE_GROUND,
+    Found,
+    Level,
+    Strategy,
+    search,
+)
+
+CAPTURE_RAD = 0.1
+"""How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
+NO_CAMERAS: Mapping[int, Camera] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Method:
+    """What a preset does: the levels of its search, the shape of the ground, and how it ends.
+
+    `power`: of the network's responses in the search, so that what it half believes (the edge of a shadow, a board)
+    hardly pulls; `tries_again`: whether a camera that does not pass the gate is tried on its own.
+    """
+
+    levels: Sequence[Level]
+    flat: bool
+    power: int
+    tries_again: bool
+    finish: Callable[..., RefinedPoses]
+
+
+METHODS: Mapping[Preset, Method] = {
+    "esc": Method(COARSE_TO_FINE, flat=False, power=3, tries_again=True, finish=refine),
+    "paper": Method(ON_THE_GROUND, flat=False, power=1, tries_again=False, finish=evaluate_poses),
+    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, power=1, tries_again=False, finish=evaluate_poses),
+}
+"""`esc`: the default. `paper`: the paper's own objective. `scpr`: its predecessor, flat and without a stitch term."""
+
+
+@dataclass(frozen=True)
+class ObservedCameras:
+    """The condition of each camera's view (`views`), and its frames and network response (`observations`)."""
+
+    views: Sequence[ViewCondition]
+    observations: Observations
+
+    def of(self, numbers: Sequence[int]) -> ObservedCameras:
+        """Return the observations of some of the cameras."""
+        return ObservedCameras([self.views[n] for n in numbers], self.observations.of(numbers))
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Inputs of a calibration: a pitch, cameras at their stored poses, and per camera its observations and memory."""
+
+    method: Method
+    pitch: Field
+    cameras: Sequence[Camera]
+    observed: ObservedCameras
+    options: Options
+    memories: Sequence[CameraMemory | None]
+    gate: Gate = field(default_factory=Gate)
+    recorder: Recorder = NOT_RECORDED
+
+    def of(self, numbers: Sequence[int]) -> Problem:
+        """Return the problem of some of the cameras."""
+        cameras, memories = [self.cameras[n] for n in numbers], [self.memories[n] for n in numbers]
+        return replace(self, cameras=cameras, observed=self.observed.of(numbers), memories=memories)
+
+    @property
+    def usable(self) -> list[int]:
+        """Numbers of the cameras whose frames can be used."""
+        return [n for n, view in enumerate(self.observed.views) if view.usable]
+
+
+@dataclass(frozen=True)
+class PoseSolution:
+    """Cameras with refined poses on their pitch, each judged by itself by the gate.
+
+    `begun`: the pose from which each was refined; `together`: numbers of the cameras that were refined jointly, the
+    others stand by themselves; `deviations`: what the lines say of lenses and field; `generations` of the search.
+    """
+
+    pitch: Field
+    begun: list[Camera]
+    results: list[CameraResult]
+    together: list[int]
+    deviations: list[Deviation]
+    generations: int
+
+
+def search_and_refine(
+    problem: Problem, progress: ProgressReporter, near: Mapping[int, Camera] = NO_CAMERAS
+) -> PoseSolution:
+    """Search for all usable cameras but those that were found `near` their stored poses, and refine; see the module."""
+    together = problem.usable
+    lost = [n for n in together if n not in near]
+    searched = Found([], np.inf, 0)
+    if lost:
+        searched = search_poses(problem.of(lost), network_responses(problem.of(lost)), progress)
+    begun = [near.get(n, camera) for n, camera in enumerate(problem.cameras)]
+    for n, camera in zip(lost, searched.cameras, strict=True):
+        begun[n] = camera
+    everyone = range(len(begun))
+    alone = {n: assess_stored(problem.of([n]), progress) for n in everyone if n not in together}
+    results = {n: attempt.result for n, attempt in alone.items()}
+    refined = RefinedPoses(problem.pitch, [], [], [])
+    while together:
+        group = problem.of(together)
+        refined = refine_poses(group, [begun[n] for n in together], progress)
+        results |= zip(together, judge_each(group, refined, progress), strict=True)
+        failing = [n for n in together if not results[n].accepted]
+        if not (failing and problem.method.tries_again):
+            break
+        for n in failing:
+            tried_before = n in alone
+            if not tried_before:
+                alone[n] = best_attempt(single_camera_problem(problem, n), begun[n], progress)
+                begun[n] = alone[n].begun
+            if tried_before or not alone[n].result.accepted:
+                together = [other for other in together if other != n]
+                results[n] = alone[n].result
+    deviations = _joined_deviations(refined, [alone[n].refined for n in everyone if n not in together])
+    in_order = [results[n] for n in everyone]
+    return PoseSolution(refined.pitch, begun, in_order, together, deviations, searched.generations)
+
+
+def refine_without(
+    excluded: Collection[int], problem: Problem, solution: PoseSolution, progress: ProgressReporter
+) -> PoseSolution:
+    """Refine the other cameras without those `excluded` ones that were refined with them; these stay as they are."""
+    together = [n for n in solution.together if n not in excluded]
+    if len(together) in (0, len(solution.together)):
+        return replace(solution, together=together)
+    group = problem.of(together)
+    refined = refine_poses(group, [solution.begun[n] for n in together], progress)
+    results = dict(enumerate(solution.results)) | dict(zip(together, judge_each(group, refined, progress), strict=True))
+    ids = {problem.cameras[n].id for n in together}
+    of_others = [d for d in solution.deviations if d.camera is not None and d.camera not in ids]
+    return replace(
+        solution,
+        pitch=refined.pitch,
+        results=list(results.values()),
+        together=together,
+        deviations=refined.deviations + of_others,
+    )
+
+
+def _joined_deviations(together: RefinedPoses, apart: Sequence[RefinedPoses]) -> list[Deviation]:
+    """Deviations of lenses and field: of a camera that stands apart its own, all others from the joint refinement."""
+    of_lenses = [deviation for one in apart for deviation in one.deviations if deviation.camera is not None]
+    apart_ids = {deviation.camera for deviation in of_lenses}
+    return [deviation for deviation in together.deviations if deviation.camera not in apart_ids] + of_lenses
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A camera that was refined by itself, from the pose `begun`."""
+
+    begun: Camera
+    refined: RefinedPoses
+    result: CameraResult
+
+    @property
+    def agreement(self) -> float:
+        """Agreement 0..1 of the frame with the expected lines at the refined pose (see `Evidence`)."""
+        return self.result.evidence.agreement
+
+
+def single_camera_problem(problem: Problem, number: int) -> Problem:
+    """Return the problem of one camera, which does not solve for the ridge unless it is the only camera."""
+    ridge = problem.options.fit_ridge and len(problem.cameras) == 1
+    return replace(problem.of([number]), options=replace(problem.options, fit_ridge=ridge))
+
+
+def best_attempt(problem: Problem, found: Camera, progress: ProgressReporter) -> Attempt:
+    """Refine a single camera from where the joint search `found` it, and while it fails the gate from other poses."""
+    best = _attempt(problem, found, progress)
+    for start in _other_starts(problem, progress, lost=best.agreement < problem.gate.least_agreement):
+        if best.result.accepted:
+            break
+        best = max(best, _attempt(problem, start, progress), key=lambda attempt: attempt.agreement)
+    return best
+
+
+def _other_starts(problem: Problem, progress: ProgressReporter, *, lost: bool) -> Iterator[Camera]:
+    """Yield the pose that a search by ridges finds, if the camera is `lost`, and its stored pose."""
+    if lost:
+        yield search_poses(problem, ridge_responses(problem), progress).cameras[0]
+    yield problem.cameras[0]
+
+
+def _attempt(problem: Problem, begun: Camera, progress: ProgressReporter) -> Attempt:
+    refined = refine_poses(problem, [begun], progress)
+    return Attempt(begun, refined, judge_each(problem, refined, progress)[0])
+
+
+def assess_stored(problem: Problem, progress: ProgressReporter) -> Attempt:
+    """Assess a single camera whose frame cannot be used at its stored pose."""
+    with progress.timed("refinement"):
+        assessed = evaluate_poses(
+            problem.pitch,
+            problem.cameras,
+            problem.observed.observations,
+            problem.options.stitch_weight,
+            free_parameters(problem),
+            memories=problem.memories,
+        )
+    return Attempt(problem.cameras[0], assessed, judge_each(problem, assessed, progress)[0])
+
+
+def search_poses(problem: Problem, responses: Sequence[Response], progress: ProgressReporter) -> Found:
+    """Search from the stored poses by the `responses` (H, W) of the cameras."""
+    options = problem.options
+    strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
+    with progress.timed("evolution"):
+        rng = np.random.default_rng(options.seed)
+        on_generation = progress.evolution(options.generations)
+        return search(
+            problem.pitch,
+            problem.cameras,
+            responses,
+            problem.method.levels,
+            strategy,
+            rng,
+            on_generation,
+            lambda level, genomes, best: problem.recorder.searched(problem.cameras, level, genomes, best),
+        )
+
+
+def network_responses(problem: Problem) -> list[Response]:
+    """Return the network's responses (H, W) in 0..1 as the search uses them, raised to the power of the preset."""
+    responses = problem.observed.observations.responses
+    return [np.asarray(cv2.pow(response, problem.method.power), dtype=np.float32) for response in responses]
+
+
+def ridge_responses(problem: Problem) -> list[Response]:
+    """Return the ridge responses (H, W) that the search uses where those of the network lead nowhere."""
+    channels = problem.observed.observations.channels
+    return [ridges_of(problem.pitch, camera, of) for camera, of in zip(problem.cameras, channels, strict=True)]
+
+
+def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:
+    """Return the ridge response (H, W) of a frame wherever the network would look for markings."""
+    lines = VisibleLines.from_camera(pitch.line_points(), camera)
+    return of_use(camera, ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px))
+
+
+def refine_poses(problem: Problem, begun: Sequence[Camera], progress: ProgressReporter) -> RefinedPoses:
+    """Refine the cameras jointly, from where the search left them (`begun`)."""
+    with progress.timed("refinement"):
+        progress.at("refinement", 0.0)
+        return problem.method.finish(
+            problem.pitch,
+            begun,
+            problem.observed.observations,
+            problem.options.stitch_weight,
+            free_parameters(problem),
+            stored=problem.cameras,
+            memories=problem.memories,
+        )
+
+
+def free_parameters(problem: Problem) -> list[Parameter]:
+    """Return the numbers of lenses and field that the options ask to solve for along with the poses."""
+    lengths = free_focal_lengths(problem.cameras) if problem.options.fit_focal_length else []
+    return [*lengths, *(free_ridge(problem.pitch) if problem.options.fit_ridge else [])]
+
+
+def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReporter) -> list[CameraResult]:
+    """Judge each refined camera by itself beside its stored pose, on the pitch that it was refined with."""
+    pitch, observations = problem.pitch, problem.observed.observations
+    with progress.timed("quality"):
+        lines = pitch.line_points()
+        results = [
+            CameraResult(
+                camera=after.camera,
+                evidence=after.evidence,
+                residual_px=after.residual_px,
+                covariance=after.covariance,
+                repeatability=after.repeatability,
+                zoom=after.zoom,
+                with_fitted_zoom=after.with_fitted_zoom,
+                refined=after.refined,
+                lens_change=after.lens_change,
+                cross_checked=after.cross_checked,
+                measured=after.measured,
+                repainted_markings=after.repainted_markings,
+                uneven_m=after.uneven_m,
+                view=view,
+                overlap=overlap_of(refined.pitch, after.camera, response),
+                evidence_before=evidence_of(lines, before, channels, response, left_out(pitch, before)),
+                moved=Movement.between(pitch, before, after.camera),
+                markings=report_markings(refined.pitch, after, channels, response),
+                moved_in_all=None if memory is None else Movement.between(pitch, memory.origin, after.camera),
+            )
+            for before, memory, after, view, channels, response in zip(
+                problem.cameras,
+                problem.memories,
+                refined.each,
+                problem.observed.views,
+                observations.channels,
+                observations.responses,
+                strict=True,
+            )
+        ]
+        return [replace(result, refusal=alone_rejection(result, problem.gate)) for result in results]
+
+
+def loss_of(problem: Problem, pitch: Field, answered: Sequence[Camera]) -> float:
+    """Return the loss of the search's middle level at the answered poses, inf if no frame can be used.
+
+    A finer level looks at larger pictures, which takes a third of a second to say hardly more.
+    """
+    group = problem.usable
+    if not group:
+        return float("inf")
+    cameras = [answered[n] for n in group]
+    responses = [
+        response if (out := left_out(pitch, camera)) is None else np.where(out, np.float32(0), response)
+        for camera, response in zip(cameras, network_responses(problem.of(group)), strict=True)
+    ]
+    level = problem.method.levels[len(problem.method.levels) // 2]
+    objective = level.objective(pitch, cameras, responses, 0.0 if level.alone else problem.options.stitch_weight)
+    return float(objective.losses(genome_of(cameras)[None])[0])

@@ -1,0 +1,207 @@
+"""Follows the cameras of an installation through a clip: frame by frame the lines, over time the filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.geometry.camera import Array, Camera, Frame
+from worker.calibration.geometry.derivatives import moved
+from worker.calibration.geometry.field import Field
+from worker.calibration.records import CalibrationError
+from worker.calibration.refinement.refine import SEARCH_PX as REFINEMENT_SEARCH_PX
+from worker.calibration.refinement.refine import Observations, refine
+from worker.calibration.refinement.uncertainty import Sigma
+from worker.calibration.tracking.line_observations import LineObservations, TrackedLines
+from worker.calibration.tracking.motion_filter import GATE, FilterStep, State, smoothed
+
+FIRST_SEARCH_PX = (28.0, *REFINEMENT_SEARCH_PX)
+"""Round by round, in pixels of a 4K frame: the first frame may be taken at the end of a swing."""
+SEARCH_PX, LOST_SEARCH_PX = (8.0, 3.0), (28.0, 14.0)
+"""The same for later frames, and before that where lines may be farther off than `KNOWN` of the first of it."""
+KNOWN = 0.5
+
+LEAST_AGREEMENT = 0.3
+"""Of the lines that the first frame has to show where the cameras are found, beyond what chance would."""
+
+How = Literal["measured", "coasted", "refused"]
+
+
+@dataclass(frozen=True)
+class TrackedPose:
+    """A camera when one frame was taken.
+
+    `how`: whether its lines were `measured`, or it went on as it went because they were not looked for or not seen
+    (`coasted`), or because they contradicted all that was known (`refused`). `motion_covariance` (6, 6) of turn (rad)
+    and shift (m): how sure the motion since the reference is; `covariance`: with how sure the reference is.
+    """
+
+    camera: Camera
+    how: How
+    motion_covariance: Array
+    covariance: Array
+
+    @property
+    def sigma(self) -> Sigma:
+        """How sure the pose is."""
+        return Sigma.from_covariance(self.covariance)
+
+    @property
+    def motion_sigma(self) -> Sigma:
+        """How sure its motion is."""
+        return Sigma.from_covariance(self.motion_covariance)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """All cameras when the frames of this number, from 0, were taken."""
+
+    number: int
+    cameras: Sequence[TrackedPose]
+
+
+class CameraTracker:
+    """Takes the frames of a clip one after the other.
+
+    What it `see`s of a moment it says at once; what it makes of that moment once it has seen `look_ahead` frames more
+    is `settled`. `cameras`: as stored, at most a fraction of a degree off; `first`: the first frames of the clip, by
+    camera. `every`: lines are measured in every so many-th frame. Raises `CalibrationError` if the first frame of a
+    camera does not show its lines.
+    """
+
+    def __init__(
+        self,
+        pitch: Field,
+        cameras: Sequence[Camera],
+        first: Mapping[str, Frame],
+        frames_per_second: float,
+        every: int = 1,
+        look_ahead: int = 0,
+    ) -> None:
+        self._tracks = [_Track(pitch, *each, first[each[0].id]) for each in _references(pitch, cameras, first)]
+        self._seconds = 1 / frames_per_second
+        self._every = every
+        self._look_ahead = look_ahead
+        self._taken = 1
+        self._settled = 0
+
+    @property
+    def references(self) -> list[Camera]:
+        """The cameras where the first frame shows them: the ones that motion is counted from."""
+        return [track.lines.reference for track in self._tracks]
+
+    @property
+    def looks(self) -> bool:
+        """Whether lines are measured in the frames that are next."""
+        return self._taken % self._every == 0
+
+    def see(self, frames: Mapping[str, Frame]) -> Moment:
+        """Take the next frames; a camera that has none coasts, and so do all where nobody `looks`."""
+        for track in self._tracks:
+            track.see(frames.get(track.lines.reference.id) if self.looks else None, self._seconds)
+        self._taken += 1
+        return self.now
+
+    @property
+    def now(self) -> Moment:
+        """The moment of the last frames, by all frames up to it."""
+        return Moment(self._taken - 1, [track.newest() for track in self._tracks])
+
+    def settled(self) -> list[Moment]:
+        """The moments that enough frames have been seen after, each of them once."""
+        return self._settle(self._taken - self._look_ahead)
+
+    def rest(self) -> list[Moment]:
+        """The last moments, after the last frames."""
+        return self._settle(self._taken)
+
+    def _settle(self, until: int) -> list[Moment]:
+        numbers = range(self._settled, until)
+        self._settled = max(self._settled, until)
+        return [Moment(number, [track.oldest() for track in self._tracks]) for number in numbers]
+
+
+class _Track:
+    """One camera on its way."""
+
+    def __init__(self, pitch: Field, reference: Camera, covariance: Array, first: Frame) -> None:
+        self.lines = TrackedLines(pitch, reference, first)
+        self._covariance = covariance
+        seen = self.lines.sighted(first, reference, SEARCH_PX[-1:])
+        if seen is None:
+            raise _not_seen(reference)
+        self.lines.learn(seen, reference)
+        self._last = State.at_reference(self.lines.observed(seen).information)
+        self._steps = [FilterStep(0.0, self._last)]
+        self._how: list[How] = ["measured"]
+
+    def see(self, frame: Frame | None, seconds: float) -> None:
+        """Take the next frame, so long after the one before; None: it is not looked at, or not there."""
+        expected = self._last.after(seconds).drawn_back(seconds)
+        how, self._last = self._known(frame, expected)
+        self._steps.append(FilterStep(seconds, self._last))
+        self._how.append(how)
+
+    def newest(self) -> TrackedPose:
+        """Where it is now."""
+        return self._followed(self._last, self._how[-1])
+
+    def oldest(self) -> TrackedPose:
+        """The oldest moment that has not settled, by all frames so far; it is forgotten then."""
+        state, how = smoothed(self._steps)[0], self._how[0]
+        del self._steps[0], self._how[0]
+        return self._followed(state, how)
+
+    def _followed(self, state: State, how: How) -> TrackedPose:
+        motion = state.change_covariance
+        return TrackedPose(moved(self.lines.reference, state.change), how, motion, self._covariance + motion)
+
+    def _known(self, frame: Frame | None, expected: State) -> tuple[How, State]:
+        if frame is None:
+            return "coasted", expected
+        seen = self._sighted(frame, expected)
+        if seen is None:
+            return "coasted", expected
+        observed = self.lines.observed(seen)
+        if expected.surprise(observed) > GATE:
+            return "refused", expected
+        known = expected.with_observed(observed)
+        self.lines.learn(seen, moved(self.lines.reference, known.change))
+        return "measured", known
+
+    def _sighted(self, frame: Frame, expected: State) -> LineObservations | None:
+        """The lines, from where the camera is expected; step by step where that is hardly known."""
+        hardly = self._off_px(expected) > KNOWN * SEARCH_PX[0]
+        searches = (*LOST_SEARCH_PX, *SEARCH_PX) if hardly else SEARCH_PX
+        return self.lines.sighted(frame, moved(self.lines.reference, expected.change), searches)
+
+    def _off_px(self, expected: State) -> float:
+        """How far lines may be from where they are expected, one standard deviation in pixels of a 4K frame."""
+        lens = self.lines.reference.intrinsics
+        turn = float(np.sqrt(np.trace(expected.change_covariance[:3, :3])))
+        return turn * lens.focal_length_px / lens.relative_size
+
+
+def _references(pitch: Field, cameras: Sequence[Camera], first: Mapping[str, Frame]) -> list[tuple[Camera, Array]]:
+    """The cameras where their first frames show them, and the covariances (6, 6) of their poses."""
+    responses = [np.zeros(first[camera.id].shape[:2], np.float32) for camera in cameras]
+    sight = Observations([Channels([first[camera.id]]) for camera in cameras], responses)
+    found = []
+    for one in refine(pitch, cameras, sight, 0.5, searches_px=FIRST_SEARCH_PX).each:
+        if one.covariance is None or one.evidence.agreement < LEAST_AGREEMENT:
+            raise _not_seen(one.camera)
+        found.append((one.camera, one.covariance))
+    return found
+
+
+def _not_seen(camera: Camera) -> CalibrationError:
+    return CalibrationError(
+        camera.id,
+        "lines-not-seen",
+        f"The first frame of camera {camera.id} does not show its lines near where its stored pose expects them; "
+        "calibrate the venue with a frame of this clip first.",
+    )

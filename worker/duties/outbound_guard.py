@@ -1,0 +1,73 @@
+"""The guard of outbound HTTP: requests go to addresses that were checked, and to no others.
+
+A name is looked up once and the connection is made to an address of that answer: a name that points elsewhere a moment
+later (DNS rebinding) leads nowhere. Redirects are not followed and proxies of the environment are not used, for the
+same reason.
+"""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Mapping
+from contextlib import AbstractAsyncContextManager
+from importlib.metadata import version
+
+import httpx
+
+PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtsps": 322}
+
+
+# Resolvers ask several servers, each several times, for as long as they are set to.
+LOOK_UP_S = 5.0
+
+
+class HostNotFoundError(Exception):
+    """The DNS look-up of a host name failed; the message says why."""
+
+
+def look_up(target: httpx.URL) -> list[str]:
+    """Return the IP addresses of the host of a URL. Raises `HostNotFoundError`."""
+    name, port = target.raw_host.decode("ascii"), target.port or PORTS[target.scheme]
+    looked_up: list[list[str] | str] = []
+
+    def resolve() -> None:
+        try:
+            found = socket.getaddrinfo(name, port, type=socket.SOCK_STREAM)
+            looked_up.append([str(address[0]) for *_, address in found])
+        except (OSError, UnicodeError) as error:
+            looked_up.append(str(error))
+
+    # Nothing ends a look-up: it goes on in a daemon thread that nobody waits for.
+    thread = threading.Thread(target=resolve, daemon=True)
+    thread.start()
+    thread.join(LOOK_UP_S)
+    match looked_up:
+        case [list(addresses)]:
+            return addresses
+        case [why]:
+            raise HostNotFoundError(f"{name} cannot be looked up: {why}")
+        case _:
+            raise HostNotFoundError(f"{name} cannot be looked up within {LOOK_UP_S:g} s")
+
+
+def stream(
+    client: httpx.AsyncClient,
+    method: str,
+    target: httpx.URL,
+    address: str,
+    *,
+    content: bytes | None = None,
+    headers: Mapping[str, str] | None = None,
+    auth: httpx.Auth | None = None,
+) -> AbstractAsyncContextManager[httpx.Response]:
+    """Send a request to the host of a URL at one of its addresses; the response streams."""
+    head = {
+        **(headers or {}),
+        "Host": target.netloc.decode("ascii"),
+        "User-Agent": f"esc/{version('esc-calibration')}",
+    }
+    # The certificate is checked against the name, whatever address the connection goes to.
+    name = {"sni_hostname": target.raw_host.decode("ascii")}
+    at = target.copy_with(host=address)
+    return client.stream(method, at, content=content, headers=head, extensions=name, auth=auth)

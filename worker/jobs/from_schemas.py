@@ -1,0 +1,123 @@
+"""What a job or a drawing is given, as the engine takes it: files become pictures, the wire the engine's types."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from service.schemas import geometry, view
+from service.schemas.field import FieldOfPlay
+from service.schemas.problems import PROBLEM_TYPES, problem_uri
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ignored_areas import Ignored
+from worker.calibration.geometry.lens import LENSES, Lens
+from worker.calibration.stitching.photometry import Light
+from worker.calibration.stitching.views import ViewChoice
+
+if TYPE_CHECKING:
+    from service.schemas.job import JobError
+
+Picture = NDArray[np.uint8]
+JPEG_QUALITY = 90
+
+
+class JobFailedError(Exception):
+    """The job has no result; `error` says why."""
+
+    def __init__(self, kind: str, detail: str, camera: str | None = None) -> None:
+        super().__init__(detail)
+        self.kind, self._detail, self._camera = kind, detail, camera
+
+    @property
+    def error(self) -> JobError:
+        """For the row of the job."""
+        # What a drawing needs would take twice as long to load with all that a job can be.
+        from service.schemas.job import JobError
+
+        told = {"type": problem_uri(self.kind), "title": PROBLEM_TYPES[self.kind].title}
+        return JobError(**told, detail=self._detail, camera=self._camera)
+
+    def because(self, why: str) -> JobFailedError:
+        """The same, with its likeliest cause."""
+        return JobFailedError(self.kind, f"{self._detail} {why[0].upper()}{why[1:]}.", self._camera)
+
+
+def decode_image(file: bytes, flags: int) -> Picture | None:
+    """A picture from a file's bytes, None where it has none; a camera's EXIF orientation is not obeyed."""
+    try:
+        picture = cv2.imdecode(np.frombuffer(file, dtype=np.uint8), flags | cv2.IMREAD_IGNORE_ORIENTATION)
+    except cv2.error:
+        return None
+    return None if picture is None else np.asarray(picture, dtype=np.uint8)
+
+
+def decode_frame(camera: str, image_size: list[int], file: bytes) -> Picture:
+    """A BGR frame (height, width, 3) of the size of the intrinsics."""
+    frame = decode_image(file, cv2.IMREAD_COLOR_BGR)
+    if frame is None:
+        raise JobFailedError("broken-image", f"A frame of camera {camera} cannot be decoded; grab it again.", camera)
+    height, width = frame.shape[:2]
+    if [width, height] != image_size:
+        raise JobFailedError(
+            "frame-size",
+            f"A frame of camera {camera} decodes to {width}x{height} pixels; its intrinsics are for "
+            f"{image_size[0]}x{image_size[1]}.",
+            camera,
+        )
+    return frame
+
+
+def encode_jpeg(picture: Picture, quality: int = JPEG_QUALITY) -> bytes:
+    """The file of a picture."""
+    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return data.tobytes()
+
+
+def encode_png(picture: Picture) -> bytes:
+    """The file of a picture with an opacity, BGRA."""
+    _, data = cv2.imencode(".png", picture)
+    return data.tobytes()
+
+
+def pitch_of(field: FieldOfPlay) -> Field:
+    """The engine's pitch."""
+    ridge = None if field.ridge is None else np.array(field.ridge)
+    size = field.length_m, field.width_m, field.line_width_m
+    return Field(*size, ridge, field.plan, field.measures_m, others=field.others)
+
+
+def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Lens:
+    """The engine's lens."""
+    matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
+    return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]), dict(lens.sigma or {}))
+
+
+def camera_of(camera: geometry.PosedCamera) -> Camera:
+    """The engine's camera at its stored pose."""
+    pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
+    return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
+
+
+def choice_of(choice: view.ViewChoice) -> ViewChoice:
+    """What a stitched view shows, for the engine."""
+    size = choice.width_px, choice.height_px
+    return ViewChoice(choice.projection, *size, choice.field_of_view_deg, choice.pan_deg, choice.horizon)
+
+
+def light_of(light: geometry.Light) -> Light:
+    """How a camera's picture is evened out, for the engine: colours from blue to red."""
+    red, green, blue = light.gain
+    return Light((blue, green, red), light.contrast, light.falloff, light.reach)
+
+
+def camera_with_ignored_areas(camera: geometry.PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:
+    """The engine's camera, with the polygons of its frames that are to be ignored."""
+    width, height = camera.image_size
+    polygons = [np.array(polygon, dtype=float) for polygon in ignore]
+    return replace(camera_of(camera), ignored=Ignored(polygons, (width, height)) if polygons else None)

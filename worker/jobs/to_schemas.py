@@ -1,0 +1,247 @@
+"""What the kinds of jobs share: what they compute with, how they end, how the engine's answer becomes the wire's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from math import isfinite, isnan
+from typing import Any, Generic, TypeVar
+
+from service.schemas import geometry
+from service.schemas.geometry import Moved
+from service.schemas.job import Progress
+from service.schemas.options import FieldOptions, Options
+from service.schemas.problems import refusal_uri
+from service.schemas.results import (
+    AnyResult,
+    CameraResult,
+    CrossCheck,
+    MarkingResult,
+    PairResult,
+    Provenance,
+    SeamPlace,
+    Sigma,
+    View,
+)
+from service.schemas.trend import Anchor, Displacement
+from worker.calibration import records
+from worker.calibration.detection.segmentation import ProviderMissing, Segmenter
+from worker.calibration.detection.view_condition import ViewCondition
+from worker.calibration.diagnostics import seam
+from worker.calibration.diagnostics.markings import MarkingReport
+from worker.calibration.gate import quality
+from worker.calibration.gate.displacement import measure_displacement
+from worker.calibration.gate.pairs import Pair
+from worker.calibration.geometry.camera import Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Lens
+from worker.calibration.refinement import cross_check, uncertainty
+from worker.calibration.stitching.photometry import Light
+from worker.jobs.from_schemas import JobFailedError, camera_of
+from worker.protocol import ComputeResources
+
+PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
+# The engine's report ends with the refinement; what is left is drawing.
+PREVIEW_FRACTION = 0.96
+R = TypeVar("R", bound=AnyResult, covariant=True)
+
+
+@dataclass(frozen=True)
+class Solution(Generic[R]):
+    """A result and the files of its pictures, by the names that `service.store.jobs.files.picture_file` knows.
+
+    `later`: the names of those that can be drawn when somebody looks; `memories`: of the accepted cameras, by camera.
+    """
+
+    result: R
+    pictures: dict[str, bytes]
+    later: Sequence[str] = ()
+    memories: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+
+
+def provenance_of(segmenter: Segmenter, options: Options | FieldOptions) -> Provenance:
+    """What computes a solution, so that it can be computed again."""
+    return Provenance(
+        software=version("esc-calibration"),
+        model_sha256=segmenter.sha256,
+        seed=options.seed or 0,
+        # Who is told changes no number, and the address may be a secret.
+        options=options.model_dump(mode="json", exclude={"callback_url"}),
+    )
+
+
+def round_to_ms(timings_s: Mapping[str, float]) -> dict[str, float]:
+    """The seconds of each stage, as a result shows them."""
+    return {stage: round(seconds, 3) for stage, seconds in timings_s.items()}
+
+
+def lens_to_schema(lens: Lens) -> geometry.Intrinsics:
+    """A lens of the engine for the wire."""
+    # What photos or clicks hardly tell has a deviation beyond any number that says something.
+    sigma = {
+        name: min(max(value, geometry.LEAST_SIGMA), geometry.LARGEST_SIGMA)
+        for name, value in lens.sigma.items()
+        if not isnan(value)
+    }
+    return geometry.Intrinsics(
+        model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist(), sigma=sigma or None
+    )
+
+
+def light_to_schema(light: Light) -> geometry.Light:
+    """How a camera's picture is evened out, for the wire: colours from red to blue."""
+    return geometry.Light(
+        gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff, reach=light.reach
+    )
+
+
+def pose_to_schema(pose: Pose) -> geometry.Pose:
+    """A pose of the engine for the wire."""
+    return geometry.Pose(
+        rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
+    )
+
+
+def finite_or_none(value: Any) -> float | None:
+    """JSON has no NaN and no infinity."""
+    return float(value) if value is not None and isfinite(value) else None
+
+
+def load_segmenter(means: ComputeResources) -> Segmenter:
+    """The network that the settings name."""
+    if not means.model.is_file():
+        raise JobFailedError("model-missing", f"{means.model} is not there; set ESC_MODEL or train one.")
+    try:
+        return Segmenter(means.model, means.threads, PROVIDERS[means.provider])
+    except ProviderMissing as missing:
+        raise JobFailedError(
+            "provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for."
+        ) from missing
+
+
+def progress_to_schema(step: records.Progress) -> Progress:
+    """How far the engine is, with room for the pictures."""
+    return Progress(
+        stage=step.stage,
+        fraction=min(max(step.fraction, 0.0), PREVIEW_FRACTION),
+        generation=step.generation,
+        loss=finite_or_none(step.loss),
+    )
+
+
+def camera_to_schema(
+    found: quality.CameraResult,
+    lens: geometry.Intrinsics | None = None,
+    light: geometry.Light | None = None,
+    moved_from_anchor: Displacement | None = None,
+) -> CameraResult:
+    """What a finish has to say of a camera; `lens` and `light` where they were found as well."""
+    return CameraResult(
+        id=found.camera.id,
+        accepted=found.accepted,
+        rejected_because=found.rejected_because,
+        refusal=None if found.refusal is None else refusal_uri(found.refusal.reason),
+        pose=pose_to_schema(found.camera.pose),
+        intrinsics=lens,
+        sigma=sigma_to_schema(found.sigma),
+        repeatability=sigma_to_schema(found.repeatability),
+        moved=Moved(
+            rotation_deg=found.moved.rotation_deg,
+            position_m=found.moved.position_m,
+            pixels=finite_or_none(found.moved.pixels),
+        ),
+        iou=finite_or_none(found.overlap.iou),
+        expected_found=finite_or_none(found.overlap.found),
+        unexpected=finite_or_none(found.overlap.unexpected),
+        found=finite_or_none(found.evidence.share),
+        by_chance=finite_or_none(found.evidence.by_chance),
+        view=_view(found.view),
+        residual_px=finite_or_none(found.residual_px),
+        light=light,
+        markings=[_marking(one) for one in found.markings],
+        displacement=moved_from_anchor,
+        cross_check=_cross_check(found.cross_checked()),
+    )
+
+
+def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
+    """How far a camera is from its anchor; one that has none yet is its own. None where that cannot be told."""
+    begun = found.camera if anchor is None else camera_of(anchor.posed)
+    moved = measure_displacement(pitch, begun, found)
+    if moved is None:
+        return None
+    turned_and_moved = quality.Movement.between(pitch, begun, found.camera)
+    return Displacement(
+        anchor=None if anchor is None else anchor.revision,
+        at=moved.place[:2].round(2).tolist(),
+        across_m=moved.shift[0],
+        away_m=moved.shift[1],
+        sigma_across_m=moved.sigma[0],
+        sigma_away_m=moved.sigma[1],
+        repeatability_across_m=moved.repeatability[0],
+        repeatability_away_m=moved.repeatability[1],
+        rotation_deg=turned_and_moved.rotation_deg,
+        position_m=turned_and_moved.position_m,
+        focal_length=None if moved.focal is None else moved.focal.value,
+        sigma_focal_length=None if moved.focal is None else moved.focal.sigma,
+        focal_length_m=moved.focal_shift_m,
+    )
+
+
+def _cross_check(found: cross_check.CrossCheck | None) -> CrossCheck | None:
+    return None if found is None else CrossCheck(apart_m=found.apart_m, expected_m=found.expected_m)
+
+
+def _marking(seen: MarkingReport) -> MarkingResult:
+    return MarkingResult(
+        name=seen.name,
+        expected_m=round(seen.expected_m, 1),
+        found=round(seen.found, 3),
+        offset_cm=_rounded_cm(seen.offset_m),
+        sigma_cm=_rounded_cm(seen.sigma_m),
+        side=seen.side,
+        elsewhere=seen.is_elsewhere,
+    )
+
+
+def pair_to_schema(pair: Pair, found: seam.Seam) -> PairResult:
+    """What two cameras say of each other."""
+    return PairResult(
+        cameras=list(pair.cameras),
+        stitch_error_px=finite_or_none(pair.error_px),
+        seam=[_place(place) for place in found.places],
+        worst=None if found.worst is None else _place(found.worst),
+    )
+
+
+def _place(place: seam.SeamPlace) -> SeamPlace:
+    return SeamPlace(
+        at=(place.at.round(1) + 0.0).tolist(),
+        across=(place.across.round(2) + 0.0).tolist(),
+        error_cm=round(100 * place.error_m, 1),
+        sigma_cm=round(100 * place.sigma_m, 1),
+    )
+
+
+def _rounded_cm(metres: float | None) -> float | None:
+    """To the millimetre."""
+    return None if metres is None or not isfinite(metres) else round(100 * metres, 1)
+
+
+def _view(found: ViewCondition) -> View:
+    return View(
+        usable=found.usable,
+        cause=found.cause,
+        where=found.where,
+        detail=found.words,
+        lines_found=finite_or_none(found.figures.lines_found),
+        blur_px=finite_or_none(found.figures.blur_px),
+    )
+
+
+def sigma_to_schema(sigma: uncertainty.Sigma | None) -> Sigma | None:
+    """A standard deviation of the engine for the wire; None where a pose is not determined."""
+    if sigma is None or not isfinite(sigma.rotation_deg) or not isfinite(sigma.position_m):
+        return None
+    return Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m)

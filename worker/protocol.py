@@ -1,0 +1,109 @@
+"""The protocol between a worker and a job program, over the program's standard input and output.
+
+In: a line of JSON, a `JobRequest`, and the bytes of the files. Out: lines of JSON, a `Message` each; the bytes of
+the pictures follow the line that announces them. So the program needs no store, and nobody tidies up after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Literal
+
+from pydantic import BaseModel
+
+from service.schemas.job import JobError, Progress
+from service.schemas.results import AnyResult, IntrinsicsResult, Result
+from service.store.jobs.task import Task
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+Files = Mapping[str, Sequence[bytes]]
+
+
+class ComputeResources(BaseModel):
+    """What a job is computed with: the network, its execution provider, and the number of threads."""
+
+    model: Path
+    provider: Literal["cpu", "cuda", "openvino"] = "cpu"
+    threads: int
+
+    @classmethod
+    def of(cls, settings: Settings) -> ComputeResources:
+        """Return the resources of the settings, with an absolute path of the model."""
+        return cls(model=settings.model.absolute(), provider=settings.provider, threads=settings.threads)
+
+
+class JobRequest(BaseModel):
+    """The request that starts a job program.
+
+    `sizes`: bytes of the files that follow, frames by camera or photos by name. The names of the fields are those of
+    the protocol.
+    """
+
+    task: Task
+    means: ComputeResources
+    sizes: dict[str, list[int]]
+
+    @classmethod
+    def of(cls, task: Task, means: ComputeResources, files: Files) -> JobRequest:
+        """Return the request for a task, without the addresses that its program does not need."""
+        sizes = {name: [len(file) for file in several] for name, several in files.items()}
+        return cls(task=task.without_addresses(), means=means, sizes=sizes)
+
+    @classmethod
+    def read(cls, stream: IO[bytes]) -> tuple[JobRequest, dict[str, list[bytes]]]:
+        """Read a request that `write` wrote, and its files."""
+        given = cls.model_validate_json(stream.readline(), extra="ignore")
+        return given, {name: [stream.read(size) for size in several] for name, several in given.sizes.items()}
+
+    def write(self, stream: IO[bytes], files: Files) -> None:
+        """Write the request as a line of JSON, then the bytes of the files."""
+        stream.write(self.model_dump_json().encode() + b"\n")
+        for several in files.values():
+            stream.writelines(several)
+
+
+class Message(BaseModel):
+    """One line of output: exactly one of progress, warning, result and error. Result and error end the job."""
+
+    progress: Progress | None = None
+    warning: str | None = None
+    result: AnyResult | None = None
+    error: JobError | None = None
+    # Beside a result: the pictures that follow, and their bytes.
+    pictures: dict[str, int] = {}
+    # The names of those that can be drawn when somebody looks.
+    later: list[str] = []
+    # Of a calibration: the memories of the accepted cameras with this job in them, by camera.
+    memories: dict[str, dict[str, Any]] = {}
+
+    @property
+    def verdict(self) -> str | None:
+        """Return how the job ended in a word: the verdict on its poses, or the kind of its error."""
+        match self.result:
+            case None:
+                return None if self.error is None else self.error.type.rpartition("/")[2]
+            case Result():
+                return self.result.verdict
+            case IntrinsicsResult():
+                return "found"
+            case _:
+                return "accepted" if self.result.accepted else "rejected"
+
+    @property
+    def last(self) -> bool:
+        """True if no other message follows."""
+        return self.result is not None or self.error is not None
+
+    def without_pictures(self, why: str) -> Message:
+        """Return the message whose result says that the pictures that came with it are missing."""
+        if self.result is None:
+            return self
+        warnings = [*self.result.warnings, why]
+        return self.model_copy(update={"result": self.result.model_copy(update={"warnings": warnings}), "pictures": {}})
+
+    def line(self) -> str:
+        """Return the message as a line of JSON."""
+        return self.model_dump_json(exclude_unset=True)

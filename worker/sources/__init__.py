@@ -1,0 +1,1 @@
+"""What cameras speak: pictures by HTTP, endless ones too, and streams by RTSP."""

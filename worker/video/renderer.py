@@ -1,0 +1,311 @@
+"""`Panorama.picture` at the speed of video: the same picture, of planes and into planes, by tables made once.
+
+What is done in advance for a panorama, and done anew only when it changes: the view is cut into strips of rows, each
+strip into stretches of columns that show one camera alone or a seam, each at one level of detail (halved frames where
+the view is coarser than the frame); each stretch has its map in the fixed-point form that OpenCV samples fastest by,
+its share of the blend and what its lens takes from the corners. Light is put on in blue, green and red at the
+resolution of chroma; what that does to luma is looked up for grey, and the little that its colour adds is carried over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.stitching.panorama import BACKDROP, Panorama, Part
+from worker.calibration.stitching.photometry import NEUTRAL, Light
+from worker.video.yuv_planes import BLACK, FROM_PLANES, NO_COLOUR, TO_PLANES, Picture, Plane
+
+# What is worked on at a time fits into a core's cache.
+STRIP_ROWS, BLOCK_COLUMNS = 128, 64
+LARGEST_LEVEL = 5
+# Chroma of two rows lies between them, beside the left one of two columns.
+CHROMA_ROW = 0.5
+Planes = tuple[Plane, Plane, Plane]
+Map = tuple[NDArray[np.int16], NDArray[np.uint16]]
+
+
+class Renderer:
+    """Makes pictures of one panorama. `threads`: how many strips are made at a time."""
+
+    def __init__(self, panorama: Panorama, threads: int = 2) -> None:
+        width, height = panorama.size
+        if width % 2 or height % 2:
+            raise ValueError(f"a view of {width}x{height} pixels: video takes even numbers only")
+        self._views = [_View.of(part) for part in panorama.parts]
+        self._strips = [
+            _strip(panorama, slice(top, min(top + STRIP_ROWS, height))) for top in range(0, height, STRIP_ROWS)
+        ]
+        self._levels = _levels_used(self._strips, len(panorama.parts))
+        self._pool = ThreadPoolExecutor(threads)
+        self._weights = [part.weight for part in panorama.parts]
+        self.move(panorama)
+
+    def fits(self, panorama: Panorama) -> bool:
+        """Whether a panorama is of the same cameras, each counting where it did: `move` is enough for it."""
+        return len(panorama.parts) == len(self._weights) and all(
+            part.weight is weight for part, weight in zip(panorama.parts, self._weights, strict=True)
+        )
+
+    def move(self, panorama: Panorama) -> None:
+        """Sample frames where a panorama says that `fits`; the corners of a lens stay where they were in the view."""
+        self._maps = list(
+            self._pool.map(
+                lambda strip: [
+                    _maps(panorama.parts[stretch.camera], strip.rows, stretch) for stretch in strip.stretches
+                ],
+                self._strips,
+            )
+        )
+
+    def render(self, pictures: Mapping[str, Picture], onto: Planes) -> None:
+        """Make the view of one picture of each camera in planes (H, W), (H/2, W/2), (H/2, W/2)."""
+        levels = list(
+            self._pool.map(
+                lambda view, used: _levels(pictures[view.camera].planes, used) if used else {},
+                self._views,
+                self._levels,
+            )
+        )
+        for _ in self._pool.map(lambda strip, maps: self._make(strip, maps, levels, onto), self._strips, self._maps):
+            pass
+
+    def close(self) -> None:
+        """Let go of the threads."""
+        self._pool.shutdown()
+
+    def _make(self, strip: _Strip, maps: Sequence[_Maps], levels: Sequence[Mapping[int, Planes]], onto: Planes) -> None:
+        rows, half_rows = strip.rows, _halved(strip.rows)
+        here = onto[0][rows], onto[1][half_rows], onto[2][half_rows]
+        if strip.unseen:
+            here[0][:] = round(BLACK + BACKDROP * 219 / 255)
+            here[1][:] = here[2][:] = NO_COLOUR
+        for stretch, at in zip(strip.stretches, maps, strict=True):
+            columns, half_columns = stretch.columns, _halved(stretch.columns)
+            target = here[0][:, columns], here[1][:, half_columns], here[2][:, half_columns]
+            view = self._views[stretch.camera]
+            source = levels[stretch.camera][stretch.level]
+            if stretch.share is None and not view.lit:
+                _sample(source, at, target)
+                continue
+            made: Sequence[Any] = [np.empty(plane.shape, np.uint8) for plane in target]
+            _sample(source, at, made)
+            if view.lit:
+                made = _evened(view, stretch, made)
+            for plane, new, share in zip(target, made, stretch.share or 3 * (None,), strict=True):
+                plane[:] = new if share is None else cv2.blendLinear(new, plane, share, 1 - share)
+
+
+@dataclass(frozen=True)
+class _View:
+    """What is done to one camera's pixels: `tones` (256, 3) of blue, green and red, `luma` (256,) of grey."""
+
+    camera: str
+    lit: bool
+    tones: Plane
+    luma: Plane
+    falloff: float
+
+    @classmethod
+    def of(cls, part: Part) -> _View:
+        light: Light = part.light
+        tones = light.tones
+        grey = np.clip((np.arange(256) - BLACK) * 255 / 219, 0, 255)
+        bent = np.stack([np.interp(grey, np.arange(256), tones[:, colour]) for colour in range(3)], axis=-1)
+        luma = bent @ TO_PLANES[0, :3] + BLACK
+        return cls(
+            part.camera, replace(light, reach=0.0) != NEUTRAL, _rounded(tones)[:, None], _rounded(luma), light.falloff
+        )
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Columns of a strip that show one camera at one level of detail.
+
+    `share`: how much it counts before what is already there, of luma and of each chroma; None: alone. `rise`: what its
+    lens takes from the corners: of luma (h, w), of luma at the resolution of chroma (h/2, w/2) and of colours
+    (h/2, w/2, 3), in 255ths of `steepest`.
+    """
+
+    camera: int
+    level: int
+    columns: slice
+    share: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]] | None
+    rise: tuple[Plane, Plane, Plane] | None
+    steepest: float
+
+
+@dataclass(frozen=True)
+class _Strip:
+    rows: slice
+    unseen: bool
+    stretches: Sequence[_Stretch]
+
+
+@dataclass(frozen=True)
+class _Maps:
+    """Where a stretch is sampled, its luma and its chroma."""
+
+    luma: Map
+    chroma: Map
+
+
+# In advance
+
+
+def _strip(panorama: Panorama, rows: slice) -> _Strip:
+    stretches: list[_Stretch] = []
+    already = np.zeros((rows.stop - rows.start, panorama.size[0]), np.float32)
+    for number, part in enumerate(panorama.parts):
+        weight = part.weight[rows]
+        already += weight
+        # Weights in turn: each camera before all that were drawn earlier.
+        share = np.where(weight > 0, weight / np.maximum(already, 1e-9), 0).astype(np.float32)
+        share[share > 1 - 1e-6] = 1
+        stretches += _stretches(number, part, rows, share)
+    return _Strip(rows, bool((already == 0).any()), stretches)
+
+
+def _stretches(number: int, part: Part, rows: slice, share: NDArray[np.float32]) -> list[_Stretch]:
+    """The columns of a strip where a camera counts, blocks that are alike put together."""
+    source = part.source[rows]
+    kinds = []
+    for left in range(0, share.shape[1], BLOCK_COLUMNS):
+        block = slice(left, min(left + BLOCK_COLUMNS, share.shape[1]))
+        counts = share[:, block] > 0
+        if counts.any():
+            kinds.append((block, bool((share[:, block] == 1).all()), _level(source[:, block], counts)))
+        else:
+            kinds.append((block, False, -1))
+    found = []
+    for (alone, level), blocks in groupby(kinds, key=lambda kind: kind[1:]):
+        if level >= 0:
+            together = [block for block, *_ in blocks]
+            columns = slice(together[0].start, together[-1].stop)
+            own = None if alone else _shares(share[:, columns])
+            here = source[:, columns]
+            found.append(_Stretch(number, level, columns, own, *_rise(part, here, _between(here, own))))
+    return found
+
+
+def _level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
+    """How often a frame is halved before it is sampled: as often as the view has room for, as in `sampled`."""
+    (x_down, x_right), (y_down, y_right) = np.gradient(source[..., 0]), np.gradient(source[..., 1])
+    area = float(np.median(np.abs(x_right * y_down - y_right * x_down)[counts]))
+    return int(np.clip(np.floor(0.5 * np.log2(max(area, 1.0))), 0, LARGEST_LEVEL))
+
+
+def _maps(part: Part, rows: slice, stretch: _Stretch) -> _Maps:
+    source = part.source[rows, stretch.columns]
+    chroma = (_between(source, stretch.share) - np.array([0, CHROMA_ROW], np.float32)) / np.float32(2)
+    return _Maps(_map(source, stretch.level), _map(chroma, stretch.level))
+
+
+def _between(source: NDArray[np.float32], share: Sequence[NDArray[np.float32]] | None) -> NDArray[np.float32]:
+    """Where chroma of two by two pixels is looked for: beside the left ones of them, between those that are seen."""
+    upper, lower = source[::2, ::2], source[1::2, ::2]
+    between = (upper + lower) / np.float32(2)
+    if share is None:
+        return between
+    seen = share[0][::2, ::2, None] > 0, share[0][1::2, ::2, None] > 0
+    return np.where(seen[0] & ~seen[1], upper, np.where(seen[1] & ~seen[0], lower, between))
+
+
+def _map(source: NDArray[np.float32], level: int) -> Map:
+    at: Any = np.ascontiguousarray(source)
+    if level:
+        at = (at + np.float32(0.5)) / np.float32(1 << level) - np.float32(0.5)
+    nothing: Any = None
+    places, parts = cv2.convertMaps(at, nothing, cv2.CV_16SC2)
+    return np.asarray(places, np.int16), np.asarray(parts, np.uint16)
+
+
+def _shares(share: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    half = ((share[::2, ::2] + share[1::2, ::2]) / 2).astype(np.float32)
+    return np.ascontiguousarray(share), half, half
+
+
+def _rise(
+    part: Part, source: NDArray[np.float32], between: NDArray[np.float32]
+) -> tuple[tuple[Plane, Plane, Plane] | None, float]:
+    if part.light.falloff == 0:
+        return None, 0.0
+    luma, chroma = (part.light.rise(at, part.frame_size) - 1 for at in (source, between))
+    steepest = float(max(np.abs(luma).max(), np.abs(chroma).max(), 1e-6))
+    of_luma, of_chroma = (_rounded(255 * np.abs(change) / steepest) for change in (luma, chroma))
+    return (of_luma, of_chroma, np.repeat(of_chroma[..., None], 3, axis=-1)), float(
+        np.copysign(steepest, part.light.falloff)
+    )
+
+
+def _levels_used(strips: Sequence[_Strip], cameras: int) -> list[list[int]]:
+    used: list[set[int]] = [set() for _ in range(cameras)]
+    for strip in strips:
+        for stretch in strip.stretches:
+            used[stretch.camera].add(stretch.level)
+    return [sorted(levels) for levels in used]
+
+
+def _rounded(values: NDArray[np.floating[Any]]) -> Plane:
+    rounded: Plane = np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    return rounded
+
+
+def _halved(extent: slice) -> slice:
+    return slice(extent.start // 2, extent.stop // 2)
+
+
+# For each picture
+
+
+def _levels(planes: Planes, used: Sequence[int]) -> dict[int, Planes]:
+    """The planes halved as often as they are used."""
+    found = {0: planes}
+    for level in range(1, used[-1] + 1):
+        luma, blue, red = (_shrunk(plane) for plane in found[level - 1])
+        found[level] = luma, blue, red
+    return found
+
+
+def _shrunk(plane: Plane) -> Plane:
+    height, width = plane.shape
+    even = plane[: max(height // 2 * 2, 1), : max(width // 2 * 2, 1)]
+    size = max(width // 2, 1), max(height // 2, 1)
+    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _sample(source: Planes, maps: _Maps, target: Sequence[Plane]) -> None:
+    for plane, at, onto in zip(source, (maps.luma, maps.chroma, maps.chroma), target, strict=True):
+        cv2.remap(plane, *at, cv2.INTER_LINEAR, onto, cv2.BORDER_REPLICATE)
+
+
+def _evened(view: _View, stretch: _Stretch, planes: Sequence[Any]) -> Sequence[Any]:
+    """The planes in the light of the other cameras."""
+    luma, blue, red = planes
+    coarse: Any = cv2.resize(luma, (blue.shape[1], blue.shape[0]), interpolation=cv2.INTER_AREA)
+    colours: Any = cv2.LUT(cv2.transform(cv2.merge((coarse, blue, red)), FROM_PLANES), view.tones)
+    luma, coarse = cv2.LUT(luma, view.luma), cv2.LUT(coarse, view.luma)
+    if stretch.rise is not None:
+        of_luma, of_coarse, of_colours = stretch.rise
+        colours = _raised(colours, of_colours, stretch.steepest, 0)
+        luma = _raised(luma, of_luma, stretch.steepest, BLACK)
+        coarse = _raised(coarse, of_coarse, stretch.steepest, BLACK)
+    evened, blue, red = cv2.split(cv2.transform(colours, TO_PLANES))
+    # What its colour adds to the luma of a pixel, around 128 so that it fits into a byte.
+    added = cv2.addWeighted(evened, 1, coarse, -1, NO_COLOUR)
+    added = cv2.resize(added, (luma.shape[1], luma.shape[0]), interpolation=cv2.INTER_LINEAR)
+    return cv2.addWeighted(luma, 1, added, 1, -NO_COLOUR), blue, red
+
+
+def _raised(values: Any, part: Plane, steepest: float, black: int) -> Any:
+    """Values above `black` multiplied by what the lens took from them."""
+    above = cv2.addWeighted(values, 1, values, 0, -black) if black else values
+    change = cv2.multiply(above, part, scale=abs(steepest) / 255)
+    return cv2.add(values, change) if steepest > 0 else cv2.subtract(values, change)

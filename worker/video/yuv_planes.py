@@ -1,0 +1,117 @@
+"""Pictures in the form in which video travels, and the arithmetic between it and blue, green, red.
+
+Brightness (luma) has a value for each pixel, the two differences of colour (chroma) one for every 2 x 2: BT.709, luma
+16 to 235, chroma 16 to 240 around 128, a chroma sample beside the left pixels of its four, between its two rows. What
+comes otherwise is converted on its way in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array, Frame
+
+if TYPE_CHECKING:
+    import av
+
+Plane = NDArray[np.uint8]
+
+BLACK, NO_COLOUR = 16, 128
+# libav's numbers: matrices of colour (AVCOL_SPC_*) and ranges (AVCOL_RANGE_*).
+BT709, UNTOLD, RANGE_LIMITED, RANGE_FULL = 1, 2, 1, 2
+# What names no matrix is BT.601 if it is no higher than PAL, BT.709 otherwise: what players take it for.
+PAL_ROWS, BT601 = 576, 5
+# swscale's bilinear, rounded properly and with all of the chroma: without these it darkens by up to five levels.
+EXACT = 0x2 | 0x40000 | 0x2000 | 0x4000
+# Shares of red, green and blue in luma.
+RED, GREEN, BLUE = 0.2126, 0.7152, 0.0722
+
+
+def _to_planes() -> Array:
+    """Luma and both chroma of blue, green, red, 1: (3, 4)."""
+    luma = np.array([BLUE, GREEN, RED])
+    of_blue = (np.array([1.0, 0, 0]) - luma) / (2 * (1 - BLUE))
+    of_red = (np.array([0, 0, 1.0]) - luma) / (2 * (1 - RED))
+    rows = np.stack([219 * luma, 224 * of_blue, 224 * of_red]) / 255
+    return np.column_stack([rows, [BLACK, NO_COLOUR, NO_COLOUR]])
+
+
+def _from_planes(to_planes: Array) -> Array:
+    """Blue, green, red of luma, chroma, 1: (3, 4)."""
+    inverse = np.linalg.inv(to_planes[:, :3])
+    return np.column_stack([inverse, -inverse @ to_planes[:, 3]])
+
+
+TO_PLANES = _to_planes()
+FROM_PLANES = _from_planes(TO_PLANES)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A frame of a clip, in the form of this room."""
+
+    frame: av.VideoFrame
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.frame.width, self.frame.height
+
+    @cached_property
+    def planes(self) -> tuple[Plane, Plane, Plane]:
+        """Luma (H, W) and both chroma (H/2, W/2), the frame's own memory."""
+        return planes_of(self.frame)
+
+    @cached_property
+    def colours(self) -> Frame:
+        """Blue, green, red (H, W, 3)."""
+        shown = self.frame.reformat(
+            format="bgr24",
+            src_colorspace=BT709,
+            dst_colorspace=BT709,
+            src_color_range=RANGE_LIMITED,
+            dst_color_range=RANGE_FULL,
+            interpolation=EXACT,
+        )
+        return np.asarray(shown.to_ndarray(), np.uint8)
+
+
+def picture_of(frame: av.VideoFrame) -> Picture:
+    """A decoded frame of any format as this room has it."""
+    matrix = _matrix(frame)
+    full = frame.color_range == RANGE_FULL or frame.format.name.startswith("yuvj")
+    if frame.format.name == "yuv420p" and matrix == BT709 and not full:
+        return Picture(frame)
+    return Picture(
+        frame.reformat(
+            format="yuv420p",
+            src_colorspace=matrix,
+            dst_colorspace=BT709,
+            src_color_range=RANGE_FULL if full else RANGE_LIMITED,
+            dst_color_range=RANGE_LIMITED,
+            interpolation=EXACT,
+        )
+    )
+
+
+def _matrix(frame: av.VideoFrame) -> int:
+    told = int(frame.colorspace)
+    if told != UNTOLD:
+        return told
+    return BT601 if frame.height <= PAL_ROWS else BT709
+
+
+def planes_of(frame: av.VideoFrame) -> tuple[Plane, Plane, Plane]:
+    """The memory of a frame of format yuv420p: luma (H, W) and both chroma (H/2, W/2), rounded up."""
+    luma, blue, red = (_view(plane) for plane in frame.planes)
+    return luma, blue, red
+
+
+def _view(plane: Any) -> Plane:
+    rows = np.frombuffer(plane, np.uint8)
+    return rows[: plane.height * plane.line_size].reshape(plane.height, plane.line_size)[:, : plane.width]
