@@ -11,6 +11,8 @@ from fields.template import Template
 
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 SUGGESTED = 3
+# Likeness of two words, 0..1, from which the one is the other misspelt.
+MISSPELT = 0.8
 
 
 class UnknownLandmark(ValueError):  # noqa: N818
@@ -37,8 +39,21 @@ def find(name: str, template: Template, size: Mapping[str, float]) -> Point:
         open_name = measured.get(f"{wanted[: number.start()]}distance{wanted[number.end() :]}")
         if open_name is not None:
             return template.places_at(size, float(number.group()))[open_name]
-    names = {plain: known for plain, (known, _) in places.items()} | measured
-    raise UnknownLandmark(name, [names[like] for like in difflib.get_close_matches(wanted, names, SUGGESTED)])
+    raise UnknownLandmark(name, _like(wanted, {plain: known for plain, (known, _) in places.items()} | measured))
+
+
+def _like(wanted: str, names: Mapping[str, str]) -> list[str]:
+    """Return the names, by how they are compared, that are spelt like `wanted`, or else that have most of its words."""
+    near = difflib.get_close_matches(wanted, names, SUGGESTED)
+    if not near:
+        shared = {plain: _words_shared(wanted.split(), plain.split()) for plain in names}
+        most = max(shared.values(), default=0)
+        near = [plain for plain, count in shared.items() if count == most > 0][:SUGGESTED]
+    return [names[plain] for plain in near]
+
+
+def _words_shared(wanted: list[str], name: list[str]) -> int:
+    return sum(bool(difflib.get_close_matches(word, name, 1, MISSPELT)) for word in wanted)
 
 
 def _plain(name: str) -> str:

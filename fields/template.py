@@ -3,6 +3,8 @@
 A file gives the `[size]` (length, width, line, and what else differs between fields of the sport), the `[measures]`
 that follow from it, and then
 
+- `uneven`, how far a usual ground is above or below its plane, a standard deviation in metres, that of turf unless
+  given;
 - `[[marking]]`, once, and `[[end]]`, at the left end (x < 0) and mirrored at the right one, `{end}` in its name: each a
   `line` through points, an `arc` counter-clockwise around `centre` from the direction of `start` to that of `end`, with
   the distance of `start` as radius, a `circle` or a `spot`; a line and an arc may have a `dash` of `paint` and `gap`.
@@ -31,6 +33,8 @@ from fields.shapes import WHITE, Arc, Line, Point, Shape, Spot, dashes
 FILES = Path(__file__).parent
 NAMES = tuple(sorted(path.stem for path in FILES.glob("*.toml")))
 END = "{end}"
+TURF_M = 0.015
+"""How uneven turf is. FIFA's and World Rugby's tests allow a centimetre under a straightedge of three metres."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +49,14 @@ class Extent:
 
 @dataclass(frozen=True)
 class Template:
-    """A sport's field. `size`: the lengths that a field has of its own, `length`, `width` and `line` among them."""
+    """A sport's field. `size`: the lengths that a field has of its own, `length`, `width` and `line` among them.
+
+    `uneven`: how far a usual ground of this sport is above or below its plane, or its roof, a standard deviation in
+    metres.
+    """
 
     source: str = ""
+    uneven: float = TURF_M
     size: Mapping[str, Extent] = field(default_factory=dict)
     measures: Mapping[str, str | float] = field(default_factory=dict)
     marking: Sequence[Mapping[str, Any]] = ()

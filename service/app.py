@@ -13,18 +13,20 @@ from fastapi import FastAPI, Request
 from starlette.responses import Response
 
 from service.api import problems
-from service.api.access import QUIET, Access
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
+from service.api.request_log import QUIET, RequestLog
+from service.pages import FOR_BROWSERS
 from service.pages import ROUTERS as PAGES
-from service.routes import docs, following, health, jobs, pictures, snapshot, stitch, venues
+from service.routes import docs, event_streams, health, jobs, pictures, snapshot, stitch, venues
 from service.routes.contract import documented
-from service.routes.submissions import again, frames, intrinsics, locate
+from service.routes.contract.introduction import DESCRIPTION, TAGS
+from service.routes.submissions import frames, intrinsics, locate, resubmit
+from service.schemas.problems import Problem
 from service.settings import Settings
-from service.store.blobs import AWAY as BLOBS_AWAY
-from service.store.engine import AWAY as DATABASE_AWAY
-from service.wire.problems import Problem
+from service.store.blobs import BLOB_OUTAGES
+from service.store.database import DATABASE_OUTAGES, outage_reason
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 log = structlog.get_logger()
@@ -36,6 +38,8 @@ def create_app(settings: Settings) -> FastAPI:
     app = documented.DocumentedApp(
         title="ESC",
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
+        description=DESCRIPTION,
+        openapi_tags=TAGS,
         version=version("esc-calibration"),
         lifespan=_lifespan,
         # FastAPI's own pages load their scripts from the internet.
@@ -43,29 +47,30 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
         # Spans, if tracing.configure() found out where to send them; figures and logs have ways of their own.
         telemetry={"metrics": False, "logs": False, "exclude": lambda scope: scope.get("path") in QUIET},
-        responses=documented.problems(422, 503),
+        responses=documented.problem_responses(422, 503),
         # Generated clients call their functions by it.
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.context = context
     app.add_middleware(BodyLimit, largest_form=int(settings.max_body_mb * 1e6))
-    app.add_middleware(Access, metrics=context.metrics)
+    app.add_middleware(RequestLog, metrics=context.metrics)
     app.add_middleware(HttpDefaults)
     documented.document_callback(app)
     documented.document_alarms(app)
     documented.document_events(app)
-    problems.install(app)
+    problems.install_handlers(app)
     _answer_outages(app)
+    app.include_router(FOR_BROWSERS)
     for routes in (
         venues,
-        following,
+        event_streams,
         snapshot,
         stitch,
         frames,
         intrinsics,
         locate,
         jobs,
-        again,
+        resubmit,
         pictures,
         health,
         docs,
@@ -79,14 +84,14 @@ def create_app(settings: Settings) -> FastAPI:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
-    duties = (context.watch.run, context.watch_venues.run, context.gate.run)
+    duties = (context.job_watch.run, context.venue_watch.run, context.authenticator.run)
     beside = [asyncio.create_task(duty()) for duty in duties]
     yield
     for task in beside:
         task.cancel()
         with suppress(asyncio.CancelledError):
             await task
-    await context.gate.write_uses()
+    await context.authenticator.write_uses()
     context.close()
 
 
@@ -95,7 +100,7 @@ def _answer_outages(app: FastAPI) -> None:
 
     async def away(_: Request, error: Exception) -> Response:
         log.error("storage is away", exc_info=error)
-        return problems.answer(Problem("unavailable", "Its storage does not answer.", headers={"Retry-After": "5"}))
+        return problems.problem_response(Problem("unavailable", outage_reason(error), headers={"Retry-After": "5"}))
 
     async def no_room(request: Request, error: Exception) -> Response:
         # Where an upload is spooled.
@@ -103,6 +108,6 @@ def _answer_outages(app: FastAPI) -> None:
             return await away(request, error)
         raise error
 
-    for error in (*DATABASE_AWAY, *BLOBS_AWAY):
+    for error in (*DATABASE_OUTAGES, *BLOB_OUTAGES):
         app.add_exception_handler(error, away)
     app.add_exception_handler(OSError, no_room)

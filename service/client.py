@@ -10,8 +10,9 @@
         for seen, event in client.venue_events("demo", ["poses.changed"]):
             print(event.type, event.data)
 
-Both have the same methods. A service that refuses raises `Refused`. What only some methods need is imported there: a
-command that lists venues takes as long to load it as to be answered.
+Both have the same methods. A service that refuses raises `Refused`. Of what a newer service says, fields and events
+that this client does not know are left out, and words that it does not know are handed on as they are. What only some
+methods need is imported there: a command that lists venues takes as long to load it as to be answered.
 """
 
 from __future__ import annotations
@@ -25,26 +26,37 @@ from functools import cache
 from http import HTTPStatus
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import httpx
-from pydantic import TypeAdapter
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from service.blocking import Call, Stream
-from service.refused import Refused as Refused
-from service.refused import passing, pause_s_of, refusal
-from service.wire.health import VenueHealth
-from service.wire.history import History, Revision
-from service.wire.merge_patch import MEDIA_TYPE as MERGE_PATCH
-from service.wire.names import OPTIONS_PART, EventKind, FormatName, Kind, LensChoice, Status, StitchFormat
-from service.wire.venue import ChangedVenue, Venue, VenueIn, Venues
+from service.blocking_client import Call, Stream
+from service.client_errors import NotUnderstood as NotUnderstood
+from service.client_errors import Refused as Refused
+from service.client_errors import passing, pause_s_of, refusal
+from service.schemas.base import TOLERANTLY
+from service.schemas.health import VenueHealth
+from service.schemas.history import History, Revision
+from service.schemas.merge_patch import MEDIA_TYPE as MERGE_PATCH
+from service.schemas.names import (
+    OPTIONS_PART,
+    EventKind,
+    FieldNumber,
+    FormatName,
+    JobKind,
+    JobStatus,
+    LensChoice,
+    StitchFormat,
+)
+from service.schemas.venue import ChangedVenue, Venue, VenueIn, Venues
 
 if TYPE_CHECKING:
     from datetime import date
 
-    from service.wire.job import Job
-    from service.wire.told.events import Event
-    from service.wire.trend import Trend
+    from service.schemas.events.venue_event import Event
+    from service.schemas.job import Job
+    from service.schemas.trend import Trend
 
 # Longer than the longest poll.
 TIMEOUT_S = 75
@@ -79,34 +91,34 @@ class AsyncClient:
 
     async def put_venue(self, venue: VenueIn, if_match: str | None = None) -> ChangedVenue:
         """Create or replace a venue, and say what it leaves to be assumed; `if_match`: only the one with this tag."""
-        content = venue.model_dump(mode="json", exclude_none=True)
+        # A service need not know a field that has its default.
+        content = venue.model_dump(mode="json", exclude_defaults=True)
         headers = {"If-Match": if_match} if if_match else {}
         answer = await self._ask("PUT", f"/venues/{venue.id}", json=content, headers=headers)
-        return ChangedVenue.model_validate_json(answer)
+        return _read(ChangedVenue, answer)
 
     async def patch_venue(self, venue_id: str, patch: Mapping[str, Any], if_match: str | None = None) -> ChangedVenue:
         """Change parts of a venue by a JSON merge patch; cameras may be an object of their ids."""
         headers = {"Content-Type": MERGE_PATCH} | ({"If-Match": if_match} if if_match else {})
         content = json.dumps(patch).encode()
-        return ChangedVenue.model_validate_json(
-            await self._ask("PATCH", f"/venues/{venue_id}", content=content, headers=headers)
-        )
+        answer = await self._ask("PATCH", f"/venues/{venue_id}", content=content, headers=headers)
+        return _read(ChangedVenue, answer)
 
     async def tagged_venue(self, venue_id: str) -> tuple[Venue, str]:
         """A venue, and the tag by which to change this one and no other."""
         response = await self._answer("GET", f"/venues/{venue_id}")
-        return Venue.model_validate_json(response.content), response.headers["etag"]
+        return _read(Venue, response.content), response.headers["etag"]
 
     async def venue(self, venue_id: str) -> Venue:
         """A venue with its stored poses."""
-        return Venue.model_validate_json(await self._ask("GET", f"/venues/{venue_id}"))
+        return _read(Venue, await self._ask("GET", f"/venues/{venue_id}"))
 
     async def venues(self) -> list[Venue]:
         """All venues."""
-        page = Venues.model_validate_json(await self._ask("GET", "/venues"))
+        page = _read(Venues, await self._ask("GET", "/venues"))
         found = page.venues
         while page.next_cursor is not None:
-            page = Venues.model_validate_json(await self._ask("GET", "/venues", params={"cursor": page.next_cursor}))
+            page = _read(Venues, await self._ask("GET", "/venues", params={"cursor": page.next_cursor}))
             found += page.venues
         return found
 
@@ -116,34 +128,39 @@ class AsyncClient:
 
     async def venue_health(self, venue_id: str) -> VenueHealth:
         """How a venue is doing: its alarms, the drift of its cameras, its schedule."""
-        return VenueHealth.model_validate_json(await self._ask("GET", f"/venues/{venue_id}/health"))
+        return _read(VenueHealth, await self._ask("GET", f"/venues/{venue_id}/health"))
 
     async def history(self, venue_id: str, most: int | None = None) -> list[Revision]:
         """Every change of a venue's poses, newest first; `most`: so many of them."""
         address = f"/venues/{venue_id}/history"
-        page = History.model_validate_json(await self._ask("GET", address))
+        page = _read(History, await self._ask("GET", address))
         found = page.revisions
         while page.next_cursor is not None and (most is None or len(found) < most):
-            page = History.model_validate_json(await self._ask("GET", address, params={"cursor": page.next_cursor}))
+            page = _read(History, await self._ask("GET", address, params={"cursor": page.next_cursor}))
             found += page.revisions
         return found[:most]
 
     async def trend(self, venue_id: str, camera: str, since: date | None = None) -> Trend:
         """How a camera has moved since its anchor, night by night; `since`: the first night to tell."""
-        from service.wire.trend import Trend
+        from service.schemas.trend import Trend
 
         params = {"since": since.isoformat()} if since else {}
         answer = await self._ask("GET", f"/venues/{venue_id}/cameras/{camera}/trend", params=params)
-        return Trend.model_validate_json(answer)
+        return _read(Trend, answer)
 
     async def restore(self, venue_id: str, revision: int) -> Venue:
         """Let the poses of a revision hold again."""
         answer = await self._ask("POST", f"/venues/{venue_id}/restore", json={"revision": revision})
-        return Venue.model_validate_json(answer)
+        return _read(Venue, answer)
 
     async def adopt_refined(self, venue_id: str, camera: str) -> Venue:
         """Store the refined pose and lens of a camera that the last accepted calibration found."""
-        return Venue.model_validate_json(await self._ask("POST", f"/venues/{venue_id}/cameras/{camera}/adopt-refined"))
+        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/cameras/{camera}/adopt-refined"))
+
+    async def adopt_field(self, venue_id: str, job_id: str, name: FieldNumber) -> Venue:
+        """Store a number of the field as the lines of a calibration have it, of those in `adoptable` of its result."""
+        wanted = {"job": job_id, "name": name}
+        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-field", json=wanted))
 
     async def venue_poses(
         self, venue_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
@@ -181,7 +198,7 @@ class AsyncClient:
         asked again when it says (Retry-After), at the latest after a minute. Ends when the
         venue is deleted; where that happened while nobody was connected, with `Refused` (404).
         """
-        from service.wire.told.events import LAST
+        from service.schemas.events.venue_event import FINAL_EVENT
 
         path, params = f"/venues/{venue_id}/events", {"events": list(kinds)}
         heard = time.monotonic()
@@ -196,10 +213,11 @@ class AsyncClient:
                         if name:
                             told[name] = value
                         elif not line and "data" in told:
-                            seen, event = told["id"], _event().validate_json(told["data"])
-                            yield seen, event
-                            if event.type == LAST:
-                                return
+                            seen, event = told["id"], _happened(told["data"])
+                            if event is not None:
+                                yield seen, event
+                                if event.type == FINAL_EVENT:
+                                    return
                             told = {}
                         # Also after whoever asked has taken its time over an event.
                         heard = time.monotonic()
@@ -248,19 +266,19 @@ class AsyncClient:
     async def jobs(
         self,
         venue: str | None = None,
-        status: Status | None = None,
-        kind: Kind | None = None,
+        status: JobStatus | None = None,
+        kind: JobKind | None = None,
         most: int | None = None,
     ) -> list[Job]:
         """Jobs, newest first: of one venue, in one state, of one kind; `most`: so many of them."""
-        from service.wire.job import Jobs
+        from service.schemas.job import Jobs
 
         chosen = {name: value for name, value in (("venue", venue), ("status", status), ("kind", kind)) if value}
-        page = Jobs.model_validate_json(await self._ask("GET", "/jobs", params=chosen))
+        page = _read(Jobs, await self._ask("GET", "/jobs", params=chosen))
         found = page.jobs
         while page.next_cursor is not None and (most is None or len(found) < most):
             more = chosen | {"cursor": page.next_cursor}
-            page = Jobs.model_validate_json(await self._ask("GET", "/jobs", params=more))
+            page = _read(Jobs, await self._ask("GET", "/jobs", params=more))
             found += page.jobs
         return found[:most]
 
@@ -393,6 +411,7 @@ class Client:
     trend = Call(AsyncClient.trend)
     restore = Call(AsyncClient.restore)
     adopt_refined = Call(AsyncClient.adopt_refined)
+    adopt_field = Call(AsyncClient.adopt_field)
     venue_poses = Call(AsyncClient.venue_poses)
     venue_stitch = Call(AsyncClient.venue_stitch)
     venue_events = Stream(AsyncClient.venue_events)
@@ -418,14 +437,38 @@ def _connection(url: str, api_key: str | None) -> dict[str, Any]:
 
 
 def _job(answer: bytes) -> Job:
-    from service.wire.job import Job
+    from service.schemas.job import Job
 
-    return Job.model_validate_json(answer)
+    return _read(Job, answer)
+
+
+Answer = TypeVar("Answer", bound=BaseModel)
+
+
+def _read(model: type[Answer], answer: bytes) -> Answer:
+    """What a service of any version says, as far as this client knows it; raises `NotUnderstood`."""
+    try:
+        return model.model_validate_json(answer, **TOLERANTLY)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        raise NotUnderstood(f"{'.'.join(map(str, first['loc'])) or model.__name__}: {first['msg']}") from error
+
+
+def _happened(data: str) -> Event | None:
+    """An event; None: it is of a type that only a newer service knows."""
+    from service.schemas.events.venue_event import EVENT_TYPES
+
+    try:
+        event = json.loads(data)
+        known = event["type"] in EVENT_TYPES
+        return _event().validate_python(event, **TOLERANTLY) if known else None
+    except (ValueError, TypeError, KeyError) as error:
+        raise NotUnderstood(f"{data[:100]} is no event") from error
 
 
 @cache
 def _event() -> TypeAdapter[Event]:
-    from service.wire.told.events import Event
+    from service.schemas.events.venue_event import Event
 
     return TypeAdapter(Event)
 

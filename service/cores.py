@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 MINE, GROUPS = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
 
-def usable(mine: Path = MINE, groups: Path = GROUPS) -> int:
+def usable_cores(mine: Path = MINE, groups: Path = GROUPS) -> int:
     """Whole cores, at least one: by affinity, and by the quotas of the control groups that the process is in."""
     try:
         cores = len(os.sched_getaffinity(0))

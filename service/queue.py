@@ -9,19 +9,22 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 
 import sqlalchemy as sa
 from dbos import DBOS, DBOSClient, DBOSConfig
 from dbos import WorkflowStatusString as QueueStatus
 
-from service.store.engine import postgresql
-from service.wire.names import Kind
+from service.schemas.names import JobKind
+from service.store.database import LIMITS, postgresql
 
 APPLICATION = "esc"
 QUEUE = "calibration"
 # For what takes a second and somebody waits for: it does not stand behind a calibration.
 LIGHT_QUEUE, LIGHT = "light", ("locate",)
 WORKFLOW = "calibrate"
+# Of the queue's own tables on PostgreSQL.
+SCHEMA = "dbos"
 # The engine's default is a hash of the source; after a deployment the jobs of the old version would never be begun.
 VERSION = "1"
 BEGINS_AGAIN = 2
@@ -33,10 +36,18 @@ def migrate(url: str) -> None:
     DBOS.migrate(url)
 
 
-def _engine(url: str) -> sa.Engine:
+def remove(url: str) -> None:
+    """Take the queue's own tables out of a PostgreSQL database again, with all that is in them."""
+    engine = postgresql(url)
+    with engine.begin() as connection:
+        connection.execute(sa.schema.DropSchema(SCHEMA, cascade=True, if_exists=True))
+    engine.dispose()
+
+
+def _engine(url: str, limits: str = LIMITS) -> sa.Engine:
     """The queue's own engine: its SQL expects the driver to begin transactions, ours does not."""
     if not url.startswith("sqlite"):
-        return postgresql(url)
+        return postgresql(url, limits)
     engine = sa.create_engine(url)
 
     @sa.event.listens_for(engine, "connect")
@@ -48,14 +59,32 @@ def _engine(url: str) -> sa.Engine:
     return engine
 
 
-# Why the queue does not begin a job again.
+@dataclass(frozen=True)
+class GivenUp:
+    """Why the queue does not begin a job again, in words.
+
+    `can_wait`: whether that says nothing against beginning it, if it never was begun.
+    """
+
+    why: str
+    can_wait: bool
+
+
 ENDED = {
-    QueueStatus.MAX_RECOVERY_ATTEMPTS_EXCEEDED.value: f"It was begun {1 + BEGINS_AGAIN} times, and each time its "
-    "worker ended before it did",
-    QueueStatus.ERROR.value: "Its last attempt broke off with an error before it could write down how it ended",
-    QueueStatus.SUCCESS.value: "Its last attempt ended without having written down how",
-    QueueStatus.CANCELLED.value: "It was taken out of the queue",
+    QueueStatus.MAX_RECOVERY_ATTEMPTS_EXCEEDED.value: GivenUp(
+        f"It was begun {1 + BEGINS_AGAIN} times, and each time its worker ended before it did", can_wait=False
+    ),
+    QueueStatus.ERROR.value: GivenUp(
+        "Its last attempt broke off with an error before it could write down how it ended", can_wait=True
+    ),
+    QueueStatus.SUCCESS.value: GivenUp("Its last attempt ended without having written down how", can_wait=True),
+    QueueStatus.CANCELLED.value: GivenUp("It was taken out of the queue", can_wait=False),
 }
+UNKNOWN = GivenUp("The queue does not know it", can_wait=True)
+
+
+def _queue_of(kind: JobKind) -> str:
+    return LIGHT_QUEUE if kind in LIGHT else QUEUE
 
 
 class Queue:
@@ -65,18 +94,21 @@ class Queue:
         self._engine = _engine(url)
         self._client = DBOSClient(system_database_engine=self._engine, application_name=APPLICATION)
 
-    def enqueue(self, connection: sa.Connection, job_id: str, priority: int, kind: Kind) -> None:
+    def enqueue(self, connection: sa.Connection, job_id: str, priority: int, kind: JobKind) -> None:
         """Put a job in, when and if the caller's transaction commits. A smaller `priority` goes first."""
-        queue = LIGHT_QUEUE if kind in LIGHT else QUEUE
         self._client.enqueue_in_transaction(
             connection,
-            {"workflow_name": WORKFLOW, "queue_name": queue, "workflow_id": job_id, "priority": priority},
+            {"workflow_name": WORKFLOW, "queue_name": _queue_of(kind), "workflow_id": job_id, "priority": priority},
             job_id,
         )
 
     def forget(self, job_ids: Collection[str]) -> None:
-        """Delete what the queue keeps about jobs that have ended; those it does not know are no error."""
+        """Delete what the queue keeps about jobs; those it does not know are no error."""
         self._client.delete_workflows(list(job_ids))
+
+    def hand_back(self, job_id: str, kind: JobKind) -> None:
+        """Put a job that a worker has begun back in, at its place; what was begun so far is not counted against it."""
+        self._client.resume_workflow(job_id, queue_name=_queue_of(kind))
 
     def close(self) -> None:
         """Let the database go."""
@@ -92,12 +124,15 @@ class WorkerQueue:
         config: DBOSConfig = {
             "name": APPLICATION,
             "system_database_url": url,
-            "system_database_engine": _engine(url),
+            # DBOS takes a statement that is given up for a failure of the workflow; it may wait as long as it wants.
+            "system_database_engine": _engine(url, limits=""),
             "executor_id": worker,
             "application_version": VERSION,
+            # The queue is polled anyway; what would be listened for are events of workflows, which nobody here sends.
+            "use_listen_notify": False,
             "log_level": "WARNING",
         }
-        DBOS(config=config)
+        self._engine = DBOS(config=config)
 
         @DBOS.workflow(name=WORKFLOW, max_recovery_attempts=BEGINS_AGAIN)
         def attempt(job_id: str) -> None:
@@ -111,14 +146,25 @@ class WorkerQueue:
                 queue, worker_concurrency=at_once, polling_interval_sec=POLL_S, on_conflict="always_update"
             )
 
+    def stop_taking(self) -> None:
+        """Take no more jobs; those that were begun go on."""
+        for event in self._engine.background_thread_stop_events:
+            event.set()
+
+    def is_idle(self) -> bool:
+        """Whether every job that was taken has ended, and the queue knows. Private to the engine as well."""
+        return not self._engine._active_workflows_set.activeList()
+
     def take_over(self, dead_workers: Collection[str]) -> None:
         """Put the jobs of dead workers back into the queue. Private to the engine: its version is pinned exactly."""
         DBOS._recover_pending_workflows(list(dead_workers))
 
-    def given_up(self, job_ids: Collection[str]) -> dict[str, str]:
-        """Which of these jobs the queue will not begin again, and why in words."""
-        found = DBOS.list_workflows(workflow_ids=list(job_ids), status=list(ENDED), load_input=False, load_output=False)
-        return {workflow.workflow_id: ENDED[workflow.status] for workflow in found}
+    def given_up(self, job_ids: Collection[str]) -> dict[str, GivenUp]:
+        """Which of these jobs the queue will not begin again, and why."""
+        found = DBOS.list_workflows(workflow_ids=list(job_ids), load_input=False, load_output=False)
+        status = {workflow.workflow_id: workflow.status for workflow in found}
+        unknown = dict.fromkeys(set(job_ids) - status.keys(), UNKNOWN)
+        return unknown | {job_id: ENDED[ended] for job_id, ended in status.items() if ended in ENDED}
 
     def forget(self, job_ids: Collection[str]) -> None:
         """Delete what the queue keeps about jobs that have ended; those it does not know are no error."""

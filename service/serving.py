@@ -11,19 +11,23 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import nullcontext
-from typing import Self
+from functools import partial
+from typing import Self, cast
 
 import structlog
 import uvicorn
 from fastapi import FastAPI
 
-from service import lifeline
-from service.api.connection import Connection, let_go_of_the_slow
+from service import child_process
+from service.api.file_descriptors import most_connections
+from service.api.slow_clients import Connection, ConnectionLimiter, close_slow_connections
 from service.app import create_app
-from service.observe import tracing
+from service.observability import tracing
 from service.settings import Settings
-from service.store.keys import Keys
+from service.store.keys import KeyRepository
+from service.worker_lock import REFUSED, AlreadyRunning, lock_worker
 
 # What open requests get to end in, and after them the worker.
 GRACE_S = 5
@@ -31,6 +35,7 @@ GRACE_S = 5
 RESTART_AFTER_S = 1.0
 RESTART_AT_LEAST_EVERY_S = 30.0
 YOUNG_S = 10.0
+ACCEPTED_AT_ONCE, WAITING_AT_THE_DOOR = 32, 2048
 # Of uvicorn's ticks, ten a second.
 TICKS_PER_LOOK = 10
 log = structlog.get_logger()
@@ -42,6 +47,9 @@ class CannotListen(Exception):  # noqa: N818
 
 def serve(settings: Settings, *, with_worker: bool) -> None:
     """Answer requests until SIGTERM or SIGINT."""
+    if with_worker:
+        # Asked here, where somebody sees the answer; the worker itself holds the lock.
+        lock_worker(settings).close()
     listener = _listen(settings)
     tracing.configure("esc-api", socket.gethostname())
     app = create_app(settings)
@@ -50,13 +58,20 @@ def serve(settings: Settings, *, with_worker: bool) -> None:
     # Uvicorn raises the signal again after its shutdown, which would end the process before the worker is stopped.
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, server.handle_exit)
-    with KeptWorker(settings) if with_worker else nullcontext():
+    workers = app.state.context.workers
+
+    def name_is_taken() -> bool:
+        return settings.worker_name in [worker.name for worker in workers.alive(settings.takeover_after_s)]
+
+    with KeptWorker(settings, name_is_taken) if with_worker else nullcontext() as kept:
         print(f"ESC listens on http://{_authority(*listener.getsockname()[:2])}", flush=True)
         server.run(sockets=[listener])
     tracing.flush()
+    if kept is not None and kept.refused:
+        raise AlreadyRunning("The worker of this service cannot run; its last line above says why.")
 
 
-def _see_to_keys(settings: Settings, keys: Keys) -> None:
+def _see_to_keys(settings: Settings, keys: KeyRepository) -> None:
     """Nobody listens to the world by accident."""
     if settings.auth == "off":
         if keys.any():
@@ -74,7 +89,7 @@ def _listen(settings: Settings) -> socket.socket:
         return socket.create_server(
             (settings.host, settings.port),
             family=socket.AF_INET6 if ":" in settings.host else socket.AF_INET,
-            backlog=2048,
+            backlog=WAITING_AT_THE_DOOR,
         )
     except OSError as error:
         taken = " Does the service run already? --port chooses another." if error.errno == errno.EADDRINUSE else ""
@@ -94,7 +109,10 @@ class _Server(uvicorn.Server):
         super().__init__(
             uvicorn.Config(
                 app,
-                http=Connection,
+                # Uvicorn only calls it.
+                http=cast(type[asyncio.Protocol], partial(Connection, ConnectionLimiter(most_connections(settings)))),
+                # So many are accepted before any of them is counted.
+                backlog=ACCEPTED_AT_ONCE,
                 ws="none",
                 log_config=None,
                 access_log=False,
@@ -105,24 +123,34 @@ class _Server(uvicorn.Server):
         self._context = app.state.context
         self._settings = settings
 
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to answer."""
+        await super().startup(sockets)
+        # asyncio lets no more wait at the door than it accepts at once.
+        for listener in sockets or ():
+            listener.listen(WAITING_AT_THE_DOOR)
+
     async def on_tick(self, counter: int) -> bool:
         """What uvicorn does ten times a second."""
         if counter % TICKS_PER_LOOK == 0:
             limits = self._settings.stall_timeout_s, self._settings.request_timeout_s
-            let_go_of_the_slow(self, asyncio.get_running_loop().time(), *limits)
+            close_slow_connections(self, asyncio.get_running_loop().time(), *limits)
         return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop answering."""
-        self._context.let_go()
+        self._context.release_waiters()
         await super().shutdown(sockets)
 
 
 class KeptWorker:
     """A worker as a child process, started again when it dies, ended with this process in any case."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, name_is_taken: Callable[[], bool]) -> None:
+        """`name_is_taken`: whether a worker of its name is alive that is not this one."""
         self._settings = settings
+        self._name_is_taken = name_is_taken
+        self.refused = False
         self._stopping = threading.Event()
         self._process: subprocess.Popen[bytes] | None = None
         # The kernel ends the child with the thread that started it: this one, which lives until `__exit__`.
@@ -134,11 +162,17 @@ class KeptWorker:
 
     def __exit__(self, *_: object) -> None:
         self._stopping.set()
-        if self._process is not None:
-            self._process.terminate()
-        self._thread.join(GRACE_S)
+        # Asked once more, the worker does not wait for its jobs.
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: self._terminate())
+        self._terminate()
+        self._thread.join(self._settings.drain_s + GRACE_S)
         if self._process is not None and self._process.poll() is None:
             self._process.kill()
+
+    def _terminate(self) -> None:
+        if self._process is not None:
+            self._process.terminate()
 
     def _keep(self) -> None:
         pause = RESTART_AFTER_S
@@ -157,6 +191,10 @@ class KeptWorker:
             log.error("no worker can be started", error=str(error))
             return
         code = self._process.wait()
+        if code == REFUSED and not self._stopping.is_set() and self._name_is_taken():
+            self.refused = True
+            self._stopping.set()
+            os.kill(os.getpid(), signal.SIGTERM)
         if not self._stopping.is_set():
             log.error("worker died, starting another", code=code)
 
@@ -166,7 +204,7 @@ class KeptWorker:
         # folder that `esc` was called in is not taken for a part of it.
         return subprocess.Popen(
             [sys.executable, "-P", "-m", "service.cli", "worker", *data],
-            env=os.environ | lifeline.for_child(),
+            env=os.environ | child_process.for_child(),
             stdin=subprocess.DEVNULL,
             start_new_session=True,
         )

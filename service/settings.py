@@ -9,12 +9,19 @@ import re
 import socket
 import sys
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, SecretStr, field_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import (
+    BaseSettings,
+    DotEnvSettingsSource,
+    EnvSettingsSource,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+)
 
 from service import cores
+from service.secret_files import read_secret
 
 # Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
 DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
@@ -25,6 +32,8 @@ HOST_PATTERN = re.compile(r"(?=.*[A-Za-z*])[A-Za-z0-9*._-]+")
 # Part of an address, which as a pattern of names would match no address but 10.1.0.evil.com.
 ADDRESS_PATTERN = re.compile(r"(?=.*\d)(?=.*\*)[\d.*-]+")
 BLOB_URL = re.compile(r"(file|s3)://.+")
+# Settings that may stand in a file each, which ESC_..._FILE names.
+SECRETS = ("database_url", "webhook_secret")
 MODEL_BESIDE_THE_CODE = Path(__file__).resolve().parent.parent / "models" / "unet.onnx"
 
 
@@ -36,54 +45,97 @@ class Settings(BaseSettings):
     )
 
     # Where things live.
-    data: Path = Field(Path("esc-data"), description="Folder of the embedded home: database, frames, pictures.")
-    database_url: str | None = Field(None, description="SQLAlchemy URL; absent: SQLite in the data folder.")
-    blob_url: str | None = Field(None, description="s3: or file: URL of frames and pictures; absent: the data folder.")
+    data: Path = Field(Path("esc-data"), description="Folder of the database, the frames and the pictures.")
+    database_url: str | None = Field(
+        None,
+        description="Database: `postgresql://user:password@host:5432/name` or `sqlite:////folder/file`. Absent: SQLite "
+        "in the data folder. `ESC_DATABASE_URL_FILE` may name a file that holds it.",
+    )
+    blob_url: str | None = Field(
+        None,
+        description="Object store of frames and pictures: `s3://bucket/folder` or `file:///folder`. Absent: `blobs` in "
+        "the data folder.",
+    )
     model: Path = Field(MODEL_BESIDE_THE_CODE, description="The segmentation network, an ONNX file.")
 
     # Listening.
-    host: str = "127.0.0.1"
-    port: int = Field(8000, ge=0, le=65535, description="0 takes a free one and says which.")
+    host: str = Field("127.0.0.1", description="Address to listen on.")
+    port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one and prints it.")
     auth: Literal["auto", "off"] = Field(
         "auto",
-        description="`auto`: callers need a key as soon as there is one, and anyway beyond this machine. `off`: anyone "
+        description="`auto`: callers need a key as soon as there is one, and always beyond this machine. `off`: anyone "
         "may call, from anywhere.",
     )
     allowed_hosts: list[str] = Field(
         [],
-        description="Names under which a service that asks for no keys may be called, beside addresses and localhost: "
-        'JSON, such as ["esc.truck.lan"].',
+        description="Names under which a service that asks for no keys may be called, beside addresses and "
+        '`localhost`: `["esc.truck.lan"]`.',
     )
-    session_hours: float = Field(12, gt=0, description="After which a browser has to sign in again.")
-    rate_per_s: float = Field(250, gt=0, description="Requests of one key to one API process.")
+    session_hours: float = Field(12, gt=0, description="Hours after which a browser has to sign in again.")
+    rate_per_s: float = Field(
+        250, gt=0, description="Requests a second of one key to one API process; raise it with `ESC_QUEUE_LIMIT`."
+    )
     rate_burst: int = Field(500, ge=1, description="Requests of one key at once, after a pause.")
 
     # What a client may send.
-    max_body_mb: float = Field(256, gt=0)
-    uploads_at_once: int = Field(16, ge=1, description="Uploads that one API process takes at the same time.")
-    followers: int = Field(1000, ge=1, description="Who follows venues at the same time, at one API process.")
-    max_frame_mb: float = Field(48, gt=0)
-    max_frame_pixels: int = Field(64_000_000, gt=0)
-    max_frames_per_camera: int = Field(16, ge=1)
+    max_body_mb: float = Field(
+        256, gt=0, description="Size of an upload; a body that is no upload may have 1 MB at most."
+    )
+    uploads_at_once: int = Field(
+        16,
+        ge=1,
+        description="Uploads that one API process takes at the same time. More are answered with 503, and one for "
+        "which there is no room in `TMPDIR` (`/tmp`), where uploads lie while they arrive, with 507.",
+    )
+    uploads_mb: float = Field(
+        1000,
+        gt=0,
+        description="Size of those uploads together. One beyond it is answered with 503 before it is read, unless it "
+        "is the only one. At most 150 MB of them are in memory.",
+    )
+    connections: int = Field(
+        4000,
+        ge=1,
+        description="Clients that are connected to one API process. Beyond it those that have been silent for longest "
+        "make room. Each is an open file: what the limit of open files (`LimitNOFILE`, `ulimits`, `ulimit -Hn`) does "
+        "not allow is logged at the start, and fewer clients are let in.",
+    )
+    followers: int = Field(
+        1000, ge=1, description="Clients that follow venues at one API process at once; more are answered with 503."
+    )
+    waiters: int = Field(
+        1000,
+        ge=1,
+        description="Clients that wait for jobs (`?wait=`, `/jobs/{id}/events`) at one API process at once; more are "
+        "answered with 503.",
+    )
+    max_frame_mb: float = Field(48, gt=0, description="Size of one frame or photo.")
+    max_frame_pixels: int = Field(64_000_000, gt=0, description="Pixels of one frame, checked before it is decoded.")
+    max_frames_per_camera: int = Field(16, ge=1, description="Frames of one camera in one job, which are fused.")
     stall_timeout_s: float = Field(
-        20, gt=0, description="A client that owes bytes and moves none is let go after this."
+        20,
+        gt=0,
+        description="A client that owes bytes and sends or takes none for so long is disconnected, as is one whose "
+        "request head is not whole by then.",
     )
     request_timeout_s: float = Field(
-        600, gt=0, description="A body must have arrived, an answer be taken, within this."
+        600, gt=0, description="Time within which a body must have arrived, and an answer have been taken."
     )
-    max_photos: int = Field(100, ge=1, description="Photos of a board in one request.")
+    max_photos: int = Field(100, ge=1, description="Photos of a board in one `POST /intrinsics`.")
     queue_limit: int = Field(100, ge=1, description="Jobs that may wait; more are answered with 429.")
 
     # Frames that the service fetches itself.
     sources: list[str] = Field(
         [],
-        description="Hosts of cameras that frames may be fetched from, names with wildcards and networks: JSON, "
-        'such as ["*.cams.lan", "10.1.0.0/16"]. Empty: none.',
+        description="Hosts of cameras that frames may be fetched from, for API and workers: names with wildcards, and "
+        'networks: `["*.cams.lan", "10.1.0.0/16"]`. Empty: none.',
     )
-    source_timeout_s: float = Field(15, gt=0, le=120, description="For the frames of a venue, all cameras at once.")
+    source_timeout_s: float = Field(
+        15, gt=0, le=120, description="Time for the frames of a venue, all cameras at once."
+    )
     source_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.snapshot"],
-        description="What fetches frames, beside API and worker.",
+        description="Program that fetches frames, beside API and worker.",
     )
 
     # Poses in other formats.
@@ -93,66 +145,130 @@ class Settings(BaseSettings):
     )
     map_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.stmap"],
-        description="What computes ST maps; called with their origin.",
+        description="Program that computes ST maps, beside the API; called with their origin.",
     )
     pose_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.clicked_pose"],
-        description="What finds a first pose while its points are being clicked.",
+        description="Program that finds a first pose while its points are being clicked, beside the API.",
     )
 
+    # Pictures and stitched views.
     picture_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.draw"],
-        description="What draws pictures that somebody looks at.",
+        description="Program that draws pictures when somebody first looks at them, beside the API.",
     )
     stitch_program: list[str] = Field(
         [sys.executable, "-P", "-m", "worker.programs.stitch"],
-        description="What makes packages and previews of stitched views.",
+        description="Program that makes packages and previews of stitched views, beside the API, one of each at once.",
     )
-    pictures_at_once: int = Field(2, ge=1, description="That one API process has drawn at the same time.")
+    pictures_at_once: int = Field(
+        2,
+        ge=1,
+        description="Pictures that one API process has drawn at the same time. Who asks for more waits, and is "
+        "answered with 503 after 20 s.",
+    )
 
     # The worker.
     worker_name: str = Field(
-        default_factory=socket.gethostname, max_length=200, description="Unique per worker and stable."
+        default_factory=socket.gethostname,
+        max_length=200,
+        description="Name of the worker, unique and best the same after a restart.",
     )
-    jobs_at_once: int = Field(1, ge=1)
+    jobs_at_once: int = Field(1, ge=1, description="Jobs that one worker computes at the same time.")
     provider: Literal["cpu", "cuda", "openvino"] = Field(
-        "cpu", description="What runs the network; all but `cpu` need their own build of ONNX Runtime."
+        "cpu",
+        description="What runs the network. `cuda` and `openvino` need `onnxruntime-gpu` or `onnxruntime-openvino` in "
+        "place of `onnxruntime`.",
     )
-    threads: int = Field(default_factory=cores.usable, ge=1, description="Per job.")
-    job_timeout_s: float = Field(600, gt=0, description="For jobs that name no limit of their own.")
+    threads: int = Field(
+        default_factory=cores.usable_cores,
+        ge=1,
+        description="Threads of a job, for inference and pictures. The default goes by affinity (`taskset`) and by the "
+        "quota of the container or unit. Results do not depend on it.",
+    )
+    job_timeout_s: float = Field(600, gt=0, description="Time limit of jobs that name none (`timeout_s`).")
     job_program: list[str] = Field(
-        [sys.executable, "-P", "-m", "worker.jobs.job"],
-        description="What computes one job, which it reads on its standard input.",
+        [sys.executable, "-P", "-m", "worker.jobs.program"],
+        description="Program that computes one job: it reads the job and its frames on standard input, writes result "
+        "and pictures to standard output, and sees no setting, no secret and no store.",
     )
-    takeover_after_s: float = Field(10, gt=2, description="Silence after which another worker takes a job over.")
+    takeover_after_s: float = Field(
+        10, gt=2, description="Silence after which a worker counts as dead and another one takes its jobs over."
+    )
+    drain_s: float = Field(
+        25,
+        ge=0,
+        description="Time that running jobs have to end when their worker is stopped; then they go back into the "
+        "queue. Keep `TimeoutStopSec` and `stop_grace_period` longer.",
+    )
 
     # What is kept, counted from the end of a job.
-    keep_frames_days: float = Field(2, ge=0)
-    keep_pictures_days: float = Field(14, ge=0, description="Those of a venue's last accepted job stay.")
-    keep_jobs_days: float = Field(400, ge=2, description="With them idempotency keys; the last accepted job stays.")
+    keep_frames_days: float = Field(2, ge=0, description="Days that frames are kept after the end of their job.")
+    keep_pictures_days: float = Field(
+        14,
+        ge=0,
+        description="Days that pictures are kept after the end of their job; those of a venue's last accepted job "
+        "stay.",
+    )
+    keep_jobs_days: float = Field(
+        400,
+        ge=2,
+        description="Days that jobs and their idempotency keys are kept; the last accepted job of a venue stays.",
+    )
     keep_revisions_years: float = Field(
-        5, ge=1, description="Poses that a calibration brought by itself; what was put, accepted or restored stays."
+        5,
+        ge=1,
+        description="Years that poses are kept which a calibration brought by itself; those that somebody put, "
+        "accepted or restored stay.",
     )
     keep_events_days: float = Field(
-        3, ge=2, description="What happened to venues: who follows one may come back within it and misses nothing."
+        3, ge=2, description="Days that events of venues are kept: who follows a venue may come back within them."
     )
-    min_free_mb: float = Field(500, ge=0, description="With less free on the disk, uploads are refused.")
-    tidy_every_s: float = Field(600, gt=0, description="How often a worker looks for what is past its time.")
+    min_free_mb: float = Field(
+        500, ge=0, description="Free room on the disk below which uploads are answered with 507."
+    )
+    tidy_every_s: float = Field(600, gt=0, description="Interval at which a worker deletes what is past its time.")
 
     # Telling others of the end of a job.
     webhook_secret: SecretStr | None = Field(
         None,
-        description="`whsec_` and 24 to 64 bytes in base64; two, separated by a space, while one replaces another.",
+        description="Key that callbacks are signed with, without which `callback_url` is refused: `whsec_` and 24 "
+        "to 64 bytes in base64; two, separated by a space, while one replaces another. `ESC_WEBHOOK_SECRET_FILE` may "
+        "name a file that holds it.",
     )
-    callback_allow_http: bool = False
-    callback_allow_private: bool = Field(False, description="Call private, loopback and link-local addresses too.")
+    callback_expires_days: float = Field(
+        2,
+        ge=1,
+        description="Age at which callbacks that were not delivered are given up, however often they were tried.",
+    )
+    callback_allow_http: bool = Field(False, description="Whether callbacks may go to `http` addresses too.")
+    callback_allow_private: bool = Field(
+        False, description="Whether callbacks may go to all private, loopback and link-local addresses."
+    )
+    callbacks: list[str] = Field(
+        [],
+        description="Hosts that callbacks may go to although they are not on the public internet, for API and workers: "
+        'names with wildcards, and networks: `["mixer.truck.lan", "10.2.0.0/24"]`.',
+    )
 
     # Being watched.
-    log_format: Literal["json", "console"] = "json"
-    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    log_format: Literal["json", "console"] = Field("json", description="Form of the log; `console` is for people.")
+    log_level: Literal["debug", "info", "warning", "error"] = Field("info", description="Least level that is logged.")
     metrics_venues: int = Field(
-        500, ge=0, description="Venues with figures of their own in /metrics: those with the worst stitch errors."
+        500, ge=0, description="Venues with figures of their own in `/metrics`: those with the worst stitch errors."
     )
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Read secrets from the files that variables name, too."""
+        return init_settings, env_settings, dotenv_settings, _SecretFiles(settings_cls, env_settings, dotenv_settings)
 
     @field_validator("database_url")
     @classmethod
@@ -169,7 +285,7 @@ class Settings(BaseSettings):
             raise ValueError("expected is s3://bucket, s3://bucket/folder or file:///folder")
         return url
 
-    @field_validator("sources")
+    @field_validator("sources", "callbacks")
     @classmethod
     def _are_hosts(cls, patterns: list[str]) -> list[str]:
         for pattern in patterns:
@@ -235,6 +351,27 @@ class Settings(BaseSettings):
             return not ipaddress.ip_address(self.host).is_loopback
         except ValueError:
             return self.host != "localhost"
+
+
+class _SecretFiles(PydanticBaseSettingsSource):
+    """The files that `ESC_..._FILE` names, in the environment or in `.env`."""
+
+    def __init__(self, settings: type[BaseSettings], *variables: PydanticBaseSettingsSource) -> None:
+        super().__init__(settings)
+        self._given: dict[str, str | None] = {}
+        for source in reversed(variables):
+            assert isinstance(source, EnvSettingsSource | DotEnvSettingsSource)
+            self._given |= {name.upper(): value for name, value in source.env_vars.items() if value}
+
+    def get_field_value(self, field: Any, field_name: str) -> tuple[Any, str, bool]:  # noqa: ARG002
+        """Find one secret."""
+        prefix = self.config.get("env_prefix", "")
+        return read_secret(f"{prefix}{field_name.upper()}", self._given), field_name, False
+
+    def __call__(self) -> dict[str, Any]:
+        """Find all secrets that stand in files."""
+        found = {name: self.get_field_value(None, name)[0] for name in SECRETS}
+        return {name: secret for name, secret in found.items() if secret is not None}
 
 
 def webhook_keys(secret: SecretStr | None) -> list[bytes]:

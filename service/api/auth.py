@@ -4,8 +4,8 @@ A program sends its key with each request. A person signs in with one: from then
 what changes something the token that only our own pages can read (a page of another site could have the cookie sent
 along, were it not for SameSite as well).
 
-A key that was found is believed for a few seconds without another look at the database, so that polling costs a hash
-and two look-ups in memory. That is how long a removed key still opens the door, in each API process; what is being
+A key that was found is cached for a few seconds without another look at the database, so that polling costs a hash and
+two look-ups in memory. That is how long a removed key still opens the door, in each API process; what is being
 answered then (a long poll, a stream of events) is answered to its end. Reading never writes: uses are remembered and
 written down once a minute.
 """
@@ -18,7 +18,8 @@ import hmac
 import ipaddress
 import math
 import time
-from collections.abc import Callable
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import get_args
@@ -28,35 +29,41 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection
 
 from service.api import origins
-from service.api.rate_limit import Buckets
+from service.api.rate_limit import TokenBuckets
+from service.schemas.addresses import ip_of
+from service.schemas.names import Scope
+from service.schemas.problems import Problem
 from service.settings import Settings
-from service.store.keys import Key, Keys, hash_of
-from service.store.sessions import Sessions
-from service.wire.addresses import ip_of
-from service.wire.names import Scope
-from service.wire.problems import Problem
+from service.store.keys import Key, KeyRepository, hash_of
+from service.store.sessions import SessionRepository
 
-BELIEVED_FOR_S = 5.0
+KEY_CACHED_FOR_S = 5.0
 COOKIE, TOKEN_HEADER = "esc_session", "X-CSRF-Token"
 USES_WRITTEN_EVERY_S = 60.0
-# Unknown keys from one address: so many at once, then one every so many seconds.
+# Unknown keys and cookies from one address: so many at once, then one every so many seconds.
 GUESSES = 10
 GUESS_EVERY_S = 6.0
+# Cookies of no session; older ones are looked up again.
+MOST_UNKNOWN_SESSIONS = 10_000
 SCOPES: tuple[Scope, ...] = get_args(Scope)
 log = structlog.get_logger()
 
 
 @dataclass(frozen=True)
-class _Believed:
+class _CachedKey:
     key: Key
     until: float
 
 
-class Gate:
-    """Lets requests pass or says why not."""
+class Authenticator:
+    """Authenticates callers by API key or session cookie, and checks scope and rate (RFC 6750)."""
 
     def __init__(
-        self, keys: Keys, sessions: Sessions, settings: Settings, clock: Callable[[], float] = time.monotonic
+        self,
+        keys: KeyRepository,
+        sessions: SessionRepository,
+        settings: Settings,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._keys = keys
         self._sessions = sessions
@@ -65,12 +72,14 @@ class Gate:
         self._off = settings.auth == "off"
         # Once on it stays on: who exchanges the only key must not leave the door open in between.
         self._on = settings.listens_beyond_this_machine
-        self._look_for_keys_at = -math.inf
-        self._believed: dict[str, _Believed] = {}
-        self._signed_in: dict[str, _Believed] = {}
+        self._next_key_check_at = -math.inf
+        self._cached_keys: dict[str, _CachedKey] = {}
+        self._cached_sessions: dict[str, _CachedKey] = {}
+        # Hashes of cookies of no session, nor ever of one: pages that go on asking with an old one guess nothing.
+        self._unknown_sessions: OrderedDict[str, None] = OrderedDict()
         self._uses: dict[str, datetime] = {}
-        self._requests = Buckets(settings.rate_per_s, settings.rate_burst, clock=clock)
-        self._guesses = Buckets(1 / GUESS_EVERY_S, GUESSES, clock=clock)
+        self._requests = TokenBuckets(settings.rate_per_s, settings.rate_burst, clock=clock)
+        self._guesses = TokenBuckets(1 / GUESS_EVERY_S, GUESSES, clock=clock)
 
     async def admit(self, request: HTTPConnection, needed: Scope) -> Key | None:
         """The caller's key, None where none is asked for; otherwise raises the problem that says why not."""
@@ -80,7 +89,7 @@ class Gate:
         key = await self._key(request)
         # Every line that the request leaves in the log.
         structlog.contextvars.bind_contextvars(key=key.name)
-        self._count(key)
+        self._count_request(key)
         if SCOPES.index(key.scope) < SCOPES.index(needed):
             raise Problem(
                 "scope-too-small",
@@ -93,13 +102,13 @@ class Gate:
 
     async def sign_in(self, request: HTTPConnection, given: str) -> str:
         """Begin a session with a key; returns what its cookie says."""
-        key = await self._of_bearer(given, _address(request))
+        key = await self._of_bearer(given, _client_address(request))
         return await run_in_threadpool(self._sessions.begin, key, timedelta(hours=self._settings.session_hours))
 
     async def sign_out(self, request: HTTPConnection) -> None:
         """End the session of a request, if it has one."""
         hash_ = hash_of(request.cookies.get(COOKIE, ""))
-        self._signed_in.pop(hash_, None)
+        self._cached_sessions.pop(hash_, None)
         await run_in_threadpool(self._sessions.end, hash_)
 
     async def run(self) -> None:
@@ -124,16 +133,16 @@ class Gate:
         if self._off:
             return False
         now = self._clock()
-        if not self._on and now >= self._look_for_keys_at:
+        if not self._on and now >= self._next_key_check_at:
             self._on = await run_in_threadpool(self._keys.any)
-            self._look_for_keys_at = now + BELIEVED_FOR_S
+            self._next_key_check_at = now + KEY_CACHED_FOR_S
         return self._on
 
     async def _key(self, request: HTTPConnection) -> Key:
         """The caller's key, as RFC 6750 has it sent and refused, or that of their session."""
         scheme, _, given = request.headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer" and given:
-            return await self._of_bearer(given, _address(request))
+            return await self._of_bearer(given, _client_address(request))
         if COOKIE in request.cookies:
             return await self._of_session(request, request.cookies[COOKIE])
         raise Problem(
@@ -144,14 +153,14 @@ class Gate:
 
     async def _of_bearer(self, given: str, address: str) -> Key:
         hash_ = hash_of(given.strip())
-        believed = self._believed.get(hash_)
-        if believed is None:
+        cached = self._cached_keys.get(hash_)
+        if cached is None:
             key = await self._find_new(hash_, address)
-        elif believed.until <= self._clock():
+        elif cached.until <= self._clock():
             key = await self._find(hash_, address)
         else:
-            key = believed.key
-        return _in_time(key)
+            key = cached.key
+        return _unexpired(key)
 
     async def _of_session(self, request: HTTPConnection, token: str) -> Key:
         changes = request.scope["method"] not in origins.READING
@@ -160,27 +169,47 @@ class Gate:
         ):
             raise Problem("token-missing", f"Load the page again: it sends {TOKEN_HEADER} with what it changes.")
         hash_ = hash_of(token)
-        believed = self._signed_in.get(hash_)
-        if believed is not None and self._clock() < believed.until:
-            return _in_time(believed.key)
-        until = self._clock() + BELIEVED_FOR_S
+        cached = self._cached_sessions.get(hash_)
+        if cached is not None and self._clock() < cached.until:
+            return _unexpired(cached.key)
+        if hash_ in self._unknown_sessions:
+            raise _session_over()
+        if cached is None:
+            address = _client_address(request)
+            return _unexpired(await self._guessed(address, lambda: self._find_session(hash_, address)))
+        return _unexpired(await self._find_session(hash_))
+
+    async def _find_session(self, hash_: str, guessed_from: str | None = None) -> Key:
+        """The key of a session; `guessed_from`: the address of who sends it for the first time."""
+        until = self._clock() + KEY_CACHED_FOR_S
         key = await run_in_threadpool(self._sessions.key_of, hash_)
         if key is None:
-            self._signed_in.pop(hash_, None)
-            raise Problem("session-over", "Sign in again.", headers={"WWW-Authenticate": "Bearer"})
-        self._signed_in[hash_] = _Believed(key, until)
-        return _in_time(key)
+            self._cached_sessions.pop(hash_, None)
+            self._unknown_sessions[hash_] = None
+            if len(self._unknown_sessions) > MOST_UNKNOWN_SESSIONS:
+                self._unknown_sessions.popitem(last=False)
+            if guessed_from is not None:
+                log.warning("unknown key", address=guessed_from, sent_as="cookie")
+            raise _session_over()
+        self._cached_sessions[hash_] = _CachedKey(key, until)
+        return key
 
     async def _find_new(self, hash_: str, address: str) -> Key:
         """As `_find`, but not too often. Keys seen before are not held up by what others try from their address."""
+        return await self._guessed(address, lambda: self._find(hash_, address))
+
+    async def _guessed(self, address: str, find: Callable[[], Awaitable[Key]]) -> Key:
+        """Return the key that `find` finds, unless too much was guessed from this address."""
         wait_s = self._guesses.wait_s(address)
         if wait_s:
-            raise Problem("too-many-unknown-keys", "See that the key is right, then try again.", headers=_later(wait_s))
+            raise Problem(
+                "too-many-unknown-keys", "See that the key is right, then try again.", headers=_retry_after(wait_s)
+            )
         # Before the look, or any number of guesses that come at once would all be looked up.
         self._guesses.take(address)
         guessed = False
         try:
-            return await self._find(hash_, address)
+            return await find()
         except Problem:
             guessed = True
             raise
@@ -189,21 +218,23 @@ class Gate:
                 self._guesses.give_back(address)
 
     async def _find(self, hash_: str, address: str) -> Key:
-        until = self._clock() + BELIEVED_FOR_S
+        until = self._clock() + KEY_CACHED_FOR_S
         key = await run_in_threadpool(self._keys.find, hash_)
         if key is None:
-            self._believed.pop(hash_, None)
+            self._cached_keys.pop(hash_, None)
             log.warning("unknown key", address=address)
-            raise _refused(
+            raise _invalid_key(
                 "key-unknown", "It was removed, or is of another service; `esc key list` names those of this."
             )
-        self._believed[hash_] = _Believed(key, until)
+        self._cached_keys[hash_] = _CachedKey(key, until)
         return key
 
-    def _count(self, key: Key) -> None:
+    def _count_request(self, key: Key) -> None:
         wait_s = self._requests.wait_s(key.hash)
         if wait_s:
-            raise Problem("rate-limited", "Ask less often, or wait in GET /jobs/{id}?wait=60.", headers=_later(wait_s))
+            raise Problem(
+                "rate-limited", "Ask less often, or wait in GET /jobs/{id}?wait=60.", headers=_retry_after(wait_s)
+            )
         self._requests.take(key.hash)
         self._uses[key.hash] = datetime.now(UTC)
 
@@ -213,21 +244,25 @@ def page_token(session_token: str) -> str:
     return hashlib.sha256(f"page of {session_token}".encode()).hexdigest()
 
 
-def _in_time(key: Key) -> Key:
+def _unexpired(key: Key) -> Key:
     if key.expired:
-        raise _refused("key-expired", f"{key.name} was good until {key.expires_at:%Y-%m-%d %H:%M} UTC.")
+        raise _invalid_key("key-expired", f"{key.name} was good until {key.expires_at:%Y-%m-%d %H:%M} UTC.")
     return key
 
 
-def _refused(kind: str, detail: str) -> Problem:
+def _session_over() -> Problem:
+    return Problem("session-over", "Sign in again.", headers={"WWW-Authenticate": "Bearer"})
+
+
+def _invalid_key(kind: str, detail: str) -> Problem:
     return Problem(kind, detail, headers={"WWW-Authenticate": 'Bearer error="invalid_token"'})
 
 
-def _later(wait_s: float) -> dict[str, str]:
+def _retry_after(wait_s: float) -> dict[str, str]:
     return {"Retry-After": str(math.ceil(wait_s))}
 
 
-def _address(request: HTTPConnection) -> str:
+def _client_address(request: HTTPConnection) -> str:
     """Where a request comes from; of IPv6 the network of 64 bits, which is what one customer has."""
     host = request.client.host if request.client else ""
     address = ip_of(host)

@@ -14,8 +14,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.problems import answer
-from service.wire.problems import Problem
+from service.api.problems import problem_response
+from service.schemas.problems import Problem
 
 LARGEST_DOCUMENT = 1_000_000
 
@@ -36,12 +36,12 @@ class BodyLimit:
         if headers.get("content-encoding", "identity").lower() != "identity":
             # A few bytes can be gigabytes, and frames do not shrink by it anyway.
             packed = Problem("encoded-body", "Send it as it is.", headers={"Accept-Encoding": "identity"})
-            await answer(packed)(scope, receive, send)
+            await problem_response(packed)(scope, receive, send)
             return
         largest, too_large = self._limit(Request(scope))
         announced = headers.get("content-length", "0")
         if announced.isdecimal() and int(announced[:20]) > largest:
-            await answer(Problem("body-too-large", too_large))(scope, receive, send)
+            await problem_response(Problem("body-too-large", too_large))(scope, receive, send)
             return
         arrived = 0
 

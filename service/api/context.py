@@ -2,47 +2,60 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, cast
 
 from fastapi import Depends, Path, Request
+from pydantic import AfterValidator
 
-from service.api.auth import Gate
+from service.api.auth import Authenticator
+from service.api.change_watch import ChangeWatch, ClientSlots
+from service.api.programs.camera_views import CameraViews
 from service.api.programs.clicked_pose import ClickedPoses
 from service.api.programs.drawings import Drawings
 from service.api.programs.stitches import Stitches
 from service.api.shared_reads import SharedReads
 from service.api.uploads import Uploads
-from service.api.watch import Places, Watch
-from service.home import Home
-from service.observe.metrics import Metrics
-from service.observe.readiness import Readiness
+from service.application_state import ApplicationState
+from service.observability.metrics import Metrics
+from service.observability.readiness import Readiness
+from service.schemas.actor import Actor
+from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN
+from service.schemas.problems import Problem
 from service.settings import Settings
-from service.store.counts.figures import look
-from service.wire.names import ID_PATTERN, JOB_ID_PATTERN
+from service.store.jobs.task import Origin
+from service.store.statistics.snapshot import read_statistics
 
 
-class Context(Home):
-    """The home, and what answers from it."""
+class Context(ApplicationState):
+    """The application state of an API process, with what limits, caches and watches its requests."""
 
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings)
         silence_s = settings.takeover_after_s
         self.reads = SharedReads(self.jobs.get)
-        self.watch = Watch(self.jobs.states)
-        self.watch_venues = Watch(self.following.newest)
-        self.followers = Places(settings.followers)
-        self.metrics = Metrics(lambda: look(self.engine, settings.metrics_venues), self.disk, silence_s)
-        self.readiness = Readiness(self.jobs, self.blobs, self.disk, self.workers, silence_s)
-        self.gate = Gate(self.keys, self.sessions, settings)
+        self.job_watch = ChangeWatch(self.jobs.states)
+        self.venue_watch = ChangeWatch(self.events.newest)
+        self.followers = ClientSlots(settings.followers, "clients follow venues", "ESC_FOLLOWERS")
+        self.waiters = ClientSlots(settings.waiters, "clients wait for jobs", "ESC_WAITERS")
+        self.metrics = Metrics(lambda: read_statistics(self.engine, settings.metrics_venues), self.disk, silence_s)
+        self.readiness = Readiness(settings.home_database_url, self.blobs, self.disk, silence_s)
+        self.authenticator = Authenticator(self.keys, self.sessions, settings)
         self.uploads = Uploads(settings)
         self.clicked_poses = ClickedPoses(settings)
         self.drawings = Drawings(settings, self.jobs, self.blobs)
         self.stitches = Stitches(settings)
+        self.camera_views = CameraViews(self.snapshots)
 
-    def let_go(self) -> None:
-        """Let everybody go who waits for a job or follows a venue."""
-        self.watch.close()
-        self.watch_venues.close()
+    def close(self) -> None:
+        """Let the database go."""
+        self.readiness.close()
+        super().close()
+
+    def release_waiters(self) -> None:
+        """Release every client that waits for a job or follows a venue."""
+        self.job_watch.close()
+        self.venue_watch.close()
 
 
 async def _context(request: Request) -> Context:
@@ -50,6 +63,26 @@ async def _context(request: Request) -> Context:
     return cast(Context, request.app.state.context)
 
 
+async def _actor(request: Request) -> Actor | None:
+    origin: Origin = request.state.origin
+    return origin.actor
+
+
 InContext = Annotated[Context, Depends(_context)]
+# Who makes the change that a request asks for.
+ByActor = Annotated[Actor | None, Depends(_actor)]
 VenueIdPath = Annotated[str, Path(pattern=ID_PATTERN, examples=["tsukuba"])]
-JobIdPath = Annotated[str, Path(pattern=JOB_ID_PATTERN, examples=["01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"])]
+
+
+def _of_a_job(job_id: str) -> str:
+    """Answer for an id that no job has as for one that no job has any more."""
+    if not re.fullmatch(JOB_ID_PATTERN, job_id):
+        raise Problem("job-not-found", "The ids of jobs are 26 letters and digits; GET /jobs lists those there are.")
+    return job_id
+
+
+JobIdPath = Annotated[
+    str,
+    AfterValidator(_of_a_job),
+    Path(json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"]),
+]

@@ -12,9 +12,9 @@ from urllib.parse import SplitResult, urlsplit
 
 from starlette.requests import HTTPConnection
 
+from service.schemas.addresses import ip_of
+from service.schemas.problems import Problem
 from service.settings import Settings
-from service.wire.addresses import ip_of
-from service.wire.problems import Problem
 
 READING = {"GET", "HEAD", "OPTIONS"}
 NOWHERE = SplitResult("", "", "", "", "")

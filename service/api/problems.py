@@ -15,68 +15,80 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.routing import compile_path
 
-from service.wire.findings import in_words
-from service.wire.problems import KINDS, MEDIA_TYPE, Problem
+from service.schemas.findings import describe_errors
+from service.schemas.merge_patch import MEDIA_TYPE as MERGE_PATCH
+from service.schemas.problems import MEDIA_TYPE, PROBLEM_TYPES, Problem
 
+MOST_ERRORS = 100
 log = structlog.get_logger()
 
 
-def answer(problem: Problem) -> Response:
+def problem_response(problem: Problem) -> Response:
     """The HTTP answer. Escaped to ASCII: a client's lone surrogates must not break it."""
     content = json.dumps(problem.members(), ensure_ascii=True).encode("ascii")
-    return Response(content, KINDS[problem.kind].status, problem.headers, MEDIA_TYPE)
+    return Response(content, PROBLEM_TYPES[problem.kind].status, problem.headers, MEDIA_TYPE)
 
 
-def invalid(error: ValidationError | RequestValidationError, model: Any, document: Any, *inside: str) -> Problem:
-    """What a schema found, each finding with the place it was found at. `model`, `document`: see `in_words`."""
-    found = error.errors()
+def validation_problem(
+    error: ValidationError | RequestValidationError, model: Any, document: Any, *inside: str
+) -> Problem:
+    """What a schema found, each finding with the place it was found at. `model`, `document`: see `describe_errors`.
+
+    A document of a megabyte can have a hundred thousand mistakes; whoever mends it needs the first of them.
+    """
+    everything = error.errors()
+    found = everything[:MOST_ERRORS]
     places = [".".join(str(step) for step in (*inside, *finding["loc"])) for finding in found]
-    told = in_words(found, model, document)
+    told = describe_errors(found, model, document)
     findings = [{"where": where, "message": message} for where, message in zip(places, told, strict=True)]
-    return Problem("invalid-request", told[0], errors=findings)
+    if len(everything) == len(found):
+        return Problem("invalid-request", told[0], errors=findings)
+    return Problem("invalid-request", told[0], errors=findings, errors_left_off=len(everything) - len(found))
 
 
 def not_json(request: Request) -> Problem:
     """The same answer wherever a document comes as something else."""
     got = request.headers.get("content-type", "")[:200]
-    return Problem("not-json", "Send it with Content-Type: application/json.", got=got)
+    # RFC 5789, section 2.2.
+    headers = {"Accept-Patch": MERGE_PATCH} if request.method == "PATCH" else None
+    return Problem("not-json", "Send it with Content-Type: application/json.", headers=headers, got=got)
 
 
-def install(app: FastAPI) -> None:
+def install_handlers(app: FastAPI) -> None:
     """Let every error of `app` leave as a problem."""
 
     @app.exception_handler(Problem)
     async def problem(_: Request, error: Problem) -> Response:
-        return answer(error)
+        return problem_response(error)
 
     @app.exception_handler(RequestValidationError)
     async def validation(request: Request, error: RequestValidationError) -> Response:
         if any(finding["type"] == "json_invalid" for finding in error.errors()):
-            return answer(Problem("malformed-request", "The body is not JSON."))
+            return problem_response(Problem("malformed-request", "The body is not JSON."))
         if isinstance(error.body, bytes):
-            return answer(not_json(request))
-        return answer(_invalid_request(request, error))
+            return problem_response(not_json(request))
+        return problem_response(_invalid_request(request, error))
 
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> Response:
         if error.status_code < 400:
             return Response(status_code=error.status_code, headers=error.headers)
-        return answer(_from_http(request, error))
+        return problem_response(_from_http(request, error))
 
     @app.exception_handler(ClientDisconnect)
     async def gone(_: Request, __: Exception) -> Response:
-        return answer(Problem("malformed-request", "The request broke off."))
+        return problem_response(Problem("malformed-request", "The request broke off."))
 
     @app.exception_handler(Exception)
     async def unexpected(_: Request, error: Exception) -> Response:
         log.error("unexpected error", exc_info=error)
-        return answer(Problem("internal-error", "This is a fault of the service; its log has the details."))
+        return problem_response(Problem("internal-error", "This is a fault of the service; its log has the details."))
 
 
 def _invalid_request(request: Request, error: RequestValidationError) -> Problem:
     """Of a body that is named as in the documents, not as what FastAPI calls it."""
     field = getattr(request.scope.get("route"), "body_field", None)
-    return invalid(error, None if field is None else field.field_info.annotation, error.body)
+    return validation_problem(error, None if field is None else field.field_info.annotation, error.body)
 
 
 def _from_http(request: Request, error: HTTPException) -> Problem:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 ROUNDING = 1e-3
 
 
-class Buckets:
+class TokenBuckets:
     """A bucket per name. A full one holds `burst` tokens, and `per_s` tokens a second flow in.
 
     Kept is one number per name, the moment at which its bucket will be full again: a full bucket and one that was never

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from starlette.concurrency import run_in_threadpool
 
-from service.wire.job import Job
+from service.schemas.job import Job
 
 AT_ONCE = 2
 """Reads: more threads only wait for each other, which cost the slowest of fifty pollers a second."""

@@ -1,40 +1,56 @@
-"""Uploads while they arrive: how many at once, and whether there is room where they are spooled."""
+"""Uploads while they arrive and are checked: how many and how large at once, on the disk and in memory."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from starlette.requests import Request
+from fastapi import Request
+from starlette.datastructures import UploadFile
 
-from service.observe.disk import spool_folder, spool_free_bytes
+from service.observability.disk import spool_folder, spool_free_bytes
+from service.schemas.problems import Problem
 from service.settings import Settings
-from service.wire.problems import Problem
 
 # Other uploads take seconds.
-AGAIN_S = 5
+AGAIN = {"Retry-After": "5"}
+# Frames of all uploads that are in memory at the same time, to be checked or stored; one is always let in.
+IN_MEMORY_BYTES = 150_000_000
+# Longer than a store that is away takes to say so.
+PATIENCE_S = 15.0
 
 
 class Uploads:
-    """Those that one API process takes at the moment. To be asked in its event loop."""
+    """Those that one API process takes at the moment."""
 
     def __init__(self, settings: Settings) -> None:
         self._at_once = settings.uploads_at_once
+        self._most = int(settings.uploads_mb * 1e6)
         self._largest = int(settings.max_body_mb * 1e6)
         # What each of them may still bring.
         self._announced: list[int] = []
+        self._room = IN_MEMORY_BYTES
+        self._room_changed = threading.Condition()
 
     @contextmanager
     def admitted(self, request: Request) -> Iterator[None]:
-        """Let an upload in, or refuse it before it is read."""
+        """Let an upload in, or refuse it before it is read. To be asked in the event loop."""
         if len(self._announced) >= self._at_once:
             raise Problem(
                 "unavailable",
                 f"{self._at_once} uploads are arriving already, and more may not at once (ESC_UPLOADS_AT_ONCE).",
-                headers={"Retry-After": str(AGAIN_S)},
+                headers=AGAIN,
             )
         announced = request.headers.get("content-length", "")
         size = int(announced) if announced.isdecimal() else self._largest
+        if self._announced and size + sum(self._announced) > self._most:
+            raise Problem(
+                "unavailable",
+                f"Uploads of {sum(self._announced) / 1e6:.0f} MB are arriving already; this one would make them more "
+                f"than {self._most / 1e6:.0f} MB (ESC_UPLOADS_MB).",
+                headers=AGAIN,
+            )
         # Of the others, part has been written: counted twice rather than not at all.
         if spool_free_bytes() < size + sum(self._announced):
             raise Problem(
@@ -47,3 +63,22 @@ class Uploads:
             yield
         finally:
             self._announced.remove(size)
+
+    @contextmanager
+    def content(self, upload: UploadFile) -> Iterator[bytes]:
+        """The bytes of one file, once there is room for them beside those of others. To be asked in a thread.
+
+        Whoever gets them lets them go with the block.
+        """
+        size = min(upload.size or 0, IN_MEMORY_BYTES)
+        with self._room_changed:
+            if not self._room_changed.wait_for(lambda: self._room >= size, PATIENCE_S):
+                raise Problem("unavailable", "The frames of other uploads are being stored.", headers=AGAIN)
+            self._room -= size
+        try:
+            upload.file.seek(0)
+            yield upload.file.read()
+        finally:
+            with self._room_changed:
+                self._room += size
+                self._room_changed.notify_all()

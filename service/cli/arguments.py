@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,33 +12,33 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from service.cli.printing import USAGE, fail
-from service.wire.names import ID_PATTERN, JOB_ID_PATTERN, FormatName, LensChoice
+from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, FieldNumber, FormatName, LensChoice
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
+    from service.schemas.options import Options
     from service.settings import Settings
-    from service.wire.options import Options
 
 M = TypeVar("M", bound="BaseModel")
-LOCAL = "http://127.0.0.1:8000"
+DEFAULT_URL = "http://127.0.0.1:8000"
 
 
-def _or_as_the_file_says(context: typer.Context, option: typer.CallbackParam, value: str | None) -> str | None:
+def _or_from_env_file(context: typer.Context, option: typer.CallbackParam, value: str | None) -> str | None:
     """What is given on the command line or in the environment, or else in `.env`, or else the default."""
     name = option.name or ""
     source = context.get_parameter_source(name)
     if (source is not None and source.name != "DEFAULT") or not Path(".env").is_file():
         return value
-    from service.cli.env_file import Service
+    from service.cli.env_file import EnvFile
 
-    in_file: str | None = getattr(Service(), name)
+    in_file: str | None = getattr(EnvFile(), name)
     return in_file or value
 
 
-def _as_header(context: typer.Context, option: typer.CallbackParam, value: str | None) -> str | None:
+def _api_key(context: typer.Context, option: typer.CallbackParam, value: str | None) -> str | None:
     """A key read from a file brings its line end along; what else no header takes is told here, not by the socket."""
-    key = _or_as_the_file_says(context, option, value)
+    key = _key_from_secret_file(context, option) or _or_from_env_file(context, option, value)
     if key is None:
         return None
     if not re.fullmatch(r"[\x21-\x7e]+", key.strip()):
@@ -45,22 +46,43 @@ def _as_header(context: typer.Context, option: typer.CallbackParam, value: str |
     return key.strip()
 
 
-def _is_of_a_venue(venue_id: str) -> str:
+def _key_from_secret_file(context: typer.Context, option: typer.CallbackParam) -> str | None:
+    """The key in the file that ESC_API_KEY_FILE names; what is given on the command line goes before it."""
+    source = context.get_parameter_source(option.name or "")
+    if source is not None and source.name == "COMMANDLINE":
+        return None
+    from service.secret_files import SecretFileError, read_secret
+
+    try:
+        return read_secret("ESC_API_KEY", os.environ)
+    except SecretFileError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def _check_venue_id(venue_id: str) -> str:
     if not re.fullmatch(ID_PATTERN, venue_id):
         raise typer.BadParameter(f"{venue_id!r} is no id: up to 64 of a-z, 0-9, - and _, such as esc venue list prints")
     return venue_id
 
 
-def _is_of_a_job(job_id: str) -> str:
+def _check_job_id(job_id: str) -> str:
     if not re.fullmatch(JOB_ID_PATTERN, job_id):
         raise typer.BadParameter(f"{job_id!r} is no id: 26 capital letters and digits, such as esc job list prints")
     return job_id
 
 
+def _check_optional_venue_id(camera_id: str | None) -> str | None:
+    return None if camera_id is None else _check_venue_id(camera_id)
+
+
+def _check_optional_job_id(job_id: str | None) -> str | None:
+    return None if job_id is None else _check_job_id(job_id)
+
+
 Url = Annotated[
     str,
     typer.Option(
-        "--url", envvar="ESC_URL", callback=_or_as_the_file_says, help="Address of the service; .env may have it too."
+        "--url", envvar="ESC_URL", callback=_or_from_env_file, help="Address of the service; .env may have it too."
     ),
 ]
 ApiKey = Annotated[
@@ -68,9 +90,10 @@ ApiKey = Annotated[
     typer.Option(
         "--api-key",
         envvar="ESC_API_KEY",
-        callback=_as_header,
+        callback=_api_key,
         metavar="KEY",
-        help="API key for the service, as `esc key add` printed it; .env may have it too.",
+        help="API key for the service, as `esc key add` printed it; .env may have it too, or the file that "
+        "ESC_API_KEY_FILE names.",
     ),
 ]
 Data = Annotated[
@@ -86,14 +109,25 @@ Port = Annotated[
 ]
 VenueId = Annotated[
     str,
-    typer.Argument(metavar="VENUE", callback=_is_of_a_venue, help="Id of a venue, as `esc venue list` prints it."),
-]
-CameraId = Annotated[
-    str,
-    typer.Argument(metavar="CAMERA", callback=_is_of_a_venue, help="Id of a camera, as `esc venue list` prints it."),
+    typer.Argument(metavar="VENUE", callback=_check_venue_id, help="Id of a venue, as `esc venue list` prints it."),
 ]
 JobId = Annotated[
-    str, typer.Argument(metavar="JOB", callback=_is_of_a_job, help="Id of a job, as `esc job list` prints it.")
+    str, typer.Argument(metavar="JOB", callback=_check_job_id, help="Id of a job, as `esc job list` prints it.")
+]
+AdoptedCamera = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[CAMERA]",
+        callback=_check_optional_venue_id,
+        help="Id of the camera whose lens is stored, as `esc venue list` prints it.",
+    ),
+]
+AdoptedField = Annotated[
+    FieldNumber | None, typer.Option("--field", help="Instead of a lens: a number of the field, with --job.")
+]
+AdoptedJob = Annotated[
+    str | None,
+    typer.Option("--job", metavar="JOB", callback=_check_optional_job_id, help="The calibration whose lines have it."),
 ]
 Frames = Annotated[
     list[str],
@@ -102,13 +136,13 @@ Frames = Annotated[
         help="A JPEG or PNG of each camera, such as left=left.jpg; several of one camera are fused.",
     ),
 ]
-Form = Annotated[
+FormatOption = Annotated[
     FormatName,
     typer.Option(
         "--format", help="File format: json is ESC's own, the others are those of the tools they are named after."
     ),
 ]
-Lens = Annotated[
+LensOption = Annotated[
     LensChoice,
     typer.Option(
         "--lens",
@@ -131,22 +165,32 @@ OptionsText = Annotated[
 ]
 
 
-def settings_of(**given: Any) -> Settings:
+def load_settings(**given: Any) -> Settings:
     """The settings, those given on the command line before all others; with them the log is set up."""
     from pydantic import ValidationError
+    from pydantic_settings import SettingsError
 
-    from service.observe import logs
+    from service.observability import logs
+    from service.secret_files import SecretFileError, bucket_credentials
     from service.settings import Settings
 
     try:
+        bucket_credentials(os.environ)
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
-        fail("\n".join(f"ESC_{'.'.join(map(str, e['loc'])).upper()}: {e['msg']}" for e in error.errors()), USAGE)
+        found = [(".".join(map(str, e["loc"])).upper(), e["msg"].removeprefix("Value error, ")) for e in error.errors()]
+        fail("\n".join(f"ESC_{name}: {message}" for name, message in found), USAGE)
+    except SettingsError as error:
+        # Of a list that is no JSON; the error names its field and nothing else.
+        name = str(error).partition('field "')[2].partition('"')[0].upper()
+        fail(f'ESC_{name}: expected a list in JSON, for instance ["127.0.0.1"]', USAGE)
+    except SecretFileError as error:
+        fail(str(error), USAGE)
     logs.configure(settings)
     return settings
 
 
-def files_of(frames: Sequence[str]) -> dict[str, list[Path]]:
+def parse_frame_files(frames: Sequence[str]) -> dict[str, list[Path]]:
     """Files by camera, of arguments CAMERA=FILE."""
     files: dict[str, list[Path]] = {}
     for frame in frames:
@@ -159,23 +203,27 @@ def files_of(frames: Sequence[str]) -> dict[str, list[Path]]:
     return files
 
 
-def options_of(text: str) -> Options:
+def parse_options(text: str) -> Options:
     """What --options says."""
-    from service.wire.options import Options
+    from service.schemas.options import Options
 
-    return checked(Options, text, "--options")
+    return parse_document(Options, text, "--options")
 
 
-def checked(model: type[M], document: str | bytes, source: str) -> M:
-    """A model from its JSON, which may be any file's content; `source` says whose fault it is if it is none."""
+def parse_document(model: type[M], document: str | bytes, source: str, example: str = "") -> M:
+    """A model from its JSON, which may be any file's content; `source` says whose fault it is if it is none.
+
+    `example`: a document of the form that was expected, shown behind what is wrong.
+    """
     from pydantic import ValidationError
 
     try:
         return model.model_validate_json(document)
     except ValidationError as error:
-        from service.wire.findings import in_words
+        from service.schemas.findings import describe_errors
 
         found = error.errors()
         is_json = all(finding["type"] != "json_invalid" for finding in found)
-        told = in_words(found, model, json.loads(document) if is_json else None)
-        fail("\n".join(f"{source}: {message}" for message in told), USAGE)
+        told = describe_errors(found, model, json.loads(document) if is_json else None)
+        lines = [f"{source}: {message}" for message in told]
+        fail("\n".join([*lines, f"Expected is {example}"] if example else lines), USAGE)

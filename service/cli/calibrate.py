@@ -8,19 +8,26 @@ from typing import Annotated
 import typer
 
 from service.cli.arguments import (
-    LOCAL,
+    DEFAULT_URL,
     ApiKey,
     Frames,
     OneCamera,
     OptionsText,
     Url,
     VenueId,
-    checked,
-    files_of,
-    options_of,
+    parse_document,
+    parse_frame_files,
+    parse_options,
 )
-from service.cli.calling import called
-from service.cli.printing import bar, followed, gate, say, tell, verdict
+from service.cli.printing import (
+    calibration_exit_code,
+    follow_to_end,
+    job_exit_code,
+    job_progress_bar,
+    print_json,
+    print_note,
+)
+from service.cli.service_client import open_client
 
 
 def calibrate(
@@ -41,35 +48,35 @@ def calibrate(
             "--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."
         ),
     ] = None,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Submit frames to a service. Exit: 0 accepted, 1 failed, 2 usage, 3 rejected by the gate, 75 busy or away.
 
     3 as well where only some cameras are accepted. Without frames the service fetches them from the cameras' sources.
     """
-    files, chosen = files_of(frames or []), options_of(options)
-    with called(url, api_key) as client:
+    files, chosen = parse_frame_files(frames or []), parse_options(options)
+    with open_client(url, api_key) as client:
         job = client.calibrate(venue, files, chosen.model_dump(mode="json", exclude_unset=True), key)
         if not wait:
-            say({"job": job.id, "url": client.url_of(job.links["self"])})
+            print_json({"job": job.id, "url": client.url_of(job.links["self"])})
             return
-        job = followed(client, job)
-    say(job)
-    raise typer.Exit(verdict(job))
+        job = follow_to_end(client, job)
+    print_json(job)
+    raise typer.Exit(job_exit_code(job))
 
 
 def snapshot(
     venue: VenueId,
     camera: OneCamera = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to.")] = Path(),
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Save what the cameras show now, fetched by the service from their sources; prints CAMERA=FILE for each."""
-    from service.intake.images import PNG_START
+    from service.intake.image_checks import PNG_START
 
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         cameras = [camera] if camera else [one.id for one in client.venue(venue).cameras]
         output.mkdir(parents=True, exist_ok=True)
         for one in cameras:
@@ -89,30 +96,49 @@ def run(
     frames: Frames,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for result.json and the pictures.")],
     options: OptionsText = "{}",
+    debug: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for what each stage saw, as pictures and JSON; its index.json says what is what.",
+        ),
+    ] = None,
 ) -> None:
     """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
     import secrets
 
-    from service.cli.local import checked_files, engine_settings, failure_told
+    from service.cli.local_engine import checked_files, engine_settings, report_job_failures
 
-    settings, chosen = engine_settings(), options_of(options)
+    settings, chosen = engine_settings(), parse_options(options)
     if chosen.callback_url is not None:
-        tell("callback_url is not used: without a service nobody is told. The exit code says how it went.")
+        print_note("callback_url is not used: without a service nobody is told. The exit code says how it went.")
+    from service.schemas.venue import VenueIn
     from service.store.jobs.files import picture_file
-    from service.wire.venue import VenueIn
+    from worker.calibration.records import NOT_RECORDED
     from worker.jobs import calibration
-    from worker.message import Means
+    from worker.jobs.debugging import DebugRecorder
+    from worker.protocol import ComputeResources
 
-    stored = checked(VenueIn, venue.read_bytes(), str(venue)).stored()
+    stored = parse_document(VenueIn, venue.read_bytes(), str(venue)).to_venue()
     if chosen.seed is None:
         chosen = chosen.model_copy(update={"seed": secrets.randbelow(2**31)})
     chosen = chosen.model_copy(update={"pictures": True})
     files = checked_files(stored, frames, settings)
-    with failure_told(), bar() as show:
-        solution = calibration.solve(stored, files, chosen, Means.of(settings), lambda step: show(step, ""))
+    resources, recorder = ComputeResources.of(settings), NOT_RECORDED if debug is None else DebugRecorder()
+    try:
+        with report_job_failures(), job_progress_bar() as show:
+            solution = calibration.solve(
+                stored, files, chosen, resources, lambda step: show(step, ""), recorder=recorder
+            )
+    finally:
+        # What was seen before a failure tells its cause.
+        if debug is not None and isinstance(recorder, DebugRecorder):
+            debug.mkdir(parents=True, exist_ok=True)
+            for name, data in recorder.files.items():
+                (debug / name).write_bytes(data)
     output.mkdir(parents=True, exist_ok=True)
     (output / "result.json").write_text(solution.result.model_dump_json(indent=2) + "\n")
     for name, picture in solution.pictures.items():
         (output / picture_file(name)).write_bytes(picture)
-    say(solution.result)
-    raise typer.Exit(gate(solution.result))
+    print_json(solution.result)
+    raise typer.Exit(calibration_exit_code(solution.result))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
-class Service(BaseSettings):
+class EnvFile(BaseSettings):
     """What `.env` says of the service that commands call."""
 
     model_config = SettingsConfigDict(env_prefix="ESC_", env_file=".env", env_ignore_empty=True, extra="ignore")

@@ -7,15 +7,26 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, AsJson, Form, JobId, Lens, OneCamera, Output, Url
-from service.cli.calling import called
-from service.cli.printing import ACCEPTED, FAILED, REJECTED, fail, followed, hand_out, outcome, say, tell, verdict
+from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, FormatOption, JobId, LensOption, OneCamera, Output, Url
+from service.cli.printing import (
+    ACCEPTED,
+    FAILED,
+    REJECTED,
+    fail,
+    follow_to_end,
+    job_exit_code,
+    outcome_text,
+    print_json,
+    print_note,
+    write_document,
+)
+from service.cli.service_client import open_client
+from service.schemas.names import JobKind, JobStatus
 from service.store.jobs.files import picture_file
-from service.wire.names import Kind, Status
 
 if TYPE_CHECKING:
     from service.client import Client
-    from service.wire.job import Job
+    from service.schemas.job import Job
 
 app = typer.Typer(
     no_args_is_help=True, help="Jobs of a running service: calibrations, and what comes before the first."
@@ -26,38 +37,38 @@ NOT_PICTURES = {"self", "events", "cancel", "venue"}
 @app.command("list")
 def list_jobs(
     venue: Annotated[str | None, typer.Option("--venue", metavar="VENUE", help="Only those of one venue.")] = None,
-    status: Annotated[Status | None, typer.Option("--status", help="Only those in this state.")] = None,
-    kind: Annotated[Kind | None, typer.Option("--kind", help="Only those of this kind.")] = None,
+    status: Annotated[JobStatus | None, typer.Option("--status", help="Only those in this state.")] = None,
+    kind: Annotated[JobKind | None, typer.Option("--kind", help="Only those of this kind.")] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most.")] = 20,
     as_json: AsJson = False,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Print a line per job, newest first: id, when it was submitted, venue, kind, status, and what came of it."""
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         jobs = client.jobs(venue, status, kind, limit)
     if as_json:
-        from service.wire.job import Jobs
+        from service.schemas.job import Jobs
 
-        say(Jobs(jobs=jobs))
+        print_json(Jobs(jobs=jobs))
         return
     for job in jobs:
         came = f"{job.created_at:%Y-%m-%dT%H:%M:%SZ}"
-        print(f"{job.id}\t{came}\t{job.venue or '-'}\t{job.kind}\t{job.status}\t{outcome(job)}")
+        print(f"{job.id}\t{came}\t{job.venue or '-'}\t{job.kind}\t{job.status}\t{outcome_text(job)}")
 
 
 @app.command("get")
-def get_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def get_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Print a job as JSON."""
-    with called(url, api_key) as client:
-        say(client.job(job))
+    with open_client(url, api_key) as client:
+        print_json(client.job(job))
 
 
 @app.command("wait")
-def wait_for_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def wait_for_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Follow a job to its end and print it. Exit: 0 accepted, 1 failed or cancelled, 3 rejected, 75 busy."""
-    with called(url, api_key) as client:
-        _to_its_end(client, client.job(job))
+    with open_client(url, api_key) as client:
+        _follow_and_exit(client, client.job(job))
 
 
 @app.command("again")
@@ -66,16 +77,16 @@ def submit_again(
     wait: Annotated[
         bool, typer.Option("--wait", help="Follow the new job to its end, as `esc job wait` does.")
     ] = False,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Compute the frames of a job once more, with its options, from the poses that hold now: a new job."""
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         new = client.again(job)
         if wait:
-            _to_its_end(client, new)
+            _follow_and_exit(client, new)
         else:
-            say({"job": new.id, "url": client.url_of(new.links["self"])})
+            print_json({"job": new.id, "url": client.url_of(new.links["self"])})
 
 
 @app.command("picture")
@@ -88,11 +99,11 @@ def picture_of_job(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="File to write; otherwise one named as the picture, here.")
     ] = None,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Save a picture of a job and print its file; without a name, print the names of those there are."""
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         found = client.job(job)
         names = [name for name in found.links if name not in NOT_PICTURES]
         if picture is None:
@@ -109,57 +120,57 @@ def picture_of_job(
 @app.command("poses")
 def job_poses(
     job: JobId,
-    form: Form = "json",
+    form: FormatOption = "json",
     camera: OneCamera = None,
-    lens: Lens = "stored",
+    lens: LensOption = "stored",
     output: Output = None,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Write the poses that a job found in the format of another tool."""
-    with called(url, api_key) as client:
-        hand_out(client.job_poses(job, form, camera, lens), output)
+    with open_client(url, api_key) as client:
+        write_document(client.job_poses(job, form, camera, lens), output)
 
 
 @app.command("accept")
-def accept_job(job: JobId, camera: OneCamera = None, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def accept_job(job: JobId, camera: OneCamera = None, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Let the poses of a job hold that the gate rejected, or that was a dry run."""
-    with called(url, api_key) as client:
-        say(client.accept(job, camera))
+    with open_client(url, api_key) as client:
+        print_json(client.accept(job, camera))
 
 
 @app.command("reject")
-def reject_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def reject_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Put back the poses that held before those of a job."""
-    with called(url, api_key) as client:
-        say(client.reject(job))
+    with open_client(url, api_key) as client:
+        print_json(client.reject(job))
 
 
 @app.command("cancel")
-def cancel_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def cancel_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """End a job that is still open."""
-    with called(url, api_key) as client:
-        say(client.cancel(job))
+    with open_client(url, api_key) as client:
+        print_json(client.cancel(job))
 
 
 @app.command("delete")
-def delete_job(job: JobId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def delete_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Forget a job that has ended, with its frames and pictures. Poses that it brought to its venue stay."""
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         client.delete_job(job)
 
 
-def _to_its_end(client: Client, job: Job) -> None:
-    from service.wire.results import FieldResult, IntrinsicsResult, LocateResult
+def _follow_and_exit(client: Client, job: Job) -> None:
+    from service.schemas.results import FieldResult, IntrinsicsResult, LocateResult
 
-    job = followed(client, job)
-    say(job)
+    job = follow_to_end(client, job)
+    print_json(job)
     match job.result:
         case IntrinsicsResult():
             raise typer.Exit(ACCEPTED)
         case LocateResult() | FieldResult():
             if not job.result.accepted:
-                tell(f"Rejected: {job.result.rejected_because}")
+                print_note(f"Rejected: {job.result.rejected_because}")
             raise typer.Exit(ACCEPTED if job.result.accepted else REJECTED)
         case _:
-            raise typer.Exit(verdict(job))
+            raise typer.Exit(job_exit_code(job))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,15 +12,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import Data, settings_of
-from service.cli.printing import FAILED, USAGE, fail, tell
-from service.cli.serve import database_told
-from service.wire.names import ID_PATTERN, Scope
+from service.cli.arguments import Data, load_settings
+from service.cli.printing import FAILED, USAGE, fail, print_note
+from service.cli.serve import report_database_errors
+from service.schemas.names import ID_PATTERN, Scope
 
 if TYPE_CHECKING:
-    from service.store.keys import Keys
+    from service.store.keys import KeyRepository
 
-ELSEWHERE = "Of a service that has its folder elsewhere, name it: --data, or ESC_DATA."
+OTHER_FOLDER_HINT = "Of a service that has its folder elsewhere, name it: --data, or ESC_DATA."
+UNITS = {"m": timedelta(minutes=1), "h": timedelta(hours=1), "d": timedelta(days=1)}
 app = typer.Typer(no_args_is_help=True, help="API keys, in the database of this machine's service.")
 
 
@@ -35,6 +37,10 @@ def add_key(
     days: Annotated[
         int | None, typer.Option("--days", min=1, max=36500, help="Days after which it expires; otherwise never.")
     ] = None,
+    venues: Annotated[
+        list[str] | None,
+        typer.Option("--venue", metavar="ID", help="A venue that it is for, repeatable; otherwise it is for all."),
+    ] = None,
     data: Data = None,
 ) -> None:
     """Make a key and print it, this once: what is stored is its hash."""
@@ -42,23 +48,51 @@ def add_key(
 
     if not re.fullmatch(ID_PATTERN, name):
         fail(f"{name!r} is no name of a key: up to 64 of a-z, 0-9, - and _, the first a letter or a digit.", USAGE)
+    for venue in venues or ():
+        if not re.fullmatch(ID_PATTERN, venue):
+            fail(f"{venue!r} is no id of a venue: up to 64 of a-z, 0-9, - and _, the first a letter or a digit.", USAGE)
     with _keys(data) as keys:
         try:
-            key = keys.add(name, scope, datetime.now(UTC) + timedelta(days) if days else None)
+            key = keys.add(name, scope, datetime.now(UTC) + timedelta(days) if days else None, venues or None)
         except KeyExists:
             fail(f"There is a key {name} already: remove it first, or take another name.", USAGE)
-    print(key)
-    tell("Keep it: it is not shown again. Its user sets ESC_API_KEY, or sends it as `Authorization: Bearer ...`.")
+    _print_key(key)
 
 
 @app.command("list")
 def list_keys(data: Data = None) -> None:
-    """Print a line per key: name, scope, when it was made, when (to the minute) last used, until when it is good."""
+    """Print a line per key: name, scope, when it was made, last used (to the minute), good until, and its venues."""
     with _known_keys(data) as keys:
         for key in keys.all():
             used, until = (f"{at:%Y-%m-%dT%H:%MZ}" if at else "-" for at in (key.last_used_at, key.expires_at))
+            venues = "all" if key.venues is None else ",".join(sorted(key.venues))
             state = " (expired)" if key.expired else ""
-            print(f"{key.name}\t{key.scope}\t{key.created_at:%Y-%m-%dT%H:%MZ}\t{used}\t{until}{state}")
+            print(f"{key.name}\t{key.scope}\t{key.created_at:%Y-%m-%dT%H:%MZ}\t{used}\t{until}{state}\t{venues}")
+
+
+@app.command("rotate")
+def rotate_key(
+    name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")],
+    grace: Annotated[
+        str, typer.Option("--grace", metavar="TIME", help="How long the old key stays good, such as 30m, 24h or 7d.")
+    ] = "24h",
+    data: Data = None,
+) -> None:
+    """Make a new key in place of another and print it, this once; the old one stays good for a while, as NAME-old."""
+    from service.store.keys import old_name
+
+    length = re.fullmatch(r"(\d{1,5})([mhd])", grace, re.ASCII)
+    if length is None:
+        fail(f"{grace!r} is no time: a number and m, h or d, such as 30m, 24h or 7d.", USAGE)
+    lasts = int(length[1]) * UNITS[length[2]]
+    with _known_keys(data) as keys:
+        key = keys.rotate(name, lasts)
+    if key is None:
+        fail(f"There is no key {name}; esc key list names those there are.", FAILED)
+    _print_key(key)
+    print_note(
+        f"The old key is {old_name(name)} now and good until {datetime.now(UTC) + lasts:%Y-%m-%dT%H:%MZ} at most."
+    )
 
 
 @app.command("remove")
@@ -66,41 +100,49 @@ def remove_key(
     name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")], data: Data = None
 ) -> None:
     """Forget a key."""
-    from service.api.auth import BELIEVED_FOR_S
+    from service.api.auth import KEY_CACHED_FOR_S
 
     with _known_keys(data) as keys:
         if not keys.remove(name):
             fail(f"There is no key {name}; esc key list names those there are.", FAILED)
         left = keys.any()
-    tell(f"Removed. A service that runs may take it for {BELIEVED_FOR_S:.0f} s more.")
+    print_note(f"Removed. A service that runs may take it for {KEY_CACHED_FOR_S:.0f} s more.")
     if not left:
-        tell("No key is left: a service on loopback will let anyone on this machine call after its next start.")
+        print_note("No key is left: a service on loopback will let anyone on this machine call after its next start.")
+
+
+def _print_key(key: str) -> None:
+    print(key)
+    print_note("Keep it: it is not shown again. Its user sets ESC_API_KEY, or sends it as `Authorization: Bearer ...`.")
 
 
 @contextmanager
-def _known_keys(data: Path | None) -> Iterator[Keys]:
+def _known_keys(data: Path | None) -> Iterator[KeyRepository]:
     """The keys of a service that has been there: to ask for them makes none."""
-    url = settings_of(data=data).home_database_url
+    url = load_settings(data=data).home_database_url
     if url.startswith("sqlite") and not Path(url.partition("sqlite:///")[2]).exists():
-        fail(f"There is no service here: {url} does not exist. {ELSEWHERE}", FAILED)
+        fail(f"There is no service here: {url} does not exist. {OTHER_FOLDER_HINT}", FAILED)
     with _keys(data) as keys:
         yield keys
 
 
 @contextmanager
-def _keys(data: Path | None) -> Iterator[Keys]:
+def _keys(data: Path | None) -> Iterator[KeyRepository]:
     """The keys of the service whose folder or database the settings name."""
-    from service.store.engine import connect, migrate
-    from service.store.keys import Keys
+    from service.store.database import connect, migrate
+    from service.store.keys import KeyRepository
 
-    settings = settings_of(data=data)
-    with database_told():
+    settings = load_settings(data=data)
+    with report_database_errors():
         engine = connect(settings.home_database_url)
         # Keys of another folder open nothing, and nothing else would tell.
-        tell(f"Keys in {engine.url.set(query={}).render_as_string(hide_password=True)}")
+        print_note(f"Keys in {engine.url.set(query={}).render_as_string(hide_password=True)}")
+        if elsewhere := os.environ.get("ESC_URL"):
+            # The other commands go there: a key that is made here opens nothing of it.
+            print_note(f"This is the database of this machine; the service at ESC_URL ({elsewhere}) is not asked.")
         made = engine.dialect.name == "sqlite" and not Path(engine.url.database or "").exists()
         migrate(engine)
         if made:
-            tell(f"That database is new: no service has used it yet. {ELSEWHERE}")
-        yield Keys(engine)
+            print_note(f"That database is new: no service has used it yet. {OTHER_FOLDER_HINT}")
+        yield KeyRepository(engine)
         engine.dispose()

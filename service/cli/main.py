@@ -11,8 +11,8 @@ from typing import Annotated
 
 import typer
 
-from service import lifeline
-from service.cli import calibrate, first, jobs, keys, serve, stitch, venues
+from service import child_process
+from service.cli import calibrate, home, jobs, keys, onboarding, serve, stitch, venues
 from service.cli.printing import FAILED, fail
 
 COMMANDS = (
@@ -22,16 +22,16 @@ COMMANDS = (
     calibrate.calibrate,
     calibrate.snapshot,
     calibrate.run,
-    first.intrinsics,
-    first.pose,
+    onboarding.intrinsics,
+    onboarding.pose,
     stitch.stitch,
 )
-NOUNS = {"venue": venues.app, "field": first.field_app, "job": jobs.app, "key": keys.app}
+NOUNS = {"venue": venues.app, "field": onboarding.field_app, "job": jobs.app, "key": keys.app, "home": home.app}
 
 
 def main() -> None:
     """Run a command; what goes wrong is a line and an exit code, not a traceback."""
-    lifeline.end_with_parent()
+    child_process.end_with_parent()
     try:
         app_of(sys.argv[1:])()
     except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError, FileExistsError) as error:
@@ -54,17 +54,17 @@ def app_of(arguments: Sequence[str]) -> typer.Typer:
     return app
 
 
-def _say_version(asked: bool) -> None:
+def _print_version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version
+        from service import build
 
-        print(f"esc {version('esc-calibration')}")
+        print(f"esc {build.description()}")
         raise typer.Exit
 
 
 def esc(
     _: Annotated[
-        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
     ] = False,
 ) -> None:
     """Keeps fixed multi-camera installations on sports fields calibrated."""

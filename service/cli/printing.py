@@ -13,49 +13,49 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from service.client import Client
-    from service.wire.job import Job
-    from service.wire.job import Progress as Step
-    from service.wire.results import FieldResult, IntrinsicsResult, LocateResult, Result
-    from service.wire.venue import ChangedVenue
+    from service.schemas.job import Job
+    from service.schemas.job import Progress as Step
+    from service.schemas.results import FieldResult, IntrinsicsResult, LocateResult, Result
+    from service.schemas.venue import ChangedVenue
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
 ZIP_START = b"PK"
 
 
-def tell(line: str) -> None:
+def print_note(line: str) -> None:
     """Print a line for whoever looks; results alone go to standard output."""
     print(line, file=sys.stderr)
 
 
-def say(what: BaseModel | dict[str, str]) -> None:
+def print_json(what: BaseModel | dict[str, str]) -> None:
     """Print an answer, as JSON."""
     print(json.dumps(what, indent=2) if isinstance(what, dict) else what.model_dump_json(indent=2))
 
 
-def say_changed(venue: ChangedVenue) -> None:
+def print_changed_venue(venue: ChangedVenue) -> None:
     """Print a venue that was put or patched, as JSON, and what it leaves to be assumed for whoever looks."""
     print(venue.model_dump_json(indent=2, exclude={"warnings"}))
     for warning in venue.warnings:
-        tell(f"Warning: {warning}")
+        print_note(f"Warning: {warning}")
 
 
-def hand_out(document: bytes, output: Path | None) -> None:
+def write_document(document: bytes, output: Path | None) -> None:
     """Write a file of another tool's format to where it is wanted."""
     if output is None:
         sys.stdout.buffer.write(document)
     else:
         output.write_bytes(document)
         if document.startswith(ZIP_START) and output.suffix != ".zip":
-            tell(f"{output} is a zip: in this format, each camera has a file of its own (--camera writes one).")
+            print_note(f"{output} is a zip: in this format, each camera has a file of its own (--camera writes one).")
 
 
 def fail(message: str, code: int) -> NoReturn:
     """End with a line on standard error."""
-    tell(message)
+    print_note(message)
     sys.exit(code)
 
 
-def in_words(headline: str, members: Mapping[str, Any]) -> str:
+def problem_text(headline: str, members: Mapping[str, Any]) -> str:
     """A problem with the parts of it that say what is wrong."""
     lines = [headline]
     lines += [f"  {part}: {json.dumps(members[part])}" for part in ("expected", "got") if part in members]
@@ -65,7 +65,7 @@ def in_words(headline: str, members: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def hint(status: int) -> str:
+def key_hint(status: int) -> str:
     """What to do about an answer that is the same whatever was asked."""
     match status:
         case 401:
@@ -79,65 +79,69 @@ def hint(status: int) -> str:
 # How a job ended
 
 
-def verdict(job: Job) -> int:
+def job_exit_code(job: Job) -> int:
     """The exit code for a job that has ended, and a line for whoever looks."""
-    from service.wire.results import Result
+    from service.schemas.results import Result
 
     if isinstance(job.result, Result):
-        return gate(job.result)
+        return calibration_exit_code(job.result)
     if job.status == "cancelled":
-        tell(f"Job {job.id} was cancelled before it had a result.")
+        print_note(f"Job {job.id} was cancelled before it had a result.")
     if job.error is not None:
-        tell(f"{job.error.title}: {job.error.detail}")
+        print_note(f"{job.error.title}: {job.error.detail}")
     return FAILED
 
 
-def gate(result: Result) -> int:
+def calibration_exit_code(result: Result) -> int:
     """The exit code for what a calibration found."""
     if result.accepted:
         return ACCEPTED
     if result.verdict == "partly":
-        tell(f"Accepted: {', '.join(result.accepted_cameras)}. Not all cameras: {result.rejected_because}")
+        print_note(f"Accepted: {', '.join(result.accepted_cameras)}. Not all cameras: {result.rejected_because}")
     else:
-        tell(f"Rejected: {result.rejected_because}")
+        print_note(f"Rejected: {result.rejected_because}")
     return REJECTED
 
 
-def outcome(job: Job) -> str:
+def outcome_text(job: Job) -> str:
     """The verdict, or what went wrong, in a line."""
-    from service.wire.results import IntrinsicsResult
+    from service.schemas.results import IntrinsicsResult, Result
 
     if job.error is not None:
         return f"{job.error.title}: {job.error.detail}"
     if job.result is None or isinstance(job.result, IntrinsicsResult):
         return "-"
+    if isinstance(job.result, Result) and job.result.verdict == "partly":
+        return f"partly: {', '.join(job.result.accepted_cameras)} accepted; {job.result.rejected_because}"
     return "accepted" if job.result.accepted else f"rejected: {job.result.rejected_because}"
 
 
-def tell_lens(result: IntrinsicsResult) -> None:
+def print_lens_summary(result: IntrinsicsResult) -> None:
     """What a person looks at first."""
     used = sum(photo.fate == "used" for photo in result.photos)
-    tell(f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px")
+    print_note(
+        f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px"
+    )
     (fx, _, cx), (_, fy, cy), _ = result.intrinsics.matrix
-    tell(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
+    print_note(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
     for photo in result.photos:
         told = {
             "used": None,
             "no-board": "shows no board",
             "wrong-size": "has another size",
             "hurts": f"hurts: the others foretell it to {photo.left_out_px or 0:.1f} px only; left out",
-        }[photo.fate]
+        }.get(photo.fate, photo.fate)
         for words in (told, "is blurred" if photo.blurred else None):
             if words:
-                tell(f"  {photo.name} {words}")
+                print_note(f"  {photo.name} {words}")
     for warning in result.warnings:
-        tell(f"Warning: {warning}")
+        print_note(f"Warning: {warning}")
 
 
-def tell_pose(result: LocateResult) -> None:
+def print_pose_summary(result: LocateResult) -> None:
     """Where a camera stands, and which clicks are doubted."""
     x, y, z = result.pose.position
-    tell(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
+    print_note(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
     for point in result.points:
         if point.doubted:
             off = "out of view" if point.residual_px is None else f"{point.residual_px:.0f} px off"
@@ -146,41 +150,43 @@ def tell_pose(result: LocateResult) -> None:
                 why = f"; its label and that of {point.exchanged_with} are exchanged"
             elif point.looks_like is not None:
                 why = f"; it is on {point.looks_like}"
-            tell(f"  {point.world} is {off}{why}")
+            print_note(f"  {point.world} is {off}{why}")
     for warning in result.warnings:
-        tell(f"  {warning[0].upper()}{warning[1:]}.")
+        print_note(f"  {warning[0].upper()}{warning[1:]}.")
     if result.rejected_because is not None:
-        tell(f"  Rejected: {result.rejected_because}")
+        print_note(f"  Rejected: {result.rejected_because}")
 
 
-def tell_field(result: FieldResult) -> None:
+def print_field_summary(result: FieldResult) -> None:
     """Each measure of a pitch, or why it cannot be told."""
     for measure in result.measures:
         what = measure.name.removesuffix("_m").replace("_", " ")
         if measure.known:
-            tell(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m (given {measure.given:.3f})")
+            within = abs(measure.value - measure.given) < 2 * measure.sigma
+            differs = f"given {measure.given:.3f}" + (", within its uncertainty" if within else "")
+            print_note(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m ({differs})")
         else:
-            tell(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
+            print_note(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
 
 
 # How far a job is
 
 
-def followed(client: Client, job: Job) -> Job:
+def follow_to_end(client: Client, job: Job) -> Job:
     """A job at its end; how far it is, is shown meanwhile."""
-    with bar() as show:
-        return client.follow(job, lambda job: show(job.progress, _waiting(job)))
+    with job_progress_bar() as show:
+        return client.follow(job, lambda job: show(job.progress, _queue_text(job)))
 
 
 @contextmanager
-def bar() -> Iterator[Callable[[Step | None, str], None]]:
+def job_progress_bar() -> Iterator[Callable[[Step | None, str], None]]:
     """A line that shows how far a calibration is, where somebody looks at the terminal."""
-    with progress() as show:
+    with progress_bar() as show:
         yield lambda step, otherwise: show(*((step.stage, step.fraction) if step else (otherwise, 0.0)))
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str, float], None]]:
+def progress_bar() -> Iterator[Callable[[str, float], None]]:
     """A line that shows what is done and which part of it is, where somebody looks at the terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -192,5 +198,5 @@ def progress() -> Iterator[Callable[[str, float], None]]:
         yield lambda name, part: shown.update(line, completed=part, description=name)
 
 
-def _waiting(job: Job) -> str:
+def _queue_text(job: Job) -> str:
     return f"queued, {job.queue_position}." if job.queue_position else "starting"

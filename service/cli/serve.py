@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import Data, Host, Port, settings_of
+from service import confinement
+from service.cli.arguments import Data, Host, Port, load_settings
 from service.cli.printing import FAILED, USAGE, fail
 
 if TYPE_CHECKING:
@@ -17,12 +18,14 @@ if TYPE_CHECKING:
 
 def up(data: Data = None, host: Host = None, port: Port = None) -> None:
     """Run the whole service on this machine: API, operator's page and one worker, with nothing else beside them."""
-    _serve(settings_of(data=data, host=host, port=port), with_worker=True)
+    confinement.hide_memory()
+    _serve(load_settings(data=data, host=host, port=port), with_worker=True)
 
 
 def serve(data: Data = None, host: Host = None, port: Port = None) -> None:
     """Run the API and the operator's page alone; `esc worker` computes, here or on other machines."""
-    _serve(settings_of(data=data, host=host, port=port), with_worker=False)
+    confinement.hide_memory()
+    _serve(load_settings(data=data, host=host, port=port), with_worker=False)
 
 
 def worker(
@@ -36,31 +39,34 @@ def worker(
     ] = None,
 ) -> None:
     """Run a worker alone: it computes the jobs of a service whose database and files its settings name."""
-    from worker import process
+    confinement.hide_memory()
+    from service.worker_lock import AlreadyRunning
+    from worker import supervisor
 
     try:
-        with database_told():
-            process.run(settings_of(data=data, worker_name=name))
-    except process.AlreadyRunning as error:
+        with report_database_errors():
+            supervisor.run(load_settings(data=data, worker_name=name))
+    except AlreadyRunning as error:
         fail(str(error), USAGE)
 
 
 def _serve(settings: Settings, *, with_worker: bool) -> None:
     from service import serving
+    from service.worker_lock import AlreadyRunning
 
     try:
-        with database_told():
+        with report_database_errors():
             serving.serve(settings, with_worker=with_worker)
-    except serving.CannotListen as error:
+    except (serving.CannotListen, AlreadyRunning) as error:
         fail(str(error), USAGE)
 
 
 @contextmanager
-def database_told() -> Iterator[None]:
+def report_database_errors() -> Iterator[None]:
     """What is wrong with the database is a line: it is wrong at the start, or not of this program's making."""
     import sqlalchemy as sa
 
-    from service.store.engine import UnsupportedDatabase
+    from service.store.database import UnsupportedDatabase
 
     try:
         yield

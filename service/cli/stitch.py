@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, AsJson, Url, checked
-from service.cli.calling import called
-from service.cli.printing import FAILED, USAGE, fail, progress, tell
-from service.wire.names import ID_PATTERN, Projection
+from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, Url, parse_document
+from service.cli.printing import FAILED, USAGE, fail, print_note, progress_bar
+from service.cli.service_client import open_client
+from service.schemas.names import ID_PATTERN, Projection
 
 if TYPE_CHECKING:
-    from service.wire.venue import Venue
-    from worker.calibration.stitch.views import ViewChoice
-    from worker.video.follow import Motion
-    from worker.video.stitch import Offset, Scene, Stitched
+    from service.schemas.venue import Venue
+    from worker.calibration.stitching.views import ViewChoice
+    from worker.video.stitch import Offset, StitchReport, StitchScene
+    from worker.video.tracking import MotionSummary
 
 # In place of a number: as it suits the cameras, whatever the venue keeps.
 AUTO = "auto"
@@ -113,39 +113,39 @@ def stitch(
         ),
     ] = None,
     as_json: AsJson = False,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Stitch clips into one, on this machine. Needs the extra `video`. Exit: 0 made, 1 failed, 2 usage."""
-    addresses = _by_camera(clips, "CAMERA=CLIP, for instance left=left.mp4")
-    begin_s, end_s = (None if time is None else _seconds(time) for time in (begin, end))
-    pictures = None if rate is None else _rate(rate)
+    addresses = _parse_by_camera(clips, "CAMERA=CLIP, for instance left=left.mp4")
+    begin_s, end_s = (None if time is None else _parse_seconds(time) for time in (begin, end))
+    pictures = None if rate is None else _parse_rate(rate)
     if (poses_out is not None or follow_every > 1) and not follow:
         fail("--poses-out and --follow-every go with --follow", USAGE)
     chosen: dict[str, Any] = {
         "projection": projection,
         "width": width,
-        "height": _or_auto(height, "--height", 64, 8192),
-        "field_of_view_deg": _or_auto(field_of_view, "--field-of-view", 5, 340),
+        "height": _parse_number_or_auto(height, "--height", 64, 8192),
+        "field_of_view_deg": _parse_number_or_auto(field_of_view, "--field-of-view", 5, 340),
         "pan_deg": pan,
-        "horizon": _or_auto(horizon, "--horizon", -3, 3),
+        "horizon": _parse_number_or_auto(horizon, "--horizon", -3, 3),
     }
     if any(isinstance(chosen[side], float | int) and chosen[side] % 2 for side in ("width", "height")):
         fail("--width and --height are even numbers: video takes no others", USAGE)
-    stored = _venue(venue, url, api_key)
+    stored = _load_venue(venue, url, api_key)
 
-    from service.cli.local import engine_settings
+    from service.cli.local_engine import engine_settings
 
     settings = engine_settings()
-    from service.cli.following import following, tell_motions
-    from worker.video.faults import VideoFault
-    from worker.video.stitch import Plan, Standing
+    from service.cli.tracked_poses import print_motions, tracking
+    from worker.video.encoding import Encoding
+    from worker.video.errors import VideoError
+    from worker.video.stitch import Plan, StaticGeometry
     from worker.video.stitch import stitch as stitched
-    from worker.video.write import Encoding
 
     plan = Plan(
         output,
-        _offsets(offset or []),
+        _parse_offsets(offset or []),
         pictures,
         begin_s,
         end_s,
@@ -155,19 +155,19 @@ def stitch(
     )
     try:
         with ExitStack() as stack:
-            follows = stack.enter_context(following(stored, follow_every, poses_out, settings.freed_axes))
-            show = stack.enter_context(progress())
-            geometry = follows if follow else Standing
-            made = stitched(_scene(stored, chosen), addresses, plan, show, geometry)
-    except VideoFault as fault:
+            follows = stack.enter_context(tracking(stored, follow_every, poses_out, settings.freed_axes))
+            show = stack.enter_context(progress_bar())
+            geometry = follows if follow else StaticGeometry
+            made = stitched(_stitch_inputs(stored, chosen), addresses, plan, show, geometry)
+    except VideoError as fault:
         fail(str(fault), FAILED)
-    _tell(made)
-    tell_motions(follows.motions)
+    _print_summary(made)
+    print_motions(follows.motions)
     if as_json:
-        print(json.dumps(_document(made, output, follows.motions), indent=2))
+        print(json.dumps(_json_document(made, output, follows.motions), indent=2))
 
 
-def _by_camera(arguments: Sequence[str], form: str) -> dict[str, str]:
+def _parse_by_camera(arguments: Sequence[str], form: str) -> dict[str, str]:
     found: dict[str, str] = {}
     for argument in arguments:
         camera, equals, value = argument.partition("=")
@@ -179,25 +179,25 @@ def _by_camera(arguments: Sequence[str], form: str) -> dict[str, str]:
     return found
 
 
-def _offsets(given: Sequence[str]) -> dict[str, Offset]:
+def _parse_offsets(given: Sequence[str]) -> dict[str, Offset]:
     from worker.video.stitch import Offset
 
     offsets = {}
-    for camera, text in _by_camera(given, "CAMERA=SECONDS, for instance right=0.120 or right=3f").items():
-        number = _number(text.removesuffix("f"), f"--offset {camera}={text}")
+    for camera, text in _parse_by_camera(given, "CAMERA=SECONDS, for instance right=0.120 or right=3f").items():
+        number = _parse_number(text.removesuffix("f"), f"--offset {camera}={text}")
         offsets[camera] = Offset(number, text.endswith("f"))
     return offsets
 
 
-def _seconds(text: str) -> float:
+def _parse_seconds(text: str) -> float:
     """Of seconds, minutes:seconds or hours:minutes:seconds."""
     total = 0.0
     for part in text.split(":"):
-        total = 60 * total + _number(part, f"the time {text!r}")
+        total = 60 * total + _parse_number(part, f"the time {text!r}")
     return total
 
 
-def _rate(text: str) -> Fraction:
+def _parse_rate(text: str) -> Fraction:
     try:
         rate = Fraction(text)
     except (ValueError, ZeroDivisionError):
@@ -207,7 +207,7 @@ def _rate(text: str) -> Fraction:
     return rate
 
 
-def _number(text: str, where: str) -> float:
+def _parse_number(text: str, where: str) -> float:
     try:
         number = float(text)
     except ValueError:
@@ -217,71 +217,71 @@ def _number(text: str, where: str) -> float:
     return number
 
 
-def _or_auto(text: str | None, option: str, least: float, most: float) -> float | str | None:
+def _parse_number_or_auto(text: str | None, option: str, least: float, most: float) -> float | str | None:
     if text is None or text == AUTO:
         return text
-    number = _number(text, option)
+    number = _parse_number(text, option)
     if not least <= number <= most:
         fail(f"{option} {text}: from {least:g} to {most:g}, or {AUTO}", USAGE)
     return int(number) if number.is_integer() else number
 
 
-def _venue(venue: str, url: str, api_key: str | None) -> Venue:
+def _load_venue(venue: str, url: str, api_key: str | None) -> Venue:
     """A venue of the service by its id, or of a file."""
     if Path(venue).is_file():
-        from service.wire.venue import VenueIn
+        from service.schemas.venue import VenueIn
 
-        return checked(VenueIn, Path(venue).read_bytes(), venue).stored()
+        return parse_document(VenueIn, Path(venue).read_bytes(), venue).to_venue()
     if not re.fullmatch(ID_PATTERN, venue):
         fail(f"There is no file {venue}, and it is no id such as `esc venue list` prints", USAGE)
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         return client.venue(venue)
 
 
-def _scene(venue: Venue, chosen: Mapping[str, Any]) -> Scene:
-    from worker.jobs.reading import camera_of, light_of, pitch_of
-    from worker.video.stitch import Scene
+def _stitch_inputs(venue: Venue, chosen: Mapping[str, Any]) -> StitchScene:
+    from worker.jobs.from_schemas import camera_of, light_of, pitch_of
+    from worker.video.stitch import StitchScene
 
     given: dict[str, Any] = {
         name: None if value == AUTO else value for name, value in chosen.items() if value is not None
     }
     lights = {camera: light_of(light) for camera, light in venue.lights.items()}
     cameras = [camera_of(camera) for camera in venue.cameras]
-    return Scene(pitch_of(venue.field), cameras, replace(_stored_choice(venue), **given), lights or None)
+    return StitchScene(pitch_of(venue.field), cameras, replace(_stored_view(venue), **given), lights or None)
 
 
-def _stored_choice(venue: Venue) -> ViewChoice:
+def _stored_view(venue: Venue) -> ViewChoice:
     """What the venue itself wants to show."""
-    from service.wire.view import ViewChoice as Kept
-    from worker.jobs.reading import choice_of
+    from service.schemas.view import ViewChoice as Kept
+    from worker.jobs.from_schemas import choice_of
 
     return choice_of(venue.view or Kept())
 
 
-def _tell(made: Stitched) -> None:
+def _print_summary(made: StitchReport) -> None:
     """Lines for whoever looks."""
     width, height = made.size
-    tell(
+    print_note(
         f"{made.frames} pictures of {width}x{height}, {made.seconds:.2f} s at {float(made.rate):.6g} a second, "
         f"in {made.took_s:.1f} s ({made.frames / made.took_s:.1f} fps)"
     )
     for camera, found in made.found.items():
-        tell(
+        print_note(
             f"The clip of camera {camera} began {made.offsets[camera]:+.3f} s after the first: found by what moves, "
             f"likeness {found.strength:.2f}, at the next best offset {found.rival:.2f}"
         )
     for camera, at in made.ended.items():
-        tell(f"The clip of camera {camera} ended early, at {at:.2f} s")
+        print_note(f"The clip of camera {camera} ended early, at {at:.2f} s")
     for camera, count in made.broken.items():
         if count:
-            tell(
+            print_note(
                 f"{count} frames of camera {camera} could not be decoded; {made.repeated[camera]} pictures show the "
                 "nearest good one in their place"
             )
 
 
-def _document(made: Stitched, output: str, motions: Mapping[str, Motion]) -> dict[str, Any]:
-    from service.cli.following import document_of
+def _json_document(made: StitchReport, output: str, motions: Mapping[str, MotionSummary]) -> dict[str, Any]:
+    from service.cli.tracked_poses import motion_document
 
     return {
         "output": output,
@@ -301,7 +301,7 @@ def _document(made: Stitched, output: str, motions: Mapping[str, Motion]) -> dic
                 "broken_frames": made.broken[camera],
                 "repeated": made.repeated[camera],
             }
-            | ({"followed": document_of(motions[camera])} if camera in motions else {})
+            | ({"followed": motion_document(motions[camera])} if camera in motions else {})
             for camera, offset in made.offsets.items()
         },
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import zipfile
 from http import HTTPStatus
 from pathlib import Path
@@ -10,22 +11,49 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import LOCAL, ApiKey, AsJson, CameraId, Form, Lens, OneCamera, Output, Url, VenueId, checked
-from service.cli.calling import called
-from service.cli.changes import edited, patch_between, patch_of, standing_like, what_is_lost
-from service.cli.printing import FAILED, REJECTED, USAGE, fail, hand_out, outcome, say, say_changed, tell
-from service.wire.names import EventKind, Projection, StitchFormat
+from service.cli.arguments import (
+    DEFAULT_URL,
+    AdoptedCamera,
+    AdoptedField,
+    AdoptedJob,
+    ApiKey,
+    AsJson,
+    FormatOption,
+    LensOption,
+    OneCamera,
+    Output,
+    Url,
+    VenueId,
+    parse_document,
+)
+from service.cli.printing import (
+    FAILED,
+    REJECTED,
+    USAGE,
+    fail,
+    outcome_text,
+    print_changed_venue,
+    print_json,
+    print_note,
+    write_document,
+)
+from service.cli.service_client import open_client
+from service.cli.venue_edits import describe_losses, edit_text, merge_patch_between, parse_patch, with_poses_of
+from service.schemas.names import EventKind, Projection, StitchFormat
 
 if TYPE_CHECKING:
     from datetime import date
 
     from service.client import Client
-    from service.wire.geometry import Moved
-    from service.wire.told.events import Event
-    from service.wire.trend import Trend
-    from service.wire.venue import Venue
+    from service.schemas.actor import Actor
+    from service.schemas.events.venue_event import Event
+    from service.schemas.geometry import Moved
+    from service.schemas.trend import Trend
+    from service.schemas.venue import Venue
 
-OTHERWISE = "Keep the poses with --keep-poses, change parts with esc venue set or edit, or put it anyway with --force."
+WAYS_TO_PUT = (
+    "Keep the poses with --keep-poses, change parts with esc venue set or edit, or put it anyway with --force."
+)
 app = typer.Typer(no_args_is_help=True, help="Venues: pitch, cameras, stored poses.")
 
 
@@ -39,24 +67,24 @@ def put_venue(
         ),
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Put it whatever would be lost by that.")] = False,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Create or replace a venue from a JSON file. Exit 1: nothing was put, something would be lost by it."""
-    from service.wire.venue import VenueIn
+    from service.schemas.venue import VenueIn
 
-    venue = checked(VenueIn, file.read_bytes(), str(file))
-    with called(url, api_key) as client:
-        before = _stored(client, venue.id)
+    venue = parse_document(VenueIn, file.read_bytes(), str(file))
+    with open_client(url, api_key) as client:
+        before = _stored_venue(client, venue.id)
         if before is None:
-            say_changed(client.put_venue(venue))
+            print_changed_venue(client.put_venue(venue))
             return
         stored, tag = before
-        wanted = standing_like(venue, stored) if keep_poses else venue
-        lost = what_is_lost(wanted.stored(), stored, client.history(venue.id, 1)[0])
+        wanted = with_poses_of(venue, stored) if keep_poses else venue
+        lost = describe_losses(wanted.to_venue(), stored, client.history(venue.id, 1)[0])
         if lost and not force:
-            fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *lost, OTHERWISE]), FAILED)
-        say_changed(client.put_venue(wanted, tag))
+            fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *lost, WAYS_TO_PUT]), FAILED)
+        print_changed_venue(client.put_venue(wanted, tag))
 
 
 @app.command("set")
@@ -70,72 +98,83 @@ def set_venue(
             "schedule=null takes it away. Values are JSON, or else text.",
         ),
     ],
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Change parts of a venue and leave the others as they are, its poses among them."""
-    patch = patch_of(changes)
-    with called(url, api_key) as client:
-        say_changed(client.patch_venue(venue, patch))
+    patch = parse_patch(changes)
+    with open_client(url, api_key) as client:
+        print_changed_venue(client.patch_venue(venue, patch))
 
 
 @app.command("edit")
-def edit_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def edit_venue(venue: VenueId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Open a venue in $EDITOR and change what was changed there, unless somebody else has changed it meanwhile."""
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         stored, tag = client.tagged_venue(venue)
-        shown = stored.sent().model_dump(mode="json", exclude_none=True)
+        shown = stored.to_input().model_dump(mode="json", exclude_none=True)
         try:
-            patch = patch_between(shown, json.loads(edited(json.dumps(shown, indent=2) + "\n")))
+            patch = merge_patch_between(shown, json.loads(edit_text(json.dumps(shown, indent=2) + "\n")))
         except ValueError as error:
             fail(f"Nothing was changed. What was saved is no JSON: {error}", USAGE)
         if not patch:
-            tell("Nothing was changed.")
+            print_note("Nothing was changed.")
             return
-        say_changed(client.patch_venue(venue, patch, tag))
+        print_changed_venue(client.patch_venue(venue, patch, tag))
 
 
 @app.command("get")
-def get_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def get_venue(venue: VenueId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Print a venue with the poses that hold now."""
-    with called(url, api_key) as client:
-        say(client.venue(venue))
+    with open_client(url, api_key) as client:
+        print_json(client.venue(venue))
 
 
 @app.command("list")
-def list_venues(as_json: AsJson = False, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def list_venues(as_json: AsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Print a line per venue: id, name, cameras."""
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         venues = client.venues()
     if as_json:
-        from service.wire.venue import Venues
+        from service.schemas.venue import Venues
 
-        say(Venues(venues=venues))
+        print_json(Venues(venues=venues))
         return
     for venue in venues:
         print(f"{venue.id}\t{venue.name}\t{' '.join(camera.id for camera in venue.cameras)}")
 
 
 @app.command("delete")
-def delete_venue(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def delete_venue(
+    venue: VenueId,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask, which is asked only at a terminal.")] = False,
+    url: Url = DEFAULT_URL,
+    api_key: ApiKey = None,
+) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures, see `esc job delete`."""
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
+        asks = sys.stdin.isatty() and not yes
+        if asks and not typer.confirm(
+            f"Forget venue {venue} and the history of its poses? It cannot be undone", err=True
+        ):
+            fail("Nothing was deleted.", FAILED)
         client.delete_venue(venue)
+    print_note(f"Venue {venue} and the history of its poses are deleted; its jobs stay: esc job list --venue {venue}")
 
 
 @app.command("poses")
 def venue_poses(
     venue: VenueId,
-    form: Form = "json",
+    form: FormatOption = "json",
     camera: OneCamera = None,
-    lens: Lens = "stored",
+    lens: LensOption = "stored",
     output: Output = None,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Write the poses that hold now in the format of another tool."""
-    with called(url, api_key) as client:
-        hand_out(client.venue_poses(venue, form, camera, lens), output)
+    with open_client(url, api_key) as client:
+        write_document(client.venue_poses(venue, form, camera, lens), output)
 
 
 @app.command("stitch")
@@ -154,7 +193,7 @@ def venue_stitch(
     if_changed: Annotated[
         bool, typer.Option("--if-changed", help="Fetch it only if the file of -o is no longer what holds.")
     ] = False,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Write the zip with which ffmpeg, compositors or OpenCV stitch: maps, weights and lights of each camera.
@@ -163,7 +202,7 @@ def venue_stitch(
     """
     if if_changed and output is None:
         fail("--if-changed needs -o FILE, the zip that may still hold", USAGE)
-    known = tag_of(output) if if_changed and output is not None else None
+    known = package_etag(output) if if_changed and output is not None else None
     parts = {
         "projection": projection,
         "width_px": width,
@@ -173,12 +212,12 @@ def venue_stitch(
         "horizon": horizon,
     }
     wanted = {name: value for name, value in parts.items() if value is not None}
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         package = client.venue_stitch(venue, form, wanted, known)
     if package is None:
-        tell(f"{output} still holds.")
+        print_note(f"{output} still holds.")
     else:
-        hand_out(package, output)
+        write_document(package, output)
 
 
 @app.command("history")
@@ -186,21 +225,22 @@ def venue_history(
     venue: VenueId,
     limit: Annotated[int, typer.Option("--limit", min=1, help="How many at most, the newest.")] = 20,
     as_json: AsJson = False,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Print a line per change of the poses, newest first: revision, time, cause, job, pixels moved and drifted."""
-    with called(url, api_key) as client:
+    """Print a line per change of the poses, newest first: revision, time, cause, job, pixels moved and drifted, who."""
+    with open_client(url, api_key) as client:
         revisions = client.history(venue, limit)
     if as_json:
-        from service.wire.history import History
+        from service.schemas.history import History
 
-        say(History(revisions=revisions))
+        print_json(History(revisions=revisions))
         return
     for revision in revisions:
         cause = revision.cause if revision.restored_from is None else f"restored {revision.restored_from}"
-        cameras = " ".join(f"{c.id}:{_pixels(c.moved)}/{_pixels(c.drift)}" for c in revision.cameras)
-        print(f"{revision.revision}\t{revision.at:%Y-%m-%dT%H:%M:%SZ}\t{cause}\t{revision.job or '-'}\t{cameras}")
+        cameras = " ".join(f"{c.id}:{_pixels_text(c.moved)}/{_pixels_text(c.drift)}" for c in revision.cameras)
+        parts = revision.revision, f"{revision.at:%Y-%m-%dT%H:%M:%SZ}", cause, revision.job or "-", cameras
+        print(*parts, _actor_text(revision.by), sep="\t")
 
 
 @app.command("trend")
@@ -213,15 +253,15 @@ def venue_trend(
         str | None, typer.Option("--since", metavar="YYYY-MM-DD", help="The first night to print, a day of UTC.")
     ] = None,
     as_json: AsJson = False,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Print how cameras have moved since their anchor, in cm at the far touchline, and what control charts say of it.
 
     A line per camera: id, state, cm, words. Of one camera, a line per night: time, state, cm, one sigma, focal length.
     """
-    first = _day(since)
-    with called(url, api_key) as client:
+    first = _parse_day(since)
+    with open_client(url, api_key) as client:
         ids = [camera] if camera else [one.id for one in client.venue(venue).cameras]
         trends = [client.trend(venue, one, first) for one in ids]
     for trend in trends:
@@ -234,11 +274,11 @@ def venue_trend(
 
 
 @app.command("health")
-def venue_health(venue: VenueId, url: Url = LOCAL, api_key: ApiKey = None) -> None:
+def venue_health(venue: VenueId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Print how a venue is doing: alarms, drift, schedule. Exit: 0 ok, 3 an alarm rings."""
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         health = client.venue_health(venue)
-    say(health)
+    print_json(health)
     if health.state != "ok":
         raise typer.Exit(REJECTED)
 
@@ -248,7 +288,7 @@ def follow_venue(
     venue: VenueId,
     only: Annotated[EventKind | None, typer.Option("--only", help="Only what is of this kind; otherwise all.")] = None,
     as_json: AsJson = False,
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Print a line for whatever happens to a venue: time, type, what; first for the poses that hold.
@@ -257,9 +297,9 @@ def follow_venue(
     """
     from service.client import PATIENCE_S
 
-    with called(url, api_key) as client:
+    with open_client(url, api_key) as client:
         for _, event in client.venue_events(venue, [only] if only else [], patience_s=PATIENCE_S):
-            line = f"{event.timestamp:%Y-%m-%dT%H:%M:%SZ}\t{event.type}\t{_happened(event)}"
+            line = f"{event.timestamp:%Y-%m-%dT%H:%M:%SZ}\t{event.type}\t{_event_text(event)}"
             # Whoever reads a pipe is to have it now.
             print(event.model_dump_json() if as_json else line, flush=True)
 
@@ -268,46 +308,55 @@ def follow_venue(
 def restore_venue(
     venue: VenueId,
     revision: Annotated[int, typer.Argument(min=1, help="Number of the revision, as `esc venue history` prints it.")],
-    url: Url = LOCAL,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Let the poses of a revision hold again, see `esc venue history`."""
-    with called(url, api_key) as client:
-        say(client.restore(venue, revision))
+    with open_client(url, api_key) as client:
+        print_json(client.restore(venue, revision))
 
 
 @app.command("adopt")
-def adopt_refined(
+def adopt(
     venue: VenueId,
-    camera: CameraId,
-    url: Url = LOCAL,
+    camera: AdoptedCamera = None,
+    field: AdoptedField = None,
+    job: AdoptedJob = None,
+    url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Store the refined pose and lens of a camera, which the last accepted calibration found, as a new revision.
+    """Store what the lines of an accepted calibration say of a lens, or of the field, as a new revision.
 
-    What that changes is in the job: `longer` and `differs_m` of the camera's `refined`.
+    Of a CAMERA: its refined pose and lens, which the last accepted calibration found; what that changes is in the job,
+    `longer` and `differs_m` of the camera's `refined`. With --field: one of the numbers in `adoptable` of the job's
+    result, which has the change as well.
     """
-    with called(url, api_key) as client:
-        say(client.adopt_refined(venue, camera))
+    if (camera is None) == (field is None) or (field is None) != (job is None):
+        raise typer.BadParameter("name a CAMERA, or a number of the field with --field and --job")
+    with open_client(url, api_key) as client:
+        if camera is not None:
+            print_json(client.adopt_refined(venue, camera))
+        elif field is not None and job is not None:
+            print_json(client.adopt_field(venue, job, field))
 
 
-def _happened(event: Event) -> str:
-    from service.wire.health import VenueAlarm
-    from service.wire.job import Job
-    from service.wire.told.events import Poses
+def _event_text(event: Event) -> str:
+    from service.schemas.events.venue_event import Poses
+    from service.schemas.health import VenueAlarm
+    from service.schemas.job import Job
 
     match event.data:
         case Poses() as poses:
             return f"revision {poses.revision}, {poses.cause}"
         case Job() as job:
-            return f"{job.id} {outcome(job)}"
+            return f"{job.id} {outcome_text(job)}"
         case VenueAlarm() as alarm:
             return alarm.why
         case change:
             return " ".join(change.changed) or "-"
 
 
-def tag_of(package: Path) -> str | None:
+def package_etag(package: Path) -> str | None:
     """By which the service knows a package that it gave; None: there is none."""
     try:
         with zipfile.ZipFile(package) as files:
@@ -319,7 +368,7 @@ def tag_of(package: Path) -> str | None:
     return tag if isinstance(tag, str) else None
 
 
-def _stored(client: Client, venue_id: str) -> tuple[Venue, str] | None:
+def _stored_venue(client: Client, venue_id: str) -> tuple[Venue, str] | None:
     from service.client import Refused
 
     try:
@@ -330,7 +379,7 @@ def _stored(client: Client, venue_id: str) -> tuple[Venue, str] | None:
         raise
 
 
-def _day(text: str | None) -> date | None:
+def _parse_day(text: str | None) -> date | None:
     from datetime import date
 
     try:
@@ -344,8 +393,14 @@ def _print_nights(trend: Trend) -> None:
         focal = "-" if night.focal_length is None else f"{night.focal_length:+.3%}"
         figures = f"{100 * night.displacement_m:.1f}\t{100 * night.sigma_m:.1f}\t{focal}"
         print(f"{night.at:%Y-%m-%dT%H:%M:%SZ}\t{night.state}\t{figures}")
-    tell(trend.words)
+    print_note(trend.words)
 
 
-def _pixels(moved: Moved | None) -> str:
+def _actor_text(actor: Actor | None) -> str:
+    if actor is None:
+        return "-"
+    return actor.name if actor.address is None else f"{actor.name} from {actor.address}"
+
+
+def _pixels_text(moved: Moved | None) -> str:
     return "-" if moved is None or moved.pixels is None else f"{moved.pixels:.1f}"

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from service.formats import freed, opentrackio
-from service.formats.lens import Shot
+from service.formats.lens import NumberedCamera
 
 COLUMNS = (
     "frame",
@@ -28,14 +28,14 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class FollowedShot:
+class TrackedCamera:
     """A camera when a frame was taken, and how that is known.
 
     `status`: what the tracking says of it. `sigma` and `motion_sigma`: one standard deviation of its pose, and of its
     motion since the first frame: of the rotation in degrees, of the position in metres.
     """
 
-    shot: Shot
+    shot: NumberedCamera
     status: str
     sigma: tuple[float, float]
     motion_sigma: tuple[float, float]
@@ -49,7 +49,7 @@ class ClipPoses:
     it, before there are any files.
     """
 
-    def __init__(self, stem: Path, shots: Sequence[Shot], freed_axes: str) -> None:
+    def __init__(self, stem: Path, shots: Sequence[NumberedCamera], freed_axes: str) -> None:
         """`shots`: the cameras as they are stored."""
         for shot in shots:
             opentrackio.write(shot)
@@ -65,7 +65,7 @@ class ClipPoses:
         self._rows = csv.writer(self._table)
         self._rows.writerow(COLUMNS)
 
-    def add(self, cameras: Sequence[FollowedShot], rate: Fraction) -> None:
+    def add(self, cameras: Sequence[TrackedCamera], rate: Fraction) -> None:
         """The next frame of a clip of so many a second, its cameras in the order of the venue."""
         for camera in cameras:
             frame = opentrackio.Frame(self._number, rate, camera.status)
@@ -74,7 +74,7 @@ class ClipPoses:
         self._packets.write(freed.write([camera.shot for camera in cameras], self._axes))
         self._number += 1
 
-    def _row(self, camera: FollowedShot) -> list[str | int]:
+    def _row(self, camera: TrackedCamera) -> list[str | int]:
         pose = camera.shot.camera.pose
         numbers = (*pose.rotation, *pose.position, *camera.sigma, *camera.motion_sigma)
         return [self._number, camera.shot.id, camera.status, *(f"{value:.8g}" for value in numbers)]

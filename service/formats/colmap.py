@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from service.formats.archive import archive
-from service.formats.lens import RADIAL, TANGENTIAL, Shot
+from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera
 
 # Parameters after fx, fy, cx, cy, in COLMAP's order (src/colmap/sensor/models.h).
 MODELS = {
@@ -18,7 +18,7 @@ MODELS = {
 }
 
 
-def write(shots: Sequence[Shot]) -> bytes:
+def write(shots: Sequence[NumberedCamera]) -> bytes:
     """The three files. Images are named as their cameras, with `.jpg`: the frames to put beside them."""
     cameras = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]", *(_camera(shot) for shot in shots)]
     images = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; then a line of POINTS2D[]"]
@@ -29,8 +29,8 @@ def write(shots: Sequence[Shot]) -> bytes:
     return archive({name: "\n".join([*lines, ""]).encode() for name, lines in files.items()})
 
 
-def _camera(shot: Shot) -> str:
-    shot.must_fit("colmap", {*RADIAL, *TANGENTIAL})
+def _camera(shot: NumberedCamera) -> str:
+    shot.require_support("colmap", {*RADIAL, *TANGENTIAL})
     coefficients = shot.coefficients
     enough = not any(coefficients[name] for name in RADIAL if name not in MODELS["OPENCV"])
     model = "OPENCV" if enough else "FULL_OPENCV"
@@ -39,7 +39,7 @@ def _camera(shot: Shot) -> str:
     return _line(shot.number, model, *shot.size, *map(float, parameters))
 
 
-def _image(shot: Shot) -> str:
+def _image(shot: NumberedCamera) -> str:
     pose = shot.camera.pose
     return _line(shot.number, *quaternion(pose.rotation), *pose.translation, shot.number, f"{shot.id}.jpg")
 

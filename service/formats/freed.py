@@ -14,16 +14,16 @@ import math
 import re
 from collections.abc import Sequence
 
-from service.formats.lens import Shot, product, transposed
+from service.formats.lens import NumberedCamera, product, transposed
 from service.formats.opentrackio import AHEAD_IS_Y, pan_tilt_roll
-from service.wire.problems import Problem
+from service.schemas.problems import Problem
 
 STEPS_PER_DEGREE = 32768
 STEPS_PER_METRE = 64_000
 AXIS = re.compile(r"(?P<sign>-?)(?P<name>[a-z]+)(?P<offset>[+-][0-9.]+)?")
 
 
-def write(shots: Sequence[Shot], axes: str) -> bytes:
+def write(shots: Sequence[NumberedCamera], axes: str) -> bytes:
     """A packet per camera, in the order of the venue; its id is the camera's place there, from 1.
 
     `axes`: what is sent as X, Y, height, pan, tilt and roll: `x y z pan tilt roll`, or `y -x z -pan+90 tilt roll`.
@@ -31,7 +31,7 @@ def write(shots: Sequence[Shot], axes: str) -> bytes:
     return b"".join(_packet(shot, axes) for shot in shots)
 
 
-def _packet(shot: Shot, axes: str) -> bytes:
+def _packet(shot: NumberedCamera, axes: str) -> bytes:
     x, y, height, pan, tilt, roll = _mapped(shot, axes)
     content = bytes([0xD1, shot.number])
     content += b"".join(_steps(shot, "degrees", value, STEPS_PER_DEGREE) for value in (pan, tilt, roll))
@@ -40,7 +40,7 @@ def _packet(shot: Shot, axes: str) -> bytes:
     return content + bytes([(0x40 - sum(content)) % 256])
 
 
-def _mapped(shot: Shot, axes: str) -> list[float]:
+def _mapped(shot: NumberedCamera, axes: str) -> list[float]:
     pan, tilt, roll = pan_tilt_roll(product(transposed(shot.rotation), transposed(AHEAD_IS_Y)))
     ours = dict(zip("xyz", shot.camera.pose.position, strict=True))
     ours |= {"pan": -math.degrees(pan), "tilt": math.degrees(tilt), "roll": math.degrees(roll)}
@@ -53,7 +53,7 @@ def _value(axis: re.Match[str], ours: dict[str, float]) -> float:
     return (-value if axis["sign"] else value) + float(axis["offset"] or 0)
 
 
-def _steps(shot: Shot, unit: str, value: float, per_unit: int) -> bytes:
+def _steps(shot: NumberedCamera, unit: str, value: float, per_unit: int) -> bytes:
     largest = (2**23 - 1) / per_unit
     if abs(value) > largest:
         raise Problem(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from service.wire.geometry import rotated
-from service.wire.problems import Problem
-from service.wire.venue import Camera
+from service.schemas.geometry import rotate
+from service.schemas.problems import Problem
+from service.schemas.venue import Camera
 
 # OpenCV's order.
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
@@ -19,7 +19,7 @@ Matrix = list[list[float]]
 
 
 @dataclass(frozen=True)
-class Shot:
+class NumberedCamera:
     """A camera with its pose, and its place among the cameras of its venue, from 1: some formats know numbers only."""
 
     camera: Camera
@@ -58,11 +58,11 @@ class Shot:
     def rotation(self) -> Matrix:
         """The matrix (3, 3), world to camera."""
         columns = [
-            rotated(self.camera.pose.rotation, axis) for axis in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+            rotate(self.camera.pose.rotation, axis) for axis in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
         ]
         return [list(row) for row in zip(*columns, strict=True)]
 
-    def must_fit(self, name: str, held: Collection[str]) -> None:
+    def require_support(self, name: str, held: Collection[str]) -> None:
         """Refuse a lens that has more than skew 0 and the coefficients `held`: what is left out is pixels wrong."""
         if self.camera.intrinsics.model == "fisheye":
             raise Problem(

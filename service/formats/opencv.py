@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from service.formats.lens import COEFFICIENTS, Shot
+from service.formats.lens import COEFFICIENTS, NumberedCamera
 
 # FileStorage has no empty matrices; five zeros are what OpenCV itself takes for no distortion.
 NO_DISTORTION = [0.0] * 5
 
 
-def write(shot: Shot) -> bytes:
+def write(shot: NumberedCamera) -> bytes:
     """Image size, camera matrix, distortion in OpenCV's order, rvec and tvec (world to camera, m)."""
-    shot.must_fit("opencv", COEFFICIENTS)  # its matrix could hold a skew, but `cv2.projectPoints` does not read it
+    shot.require_support(
+        "opencv", COEFFICIENTS
+    )  # its matrix could hold a skew, but `cv2.projectPoints` does not read it
     camera = shot.camera
     width, height = shot.size
     lines = [

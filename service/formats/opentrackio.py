@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from service.formats.lens import RADIAL, TANGENTIAL, Shot, product, transposed
-from service.wire.problems import Problem
+from service.formats.lens import RADIAL, TANGENTIAL, NumberedCamera, product, transposed
+from service.schemas.problems import Problem
 
 SENSOR_WIDTH_MM = 36.0
 # Camera axes from OpenCV's (x right, y down, z ahead) to x right, y ahead, z up.
@@ -36,12 +36,12 @@ class Frame:
     status: str
 
 
-def write(shot: Shot) -> bytes:
+def write(shot: NumberedCamera) -> bytes:
     """One sample of a camera that stands still: it names a pose, not a moment of a stream."""
-    return (json.dumps(_identified(_sample(shot)), indent=2) + "\n").encode()
+    return (json.dumps(_with_sample_id(_sample(shot)), indent=2) + "\n").encode()
 
 
-def write_frame(shot: Shot, frame: Frame) -> bytes:
+def write_frame(shot: NumberedCamera, frame: Frame) -> bytes:
     """One sample of a clip, a line of JSON. Its timecode counts from 00:00:00:00 at the first frame, without drops.
 
     The samples travel beside the video, whose frames they are of: nobody knows by a clock when those were taken.
@@ -55,10 +55,10 @@ def write_frame(shot: Shot, frame: Frame) -> bytes:
             "timecode": _timecode(frame),
         },
     }
-    return (json.dumps(_identified(_sample(shot) | moment), separators=(",", ":")) + "\n").encode()
+    return (json.dumps(_with_sample_id(_sample(shot) | moment), separators=(",", ":")) + "\n").encode()
 
 
-def _sample(shot: Shot) -> dict[str, Any]:
+def _sample(shot: NumberedCamera) -> dict[str, Any]:
     return {
         "protocol": {"name": "OpenTrackIO", "version": [1, 0, 1]},
         "static": {"camera": _sensor(shot)},
@@ -69,7 +69,7 @@ def _sample(shot: Shot) -> dict[str, Any]:
     }
 
 
-def _identified(sample: dict[str, Any]) -> dict[str, Any]:
+def _with_sample_id(sample: dict[str, Any]) -> dict[str, Any]:
     """The same sample has the same id."""
     return sample | {"sampleId": uuid.uuid5(SOURCES, json.dumps(sample, sort_keys=True)).urn}
 
@@ -98,7 +98,7 @@ def _rational(rate: Fraction) -> dict[str, int]:
     return {"num": rate.numerator, "denom": rate.denominator}
 
 
-def _sensor(shot: Shot) -> dict[str, Any]:
+def _sensor(shot: NumberedCamera) -> dict[str, Any]:
     (width, height), (fx, fy) = shot.size, shot.focal
     return {
         "label": shot.id,
@@ -111,8 +111,8 @@ def _sensor(shot: Shot) -> dict[str, Any]:
     }
 
 
-def _lens(shot: Shot) -> dict[str, Any]:
-    shot.must_fit("opentrackio", {*RADIAL, *TANGENTIAL})
+def _lens(shot: NumberedCamera) -> dict[str, Any]:
+    shot.require_support("opentrackio", {*RADIAL, *TANGENTIAL})
     (width, height), (fx, fy), (cx, cy) = shot.size, shot.focal, shot.principal
     focal = fx * SENSOR_WIDTH_MM / width
     k = shot.coefficients
@@ -144,7 +144,7 @@ def _lens(shot: Shot) -> dict[str, Any]:
     }
 
 
-def _transform(shot: Shot) -> dict[str, Any]:
+def _transform(shot: NumberedCamera) -> dict[str, Any]:
     b = product(transposed(shot.rotation), transposed(AHEAD_IS_Y))
     pan, tilt, roll = pan_tilt_roll(b)
     x, y, z = shot.camera.pose.position

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from service.formats.lens import Shot
+from service.formats.lens import NumberedCamera
 
 
-def write(shots: Sequence[Shot]) -> bytes:
+def write(shots: Sequence[NumberedCamera]) -> bytes:
     """All cameras in one object."""
     return (json.dumps({"cameras": [shot.camera.model_dump(mode="json") for shot in shots]}, indent=2) + "\n").encode()

@@ -9,12 +9,12 @@ from __future__ import annotations
 import json
 import math
 
-from service.formats.lens import RADIAL, TANGENTIAL, THIN_PRISM, Matrix, Shot, transposed
+from service.formats.lens import RADIAL, TANGENTIAL, THIN_PRISM, Matrix, NumberedCamera, transposed
 
 
-def write(shot: Shot) -> bytes:
+def write(shot: NumberedCamera) -> bytes:
     """The parameters of a camera: pixels, degrees, metres."""
-    shot.must_fit("soccernet", {*RADIAL, *TANGENTIAL, *THIN_PRISM})
+    shot.require_support("soccernet", {*RADIAL, *TANGENTIAL, *THIN_PRISM})
     # y and z turn round: half a turn about x.
     orientation = transposed([[right, -down, -ahead] for right, down, ahead in shot.rotation])
     pan, tilt, roll = (math.degrees(angle) for angle in _pan_tilt_roll(orientation))

@@ -6,14 +6,17 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from service.api.programs.running import OneAtATime
-from service.formats.lens import Shot
+from service.formats.lens import NumberedCamera
 
 # A 4K lens takes 10 s of one core, and its maps 100 MB.
 _maps = OneAtATime("set of ST maps", longest_s=60, again_s=10)
 
 
 def write(
-    shot: Shot, origin: Literal["top-left", "bottom-left"], program: Sequence[str], environment: Mapping[str, str]
+    shot: NumberedCamera,
+    origin: Literal["top-left", "bottom-left"],
+    program: Sequence[str],
+    environment: Mapping[str, str],
 ) -> bytes:
     """Both directions; `origin`: the corner that green counts from."""
     return _maps.run([*program, origin], environment, shot.camera.model_dump_json().encode())

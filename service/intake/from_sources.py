@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake, frame_paths
+from service.schemas.job import Job, JobError
+from service.schemas.options import Options
+from service.schemas.problems import PROBLEM_TYPES, Problem, problem_uri
+from service.schemas.venue import Venue
 from service.store.blobs import Blobs
 from service.store.ids import new_id
-from service.store.jobs.submission import Submission, Submissions, VenueGone, fetched_hash
+from service.store.jobs.submission import Submission, SubmissionRepository, VenueGone, fetched_hash
 from service.store.jobs.task import Origin, seeded
-from service.store.venues import Venues
-from service.wire.job import Job, JobError
-from service.wire.options import Options
-from service.wire.problems import KINDS, Problem, type_of
-from service.wire.venue import Venue
+from service.store.venues import VenueRepository
 
 
 class FromSources:
     """Fetches and submits."""
 
     def __init__(
-        self, venues: Venues, submissions: Submissions, snapshots: Snapshots, blobs: Blobs, intake: Intake
+        self,
+        venues: VenueRepository,
+        submissions: SubmissionRepository,
+        snapshots: Snapshots,
+        blobs: Blobs,
+        intake: Intake,
     ) -> None:
         self._venues = venues
         self._submissions = submissions
@@ -29,9 +34,21 @@ class FromSources:
         self._blobs = blobs
         self._intake = intake
 
-    def calibrate(self, venue_id: str, options: Options, key: str | None, origin: Origin) -> tuple[Job, bool]:
-        """A job from a frame of each source, or the job that the request already is; says if it is new.
+    def calibrate(
+        self,
+        venue_id: str,
+        options: Options,
+        key: str | None,
+        origin: Origin,
+        frames: int = 1,
+        spacing_s: float = 0.0,
+        within_s: float | None = None,
+        fetched: Callable[[], None] = lambda: None,
+    ) -> tuple[Job, bool]:
+        """A job from a frame of each source, or several, or the job that the request already is; says if it is new.
 
+        `within_s`: the time that the sources have, at most that of the settings. `fetched` is called once all frames
+        have come.
         Raises a `Problem` for a source that gives no frame, `VenueGone` and what else `Intake.take` raises. The same
         request is the same job whatever the cameras show meanwhile.
         """
@@ -39,34 +56,43 @@ class FromSources:
         known = self._submissions.same_as(venue_id, key, sent)
         if known is not None:
             return known, False
+        self._intake.require_place(origin)
         found = self._venues.with_credentials(venue_id)
         if found is None:
             raise VenueGone
         venue, credentials = found
-        frames = self._snapshots.take(venue.cameras, credentials)
-        submission = _submission(venue, options, key, origin, list(frames))
+        taken = self._snapshots.take_of_all(venue.cameras, credentials, frames, spacing_s, within_s)
+        fetched()
+        counts = {camera: len(several) for camera, several in taken.items()}
+        submission = _submission(venue, options, key, origin, counts)
 
         def store() -> None:
-            for camera, (path,) in submission.frames.items():
-                self._blobs.put(path, frames[camera])
+            for camera, paths in submission.frames.items():
+                for path, frame in zip(paths, taken[camera], strict=True):
+                    self._blobs.put(path, frame)
 
         return self._intake.take(submission, store)
 
     def fail(self, venue: Venue, options: Options, key: str | None, origin: Origin, why: Problem) -> Job:
         """A job for a calibration that nobody waits for and whose frames could not be had: it has failed."""
         error = JobError(
-            type=type_of(why.kind), title=KINDS[why.kind].title, detail=why.detail, camera=why.parts.get("camera")
+            type=problem_uri(why.kind),
+            title=PROBLEM_TYPES[why.kind].title,
+            detail=why.detail,
+            camera=why.parts.get("camera"),
         )
-        return self._submissions.fail(_submission(venue, options, key, origin, []), error)
+        return self._submissions.fail(_submission(venue, options, key, origin, {}), error)
 
 
-def _submission(venue: Venue, options: Options, key: str | None, origin: Origin, cameras: Sequence[str]) -> Submission:
+def _submission(
+    venue: Venue, options: Options, key: str | None, origin: Origin, counts: Mapping[str, int]
+) -> Submission:
     job_id = new_id()
     return Submission(
         job_id=job_id,
         venue=venue,
         options=seeded(options),
-        frames=frame_paths(job_id, dict.fromkeys(cameras, 1)),
+        frames=frame_paths(job_id, counts),
         origin=origin,
         content_hash=fetched_hash(options),
         idempotency_key=key,

@@ -5,54 +5,82 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
 from pathlib import Path
 
 import structlog
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
-from service import lifeline
-from service.intake import images
+from service import child_process
+from service.intake import image_checks
+from service.schemas.problems import Problem
+from service.schemas.programs.fetching import SourceFetch
+from service.schemas.source_urls import SourceSecrets
+from service.schemas.venue import Camera
 from service.settings import Settings
-from service.wire.addresses import HIDDEN
-from service.wire.problems import Problem
-from service.wire.venue import Camera
 
 # Beyond the time that the sources have: to start, and to encode.
 STARTING_S = 10.0
 # Of this process: each keeps a thread busy.
 AT_ONCE = 8
+# Of the time that a source had: what took as much of it was ended by it.
+LATE = 0.9
 log = structlog.get_logger()
 
 
 class SourceTask(BaseModel):
     """What the program reads on its standard input."""
 
-    # By camera: the address, and user and password of it.
+    # By camera: the address as it is shown, and what is secret in it (see SourceSecrets).
     sources: dict[str, tuple[str, str | None]]
     allowed: list[str]
     folder: str
     seconds: float
     most_bytes: int
     most_pixels: int
+    # Of each camera, and from the beginning of one to the beginning of the next.
+    frames: int = 1
+    spacing_s: float = 0.0
 
 
 class SourceAnswer(BaseModel):
-    """A line that it prints for each camera; `why`: there is no frame. Otherwise the file of that name is it."""
+    """A line that it prints for each camera; `why`: a frame is missing. Otherwise all are in their files."""
 
     camera: str
     why: str | None = None
+    seconds: float = Field(0.0, description="That it took, but for the time between frames.")
+
+
+class SourceLate(Problem):
+    """A source gave no frame within the time that it had; with more time it might have."""
 
 
 class Snapshots:
-    """Takes frames, of a venue's cameras at once."""
+    """Takes frames, of a venue's cameras at once; `count` is told how long each source took."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, count: Callable[[Sequence[SourceFetch]], None]) -> None:
         self._settings = settings
+        self._count = count
         self._turns = threading.BoundedSemaphore(AT_ONCE)
 
-    def take(self, cameras: Sequence[Camera], credentials: Mapping[str, str]) -> dict[str, bytes]:
-        """A checked frame of each camera, by its id. Raises a `Problem` that names the first camera that gave none."""
+    def take(self, camera: Camera, credentials: Mapping[str, str]) -> bytes:
+        """Return a checked frame of a camera. Raises a `Problem` if it gives none."""
+        return self.take_of_all([camera], credentials)[camera.id][0]
+
+    def take_of_all(
+        self,
+        cameras: Sequence[Camera],
+        credentials: Mapping[str, str],
+        frames: int = 1,
+        spacing_s: float = 0.0,
+        within_s: float | None = None,
+    ) -> dict[str, list[bytes]]:
+        """Return checked frames of each camera by its id, so many and so far apart.
+
+        `within_s`: the time that sources have, beyond what lies between frames; None: what the settings say. Raises a
+        `Problem` that names the first camera that gave none, `SourceLate` if it was not quick enough.
+        """
         for camera in cameras:
             if camera.source is None:
                 raise Problem(
@@ -64,53 +92,88 @@ class Snapshots:
             raise Problem("unavailable", "Other frames are being fetched.", headers={"Retry-After": "5"})
         try:
             with tempfile.TemporaryDirectory(prefix="esc-frames-") as folder:
-                answers = self._ask(cameras, credentials, folder)
-                return {camera.id: self._checked(camera, answers.get(camera.id), Path(folder)) for camera in cameras}
+                task = self._task(cameras, credentials, folder, within_s).model_copy(
+                    update={"frames": frames, "spacing_s": spacing_s}
+                )
+                answers = self._ask(task, credentials)
+                self._count_fetches(cameras, answers, task)
+                return {camera.id: self._checked(camera, answers.get(camera.id), task) for camera in cameras}
         finally:
             self._turns.release()
 
-    def _ask(self, cameras: Sequence[Camera], credentials: Mapping[str, str], folder: str) -> dict[str, SourceAnswer]:
-        task = SourceTask(
+    def _count_fetches(self, cameras: Sequence[Camera], answers: Mapping[str, SourceAnswer], task: SourceTask) -> None:
+        given = [answers.get(camera.id) for camera in cameras]
+        self._count(
+            [
+                SourceFetch(answer.seconds, got_frame=answer.why is None)
+                if answer
+                else SourceFetch(task.seconds, got_frame=False)
+                for answer in given
+            ]
+        )
+
+    def _task(
+        self, cameras: Sequence[Camera], credentials: Mapping[str, str], folder: str, within_s: float | None
+    ) -> SourceTask:
+        return SourceTask(
             sources={camera.id: (camera.source or "", credentials.get(camera.id)) for camera in cameras},
             allowed=self._settings.sources,
             folder=folder,
-            seconds=self._settings.source_timeout_s,
+            seconds=min(within_s or inf, self._settings.source_timeout_s),
             most_bytes=int(self._settings.max_frame_mb * 1e6),
             most_pixels=self._settings.max_frame_pixels,
         )
+
+    def _ask(self, task: SourceTask, credentials: Mapping[str, str]) -> dict[str, SourceAnswer]:
         try:
             done = subprocess.run(
                 self._settings.source_program,
                 input=task.model_dump_json().encode(),
-                env=lifeline.without_secrets() | self._settings.native_environment,
+                env=child_process.without_secrets() | self._settings.native_environment,
                 capture_output=True,
-                timeout=self._settings.source_timeout_s + STARTING_S,
+                timeout=longest_s(task) + STARTING_S,
             )
             output, errors = done.stdout, done.stderr
         except subprocess.TimeoutExpired as late:
             output, errors = late.stdout or b"", late.stderr or b""
         if errors:
             log.warning("fetching frames", stderr=_without(credentials, errors.decode(errors="replace"))[-2000:])
-        return {answer.camera: answer for line in output.splitlines() if (answer := _understood(line))}
+        return {
+            answer.camera: answer.model_copy(update={"why": answer.why and _without(credentials, answer.why)})
+            for line in output.splitlines()
+            if (answer := _understood(line))
+        }
 
-    def _checked(self, camera: Camera, answer: SourceAnswer | None, folder: Path) -> bytes:
+    def _checked(self, camera: Camera, answer: SourceAnswer | None, task: SourceTask) -> list[bytes]:
         if answer is None or answer.why is not None:
-            why = answer.why if answer else f"it gave no frame within {self._settings.source_timeout_s:g} s"
-            raise Problem(
+            why = answer.why if answer else f"it gave no frame within {task.seconds:g} s"
+            problem = SourceLate if answer is None or answer.seconds >= LATE * task.seconds else Problem
+            raise problem(
                 "source-failed",
                 f"No frame of camera {camera.id} from {camera.source}: {why}.",
                 camera=camera.id,
                 source=camera.source,
             )
-        data = (folder / camera.id).read_bytes()
-        images.check(camera, data, self._settings)
-        return data
+        files = [frame_file(task, camera.id, number).read_bytes() for number in range(task.frames)]
+        for data in files:
+            image_checks.check(camera, data, self._settings)
+        return files
+
+
+def frame_file(task: SourceTask, camera: str, number: int) -> Path:
+    """Where the program puts a frame of a camera."""
+    return Path(task.folder) / f"{camera}.{number}"
+
+
+def longest_s(task: SourceTask) -> float:
+    """After which the program gives up."""
+    return task.seconds + (task.frames - 1) * task.spacing_s
 
 
 def _without(credentials: Mapping[str, str], text: str) -> str:
     """What native code says may repeat an address whole."""
-    for userinfo in credentials.values():
-        text = text.replace(userinfo, HIDDEN)
+    for secrets in credentials.values():
+        text = SourceSecrets.decoded(secrets).redact(text)
     return text
 
 

@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
-import ipaddress
-from collections.abc import Collection, Mapping, Sequence
-from fnmatch import fnmatchcase
+from collections.abc import Mapping, Sequence
 from urllib.parse import urlsplit
 
-from service.wire.addresses import HIDDEN, IpAddress, ip_of
-from service.wire.problems import Problem
-from service.wire.venue import Camera, Venue
+from service.schemas import hosts
+from service.schemas.problems import Problem
+from service.schemas.source_urls import SourceSecrets, UnknownSecret
+from service.schemas.venue import Camera, Venue
 
 
-def credentials_of(
-    venue: Venue, sent: Mapping[str, str | None], before: Venue | None, known: Mapping[str, str]
+def secrets_of(
+    venue: Venue, sent: Mapping[str, SourceSecrets], before: Venue | None, known: Mapping[str, str]
 ) -> dict[str, str]:
-    """User and password by camera, of a venue that is put: those `sent`, or where it says so those that are `known`.
+    """What is secret in the sources of a venue that is put, by camera: what was `sent`, or where it says so is `known`.
 
     These go to the host that they were for, and to no other.
     """
     kept: dict[str, str] = {}
-    hosts = {} if before is None else {camera.id: _host(camera) for camera in before.cameras}
+    known_hosts = {} if before is None else {camera.id: _host(camera) for camera in before.cameras}
     for camera in venue.cameras:
-        given = sent.get(camera.id)
-        if given is None:
-            continue
-        if given != HIDDEN:
-            kept[camera.id] = given
-        elif camera.id in known and hosts.get(camera.id) == _host(camera):
-            kept[camera.id] = known[camera.id]
-        else:
+        there = known.get(camera.id, "") if known_hosts.get(camera.id) == _host(camera) else ""
+        try:
+            secrets = sent.get(camera.id, SourceSecrets()).fill_hidden(SourceSecrets.decoded(there))
+        except UnknownSecret as secret:
             raise Problem(
                 "source-refused",
-                f"The service has no user and password for camera {camera.id} at this host: send them in the URL.",
+                f"The service has no {secret} for camera {camera.id} at this host: send them in the URL.",
                 camera=camera.id,
-            )
+            ) from None
+        if encoded := secrets.encoded():
+            kept[camera.id] = encoded
     return kept
 
 
@@ -50,8 +47,7 @@ def check(venue: Venue, allowed: Sequence[str]) -> None:
                 "This service fetches no frames: name the hosts of its cameras in ESC_SOURCES, or upload frames.",
                 camera=camera.id,
             )
-        may_lead_there = ip_of(host) is None and _networks(allowed)
-        if not (_named(host, allowed) or _in_a_network([host], allowed) or may_lead_there):
+        if not hosts.may_be_permitted(host, allowed):
             raise Problem(
                 "source-refused",
                 f"The source of camera {camera.id} is on {host}, which ESC_SOURCES does not name.",
@@ -60,37 +56,6 @@ def check(venue: Venue, allowed: Sequence[str]) -> None:
             )
 
 
-def permitted(host: str, addresses: Collection[str], allowed: Sequence[str]) -> bool:
-    """Whether a host may be asked for a frame: by its name, or by every address that its name leads to."""
-    return _named(host, allowed) or _in_a_network(addresses, allowed)
-
-
 def _host(camera: Camera) -> tuple[str, str]:
     parts = urlsplit(camera.source or "")
     return parts.scheme, parts.netloc
-
-
-def _named(host: str, allowed: Sequence[str]) -> bool:
-    return ip_of(host) is None and any(fnmatchcase(host.lower(), pattern.lower()) for pattern in allowed)
-
-
-def _in_a_network(addresses: Collection[str], allowed: Sequence[str]) -> bool:
-    networks = _networks(allowed)
-    found = [_plain(address) for address in addresses]
-    return bool(found) and all(ip is not None and any(ip in network for network in networks) for ip in found)
-
-
-def _networks(allowed: Sequence[str]) -> list[ipaddress.IPv4Network | ipaddress.IPv6Network]:
-    networks = []
-    for pattern in allowed:
-        try:
-            networks.append(ipaddress.ip_network(pattern))
-        except ValueError:
-            continue
-    return networks
-
-
-def _plain(address: str) -> IpAddress | None:
-    """An IPv4 address in its IPv6 form is the IPv4 address."""
-    ip = ip_of(address)
-    return (ip.ipv4_mapped or ip) if isinstance(ip, ipaddress.IPv6Address) else ip

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from datetime import timedelta
 
+from service.schemas.job import Job
+from service.schemas.problems import Problem
 from service.settings import Settings
 from service.store.blobs import Blobs
-from service.store.expiry import Expiry
+from service.store.database import DATABASE_OUTAGES
+from service.store.expiry import ExpiryRepository
+from service.store.jobs.attempts import Enqueue
 from service.store.jobs.files import frame_folder
-from service.store.jobs.submission import Enqueue, Refusal, Submission, Submissions
-from service.wire.job import Job
-from service.wire.problems import Problem
+from service.store.jobs.submission import Refusal, Submission, SubmissionRepository
+from service.store.jobs.task import Origin
 
 # Longer than any upload takes from its first stored frame to its job.
 UPLOAD_GRACE = timedelta(hours=1)
@@ -21,7 +25,12 @@ class Intake:
     """Makes jobs of submissions."""
 
     def __init__(
-        self, settings: Settings, submissions: Submissions, expiry: Expiry, blobs: Blobs, enqueue: Enqueue
+        self,
+        settings: Settings,
+        submissions: SubmissionRepository,
+        expiry: ExpiryRepository,
+        blobs: Blobs,
+        enqueue: Enqueue,
     ) -> None:
         self._settings = settings
         self._submissions = submissions
@@ -35,23 +44,37 @@ class Intake:
         `store` puts them where the submission says. Raises a `Refusal`, and a `Problem` that `store` raises.
         """
         venue_id = None if submission.venue is None else submission.venue.id
+        known = self._submissions.same_as(
+            venue_id, submission.idempotency_key, submission.content_hash, submission.kind
+        )
+        if known is not None:
+            return known, False
+        # Storing costs more than asking. The transaction below asks again, for those that come at once.
+        self.require_place(submission.origin)
+        # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
+        self._expiry.register_upload(submission.job_id, UPLOAD_GRACE)
         try:
-            known = self._submissions.same_as(
-                venue_id, submission.idempotency_key, submission.content_hash, submission.kind
-            )
-            if known is not None:
-                return known, False
-            # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
-            self._expiry.expect_upload(submission.job_id, UPLOAD_GRACE)
             store()
             job, new = self._submissions.submit(submission, self._settings.queue_limit, self._enqueue)
         except (Refusal, Problem):
-            self._blobs.delete_under(frame_folder(submission.job_id))
+            self._take_back(submission.job_id)
             raise
         if not new:
-            self._blobs.delete_under(frame_folder(submission.job_id))
+            self._take_back(submission.job_id)
         # After any other error the frames stay: whether the transaction was committed is then not known.
         return job, new
+
+    def require_place(self, origin: Origin) -> None:
+        """Raise `QueueFull` if as many jobs wait as may, or all other places are kept for schedules."""
+        self._submissions.require_place(self._settings.queue_limit, is_schedule=origin.is_schedule)
+
+    def _take_back(self, job_id: str) -> None:
+        """Delete what was stored of a submission that became no job, and take it off the list of what is to be."""
+        folder = frame_folder(job_id)
+        self._blobs.delete_under(folder)
+        # While the database is away it stays on the list, and there is nothing left to delete.
+        with suppress(*DATABASE_OUTAGES):
+            self._expiry.forget_leftovers([folder])
 
 
 def frame_paths(job_id: str, counts: Mapping[str, int]) -> dict[str, list[str]]:

@@ -2,17 +2,22 @@
 
 from fastapi import APIRouter
 
-from service.pages import assets, calibrate, ignore, jobs, newvenue, signin, venues
+from service.pages import assets, calibrate, ignore, jobs, new_venue, problem_pages, signin, venue_settings, venues
 
+# Before the routes of the interface: for browsers alone, at addresses that the interface has as well.
+FOR_BROWSERS: APIRouter = problem_pages.router
 ROUTERS: tuple[APIRouter, ...] = (
     assets.router,
+    assets.at_the_root,
     signin.router,
     signin.out,
     venues.router,
     venues.data,
     calibrate.router,
     ignore.router,
-    newvenue.router,
-    newvenue.data,
+    venue_settings.router,
+    new_venue.router,
+    new_venue.data,
     jobs.router,
+    problem_pages.document_router,
 )

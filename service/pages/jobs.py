@@ -7,11 +7,15 @@ from typing import Annotated, get_args
 from fastapi import APIRouter, Query, Request, Response
 
 from service.api.context import InContext, JobIdPath
-from service.pages.shown import Page, page
-from service.pages.venues import holds
-from service.routes.contract.documented import needs
-from service.wire.names import ID_PATTERN, JOB_ID_PATTERN, FormatName, Kind, Status
-from service.wire.problems import Problem
+from service.pages.page_rendering import Page, render_page
+from service.pages.venues import poses_are_current, sizes_of
+from service.routes.contract.documented import needs_scope
+from service.routes.contract.restricted import OnlyVenues, lists_by_venue
+from service.schemas.job import Job
+from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, FormatName, JobKind, JobStatus
+from service.schemas.problems import Problem
+from service.store.jobs.queries import JobPage
+from service.store.repositories import Repositories
 
 PER_PAGE = 50
 # In their order; other kinds of jobs have others.
@@ -19,42 +23,60 @@ STAGES = ("segmentation", "evolution", "refinement", "preview")
 router = APIRouter(prefix="/ui/jobs", route_class=Page, include_in_schema=False)
 
 
-@router.get("", openapi_extra=needs("read"))
+@router.get("", openapi_extra=needs_scope("read"))
+@lists_by_venue
 def jobs(
     request: Request,
     context: InContext,
+    only: OnlyVenues,
     venue: Annotated[str, Query(pattern=rf"^$|{ID_PATTERN}")] = "",
-    status: Annotated[str, Query(pattern=f"^({'|'.join(get_args(Status))})?$")] = "",
-    kind: Annotated[str, Query(pattern=f"^({'|'.join(get_args(Kind))})?$")] = "",
+    status: Annotated[str, Query(pattern=f"^({'|'.join(get_args(JobStatus))})?$")] = "",
+    kind: Annotated[str, Query(pattern=f"^({'|'.join(get_args(JobKind))})?$")] = "",
     cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
 ) -> Response:
     """Jobs, newest first. A form sends the filters that were left open as empty strings."""
-    found = context.jobs.page(venue or None, status or None, cursor, PER_PAGE + 1, kind or None)
+    wanted = JobPage(
+        PER_PAGE + 1, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only
+    )
+    found = context.jobs.page(wanted)
     shown = found[:PER_PAGE]
-    return page(
+    return render_page(
         request,
         "jobs.html",
         jobs=shown,
         chosen={"venue": venue, "status": status, "kind": kind},
-        statuses=get_args(Status),
-        kinds=get_args(Kind),
+        statuses=get_args(JobStatus),
+        kinds=get_args(JobKind),
         cursor=shown[-1].id if len(found) > PER_PAGE else None,
     )
 
 
-@router.get("/{job_id}", openapi_extra=needs("read"))
+@router.get("/{job_id}", openapi_extra=needs_scope("read"))
 def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
     """One job, followed while it is open."""
     found = context.jobs.get(job_id)
     if found is None:
         kept = f"{context.settings.keep_jobs_days:g} days"
-        raise Problem("job-not-found", f"Jobs are deleted {kept} after their end.")
+        raise Problem("job-not-found", f"It was deleted: by somebody, or since it ended more than {kept} ago.")
     newest = context.venues.history(found.venue, None, 1) if found.venue and found.kind == "calibration" else []
-    return page(
+    return render_page(
         request,
         "job.html",
         job=found,
         stages=STAGES,
         formats=get_args(FormatName),
-        holds=bool(newest) and holds(found, newest[0]),
+        holds=bool(newest) and poses_are_current(found, newest[0]),
+        sizes=sizes_of(context.venues.get(found.venue) if found.venue else None),
+        decidable=context.decisions.decidable(job_id),
+        adoptable=context.adopted_fields.adoptable(job_id),
+        can_be_repeated=can_be_resubmitted(context, found),
     )
+
+
+def can_be_resubmitted(context: Repositories, job: Job) -> bool:
+    """Whether the frames of a job are kept and are still frames of its venue, which nothing else is computed for."""
+    before = context.submissions.of(job.id)
+    if before is None or before.venue is None:
+        return before is not None
+    now = context.venues.get(before.venue.id)
+    return now is not None and now.accepts_frames_of(before.venue) and not context.past_calibrations.active([now.id])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.wire.results import PairResult
+from service.schemas.results import PairResult
 
 WIDTH, HEIGHT, LEFT, BELOW, ABOVE = 480.0, 120.0, 34.0, 18.0, 8.0
 LEAST_TOP_CM = 5.0
@@ -12,7 +12,7 @@ LEAST_TOP_CM = 5.0
 
 
 @dataclass(frozen=True)
-class Dot:
+class SeamDot:
     """A place of the seam in the box: its error, what is one sigma around it, and what to say of it."""
 
     x: float
@@ -27,7 +27,7 @@ class Dot:
 class SeamCurve:
     """Dots in a box of `WIDTH` x `HEIGHT`; `top_cm` is the error at its top, `base` the height of none."""
 
-    dots: list[Dot]
+    dots: list[SeamDot]
     path: str
     top_cm: float
     base: float
@@ -46,12 +46,12 @@ def seam_curve(pair: PairResult) -> SeamCurve | None:
         return round(HEIGHT - BELOW - up * min(max(error_cm, 0.0) / top_cm, 1.0), 1)
 
     dots = [
-        Dot(
+        SeamDot(
             round(LEFT + 4 + (across - 8) * number / (len(places) - 1), 1),
             height(place.error_cm),
             height(place.error_cm - place.sigma_cm),
             height(place.error_cm + place.sigma_cm),
-            f"{place.error_cm:.1f} ± {place.sigma_cm:.1f} cm at ({place.at[0]:.0f}, {place.at[1]:.0f}) m",
+            f"{place.error_cm:.1f} ± {place.sigma_cm:.1f} cm at ({round(place.at[0])}, {round(place.at[1])}) m",
             place == pair.worst,
         )
         for number, place in enumerate(places)

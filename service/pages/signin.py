@@ -11,10 +11,10 @@ from starlette.responses import RedirectResponse
 
 from service.api.auth import COOKIE
 from service.api.context import InContext
-from service.pages.shown import HEADERS, SIGN_IN, Page, local, page
+from service.pages.page_rendering import HEADERS, SIGN_IN, Page, local_target, render_page
 from service.routes.contract.documented import FOR_ALL
 from service.routes.contract.guarded import Guarded
-from service.wire.problems import KINDS, Problem
+from service.schemas.problems import PROBLEM_TYPES, Problem
 
 LONGEST_FORM = 8192
 router = APIRouter(route_class=Page, include_in_schema=False)
@@ -26,9 +26,9 @@ async def sign_in_page(
     request: Request, context: InContext, wanted: Annotated[str, Query(alias="next", max_length=2048)] = "/"
 ) -> Response:
     """The form; where no key is asked for there is nothing to sign in to."""
-    if not await context.gate.asks_for_keys():
+    if not await context.authenticator.asks_for_keys():
         return RedirectResponse("/", HTTPStatus.SEE_OTHER)
-    return page(request, "sign_in.html", next=local(wanted), problem=None)
+    return render_page(request, "sign_in.html", next=local_target(wanted), problem=None)
 
 
 @router.post(SIGN_IN, openapi_extra=FOR_ALL)
@@ -36,12 +36,12 @@ async def sign_in(request: Request, context: InContext) -> Response:
     """Begin a session if the key is one of this service."""
     _require_own_page(request)
     given = await _form(request)
-    target = local(given.get("next", "/"))
+    target = local_target(given.get("next", "/"))
     try:
-        session = await context.gate.sign_in(request, given.get("key", ""))
+        session = await context.authenticator.sign_in(request, given.get("key", ""))
     except Problem as problem:
-        status = KINDS[problem.kind].status
-        return page(request, "sign_in.html", status, next=target, problem=problem)
+        status = PROBLEM_TYPES[problem.kind].status
+        return render_page(request, "sign_in.html", status, next=target, problem=problem)
     answer = RedirectResponse(target, HTTPStatus.SEE_OTHER, HEADERS)
     answer.set_cookie(
         COOKIE,
@@ -58,7 +58,7 @@ async def sign_in(request: Request, context: InContext) -> Response:
 async def sign_out(request: Request, context: InContext) -> Response:
     """End the session; without one there is nothing to end."""
     _require_own_page(request)
-    await context.gate.sign_out(request)
+    await context.authenticator.sign_out(request)
     answer = Response(status_code=HTTPStatus.NO_CONTENT)
     answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=_over_tls(request))
     return answer

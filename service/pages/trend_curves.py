@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from math import hypot
 
-from service.wire.trend import Chart, Trend, TrendPoint, TrendState
+from service.schemas.trend import Chart, Trend, TrendPoint, TrendState
 
 WIDTH, HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 520.0, 190.0, 46.0, 10.0, 10.0, 28.0
 LEAST_TOP_CM, LEAST_TOP_PERCENT = 2.0, 0.05
@@ -31,7 +31,7 @@ class Tick:
 
 
 @dataclass(frozen=True)
-class Dot:
+class TrendDot:
     """A night in the box, and what to say of it."""
 
     x: float
@@ -54,7 +54,7 @@ class TrendCurve:
     dates: list[Tick]
     band: str
     average: str
-    dots: list[Dot]
+    dots: list[TrendDot]
     width: float = WIDTH
     height: float = HEIGHT
     left: float = LEFT
@@ -146,12 +146,14 @@ def _band(values: Sequence[_Value], across: Callable[[datetime], float], up: Cal
 
 def _dots(
     values: Sequence[_Value], unit: str, across: Callable[[datetime], float], up: Callable[[float], float]
-) -> list[Dot]:
+) -> list[TrendDot]:
     many = len(values) > NIGHTS_WITH_DOTS
     shown = [value for value in values if not many or value.state != "quiet"]
     size = SMALL if many else 1.0
     return [
-        Dot(across(one.at), up(one.value), size * RADII[one.state], one.state, f"{_date(one.at)}: {_figure(one, unit)}")
+        TrendDot(
+            across(one.at), up(one.value), size * RADII[one.state], one.state, f"{_date(one.at)}: {_figure(one, unit)}"
+        )
         for one in shown
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any, get_args
@@ -10,20 +11,21 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.api import etags
 from service.api.context import InContext, VenueIdPath
-from service.pages.shown import Page, page
+from service.pages.page_rendering import Page, render_page
 from service.pages.sparkline import Sparkline, sparkline
-from service.routes.contract.documented import needs
+from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
-from service.routes.venues import ExistingVenue, tag_of
-from service.store.counts.glances import Glance
-from service.store.revisions import TAKEN
-from service.store.stores import Stores
-from service.wire.health import Alarm
-from service.wire.history import Revision
-from service.wire.job import Job
-from service.wire.names import ID_PATTERN, FormatName
-from service.wire.venue import Venue
-from service.wire.view import ViewChoice
+from service.routes.contract.restricted import OnlyVenues, lists_by_venue
+from service.routes.venues import ExistingVenue, venue_etag
+from service.schemas.health import Alarm, VenueHealth
+from service.schemas.history import Revision
+from service.schemas.job import Job
+from service.schemas.names import ID_PATTERN, FormatName
+from service.schemas.venue import Venue
+from service.schemas.view import ViewChoice
+from service.store.repositories import Repositories
+from service.store.revisions import CALIBRATION_CAUSES
+from service.store.statistics.venue_summary import CalibrationSummary
 
 PER_PAGE = 50
 # What a chart shows, and a table beside it.
@@ -35,11 +37,11 @@ data = APIRouter(route_class=Guarded, include_in_schema=False)
 
 
 @dataclass(frozen=True)
-class Row:
+class VenueRow:
     """A venue in the list: its last calibration that ended, the one that is going on, and what rings."""
 
     venue: Venue
-    glance: Glance | None
+    glance: CalibrationSummary | None
     active: Job | None
     alarms: list[Alarm]
 
@@ -49,34 +51,40 @@ class Row:
         return sparkline(self.glance.errors, self.glance.limit_px) if self.glance else None
 
 
-@router.get("/", openapi_extra=needs("read"))
+@router.get("/", openapi_extra=needs_scope("read"))
+@lists_by_venue
 def venues(
-    request: Request, context: InContext, after: Annotated[str | None, Query(pattern=ID_PATTERN)] = None
+    request: Request,
+    context: InContext,
+    only: OnlyVenues,
+    after: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
 ) -> Response:
     """Every venue, with its last result."""
-    found = context.venues.page(after, PER_PAGE + 1)
+    found = context.venues.page(after, PER_PAGE + 1, only)
     shown, more = found[:PER_PAGE], len(found) > PER_PAGE
-    return page(
-        request, "venues.html", rows=rows_of(context, shown), after=shown[-1].id if more else None, first=not after
+    return render_page(
+        request, "venues.html", rows=venue_rows(context, shown), after=shown[-1].id if more else None, first=not after
     )
 
 
-def rows_of(context: Stores, venues: list[Venue]) -> list[Row]:
+def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
     """A few queries for all of them, however many jobs there are."""
     ids = [venue.id for venue in venues]
-    glances, alarms = context.glances.of(ids), context.glances.alarms(ids)
+    glances, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
     active = context.past_calibrations.active(ids)
     jobs = context.jobs.several(active.values())
     return [
-        Row(venue, glances.get(venue.id), jobs.get(active.get(venue.id, "")), alarms.get(venue.id, []))
+        VenueRow(venue, glances.get(venue.id), jobs.get(active.get(venue.id, "")), alarms.get(venue.id, []))
         for venue in venues
     ]
 
 
-@router.get("/ui/venues/{venue_id}", openapi_extra=needs("read"))
+@router.get("/ui/venues/{venue_id}", openapi_extra=needs_scope("read"))
 def venue(stored: ExistingVenue, request: Request, context: InContext) -> Response:
     """One venue: its last result in pictures and numbers, and how it came to it."""
     venue_id = stored.id
+    # First: what happens from here on may be shown already, and is told of once more.
+    seen = context.events.newest([venue_id]).get(venue_id, 0)
     ends = context.past_calibrations.of(venue_id, IN_TABLE)
     newest = context.past_calibrations.newest_result(venue_id)
     job = context.jobs.get(newest) if newest else None
@@ -84,7 +92,7 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
     health = context.venues.health(venue_id)
     active = context.past_calibrations.active([venue_id]).get(venue_id)
     a_year_ago = datetime.now(UTC) - IN_TRENDS
-    return page(
+    return render_page(
         request,
         "venue.html",
         venue=stored,
@@ -92,17 +100,31 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         job=job,
         revisions=revisions,
         health=health,
-        holds=job is not None and holds(job, revisions[0]),
+        holds=job is not None and poses_are_current(job, revisions[0]),
+        sizes=sizes_of(stored),
+        decidable=context.decisions.decidable(job.id) if job else None,
+        adoptable=context.adopted_fields.adoptable(job.id) if job else {},
+        restorable=context.venues.restorable(stored, [one.revision for one in revisions]),
+        kept_jobs=kept_jobs(context, revisions, health),
         trends=[context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],
         active=context.jobs.get(active) if active else None,
         formats=get_args(FormatName),
         usual_view=ViewChoice(),
         previewed=context.past_calibrations.last_taken(venue_id) is not None,
-        tag=etags.quoted(tag_of(stored)),
+        tag=etags.quoted(venue_etag(stored)),
+        seen=seen,
     )
 
 
-@data.get("/ui/venues/{venue_id}/history.json", openapi_extra=needs("read"))
+def kept_jobs(context: Repositories, revisions: list[Revision], health: VenueHealth | None) -> Collection[str]:
+    """Of the jobs that a page names beside the last calibrations, those that were not deleted."""
+    jobs = {one.job for one in revisions if one.job}
+    if health and health.schedule and health.schedule.last_job:
+        jobs.add(health.schedule.last_job)
+    return context.jobs.states(jobs).keys()
+
+
+@data.get("/ui/venues/{venue_id}/history.json", openapi_extra=needs_scope("read"))
 def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
     """What the chart draws, oldest first: times in seconds, a value or null for each."""
     ends = [end for end in reversed(context.past_calibrations.of(venue_id, IN_CHART)) if end.accepted is not None]
@@ -120,6 +142,11 @@ def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
     }
 
 
-def holds(job: Job, newest: Revision) -> bool:
+def sizes_of(venue: Venue | None) -> dict[str, list[int]]:
+    """The width and height of each camera's frames."""
+    return {camera.id: camera.image_size for camera in venue.cameras} if venue else {}
+
+
+def poses_are_current(job: Job, newest: Revision) -> bool:
     """Whether the poses that a job found are those that its venue has."""
-    return newest.job == job.id and newest.cause in TAKEN
+    return newest.job == job.id and newest.cause in CALIBRATION_CAUSES

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fastapi import APIRouter
-from starlette.responses import FileResponse
+from fastapi import APIRouter, Response
+from starlette.responses import FileResponse, HTMLResponse
 
+from service.api.context import InContext
 from service.routes.contract.documented import FOR_ALL
 from service.routes.contract.guarded import Guarded
 
@@ -21,9 +22,12 @@ POLICY = (
 
 
 @router.get("", openapi_extra=FOR_ALL)
-async def page() -> FileResponse:
-    """The page."""
-    return FileResponse(FILES / "index.html", headers={"Content-Security-Policy": POLICY})
+async def page(context: InContext) -> Response:
+    """The page; where no key is asked for, it does not speak of any."""
+    text = (FILES / "index.html").read_text(encoding="utf-8")
+    if not await context.authenticator.asks_for_keys():
+        text = text.replace('allow-authentication="true"', 'allow-authentication="false"')
+    return HTMLResponse(text, headers={"Content-Security-Policy": POLICY})
 
 
 @router.get("/rapidoc-min.js", openapi_extra=FOR_ALL)

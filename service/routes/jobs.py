@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterable, Callable
+from collections.abc import AsyncIterable, AsyncIterator, Callable
 from datetime import timedelta
 from http import HTTPStatus
 from typing import Annotated
 
 import structlog
-from fastapi import APIRouter, Depends, Header, HTTPException, Query, Response
+from fastapi import APIRouter, Depends, Header, HTTPException, Query, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from service.api.context import Context, InContext, JobIdPath
-from service.routes.contract.documented import needs, problems
-from service.routes.contract.exported import DOCUMENTS, Wanted, exported, refined_venue
+from service.api.context import ByActor, Context, InContext, JobIdPath
+from service.routes.contract.documented import needs_scope, problem_responses
+from service.routes.contract.exported import DOCUMENTS, ExportQuery, export_response, with_refined_poses
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
-from service.routes.venues import RETRY_AFTER_S, revision_unfit
-from service.store.blobs import AWAY as BLOBS_AWAY
-from service.store.engine import AWAY
-from service.store.jobs.decisions import MovedOn, NoPoses
+from service.routes.contract.missing import no_such_job
+from service.routes.contract.paged import NEXT_PAGE, next_page
+from service.routes.contract.restricted import OnlyVenues, lists_by_venue
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
+from service.routes.venues import RETRY_AFTER_S, revision_unfit, venue_moved_on
+from service.schemas.job import Job, Jobs
+from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, OPEN_STATUSES, FormatName, JobKind, JobStatus, ListFields
+from service.schemas.problems import Problem
+from service.schemas.results import Result
+from service.store.blobs import BLOB_OUTAGES
+from service.store.database import DATABASE_OUTAGES
+from service.store.jobs.decisions import NoPoses, VenueHasChanged
 from service.store.jobs.files import frame_folder, pictures_folder
-from service.store.jobs.reading import State
+from service.store.jobs.queries import JobPage, JobState
 from service.store.revisions import RevisionUnfit
-from service.wire.job import Job, Jobs
-from service.wire.names import ID_PATTERN, JOB_ID_PATTERN, OPEN, FormatName, Kind, Status
-from service.wire.problems import Problem
-from service.wire.results import Result
 
 log = structlog.get_logger()
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
@@ -39,10 +42,10 @@ STRAGGLING = timedelta(minutes=10)
 EVENT_AT_LEAST_EVERY_S = 10
 
 
-def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
+def job_response(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
     """The one form a job leaves in: body, ETag, Location of a new one, Retry-After while it is open."""
     body = job.model_dump_json().encode()
-    answer = unless_known(body, if_none_match, lambda: Response(body, status, media_type="application/json"))
+    answer = tagged_response(body, if_none_match, lambda: Response(body, status, media_type="application/json"))
     if job.open:
         answer.headers["Retry-After"] = str(RETRY_AFTER_S)
     if answer.status_code == HTTPStatus.ACCEPTED:
@@ -50,65 +53,82 @@ def job_answer(job: Job, *, status: int = 200, if_none_match: str | None = None)
     return answer
 
 
-async def at_its_end(context: Context, job: Job, wait_s: float) -> Job:
+async def wait_for_end(context: Context, job: Job, wait_s: float) -> Job:
     """The job when it has ended, or as it is after the time that somebody waits."""
     if not wait_s or not job.open:
         return job
-    await context.watch.until(job.id, lambda state: state.status not in OPEN, min(wait_s, LONGEST_WAIT_S))
+    await context.job_watch.until(job.id, lambda state: state.status not in OPEN_STATUSES, min(wait_s, LONGEST_WAIT_S))
     return await _read_again(context, job)
 
 
-async def _existing(job_id: JobIdPath, context: InContext) -> Job:
+async def _existing_job(job_id: JobIdPath, context: InContext) -> Job:
     job = await context.reads.get(job_id)
     if job is None:
-        kept = f"{context.settings.keep_jobs_days:g} days"
-        raise Problem("job-not-found", f"GET /jobs lists those there are; they are deleted {kept} after their end.")
+        raise no_such_job(context.settings)
     return job
 
 
-Existing = Annotated[Job, Depends(_existing)]
+ExistingJob = Annotated[Job, Depends(_existing_job)]
 
 
-@router.get("", openapi_extra=needs("read"))
+@router.get("", openapi_extra=needs_scope("read"), responses={200: {"headers": NEXT_PAGE}})
+@lists_by_venue
 def list_jobs(
     context: InContext,
+    only: OnlyVenues,
+    request: Request,
+    response: Response,
     venue: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
-    status: Status | None = None,
-    kind: Kind | None = None,
+    status: JobStatus | None = None,
+    kind: JobKind | None = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
     cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
+    fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Jobs:
-    """Jobs, newest first, in pages."""
-    page = context.jobs.page(venue, status, cursor, limit + 1, kind)
-    more = len(page) > limit
-    return Jobs(jobs=page[:limit], next_cursor=page[limit - 1].id if more else None)
+    """List jobs, newest first, in pages; with a key for some venues, theirs."""
+    wanted = JobPage(limit + 1, before=cursor, venue=venue, status=status, kind=kind, only=only)
+    summaries = context.jobs.summaries(wanted) if fields == "summary" else None
+    jobs = context.jobs.page(wanted) if summaries is None else []
+    listed = summaries or jobs
+    shown = Jobs(
+        jobs=jobs[:limit],
+        summaries=None if summaries is None else summaries[:limit],
+        next_cursor=listed[limit - 1].id if len(listed) > limit else None,
+    )
+    response.headers.update(next_page(request, shown.next_cursor))
+    return shown
 
 
 @router.get(
     "/{job_id}",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_model=Job,
-    responses=TAGGED | problems(404),
+    responses=TAGGED | problem_responses(404),
 )
 async def get_job(
-    job: Existing,
+    job: ExistingJob,
     context: InContext,
     wait: Annotated[float, Query(ge=0, allow_inf_nan=False, description="Seconds, at most 60 are waited.")] = 0,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
-    """A job in whatever state. With `wait` the answer is held until the job ends."""
-    return job_answer(await at_its_end(context, job, wait), if_none_match=if_none_match)
+    """Return a job in whatever state. With `wait` the answer is held until the job ends."""
+    if wait and job.open:
+        with context.waiters.taken():
+            job = await wait_for_end(context, job, wait)
+    return job_response(job, if_none_match=if_none_match)
 
 
-@router.post("/{job_id}/cancel", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404))
-def cancel_job(job: Existing, context: InContext) -> Response:
+@router.post(
+    "/{job_id}/cancel", openapi_extra=needs_scope("calibrate"), response_model=Job, responses=problem_responses(404)
+)
+def cancel_job(job: ExistingJob, context: InContext, by: ByActor) -> Response:
     """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
-    context.decisions.cancel(job.id)
-    return job_answer(context.jobs.get(job.id) or job)
+    context.decisions.cancel(job.id, by)
+    return job_response(context.jobs.get(job.id) or job)
 
 
-@router.delete("/{job_id}", openapi_extra=needs("admin"), status_code=204, responses=problems(404, 409))
-def delete_job(job: Existing, context: InContext) -> None:
+@router.delete("/{job_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses(404, 409))
+def delete_job(job: ExistingJob, context: InContext) -> None:
     """Forget a job that has ended, with its frames and its pictures. Poses that it brought to its venue stay."""
     if job.open:
         raise Problem("job-open", f"Cancel it first: POST /jobs/{job.id}/cancel.", job=job.id)
@@ -119,14 +139,20 @@ def delete_job(job: Existing, context: InContext) -> None:
     for folder in (frame_folder(job.id), pictures_folder(job.id)):
         try:
             context.blobs.delete_under(folder)
-        except BLOBS_AWAY:
+        except BLOB_OUTAGES:
             log.warning("cannot delete yet", folder=folder, exc_info=True)
 
 
-@router.post("/{job_id}/accept", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))
+@router.post(
+    "/{job_id}/accept",
+    openapi_extra=needs_scope("calibrate"),
+    response_model=Job,
+    responses=problem_responses(404, 409),
+)
 def accept_job(
-    job: Existing,
+    job: ExistingJob,
     context: InContext,
+    by: ByActor,
     camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None,
 ) -> Response:
     """Let the poses of a calibration hold that the gate rejected, or that was a dry run. Nothing changes if they do.
@@ -137,43 +163,41 @@ def accept_job(
     if camera is not None and ids and camera not in ids:
         raise Problem("poses-not-found", f"It found those of {', '.join(ids)}.", camera=camera, expected=ids)
     cameras = None if camera is None else [camera]
-    return _decided(context, job, lambda job_id: context.decisions.accept(job_id, cameras))
+    return _decide(context, job, lambda job_id: context.decisions.accept(job_id, cameras, by))
 
 
-@router.post("/{job_id}/reject", openapi_extra=needs("calibrate"), response_model=Job, responses=problems(404, 409))
-def reject_job(job: Existing, context: InContext) -> Response:
+@router.post(
+    "/{job_id}/reject",
+    openapi_extra=needs_scope("calibrate"),
+    response_model=Job,
+    responses=problem_responses(404, 409),
+)
+def reject_job(job: ExistingJob, context: InContext, by: ByActor) -> Response:
     """Put back what was before the poses of a calibration. Nothing changes if they never held or were put back.
 
     Only while they are the last that came; to go back further, `POST /venues/{id}/restore`.
     """
-    return _decided(context, job, context.decisions.reject)
+    return _decide(context, job, lambda job_id: context.decisions.reject(job_id, by))
 
 
-def _decided(context: Context, job: Job, decide: Callable[[str], None]) -> Response:
+def _decide(context: Context, job: Job, decide: Callable[[str], None]) -> Response:
     try:
         decide(job.id)
     except NoPoses:
         raise _no_poses(job) from None
-    except MovedOn as moved:
-        newest = moved.newest
-        is_now = f"at revision {newest.revision} ({newest.cause})" if newest else "deleted"
-        raise Problem(
-            "venue-moved-on",
-            f"Venue {job.venue} is {is_now}, or has another pitch; see GET /venues/{job.venue}/history and decide.",
-            job=job.id,
-            got=newest and newest.revision,
-        ) from None
+    except VenueHasChanged as moved:
+        raise venue_moved_on(job.venue, job.id, moved) from None
     except RevisionUnfit as unfit:
         raise revision_unfit(unfit) from None
-    return job_answer(context.jobs.get(job.id) or job)
+    return job_response(context.jobs.get(job.id) or job)
 
 
 def _no_poses(job: Job) -> Problem:
     return Problem("poses-not-found", "It has not found any yet." if job.open else "It found none.", job=job.id)
 
 
-async def _not_seen_to_its_end(
-    job: Existing,
+async def _require_unseen_events(
+    job: ExistingJob,
     context: InContext,
     last_event_id: Annotated[str | None, Header(description="The id of the last event that arrived.")] = None,
 ) -> None:
@@ -185,20 +209,25 @@ async def _not_seen_to_its_end(
         raise HTTPException(HTTPStatus.NO_CONTENT)
 
 
+async def _waiter_place(context: InContext) -> AsyncIterator[None]:
+    with context.waiters.taken():
+        yield
+
+
 @router.get(
     "/{job_id}/events",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_class=EventSourceResponse,
-    dependencies=[Depends(_not_seen_to_its_end)],
-    responses={204: {"description": "The event of `Last-Event-ID` was the end"}, **problems(404)},
+    dependencies=[Depends(_require_unseen_events), Depends(_waiter_place)],
+    responses={204: {"description": "The event of `Last-Event-ID` was the end"}, **problem_responses(404)},
 )
-async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerSentEvent]:
-    """The job as server-sent events: `progress` whenever it changes and every 10 s, `end` when it has ended."""
-    while not context.watch.closed:
+async def job_events(job: ExistingJob, context: InContext) -> AsyncIterable[ServerSentEvent]:
+    """Stream the job as server-sent events: `progress` whenever it changes and every 10 s, `end` when it has ended."""
+    while not context.job_watch.closed:
         try:
             state = await _state(context, job)
             job = await _read_again(context, job)
-        except AWAY:
+        except DATABASE_OUTAGES:
             # The client connects again, as after any stream that broke off.
             log.warning("cannot tell of a job", exc_info=True)
             return
@@ -206,36 +235,36 @@ async def job_events(job: Existing, context: InContext) -> AsyncIterable[ServerS
         yield ServerSentEvent(data=job, event="progress" if job.open else "end", id=number)
         if not job.open:
             return
-        await context.watch.until(job.id, _later_than(state), EVENT_AT_LEAST_EVERY_S)
+        await context.job_watch.until(job.id, _is_newer_than(state), EVENT_AT_LEAST_EVERY_S)
 
 
 @router.get(
     "/{job_id}/poses",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses=DOCUMENTS | problems(404),
+    responses=DOCUMENTS | problem_responses(404),
 )
 def job_poses(
-    job: Existing,
+    job: ExistingJob,
     context: InContext,
-    wanted: Annotated[Wanted, Depends()],
+    wanted: Annotated[ExportQuery, Depends()],
     form: Annotated[FormatName, Query(alias="format")] = "json",
 ) -> Response:
-    """The poses that a job found, accepted or not, in the format of another tool."""
+    """Export the poses that a job found, accepted or not, to another tool's format."""
     venue = context.jobs.posed(job.id)
     if venue is None:
         raise _no_poses(job)
     if wanted.lens == "refined":
         why_none = "its lines do not determine a lens, or the job is one of an earlier release."
-        venue = refined_venue(venue, context.refined.of_job(job.id), wanted.camera, why_none)
-    return exported(context, venue, f"{venue.id}-{job.id}", form, wanted)
+        venue = with_refined_poses(venue, context.refined.of_job(job.id), wanted.camera, why_none)
+    return export_response(context, venue, f"{venue.id}-{job.id}", form, wanted)
 
 
-def _later_than(seen: State | None) -> Callable[[State], bool]:
+def _is_newer_than(seen: JobState | None) -> Callable[[JobState], bool]:
     return lambda state: seen is None or state.revision > seen.revision
 
 
-async def _state(context: Context, job: Job) -> State | None:
+async def _state(context: Context, job: Job) -> JobState | None:
     return (await run_in_threadpool(context.jobs.states, [job.id])).get(job.id)
 
 

@@ -8,15 +8,15 @@ from fastapi import APIRouter, Path, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context, InContext
-from service.intake.images import PNG_START
-from service.routes.contract.documented import BINARY, needs, problems
+from service.intake.image_checks import PNG_START
+from service.routes.contract.documented import BINARY, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.jobs import Existing
+from service.routes.jobs import ExistingJob
+from service.schemas.job import Job
+from service.schemas.names import ID_PATTERN
+from service.schemas.problems import Problem
 from service.store.jobs.files import picture_file
-from service.store.jobs.reading import Pictures
-from service.wire.job import Job
-from service.wire.names import ID_PATTERN
-from service.wire.problems import Problem
+from service.store.jobs.queries import Pictures
 
 router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Guarded)
 
@@ -25,24 +25,28 @@ PNG, JPEG = "image/png", "image/jpeg"
 # Name of the route, address below that of the job, what it shows. What is left of a suffix in the address, with an
 # underscore for each slash, is the picture's name.
 PICTURES = (
-    ("preview", "preview.jpg", "One wide view stitched from all cameras."),
-    ("preview_before", "preview/before.jpg", "The same view by the stored poses."),
-    ("seam", "seam.png", "Over the stitched view: where one camera hands over to another."),
-    ("birdseye", "birdseye.jpg", "The pitch from above, 10 px/m, more of small ones."),
-    ("overlay", "overlay/{camera}.jpg", "A camera's frame with the field drawn on it, before and after."),
-    ("frame", "frame/{camera}.jpg", "A camera's frame, at most 1920 pixels wide, which the three layers are for."),
-    ("stored_layer", "stored/{camera}.png", "Over a camera's frame: the field by the pose that was stored."),
-    ("new_layer", "new/{camera}.png", "Over a camera's frame: the field by the pose that was found."),
-    ("mask_layer", "mask/{camera}.png", "Over a camera's frame: where the network saw markings."),
+    ("preview", "preview.jpg", "Draw one wide view stitched from all cameras by the poses that were found."),
+    ("preview_before", "preview/before.jpg", "Draw the stitched view by the poses that were stored."),
+    ("seam", "seam.png", "Draw where in the stitched view one camera hands over to another, to lay over it."),
+    ("birdseye", "birdseye.jpg", "Draw the pitch from above, 10 px/m, more of small ones."),
+    ("overlay", "overlay/{camera}.jpg", "Draw the field on a camera's frame, before and after."),
+    (
+        "frame",
+        "frame/{camera}.jpg",
+        "Return a camera's frame, at most 1920 pixels wide, which the three layers are for.",
+    ),
+    ("stored_layer", "stored/{camera}.png", "Draw the field by the pose that was stored, to lay over a frame."),
+    ("new_layer", "new/{camera}.png", "Draw the field by the pose that was found, to lay over a frame."),
+    ("mask_layer", "mask/{camera}.png", "Draw where the network saw markings, to lay over a frame."),
     (
         "coverage",
         "coverage.jpg",
-        "Of the intrinsics of a lens: where in the picture the board was seen, and residuals enlarged.",
+        "Draw where in the picture of a lens the board was seen, and residuals enlarged.",
     ),
     (
         "points",
         "points.jpg",
-        "Of a first pose: the clicked points and the pitch as the pose has it, in the frame if one was sent.",
+        "Draw the clicked points of a first pose and the pitch as the pose has it, in the frame if one was sent.",
     ),
 )
 
@@ -50,10 +54,10 @@ PICTURES = (
 def _show(route: str, address: str, shows: str) -> None:
     name, _, suffix = address.replace("/", "_").partition(".")
 
-    async def of_job(job: Existing, context: InContext) -> Response:
+    async def of_job(job: ExistingJob, context: InContext) -> Response:
         return await _picture(context, job, name)
 
-    async def of_camera(job: Existing, camera: CameraPath, context: InContext) -> Response:
+    async def of_camera(job: ExistingJob, camera: CameraPath, context: InContext) -> Response:
         return await _picture(context, job, name.format(camera=camera))
 
     content = {PNG if suffix == "png" else JPEG: BINARY}
@@ -62,9 +66,9 @@ def _show(route: str, address: str, shows: str) -> None:
         of_camera if "{camera}" in address else of_job,
         name=route,
         description=shows,
-        openapi_extra=needs("read"),
+        openapi_extra=needs_scope("read"),
         response_class=Response,
-        responses={200: {"content": content}, **problems(404, 410)},
+        responses={200: {"content": content}, **problem_responses(404, 410)},
     )
 
 
@@ -92,12 +96,12 @@ for each in PICTURES:
 
 @router.get(
     "/{job_id}/frames/{number}",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses={200: {"content": {JPEG: BINARY, PNG: BINARY}}, **problems(404, 410)},
+    responses={200: {"content": {JPEG: BINARY, PNG: BINARY}}, **problem_responses(404, 410)},
 )
-def job_frame(job: Existing, number: Annotated[int, Path(ge=0, le=10_000)], context: InContext) -> Response:
-    """A frame or photo of a job as it came; `frames` of the job has the addresses of all."""
+def job_frame(job: ExistingJob, number: Annotated[int, Path(ge=0, le=10_000)], context: InContext) -> Response:
+    """Return a frame or photo of a job as it came; `frames` of the job has the addresses of all."""
     path = context.jobs.frame(job.id, number)
     data = None if path is None else context.blobs.get(path)
     if data is None and job.frames:

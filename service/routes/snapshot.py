@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
+from starlette.concurrency import run_in_threadpool
 
 from service.api.context import InContext, VenueIdPath
-from service.intake.images import PNG_START
-from service.routes.contract.documented import BINARY, needs, problems
+from service.intake.image_checks import PNG_START
+from service.routes.contract.documented import BINARY, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.venues import camera_of, no_such_venue
-from service.wire.names import ID_PATTERN
+from service.routes.contract.missing import no_such_venue
+from service.routes.venues import camera_of
+from service.schemas.names import ID_PATTERN
 
 router = APIRouter(tags=["venues"], route_class=Guarded)
 PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINARY, "image/png": BINARY}}}
@@ -19,16 +21,18 @@ PICTURE: dict[int | str, dict[str, Any]] = {200: {"content": {"image/jpeg": BINA
 
 @router.get(
     "/venues/{venue_id}/cameras/{camera}/snapshot",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses={**PICTURE, **problems(404, 413, 422, 502)},
+    responses={**PICTURE, **problem_responses(404, 413, 422, 502)},
 )
-def snapshot(venue_id: VenueIdPath, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext) -> Response:
-    """A frame of a camera from its source, as it came."""
-    found = context.venues.with_credentials(venue_id)
+async def snapshot(
+    venue_id: VenueIdPath, camera: Annotated[str, Path(pattern=ID_PATTERN)], context: InContext
+) -> Response:
+    """Fetch a frame of a camera from its source, as it comes. Those who ask within two seconds get the same."""
+    found = await run_in_threadpool(context.venues.with_credentials, venue_id)
     if found is None:
         raise no_such_venue(venue_id)
     venue, credentials = found
-    data = context.snapshots.take([camera_of(venue, camera)], credentials)[camera]
+    data = await context.camera_views.frame(venue.id, camera_of(venue, camera), credentials)
     media_type = "image/png" if data.startswith(PNG_START) else "image/jpeg"
     return Response(data, media_type=media_type, headers={"Cache-Control": "no-store"})

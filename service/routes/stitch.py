@@ -6,21 +6,21 @@ import json
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.api import etags
 from service.api.context import Context, InContext
-from service.routes.contract.documented import BINARY, headers, needs, problems
+from service.routes.contract.documented import BINARY, header_docs, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
 from service.routes.venues import ExistingVenue
+from service.schemas.names import Projection, StitchFormat
+from service.schemas.problems import Problem
+from service.schemas.programs.stitching import StitchRequest
+from service.schemas.venue import Venue
+from service.schemas.view import FieldOfView, Height, Horizon, Pan, ViewChoice, Width
 from service.store.jobs.files import source_file
-from service.wire.names import Projection, StitchFormat
-from service.wire.problems import Problem
-from service.wire.programs.stitching import Stitching
-from service.wire.venue import Venue
-from service.wire.view import FieldOfView, Height, Horizon, Pan, ViewChoice, Width
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # Of the files of a package: whoever has one of another edition fetches it anew.
@@ -31,7 +31,7 @@ OR_AUTO = "`auto`: as it suits the cameras, whatever the venue's view says."
 
 
 @dataclass(frozen=True)
-class View:
+class ViewQuery:
     """What a request wants otherwise than the venue's view has it; `auto` in place of a number: as it suits."""
 
     projection: Annotated[Projection | None, Query(description="Absent, like all parts: as the venue's view.")] = None
@@ -50,69 +50,73 @@ class View:
 
 @router.get(
     "/{venue_id}/stitch",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_class=Response,
     responses={
-        200: {"content": {ZIP: BINARY}, **headers("ETag")},
+        200: {"content": {ZIP: BINARY}, **header_docs("ETag")},
         304: TAGGED[304],
-        **problems(404, 422, 503),
+        **problem_responses(404, 422, 503),
     },
 )
-def stitch_package(
+async def stitch_package(
     venue: ExistingVenue,
     context: InContext,
-    view: Annotated[View, Depends()],
+    request: Request,
+    view: Annotated[ViewQuery, Depends()],
     form: Annotated[StitchFormat, Query(alias="format", description="What the maps are made for.")] = "ffmpeg",
     if_none_match: IfNoneMatch = None,
 ) -> Response:
-    """The stitched view for other tools: a zip with maps, weights and lights of each camera and what uses them.
+    """Export the stitched view for other tools: a zip with maps, weights and lights of each camera and what uses them.
 
     It holds until a pose, a lens, a light or the view changes: the `ETag` is made of those, and `If-None-Match` is
     answered before anything is computed. `poses.changed` of `/events` says when to ask.
     """
-    asked = context.stitches.asked(venue, _revision(context, venue), view=view.of(venue), wanted=form, tag="")
-
-    def package() -> Response:
-        tag = etags.quoted(etags.of(_made_of(asked)))
-        content = context.stitches.package(asked.model_copy(update={"tag": tag}))
-        head = {"Content-Disposition": f'attachment; filename="{venue.id}-stitch-{form}.zip"'}
-        return Response(content, headers=head, media_type=ZIP)
-
-    return unless_known(_made_of(asked), if_none_match, package)
+    revision = await run_in_threadpool(_revision, context, venue)
+    asked = context.stitches.asked(venue, revision, view=view.of(venue), wanted=form, tag="")
+    made_of = _made_of(asked)
+    tag = etags.of(made_of)
+    if if_none_match is not None and etags.matches_weakly(if_none_match, tag):
+        return tagged_response(made_of, if_none_match, Response)
+    key = request.state.key
+    content = await context.stitches.package(
+        asked.model_copy(update={"tag": etags.quoted(tag)}), "" if key is None else key.name
+    )
+    head = {"Content-Disposition": f'attachment; filename="{venue.id}-stitch-{form}.zip"'}
+    return tagged_response(made_of, None, lambda: Response(content, headers=head, media_type=ZIP))
 
 
 @router.get(
     "/{venue_id}/stitch/preview",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_class=Response,
     responses={
-        200: {"content": {JPEG: BINARY}, **headers("ETag")},
+        200: {"content": {JPEG: BINARY}, **header_docs("ETag")},
         304: TAGGED[304],
-        **problems(404, 422, 503),
+        **problem_responses(404, 422, 503),
     },
 )
 async def stitch_preview(
     venue: ExistingVenue,
     context: InContext,
-    view: Annotated[View, Depends()],
+    view: Annotated[ViewQuery, Depends()],
     seam: Annotated[bool, Query(description="Draw where one camera hands over to another.")] = False,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
-    """The stitched view of the frames of the last calibration whose poses were taken, at most 1280 pixels wide."""
+    """Draw the stitched view of the frames of the last calibration whose poses were taken, at most 1280 pixels wide."""
     revision = await run_in_threadpool(_revision, context, venue)
     choice = {"view": view.of(venue), "wanted": "picture", "seam": seam}
     asked = context.stitches.asked(venue, revision, tag="", **choice)
     job = await run_in_threadpool(context.past_calibrations.last_taken, venue.id)
     made_of = _made_of(asked) + (job or "").encode()
     tag = etags.of(made_of)
-    if if_none_match is not None and etags.names(if_none_match, tag):
-        return unless_known(made_of, if_none_match, Response)
+    if if_none_match is not None and etags.matches_weakly(if_none_match, tag):
+        return tagged_response(made_of, if_none_match, Response)
     frames = await run_in_threadpool(_frames, context, venue, job)
     picture = await context.stitches.preview(asked, frames)
-    return unless_known(made_of, None, lambda: Response(picture, media_type=JPEG))
+    return tagged_response(made_of, None, lambda: Response(picture, media_type=JPEG))
 
 
-def _made_of(asked: Stitching) -> bytes:
+def _made_of(asked: StitchRequest) -> bytes:
     """All that a package or picture follows from, but for the machine and its frames."""
     parts: dict[str, Any] = asked.model_dump(mode="json", exclude={"threads", "tag", "sizes"})
     return json.dumps([EDITION, parts]).encode()

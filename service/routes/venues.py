@@ -2,32 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime, time
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Body, Depends, Header, Path, Query, Response
+from fastapi import APIRouter, Body, Depends, Header, Path, Query, Request, Response
 from pydantic import ValidationError
 
 from service.api import etags
-from service.api.context import InContext, VenueIdPath
-from service.api.problems import invalid
+from service.api.context import ByActor, Context, InContext, VenueIdPath
+from service.api.problems import validation_problem
 from service.intake import sources
-from service.routes.contract.documented import headers, needs, problems
-from service.routes.contract.exported import DOCUMENTS, Wanted, exported, no_refined_pose, refined_venue
+from service.routes.contract.documented import header_docs, needs_scope, problem_responses
+from service.routes.contract.exported import (
+    DOCUMENTS,
+    ExportQuery,
+    export_response,
+    no_refined_pose,
+    with_refined_poses,
+)
 from service.routes.contract.guarded import Guarded
-from service.routes.contract.tagged import TAGGED, IfNoneMatch, json, unless_known
+from service.routes.contract.missing import no_such_job, no_such_venue
+from service.routes.contract.paged import NEXT_PAGE, next_page
+from service.routes.contract.restricted import OnlyVenues, lists_by_venue
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, json_response, tagged_response
+from service.schemas.base import Day, Name
+from service.schemas.events import callback_urls
+from service.schemas.geometry import PoseIn
+from service.schemas.health import VenueHealth
+from service.schemas.history import AdoptField, History, Restore
+from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
+from service.schemas.names import ID_PATTERN, FormatName, ListFields
+from service.schemas.problems import Problem
+from service.schemas.trend import Trend
+from service.schemas.venue import PATCH_EXAMPLES, Camera, ChangedVenue, Venue, VenueIn, Venues, VenueSummary
 from service.settings import Settings
+from service.store.adopted_fields import NoSuchJob, NotAdoptable, NumberRefused
+from service.store.jobs.decisions import VenueHasChanged
 from service.store.refined import NoRefinedPose
 from service.store.revisions import NoSuchRevision, RevisionUnfit
-from service.wire.base import Day
-from service.wire.health import VenueHealth
-from service.wire.history import History, Restore
-from service.wire.merge_patch import MEDIA_TYPE, merged
-from service.wire.names import ID_PATTERN, FormatName
-from service.wire.problems import Problem
-from service.wire.told import callback_urls
-from service.wire.trend import Trend
-from service.wire.venue import PATCH_EXAMPLES, Camera, ChangedVenue, Venue, VenueIn, Venues
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # While a job is open.
@@ -40,11 +53,6 @@ PATCH_BODY: dict[str, Any] = {
         "content": {MEDIA_TYPE: {"schema": {"type": "object"}, "examples": PATCH_EXAMPLES}},
     }
 }
-
-
-def no_such_venue(venue_id: str) -> Problem:
-    """The same answer wherever a venue is named."""
-    return Problem("venue-not-found", f"PUT /venues/{venue_id} creates it; GET /venues lists those there are.")
 
 
 def venue_busy(job_id: str) -> Problem:
@@ -68,14 +76,14 @@ def camera_of(venue: Venue, camera_id: str) -> Camera:
     )
 
 
-def _existing(venue_id: VenueIdPath, context: InContext) -> Venue:
+def _existing_venue(venue_id: VenueIdPath, context: InContext) -> Venue:
     venue = context.venues.get(venue_id)
     if venue is None:
         raise no_such_venue(venue_id)
     return venue
 
 
-ExistingVenue = Annotated[Venue, Depends(_existing)]
+ExistingVenue = Annotated[Venue, Depends(_existing_venue)]
 
 
 def no_refined_since(venue_id: str) -> str:
@@ -91,13 +99,25 @@ def revision_unfit(unfit: RevisionUnfit) -> Problem:
     return Problem("revision-unfit", f"{unfit} PUT the venue with the poses that you want.")
 
 
+def venue_moved_on(venue_id: str | None, job_id: str, moved: VenueHasChanged) -> Problem:
+    """The same answer wherever something of a job is to hold, and the venue has changed since."""
+    newest = moved.newest
+    is_now = f"at revision {newest.revision} ({newest.cause})" if newest else "deleted"
+    return Problem(
+        "venue-moved-on",
+        f"Venue {venue_id} is {is_now}, or has another pitch; see GET /venues/{venue_id}/history and decide.",
+        job=job_id,
+        got=newest and newest.revision,
+    )
+
+
 @router.put(
     "/{venue_id}",
-    openapi_extra=needs("admin"),
+    openapi_extra=needs_scope("admin"),
     responses={
-        200: headers("ETag"),
-        201: {"model": ChangedVenue, **headers("ETag")},
-        **problems(400, 408, 412, 413, 415, 422),
+        200: header_docs("ETag"),
+        201: {"model": ChangedVenue, **header_docs("ETag")},
+        **problem_responses(400, 404, 408, 412, 413, 415, 422),
     },
 )
 def put_venue(
@@ -105,37 +125,37 @@ def put_venue(
     venue: VenueIn,
     response: Response,
     context: InContext,
+    by: ByActor,
     if_match: Annotated[str | None, Header()] = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> ChangedVenue:
     """Create or replace a venue. Its poses are where the next calibration starts."""
-    stored = _checked(venue, venue_id, context.settings)
+    wanted = _check_venue(venue, venue_id, context.settings)
 
-    def allow(before: Venue | None) -> None:
+    def change(before: Venue | None, known: dict[str, str]) -> tuple[Venue, dict[str, str]]:
         _require_match(if_match, before)
-        tag = tag_of(before) if before else None
-        if if_none_match is not None and etags.names(if_none_match, tag):
-            raise Problem("venue-changed", "The venue is already there.", got=_shown(tag))
+        tag = venue_etag(before) if before else None
+        if if_none_match is not None and etags.matches_weakly(if_none_match, tag):
+            raise Problem("venue-changed", "The venue is already there.", got=_quoted_tag(tag))
+        return wanted.with_callbacks_of(before), sources.secrets_of(wanted, venue.secrets, before, known)
 
-    def credentials(before: Venue | None, known: dict[str, str]) -> dict[str, str]:
-        return sources.credentials_of(stored, venue.credentials, before, known)
-
-    new = context.venues.put(stored, allow, credentials)
-    response.headers["ETag"] = etags.quoted(tag_of(stored))
+    stored, new = context.venues.change(venue_id, change, by)
+    response.headers["ETag"] = etags.quoted(venue_etag(stored))
     response.status_code = 201 if new else 200
-    return ChangedVenue.of(stored)
+    return _changed_venue([camera.pose for camera in venue.cameras], stored.with_hidden_callbacks())
 
 
 @router.patch(
     "/{venue_id}",
-    openapi_extra=needs("admin") | PATCH_BODY,
-    responses={200: headers("ETag"), **problems(400, 404, 408, 412, 413, 415, 422)},
+    openapi_extra=needs_scope("admin") | PATCH_BODY,
+    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 412, 413, 415, 422)},
 )
 def patch_venue(
     venue_id: VenueIdPath,
     patch: Annotated[dict[str, Any], Body(media_type=MEDIA_TYPE)],
     response: Response,
     context: InContext,
+    by: ByActor,
     if_match: Annotated[str | None, Header()] = None,
 ) -> ChangedVenue:
     """Change parts of a venue and leave the others as they are, the poses that were calibrated among them.
@@ -147,87 +167,107 @@ def patch_venue(
         if before is None:
             raise no_such_venue(venue_id)
         _require_match(if_match, before)
-        document = merged(_patchable(before, patch), patch)
+        document = apply_merge_patch(_patch_target(before, patch), patch)
         try:
             venue = VenueIn.model_validate(document)
         except ValidationError as error:
-            raise _misnamed_camera(before, patch) or invalid(error, VenueIn, document, "body") from None
-        stored = _checked(venue, venue_id, context.settings)
-        return stored, sources.credentials_of(stored, venue.credentials, before, known)
+            raise _misnamed_camera(before, patch) or validation_problem(error, VenueIn, document, "body") from None
+        stored = _check_venue(venue, venue_id, context.settings)
+        return stored.with_callbacks_of(before), sources.secrets_of(stored, venue.secrets, before, known)
 
-    stored, _ = context.venues.change(venue_id, change)
-    response.headers["ETag"] = etags.quoted(tag_of(stored))
-    return ChangedVenue.of(stored)
+    stored, _ = context.venues.change(venue_id, change, by)
+    response.headers["ETag"] = etags.quoted(venue_etag(stored))
+    # Which of position and translation was once sent is not known: both are read.
+    poses = [PoseIn.model_validate(camera.pose.model_dump()) for camera in stored.cameras]
+    return _changed_venue(poses, stored.with_hidden_callbacks())
 
 
-@router.get("", openapi_extra=needs("read"))
+@router.get("", openapi_extra=needs_scope("read"), responses={200: {"headers": NEXT_PAGE}})
+@lists_by_venue
 def list_venues(
     context: InContext,
+    only: OnlyVenues,
+    request: Request,
+    response: Response,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     cursor: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
+    q: Annotated[Name | None, Query(min_length=1, description="Only those whose id or name contains this.")] = None,
+    state: Annotated[
+        Literal["ok", "alarm"] | None, Query(description="Only those of which an alarm rings, or none does.")
+    ] = None,
+    fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Venues:
-    """All venues by id, in pages."""
-    page = context.venues.page(cursor, limit + 1)
-    more = len(page) > limit
-    return Venues(venues=page[:limit], next_cursor=page[limit - 1].id if more else None)
+    """List all venues by id, in pages; with a key for some venues, these."""
+    page = context.venues.page(cursor, limit + 1, only, q, state)
+    more, page = len(page) > limit, page[:limit]
+    listed = Venues(
+        venues=[] if fields == "summary" else [venue.with_hidden_callbacks() for venue in page],
+        summaries=_summaries(context, page) if fields == "summary" else None,
+        next_cursor=page[-1].id if more else None,
+    )
+    response.headers.update(next_page(request, listed.next_cursor))
+    return listed
 
 
 @router.get(
     "/{venue_id}",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_model=Venue,
-    responses=TAGGED | problems(404),
+    responses=TAGGED | problem_responses(404),
 )
 def get_venue(venue: ExistingVenue, if_none_match: IfNoneMatch = None) -> Response:
-    """A venue with the poses that hold now."""
-    body = venue.model_dump_json().encode()
-    return unless_known(body, if_none_match, json(body))
+    """Return a venue with the poses that hold now."""
+    body = venue.with_hidden_callbacks().model_dump_json().encode()
+    return tagged_response(body, if_none_match, json_response(body))
 
 
 @router.get(
     "/{venue_id}/poses",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_class=Response,
-    responses=DOCUMENTS | problems(404),
+    responses=DOCUMENTS | problem_responses(404),
 )
 def venue_poses(
     venue: ExistingVenue,
     context: InContext,
-    wanted: Annotated[Wanted, Depends()],
+    wanted: Annotated[ExportQuery, Depends()],
     form: Annotated[FormatName, Query(alias="format")] = "json",
 ) -> Response:
-    """The poses that hold now, in the format of another tool; with `lens=refined` those of the last accepted job."""
+    """Export the poses that hold now to another tool's format; with `lens=refined` those of the last accepted job."""
     if wanted.lens == "refined":
-        venue = refined_venue(venue, context.refined.of_venue(venue), wanted.camera, no_refined_since(venue.id))
-    return exported(context, venue, venue.id, form, wanted)
+        venue = with_refined_poses(venue, context.refined.of_venue(venue), wanted.camera, no_refined_since(venue.id))
+    return export_response(context, venue, venue.id, form, wanted)
 
 
 @router.get(
     "/{venue_id}/history",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_model=History,
-    responses=TAGGED | problems(404),
+    responses=TAGGED | {200: {"headers": TAGGED[200]["headers"] | NEXT_PAGE}} | problem_responses(404),
 )
 def venue_history(
     venue: ExistingVenue,
+    request: Request,
     context: InContext,
     limit: Annotated[int, Query(ge=1, le=1000)] = 50,
     cursor: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
-    """Every change of the poses with its cause, newest first, in pages; how far each camera moved and has drifted."""
+    """List every change of the poses with its cause, newest first, and how far each camera moved and has drifted."""
     page = context.venues.history(venue.id, cursor, limit + 1)
     more = len(page) > limit
     shown = History(revisions=page[:limit], next_cursor=page[limit - 1].revision if more else None)
     body = shown.model_dump_json().encode()
-    return unless_known(body, if_none_match, json(body))
+    answer = tagged_response(body, if_none_match, json_response(body))
+    answer.headers.update(next_page(request, shown.next_cursor))
+    return answer
 
 
 @router.get(
     "/{venue_id}/cameras/{camera}/trend",
-    openapi_extra=needs("read"),
+    openapi_extra=needs_scope("read"),
     response_model=Trend,
-    responses=TAGGED | problems(404),
+    responses=TAGGED | problem_responses(404),
 )
 def camera_trend(
     venue: ExistingVenue,
@@ -236,19 +276,19 @@ def camera_trend(
     since: Annotated[Day | None, Query(description="The first night to tell, a day of UTC; without it, all.")] = None,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
-    """How a camera has moved since its anchor, night by night, and what control charts (EWMA, CUSUM) say of it.
+    """Tell how a camera has moved since its anchor, night by night, and what control charts (EWMA, CUSUM) say of it.
 
     In metres on the ground at the farthest marking in view, which a camera on the long side has on the far touchline.
     """
     camera_of(venue, camera)
     first = None if since is None else datetime.combine(since, time.min, UTC)
     body = context.trends.of(venue, camera, first).model_dump_json().encode()
-    return unless_known(body, if_none_match, json(body))
+    return tagged_response(body, if_none_match, json_response(body))
 
 
-@router.get("/{venue_id}/health", openapi_extra=needs("read"), responses=problems(404))
+@router.get("/{venue_id}/health", openapi_extra=needs_scope("read"), responses=problem_responses(404))
 def venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
-    """How a venue is doing: the alarms that ring, since when and why, and how far its cameras have drifted."""
+    """Tell how a venue is doing: the alarms that ring, since when and why, and how far its cameras have drifted."""
     health = context.venues.health(venue_id)
     if health is None:
         raise no_such_venue(venue_id)
@@ -257,14 +297,15 @@ def venue_health(venue_id: VenueIdPath, context: InContext) -> VenueHealth:
 
 @router.post(
     "/{venue_id}/restore",
-    openapi_extra=needs("calibrate"),
-    responses={200: headers("ETag"), **problems(400, 404, 408, 409, 412, 413, 415)},
+    openapi_extra=needs_scope("calibrate"),
+    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 409, 412, 413, 415)},
 )
 def restore_venue(
     venue_id: VenueIdPath,
     wanted: Restore,
     response: Response,
     context: InContext,
+    by: ByActor,
     if_match: Annotated[str | None, Header()] = None,
 ) -> Venue:
     """Let the poses of a revision hold again, with their lenses and their ridge; that is a revision of its own."""
@@ -275,25 +316,26 @@ def restore_venue(
         _require_match(if_match, before)
 
     try:
-        restored = context.venues.restore(venue_id, wanted.revision, allow)
+        restored = context.venues.restore(venue_id, wanted.revision, allow, by)
     except NoSuchRevision:
         raise Problem("revision-not-found", f"GET /venues/{venue_id}/history lists those there are.") from None
     except RevisionUnfit as unfit:
         raise revision_unfit(unfit) from None
-    response.headers["ETag"] = etags.quoted(tag_of(restored))
-    return restored
+    response.headers["ETag"] = etags.quoted(venue_etag(restored))
+    return restored.with_hidden_callbacks()
 
 
 @router.post(
     "/{venue_id}/cameras/{camera}/adopt-refined",
-    openapi_extra=needs("calibrate"),
-    responses={200: headers("ETag"), **problems(404, 412)},
+    openapi_extra=needs_scope("calibrate"),
+    responses={200: header_docs("ETag"), **problem_responses(404, 412)},
 )
 def adopt_refined(
     venue_id: VenueIdPath,
     camera: Annotated[str, Path(pattern=ID_PATTERN)],
     response: Response,
     context: InContext,
+    by: ByActor,
     if_match: Annotated[str | None, Header()] = None,
 ) -> Venue:
     """Store a camera's refined pose and lens of the last accepted calibration; that is a revision of its own.
@@ -308,15 +350,63 @@ def adopt_refined(
         _require_match(if_match, before)
 
     try:
-        adopted = context.refined.adopt(venue_id, camera, allow)
+        adopted = context.refined.adopt(venue_id, camera, allow, by)
     except NoRefinedPose:
         raise no_refined_pose(camera, no_refined_since(venue_id)) from None
-    response.headers["ETag"] = etags.quoted(tag_of(adopted))
-    return adopted
+    response.headers["ETag"] = etags.quoted(venue_etag(adopted))
+    return adopted.with_hidden_callbacks()
 
 
-@router.delete("/{venue_id}", openapi_extra=needs("admin"), status_code=204, responses=problems(404, 409, 412))
-def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[str | None, Header()] = None) -> None:
+@router.post(
+    "/{venue_id}/adopt-field",
+    openapi_extra=needs_scope("calibrate"),
+    responses={200: header_docs("ETag"), **problem_responses(400, 404, 408, 409, 412, 413, 415)},
+)
+def adopt_field(
+    venue_id: VenueIdPath,
+    wanted: AdoptField,
+    response: Response,
+    context: InContext,
+    by: ByActor,
+    if_match: Annotated[str | None, Header()] = None,
+) -> Venue:
+    """Store a number of the field as the lines of an accepted calibration have it; that is a revision of its own.
+
+    Of those in `adoptable` of its result, while the venue stands as the job left it. Poses stay until the next
+    calibration moves them. What cameras remember of earlier nights ends, as with any other field. Nothing changes if
+    the field has that number already.
+    """
+
+    def allow(before: Venue | None) -> None:
+        if before is None:
+            raise no_such_venue(venue_id)
+        _require_match(if_match, before)
+
+    try:
+        adopted = context.adopted_fields.adopt(venue_id, wanted.job, wanted.name, allow, by)
+    except NoSuchJob:
+        raise no_such_job(context.settings) from None
+    except NotAdoptable as offers:
+        told = f"It offers {', '.join(offers.offered)}." if offers.offered else "It offers none."
+        raise Problem(
+            "field-number-not-found", told, job=wanted.job, expected=list(offers.offered), got=wanted.name
+        ) from None
+    except VenueHasChanged as moved:
+        raise venue_moved_on(venue_id, wanted.job, moved) from None
+    except NumberRefused as refused:
+        raise Problem(
+            "field-number-refused", f"{refused}. Measure the field again.", job=wanted.job, got=wanted.name
+        ) from None
+    response.headers["ETag"] = etags.quoted(venue_etag(adopted))
+    return adopted.with_hidden_callbacks()
+
+
+@router.delete(
+    "/{venue_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses(404, 409, 412)
+)
+def delete_venue(
+    venue_id: VenueIdPath, context: InContext, by: ByActor, if_match: Annotated[str | None, Header()] = None
+) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures: `DELETE /jobs/{id}`."""
 
     def allow(before: Venue | None, active_job: str | None) -> None:
@@ -326,10 +416,28 @@ def delete_venue(venue_id: VenueIdPath, context: InContext, if_match: Annotated[
             raise venue_busy(active_job)
         _require_match(if_match, before)
 
-    context.venues.delete(venue_id, allow)
+    context.venues.delete(venue_id, allow, by)
 
 
-def _patchable(venue: Venue, patch: dict[str, Any]) -> dict[str, Any]:
+def _summaries(context: Context, venues: Sequence[Venue]) -> list[VenueSummary]:
+    """A line of each, with what is known of all of them at a glance."""
+    ids = [venue.id for venue in venues]
+    glances, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
+    return [
+        VenueSummary(
+            id=venue.id,
+            name=venue.name,
+            cameras=[camera.id for camera in venue.cameras],
+            scheduled=venue.schedule is not None,
+            state="alarm" if venue.id in alarms else "ok",
+            alarms=alarms.get(venue.id, []),
+            last=glances[venue.id].last if venue.id in glances else None,
+        )
+        for venue in venues
+    ]
+
+
+def _patch_target(venue: Venue, patch: dict[str, Any]) -> dict[str, Any]:
     """A venue to be patched. A camera's place is said twice: where a patch moves the camera, it says it once."""
     document: dict[str, Any] = venue.model_dump(mode="json")
     by_id = patch.get("cameras")
@@ -353,7 +461,14 @@ def _misnamed_camera(venue: Venue, patch: dict[str, Any]) -> Problem | None:
     return None
 
 
-def _checked(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
+def _changed_venue(poses: Sequence[PoseIn], shown: Venue) -> ChangedVenue:
+    """The answer to whoever changed a venue, with what it leaves to be assumed; `poses` of its cameras as sent."""
+    from service.intake.pose_warnings import warnings_of
+
+    return ChangedVenue.of(shown, warnings_of(poses, shown))
+
+
+def _check_venue(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
     """A venue as it is kept, if this service can keep it at this address."""
     if venue.id != venue_id:
         raise Problem("venue-id-mismatch", "Use one id.", expected=venue_id, got=venue.id)
@@ -363,23 +478,32 @@ def _checked(venue: VenueIn, venue_id: str, settings: Settings) -> Venue:
             callback_urls.check(told.callback_url, settings)
     for webhook in venue.webhooks:
         callback_urls.check(webhook.url, settings, "webhooks")
-    stored = venue.stored()
+    if venue.schedule is not None and venue.schedule.frames > settings.max_frames_per_camera:
+        raise Problem(
+            "too-many-frames",
+            "The schedule may have no more frames of a camera than an upload (ESC_MAX_FRAMES_PER_CAMERA).",
+            expected=settings.max_frames_per_camera,
+            got=venue.schedule.frames,
+        )
+    stored = venue.to_venue()
     sources.check(stored, settings.sources)
     return stored
 
 
 def _require_match(if_match: str | None, before: Venue | None) -> None:
     """Whoever changes a venue changes the one that he has seen."""
-    tag = tag_of(before) if before else None
-    if if_match is not None and not etags.names(if_match, tag):
-        raise Problem("venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=_shown(tag))
+    tag = venue_etag(before) if before else None
+    if if_match is not None and not etags.matches(if_match, tag):
+        raise Problem(
+            "venue-changed", "Read the venue again and decide.", expected=if_match[:200], got=_quoted_tag(tag)
+        )
 
 
-def _shown(tag: str | None) -> str | None:
+def _quoted_tag(tag: str | None) -> str | None:
     """A tag as headers have it; None: there is no venue."""
     return None if tag is None else etags.quoted(tag)
 
 
-def tag_of(venue: Venue) -> str:
+def venue_etag(venue: Venue) -> str:
     """By which it is known whether it changed."""
-    return etags.of(venue.model_dump_json().encode())
+    return etags.of(venue.with_hidden_callbacks().model_dump_json().encode())

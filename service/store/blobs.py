@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from datetime import timedelta
 from pathlib import Path
@@ -15,35 +15,38 @@ import obstore
 from obstore.exceptions import BaseError
 from obstore.store import LocalStore, ObjectStore, from_url
 
+from service.secret_files import bucket_credentials
+
 if TYPE_CHECKING:
-    from obstore.store import BackoffConfig, ClientConfig, RetryConfig
+    from obstore.store import BackoffConfig, ClientConfig, RetryConfig, S3Config
 
 
-class FolderAway(Exception):  # noqa: N818
-    """The folder of the files cannot be written or read, the machine says why."""
+class BlobFolderUnavailable(Exception):  # noqa: N818
+    """The folder of the blobs cannot be written or read; the message is that of the operating system."""
 
 
 # What is raised while a bucket is away, or a disk full: trying again later can help.
-AWAY = (BaseError, FolderAway)
+BLOB_OUTAGES = (BaseError, BlobFolderUnavailable)
 # For one answer of a bucket to one request.
 ANSWER_S = 30.0
 TRUE = ("1", "true", "on", "yes", "y")
 
 
 @contextmanager
-def _told() -> Iterator[None]:
-    """The machine's errors are told apart from those of anything else that opens files or starts programs."""
+def _raising_blob_outages() -> Iterator[None]:
+    """Raise `BlobFolderUnavailable` for an `OSError`, which anything else that opens files may raise as well."""
     try:
         yield
     except OSError as error:
-        raise FolderAway(str(error)) from error
+        raise BlobFolderUnavailable(str(error)) from error
 
 
 class Blobs:
     """Objects by path, in a folder (`file:` URL) or in a bucket (`s3:` URL).
 
-    Whose bucket, and with which credentials, is read from the environment (`AWS_...`). A bucket that does not answer is
-    asked again for `patience_s`: long for who has computed for minutes, short where somebody waits for the answer.
+    Whose bucket, and with which credentials, is read from the environment (`AWS_...`) or the files that it names. A
+    bucket that does not answer is asked again for `patience_s`: long for who has computed for minutes, short where
+    somebody waits for the answer.
     """
 
     def __init__(self, url: str, patience_s: float = 120.0) -> None:
@@ -52,17 +55,22 @@ class Blobs:
         self._store: ObjectStore = (
             LocalStore(self._folder, mkdir=True)
             if self._folder
-            else from_url(url, client_options=_within(patience_s), retry_config=_for(patience_s))
+            else from_url(
+                url,
+                config=_credentials(),
+                client_options=_client_options(patience_s),
+                retry_config=_retry_options(patience_s),
+            )
         )
 
-    @_told()
+    @_raising_blob_outages()
     def put(self, path: str, data: bytes) -> None:
         """Store an object; when this returns it survives a crash, of the machine too."""
         # In one piece: of several, those before a crash would stay in the bucket, where no list of objects shows them.
         obstore.put(self._store, path, data, use_multipart=False)
-        self._make_sure_of(path)
+        self._sync_path(path)
 
-    @_told()
+    @_raising_blob_outages()
     def copy(self, path: str, to: str) -> bool:
         """Store an object a second time, as `put` does, without its bytes coming here; False if there is none."""
         try:
@@ -74,10 +82,10 @@ class Blobs:
                 obstore.copy(self._store, path, to)
         except FileNotFoundError:
             return False
-        self._make_sure_of(to)
+        self._sync_path(to)
         return True
 
-    @_told()
+    @_raising_blob_outages()
     def move(self, path: str, to: str) -> bool:
         """Let an object be found elsewhere; in a folder that takes no room. False if there is none.
 
@@ -90,10 +98,10 @@ class Blobs:
             (self._folder / path).rename(self._folder / to)
         except FileNotFoundError:
             return False
-        self._make_sure_of(to)
+        self._sync_path(to)
         return True
 
-    def _make_sure_of(self, path: str) -> None:
+    def _sync_path(self, path: str) -> None:
         if self._folder:
             # A bucket promises durability; a file has it only after its pages have reached the disk, and the entry of
             # each folder on the way to it, of which any may be new.
@@ -102,7 +110,7 @@ class Blobs:
             for folder in place.parents[: len(Path(path).parts)]:
                 _sync(folder)
 
-    @_told()
+    @_raising_blob_outages()
     def get(self, path: str) -> bytes | None:
         """An object, or None if there is none."""
         try:
@@ -110,7 +118,7 @@ class Blobs:
         except FileNotFoundError:
             return None
 
-    @_told()
+    @_raising_blob_outages()
     def has(self, path: str) -> bool:
         """Whether there is such an object."""
         try:
@@ -119,7 +127,7 @@ class Blobs:
             return False
         return True
 
-    @_told()
+    @_raising_blob_outages()
     def delete_under(self, prefix: str) -> None:
         """Remove the folder `prefix` with every object in it."""
         if self._folder:
@@ -130,6 +138,17 @@ class Blobs:
         for page in obstore.list(self._store, prefix):
             obstore.delete(self._store, [entry["path"] for entry in page])
 
+    def paths(self) -> Iterator[str]:
+        """The path of every object."""
+        for page in obstore.list(self._store):
+            for entry in page:
+                yield entry["path"]
+
+    @_raising_blob_outages()
+    def delete(self, paths: Sequence[str]) -> None:
+        """Remove objects."""
+        obstore.delete(self._store, paths)
+
     def check(self) -> None:
         """Raise unless the store answers."""
         if self._folder and not os.access(self._folder, os.W_OK):
@@ -138,14 +157,22 @@ class Blobs:
             break
 
 
-def _within(patience_s: float) -> ClientConfig:
+def _credentials() -> S3Config:
+    """Return the bucket credentials that stand in files; obstore finds the others in the environment."""
+    found: S3Config = {}
+    for name, secret in bucket_credentials(os.environ).items():
+        found[name] = secret
+    return found
+
+
+def _client_options(patience_s: float) -> ClientConfig:
     """A bucket that takes a request and then says nothing uses up no more patience than there is."""
     # Options given here replace those of the environment, of which this is one.
     plain = os.environ.get("AWS_ALLOW_HTTP", "").lower() in TRUE
     return {"timeout": timedelta(seconds=min(ANSWER_S, patience_s)), "allow_http": plain}
 
 
-def _for(patience_s: float) -> RetryConfig:
+def _retry_options(patience_s: float) -> RetryConfig:
     """Ask again until the time is over, however often that is."""
     pauses: BackoffConfig = {"init_backoff": timedelta(seconds=0.1), "max_backoff": timedelta(seconds=2), "base": 2}
     return {"max_retries": 10_000, "retry_timeout": timedelta(seconds=patience_s), "backoff": pauses}

@@ -9,6 +9,7 @@ The last accepted job of each venue, the one that brought its poses, is past no 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -17,9 +18,11 @@ from itertools import takewhile
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.engine import Repository, clock, reading, serialise, writing
+from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.events.outbox import CALLBACKS
 from service.store.jobs.files import frame_folder, picture_folder, pictures_folder
-from service.store.revisions import TAKEN
+from service.store.revisions import CALIBRATION_CAUSES
+from service.store.statistics import counters
 
 j = tables.jobs.c
 r = tables.revisions.c
@@ -28,7 +31,7 @@ e = tables.events.c
 left = tables.leftovers.c
 LAST_ACCEPTED = (
     sa.select(r.job)
-    .where(r.venue == j.venue, r.cause.in_(TAKEN))
+    .where(r.venue == j.venue, r.cause.in_(CALIBRATION_CAUSES))
     .order_by(r.number.desc())
     .limit(1)
     .correlate(tables.jobs)
@@ -37,7 +40,7 @@ LAST_ACCEPTED = (
 # Of the same venue: the revision that holds, and the last whose poses a job brought.
 others = sa.alias(tables.revisions, "others")
 NEWEST = sa.select(others.c.number).where(others.c.venue == r.venue).order_by(others.c.number.desc()).limit(1)
-NEWEST_TAKEN = NEWEST.where(others.c.cause.in_(TAKEN))
+NEWEST_TAKEN = NEWEST.where(others.c.cause.in_(CALIBRATION_CAUSES))
 NOT_THE_LAST_ACCEPTED = j.id != sa.func.coalesce(LAST_ACCEPTED, "")
 
 
@@ -54,7 +57,7 @@ class OldFrames:
     frames: dict[str, str]
 
 
-class Expiry(Repository):
+class ExpiryRepository(Repository):
     """What the database knows to be past its time."""
 
     def old_frames(self, ended_before: datetime, limit: int) -> list[OldFrames]:
@@ -80,14 +83,14 @@ class Expiry(Repository):
     def expire_frames(self, job_ids: Collection[str], now: datetime) -> None:
         """Let ended jobs have no frames."""
         with writing(self._engine) as connection:
-            serialise(connection, "expiry")
+            advisory_lock(connection, "expiry")
             self._mark(connection, job_ids, frames_deleted_at=now)
             self._leave(connection, [frame_folder(job_id) for job_id in job_ids], now)
 
     def expire_pictures(self, ended_before: datetime, now: datetime, limit: int) -> int:
         """The same for pictures, but for those of the last accepted job of each venue."""
         with writing(self._engine) as connection:
-            serialise(connection, "expiry")
+            advisory_lock(connection, "expiry")
             ids = self._ended(connection, ended_before, limit, j.pictures_deleted_at.is_(None), NOT_THE_LAST_ACCEPTED)
             self._mark(connection, ids, pictures_deleted_at=now)
             self._leave(connection, [pictures_folder(job_id) for job_id in ids], now)
@@ -112,7 +115,7 @@ class Expiry(Repository):
             .limit(limit)
         )
         with writing(self._engine) as connection:
-            serialise(connection, "expiry")
+            advisory_lock(connection, "expiry")
             ids = list(connection.scalars(old))
             of_them = sa.exists().where(r.id.in_(ids), r.venue == m.venue, r.number == m.revision)
             connection.execute(sa.delete(tables.memories).where(of_them))
@@ -125,7 +128,7 @@ class Expiry(Repository):
         The newest stays: it tells who comes back whether something was missed.
         """
         with writing(self._engine) as connection:
-            serialise(connection, "expiry")
+            advisory_lock(connection, "expiry")
             newest = connection.scalar(sa.select(sa.func.max(e.id)))
             oldest = connection.execute(sa.select(e.id, e.at).order_by(e.id).limit(limit)).all()
             past = [row.id for row in takewhile(lambda row: row.at < before and row.id != newest, oldest)]
@@ -133,15 +136,45 @@ class Expiry(Repository):
                 connection.execute(sa.delete(tables.events).where(e.id <= past[-1]))
             return len(past)
 
+    def expire_deliveries(self, before: datetime, limit: int) -> Counter[str]:
+        """Give up to `limit` deliveries up whose event is from before a moment; says how many of each receiver.
+
+        A receiver that hangs is tried so seldom that the tries of what waits for it would not end for years.
+        """
+        d = tables.deliveries.c
+        happened_at = sa.func.coalesce(e.at, j.finished_at)
+        old = (
+            sa.select(d.id, d.event, d.receiver)
+            .select_from(
+                tables.deliveries.outerjoin(tables.events, e.id == d.event).outerjoin(tables.jobs, j.id == d.id)
+            )
+            .where(d.status == "waiting", sa.or_(happened_at < before, happened_at.is_(None)))
+            .order_by(d.due_at)
+            .limit(limit)
+        )
+        with writing(self._engine) as connection:
+            advisory_lock(connection, "deliveries")
+            rows = connection.execute(old).all()
+            if not rows:
+                return Counter()
+            # That of a job goes with its job, and says until then how it ended.
+            of_jobs = sa.update(tables.deliveries).where(d.id.in_([row.id for row in rows if row.event is None]))
+            said = sa.func.coalesce(d.last_error, "its turn did not come in time")
+            connection.execute(of_jobs.values(status="given-up", last_error=said))
+            of_events = [row.id for row in rows if row.event is not None]
+            connection.execute(sa.delete(tables.deliveries).where(d.id.in_(of_events)))
+            counters.add(connection, {(CALLBACKS, ("expired",)): len(rows)})
+            return Counter(row.receiver for row in rows)
+
     def delete_jobs(self, job_ids: Collection[str], now: datetime) -> None:
         """Forget ended jobs with everything that is theirs; their files are to be deleted from `now` on."""
         with writing(self._engine) as connection:
-            serialise(connection, "expiry")
+            advisory_lock(connection, "expiry")
             connection.execute(sa.delete(tables.jobs).where(j.id.in_(job_ids), j.finished_at.is_not(None)))
             connection.execute(sa.delete(tables.deliveries).where(tables.deliveries.c.id.in_(job_ids)))
             self._leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)
 
-    def expect_upload(self, job_id: str, grace: timedelta) -> None:
+    def register_upload(self, job_id: str, grace: timedelta) -> None:
         """Frames are about to be stored; unless they become this job within the grace they are nobody's."""
         with writing(self._engine) as connection:
             self._leave(connection, [frame_folder(job_id)], clock(connection) + grace)
@@ -152,7 +185,7 @@ class Expiry(Repository):
         with reading(self._engine) as connection:
             return list(connection.scalars(query))
 
-    def swept(self, folders: Collection[str]) -> None:
+    def forget_leftovers(self, folders: Collection[str]) -> None:
         """The files of these folders are gone."""
         with writing(self._engine) as connection:
             connection.execute(sa.delete(tables.leftovers).where(left.folder.in_(folders)))

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import sqlalchemy as sa
 
-from service.store.engine import Repository, reading, serialise, writing
+from service.schemas.names import Scope
+from service.store.database import Repository, advisory_lock, reading, writing
 from service.store.tables import api_keys
-from service.wire.names import Scope
 
 PREFIX = "esc_"
+LONGEST_NAME, OLD = 64, "-old"
 k = api_keys.c
 
 
@@ -28,6 +30,12 @@ class Key:
     created_at: datetime
     expires_at: datetime | None
     last_used_at: datetime | None
+    # Ids of the venues that it is for; None: all.
+    venues: frozenset[str] | None = None
+
+    def is_for(self, venue_id: str | None) -> bool:
+        """Whether its owner may know of a venue. What belongs to none (None) is for keys of all venues only."""
+        return self.venues is None or venue_id in self.venues
 
     @property
     def expired(self) -> bool:
@@ -54,21 +62,53 @@ def hash_of(key: str) -> str:
     return hashlib.sha256(key.encode()).hexdigest()
 
 
-class Keys(Repository):
+def old_name(name: str) -> str:
+    """What a key is called once it was exchanged; names are as long as before."""
+    return f"{name[: LONGEST_NAME - len(OLD)]}{OLD}"
+
+
+class KeyRepository(Repository):
     """The keys in the database."""
 
-    def add(self, name: str, scope: Scope, expires_at: datetime | None = None) -> str:
-        """Make a key and return it: the only time that it can be seen."""
+    def add(
+        self, name: str, scope: Scope, expires_at: datetime | None = None, venues: Collection[str] | None = None
+    ) -> str:
+        """Make a key and return it: the only time that it can be seen. `venues`: it is for no others; None: for all."""
         key = new_key()
         with writing(self._engine) as connection:
-            serialise(connection, "keys")
+            advisory_lock(connection, "keys")
             if connection.scalar(sa.select(k.name).where(k.name == name)) is not None:
                 raise KeyExists
             connection.execute(
                 sa.insert(api_keys).values(
-                    name=name, hash=hash_of(key), scope=scope, created_at=datetime.now(UTC), expires_at=expires_at
+                    name=name,
+                    hash=hash_of(key),
+                    scope=scope,
+                    created_at=datetime.now(UTC),
+                    expires_at=expires_at,
+                    venues=None if venues is None else sorted(set(venues)),
                 )
             )
+        return key
+
+    def rotate(self, name: str, grace: timedelta) -> str | None:
+        """Make a new key of the same name, scope, venues and end, and return it; None: there is no key of this name.
+
+        The old one goes on under the name with `-old` until the grace is over; one that was still there is forgotten.
+        """
+        key, old = new_key(), old_name(name)
+        with writing(self._engine) as connection:
+            advisory_lock(connection, "keys")
+            row = connection.execute(sa.select(api_keys).where(k.name == name)).one_or_none()
+            if row is None:
+                return None
+            now = datetime.now(UTC)
+            until = now + grace if row.expires_at is None else min(row.expires_at, now + grace)
+            connection.execute(sa.delete(api_keys).where(k.name == old))
+            connection.execute(sa.update(api_keys).where(k.name == name).values(name=old, expires_at=until))
+            same = {"scope": row.scope, "expires_at": row.expires_at, "venues": row.venues}
+            new = {"name": name, "hash": hash_of(key), "created_at": now}
+            connection.execute(sa.insert(api_keys).values(**new, **same))
         return key
 
     def remove(self, name: str) -> bool:
@@ -79,7 +119,7 @@ class Keys(Repository):
     def all(self) -> list[Key]:
         """Every key, by name."""
         with reading(self._engine) as connection:
-            return [_key(row) for row in connection.execute(sa.select(api_keys).order_by(k.name))]
+            return [key_in(row) for row in connection.execute(sa.select(api_keys).order_by(k.name))]
 
     def any(self) -> bool:
         """Whether there is a key. An expired one counts: time alone must not open a service."""
@@ -90,7 +130,7 @@ class Keys(Repository):
         """The key with this hash."""
         with reading(self._engine) as connection:
             row = connection.execute(sa.select(api_keys).where(k.hash == hash_)).one_or_none()
-        return None if row is None else _key(row)
+        return None if row is None else key_in(row)
 
     def note_uses(self, last: Mapping[str, datetime]) -> None:
         """Write down when keys, by their hashes, were last used; another process may have noted a later use."""
@@ -102,5 +142,7 @@ class Keys(Repository):
             )
 
 
-def _key(row: sa.Row[tuple[object, ...]]) -> Key:
-    return Key(**row._mapping)
+def key_in(row: Any) -> Key:
+    """The key in a row of the table."""
+    venues = None if row.venues is None else frozenset(row.venues)
+    return Key(row.name, row.hash, row.scope, row.created_at, row.expires_at, row.last_used_at, venues)

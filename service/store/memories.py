@@ -14,8 +14,8 @@ from typing import Any
 import sqlalchemy as sa
 import structlog
 
+from service.schemas.venue import Venue
 from service.store import tables
-from service.wire.venue import Venue
 
 # A memory as the engine has written it; and those of a venue, by camera.
 Memory = dict[str, Any]
@@ -58,8 +58,8 @@ def forget_memories(connection: sa.Connection, venue_id: str) -> None:
 
 def without_those_that_changed(memories: Memories, before: Venue, after: Venue) -> Memories:
     """The memories of the cameras that stand and image in one venue as in another."""
-    stood = {camera.id: camera for camera in before.standing}
-    same = {camera.id for camera in after.standing if stood.get(camera.id) == camera}
+    stood = {camera.id: camera for camera in before.poses_and_lenses}
+    same = {camera.id for camera in after.poses_and_lenses if stood.get(camera.id) == camera}
     return {camera: memory for camera, memory in memories.items() if camera in same}
 
 

@@ -1,7 +1,8 @@
 """How far a camera moved: degrees, metres, and pixels of the pitch in its picture.
 
-For history and alarms, which the service writes itself: `quality.Movement` of the engine, on fewer points and a flat
-pitch. Lenses are OpenCV's own, which takes its time to load: import this where a movement is wanted.
+For history, alarms and what is said of a pose that was put, which the service writes itself: `quality.Movement` of the
+engine, on fewer points and a flat pitch. Lenses are OpenCV's own, which takes its time to load: import this where a
+movement is wanted.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fields.shapes import Arc, Line, Shape, Spot
-from service.wire.field import FieldOfPlay
-from service.wire.geometry import Moved, PosedCamera
-from service.wire.names import LensModel
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Moved, PosedCamera
+from service.schemas.names import LensModel
 
 Array = NDArray[np.float64]
 # Of all markings together; as many more as there are markings.
@@ -47,15 +48,27 @@ def _rotation(camera: PosedCamera) -> Array:
     return np.asarray(cv2.Rodrigues(np.array(camera.pose.rotation, dtype=float))[0], dtype=float)
 
 
+def visible_m(field: FieldOfPlay, camera: PosedCamera) -> float:
+    """Metres of markings in a camera's picture, to within some metres: the ground is flat and the places are few."""
+    points = points_on_markings(field)
+    length = sum(shape.length for shape in field.plan.markings(field.size) if not isinstance(shape, Spot))
+    return float(_inside(camera, pixels(camera, points)).mean() * length)
+
+
 def _shift_px(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> float | None:
     """The mean over the markings that were in view."""
-    points = _points(field)
-    was, now = _pixels(before, points), _pixels(after, points)
-    in_view = ((was >= 0) & (was <= np.array(before.image_size) - 1)).all(axis=1) & np.isfinite(now).all(axis=1)
+    points = points_on_markings(field)
+    was, now = pixels(before, points), pixels(after, points)
+    in_view = _inside(before, was) & np.isfinite(now).all(axis=1)
     return float(np.linalg.norm(now - was, axis=1)[in_view].mean()) if in_view.any() else None
 
 
-def _points(field: FieldOfPlay) -> Array:
+def _inside(camera: PosedCamera, places: Array) -> NDArray[np.bool_]:
+    """Which pixels (N, 2) lie in a camera's picture."""
+    return np.asarray(((places >= 0) & (places <= np.array(camera.image_size) - 1)).all(axis=1))
+
+
+def points_on_markings(field: FieldOfPlay) -> Array:
     """Places on the markings of a field (N, 2), evenly along them."""
     shapes = field.plan.markings(field.size)
     spacing = sum(shape.length for shape in shapes if not isinstance(shape, Spot)) / POINTS
@@ -80,7 +93,7 @@ def _shares(length: float, spacing: float) -> Array:
     return ((np.arange(pieces) + 0.5) / pieces)[:, None]
 
 
-def _pixels(camera: PosedCamera, points: Array) -> Array:
+def pixels(camera: PosedCamera, points: Array) -> Array:
     """Where points of the ground (N, 2) are in the picture; NaN behind the camera and where no lens formula holds."""
     on_ground = np.column_stack([points, np.zeros(len(points))])
     seen_from_camera = on_ground @ _rotation(camera).T + camera.pose.translation
@@ -88,11 +101,11 @@ def _pixels(camera: PosedCamera, points: Array) -> Array:
     lens = camera.intrinsics
     distortion = np.array(lens.distortion or [0.0] * 4)
     held = (depth > 0) & (across <= _turning_back(lens.model, distortion) * depth)
-    pixels = np.full(points.shape, np.nan)
+    places = np.full(points.shape, np.nan)
     if held.any():
         matrix = np.array(lens.matrix)
-        pixels[held] = _distorted(lens.model, distortion, seen_from_camera[held]) @ matrix[:2, :2].T + matrix[:2, 2]
-    return pixels
+        places[held] = _distorted(lens.model, distortion, seen_from_camera[held]) @ matrix[:2, :2].T + matrix[:2, 2]
+    return places
 
 
 def _turning_back(model: LensModel, distortion: Array) -> float:

@@ -11,15 +11,17 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
+from service.schemas.actor import Actor
+from service.schemas.results import Refined
+from service.schemas.venue import Camera, Venue
 from service.store import tables
-from service.store.alarms import settle_alarms
-from service.store.engine import Repository, reading, serialise, writing
-from service.store.jobs.reading import found_poses
+from service.store.alarms import update_alarms
+from service.store.database import Repository, advisory_lock, reading, writing
+from service.store.jobs.queries import found_poses
 from service.store.memories import keep_memories, newest_memories
-from service.store.revisions import TAKEN, add_revision
-from service.store.venues import find_venue, save_venue, venue_lock, with_result
-from service.wire.results import Refined
-from service.wire.venue import Camera, Venue
+from service.store.revisions import CALIBRATION_CAUSES, add_revision
+from service.store.statistics.venue_quality import update_quality
+from service.store.venues import find_stored, save_venue, venue_lock, with_result
 
 # Revisions in which the last accepted pose of a camera is looked for: others may have been accepted without it since.
 LOOKED_BACK = 20
@@ -38,7 +40,7 @@ class FoundRefined:
     refined: Refined
 
 
-class RefinedPoses(Repository):
+class RefinedPoseRepository(Repository):
     """The refined poses in the results of the jobs in the database."""
 
     def of_venue(self, venue: Venue) -> dict[str, Refined]:
@@ -53,26 +55,30 @@ class RefinedPoses(Repository):
         cameras = [] if found is None else found[1].cameras
         return {camera.id: camera.refined for camera in cameras if camera.refined is not None}
 
-    def adopt(self, venue_id: str, camera_id: str, allow: Callable[[Venue | None], None]) -> Venue:
+    def adopt(
+        self, venue_id: str, camera_id: str, allow: Callable[[Venue | None], None], by: Actor | None = None
+    ) -> Venue:
         """Store a camera's refined pose and lens as a new revision, unless `allow` raises at the sight of the venue.
 
         The memories stay: they hold measurements, which are the same whatever the lens is taken to be. Raises
         `NoRefinedPose`. Nothing is written if the camera has that pose and lens already.
         """
         with writing(self._engine) as connection:
-            serialise(connection, venue_lock(venue_id))
-            before = find_venue(connection, venue_id)
+            advisory_lock(connection, venue_lock(venue_id))
+            stored = find_stored(connection, venue_id)
+            before = None if stored is None else stored.venue
             allow(before)
             assert before is not None
             found = _refined_of(connection, before).get(camera_id)
             if found is None:
                 raise NoRefinedPose
             venue = with_refined(before, {camera_id: found.refined}, keep_sigma=True)
-            if not venue.stands_like(before):
-                save_venue(connection, venue)
-                number = add_revision(connection, venue, "adopted", found.job)
-                keep_memories(connection, venue_id, number, newest_memories(connection, venue_id))
-                settle_alarms(connection, venue)
+            if not venue.has_same_poses_as(before):
+                with update_quality(connection, venue_id) as quality:
+                    save_venue(connection, venue, quality.now, stored)
+                    number = add_revision(connection, quality, venue, "adopted", found.job, by=by)
+                    keep_memories(connection, venue_id, number, newest_memories(connection, venue_id))
+                    update_alarms(connection, quality, venue)
             return venue
 
 
@@ -112,7 +118,7 @@ def _refined_of(connection: sa.Connection, venue: Venue) -> dict[str, FoundRefin
         answered = {camera.id: camera for camera in left_by_it.cameras}
         for result in calibrated[1].cameras:
             camera = sought.get(result.id)
-            if camera is None or not result.accepted or not _is_of(camera, answered[result.id], result.refined):
+            if camera is None or not result.accepted or not is_of(camera, answered[result.id], result.refined):
                 continue
             del sought[result.id]
             if result.refined is not None:
@@ -120,15 +126,15 @@ def _refined_of(connection: sa.Connection, venue: Venue) -> dict[str, FoundRefin
     return found
 
 
-def _is_of(camera: Camera, answered: Camera, refined: Refined | None) -> bool:
+def is_of(camera: Camera, answered: Camera, refined: Refined | None) -> bool:
     """Whether a camera stands where a calibration answered that it stands, or has its refined pose already."""
-    ways = [answered.posed.standing]
+    ways = [answered.posed.pose_and_lens]
     if refined is not None:
-        ways.append(_refined_camera(answered, refined, keep_sigma=True).posed.standing)
-    return camera.posed.standing in ways
+        ways.append(_refined_camera(answered, refined, keep_sigma=True).posed.pose_and_lens)
+    return camera.posed.pose_and_lens in ways
 
 
 def _jobs_that_brought_poses(connection: sa.Connection, venue_id: str) -> list[str]:
     """Jobs of the last revisions that calibrations brought, newest first, each once."""
-    query = sa.select(r.job).where(r.venue == venue_id, r.cause.in_(TAKEN)).order_by(r.number.desc())
+    query = sa.select(r.job).where(r.venue == venue_id, r.cause.in_(CALIBRATION_CAUSES)).order_by(r.number.desc())
     return list(dict.fromkeys(connection.scalars(query.limit(LOOKED_BACK))))

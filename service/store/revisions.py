@@ -6,26 +6,35 @@ computes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from datetime import datetime
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, get_args
 
 import sqlalchemy as sa
 
+from service.schemas.actor import Actor
+from service.schemas.base import TOLERANTLY
+from service.schemas.events.venue_event import Poses
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Movement, PosedCamera
+from service.schemas.history import Cause, Revision
+from service.schemas.names import FieldNumber
+from service.schemas.venue import Camera, Venue
 from service.store import tables
-from service.store.counts.figures import note
-from service.store.engine import clock
-from service.store.told.events import add_event
+from service.store.actors import actor_in, columns_of
+from service.store.documents import to_document
+from service.store.events.event_log import add_event
+from service.store.statistics.venue_quality import VenueQuality
 from service.store.trends import begin_anchors, go_back
-from service.wire.field import FieldOfPlay
-from service.wire.geometry import Movement, PosedCamera
-from service.wire.history import Cause, Revision, RevisionCamera
-from service.wire.told.events import Poses
-from service.wire.venue import Camera, Venue
 
 r = tables.revisions.c
 # Whose poses hold, or held.
-TAKEN: tuple[Cause, ...] = ("calibrated", "accepted")
+CALIBRATION_CAUSES: tuple[Cause, ...] = ("calibrated", "accepted")
+FIELD_NUMBERS: tuple[FieldNumber, ...] = get_args(FieldNumber)
+NUMBERS_BESIDE_RIDGE: tuple[FieldNumber, ...] = ("length_m", "width_m")
+# Numbers of a field that revisions have changed: `NumberChange` by name, with the number of the revision.
+Changes = Sequence[tuple[int, dict[str, dict[str, float]]]]
 
 
 class NoSuchRevision(Exception):  # noqa: N818
@@ -38,33 +47,39 @@ class RevisionUnfit(Exception):  # noqa: N818
 
 def add_revision(
     connection: sa.Connection,
+    quality: VenueQuality,
     venue: Venue,
     cause: Cause,
     job: str | None = None,
     restored: Revision | None = None,
     stitch_error_px: float | None = None,
+    by: Actor | None = None,
+    field_before: FieldOfPlay | None = None,
 ) -> int:
     """Write down the state that a venue has now, inside the caller's serialised transaction.
 
-    Gives the number of the revision.
+    `field_before`: of a revision that changes numbers of the field, the field without that change; undoing the revision
+    gives them back. Gives the number of the revision.
     """
-    before, at = _newest_row(connection, venue.id), clock(connection)
+    before, at = _newest_row_by(connection, quality), quality.now
     number = 1 if before is None else before.number + 1
     movements = _movements(connection, venue, number, before, cause, restored)
-    connection.execute(
-        sa.insert(tables.revisions).values(
-            venue=venue.id,
-            number=number,
-            at=at,
-            cause=cause,
-            job=job,
-            restored_from=None if restored is None else restored.revision,
-            stitch_error_px=stitch_error_px,
-            cameras=[camera.posed.model_dump(mode="json") for camera in venue.cameras],
-            ridge=venue.field.ridge,
-            movements={camera: movement.model_dump() for camera, movement in movements.items()},
-        )
-    )
+    row = {
+        "venue": venue.id,
+        "number": number,
+        "at": at,
+        "cause": cause,
+        "job": job,
+        "restored_from": None if restored is None else restored.revision,
+        "stitch_error_px": stitch_error_px,
+        "cameras": [to_document(camera.posed) for camera in venue.cameras],
+        "ridge": venue.field.ridge,
+        "field_numbers": _number_changes(field_before or venue.field, venue.field) or None,
+        "movements": {camera: movement.model_dump() for camera, movement in movements.items()},
+        **columns_of(by),
+    }
+    connection.execute(sa.insert(tables.revisions).values(**row))
+    quality.newest_revision = SimpleNamespace(**row)
     changed = _changed(venue, _cameras(before))
     if restored is not None:
         go_back(connection, venue, restored.revision)
@@ -80,15 +95,21 @@ def add_revision(
         cameras=[camera.posed for camera in venue.cameras],
         changed=changed,
     )
-    add_event(connection, venue.id, venue.webhooks, "poses.changed", poses, at)
+    add_event(connection, venue.id, venue.webhooks, "poses.changed", poses, at, by)
     drifts = [movement.drift.pixels for movement in movements.values() if movement.drift]
-    note(connection, venue.id, drift_px=max((drift for drift in drifts if drift is not None), default=None))
+    quality.row.drift_px = max((drift for drift in drifts if drift is not None), default=None)
     return number
 
 
 def newest_revision(connection: sa.Connection, venue_id: str) -> Revision | None:
     """The one that holds, inside the caller's transaction."""
     row = _newest_row(connection, venue_id)
+    return None if row is None else _revision(row)
+
+
+def newest_known(connection: sa.Connection, quality: VenueQuality) -> Revision | None:
+    """The one that holds, read once in a transaction."""
+    row = _newest_row_by(connection, quality)
     return None if row is None else _revision(row)
 
 
@@ -109,7 +130,7 @@ def revisions_of(connection: sa.Connection, venue_id: str, before: int | None, l
 
 def revision_of_job(connection: sa.Connection, job_id: str) -> int | None:
     """The number of the revision that a job's poses became last."""
-    query = sa.select(sa.func.max(r.number)).where(r.job == job_id, r.cause.in_(TAKEN))
+    query = sa.select(sa.func.max(r.number)).where(r.job == job_id, r.cause.in_(CALIBRATION_CAUSES))
     number: int | None = connection.scalar(query)
     return number
 
@@ -119,13 +140,13 @@ def revisions_of_jobs(connection: sa.Connection, job_ids: Collection[str]) -> di
     if not job_ids:
         return {}
     newest = sa.func.max(r.number).label("newest")
-    query = sa.select(r.job, newest).where(r.job.in_(job_ids), r.cause.in_(TAKEN)).group_by(r.job)
+    query = sa.select(r.job, newest).where(r.job.in_(job_ids), r.cause.in_(CALIBRATION_CAUSES)).group_by(r.job)
     return {row.job: row.newest for row in connection.execute(query)}
 
 
 def revision_before(connection: sa.Connection, venue_id: str, job_id: str) -> int:
     """The number of the last revision that is not a job's, or that gave its poses back."""
-    of_job = sa.and_(sa.func.coalesce(r.job, "") == job_id, r.cause.in_(TAKEN))
+    of_job = sa.and_(sa.func.coalesce(r.job, "") == job_id, r.cause.in_(CALIBRATION_CAUSES))
     number: int = connection.execute(
         sa.select(sa.func.max(r.number)).where(r.venue == venue_id, sa.not_(of_job))
     ).scalar_one()
@@ -137,29 +158,75 @@ def state_at(connection: sa.Connection, venue: Venue, number: int) -> tuple[Venu
     row = connection.execute(sa.select(tables.revisions).where(r.venue == venue.id, r.number == number)).one_or_none()
     if row is None:
         raise NoSuchRevision
-    cameras = [PosedCamera.model_validate(camera) for camera in row.cameras]
+    return _state_of(venue, row, _changes_of_numbers(connection, venue.id)), _revision(row)
+
+
+def revisions_that_fit(connection: sa.Connection, venue: Venue, numbers: Collection[int]) -> set[int]:
+    """Those of a venue's revisions that it can be put back to."""
+    rows = connection.execute(sa.select(tables.revisions).where(r.venue == venue.id, r.number.in_(numbers)))
+    changes = _changes_of_numbers(connection, venue.id)
+    return {row.number for row in rows if _fits(venue, row, changes)}
+
+
+def _fits(venue: Venue, row: Any, changes: Changes) -> bool:
+    try:
+        _state_of(venue, row, changes)
+    except RevisionUnfit:
+        return False
+    return True
+
+
+def _state_of(venue: Venue, row: Any, changes: Changes) -> Venue:
+    cameras = [PosedCamera.model_validate(camera, **TOLERANTLY) for camera in row.cameras]
     then, now = ({camera.id: camera.image_size for camera in some} for some in (cameras, venue.cameras))
     if then != now:
         raise RevisionUnfit(f"It has the cameras {_in_words(then)}, and the venue now has {_in_words(now)}.")
     try:
-        return _with_state(venue, cameras, row.ridge), _revision(row)
+        return _with_state(venue, cameras, row.ridge, _numbers_at(venue.field, row.number, changes))
     except ValueError:
         raise RevisionUnfit("Its ridge is none of the pitch that the venue now has.") from None
 
 
-def _with_state(venue: Venue, cameras: list[PosedCamera], ridge: list[list[float]] | None) -> Venue:
-    """The same venue with the poses and lenses of another time, and the ridge that they belong to."""
+def _number_changes(before: FieldOfPlay, after: FieldOfPlay) -> dict[str, dict[str, float]]:
+    """The numbers of a field that differ from those before, as `schemas.history.NumberChange` by name."""
+    numbers = {name: {"before": before.number(name), "after": after.number(name)} for name in FIELD_NUMBERS}
+    return {name: number for name, number in numbers.items() if number["before"] != number["after"]}
+
+
+def _changes_of_numbers(connection: sa.Connection, venue_id: str) -> Changes:
+    """The changes of numbers of the field that came with revisions, each with its revision, oldest first."""
+    query = sa.select(r.number, r.field_numbers).where(r.venue == venue_id, r.field_numbers.is_not(None))
+    return [(row.number, row.field_numbers) for row in connection.execute(query.order_by(r.number))]
+
+
+def _numbers_at(field: FieldOfPlay, revision: int, changes: Changes) -> dict[str, float]:
+    """What length and width were at a revision, of those that revisions have changed since.
+
+    One that somebody has put since is as that person says, at any time. The ridge is kept with every revision.
+    """
+    numbers: dict[str, float] = {}
+    for name in NUMBERS_BESIDE_RIDGE:
+        since = [change[name] for number, change in changes if number > revision and name in change]
+        if since and field.number(name) == since[-1]["after"]:
+            numbers[name] = since[0]["before"]
+    return numbers
+
+
+def _with_state(
+    venue: Venue, cameras: list[PosedCamera], ridge: list[list[float]] | None, numbers: dict[str, float]
+) -> Venue:
+    """The same venue with the poses and lenses of another time, and the ridge and numbers that they belong to."""
     then = {camera.id: camera for camera in cameras}
     back = [
         camera.model_copy(
             update={
                 "pose": then[camera.id].pose,
-                "intrinsics": then[camera.id].intrinsics.as_known_by(camera.intrinsics),
+                "intrinsics": then[camera.id].intrinsics.with_sigma_of(camera.intrinsics),
             }
         )
         for camera in venue.cameras
     ]
-    field = FieldOfPlay.model_validate(venue.field.model_dump() | {"ridge": ridge})
+    field = FieldOfPlay.model_validate(venue.field.model_dump() | numbers | {"ridge": ridge})
     return venue.model_copy(update={"cameras": back, "field": field})
 
 
@@ -172,7 +239,7 @@ def _movements(
         since = {camera.id: camera.drift_since for camera in restored.cameras}
     for camera in venue.cameras:
         previous = last.get(camera.id)
-        replaced = previous is None or previous.standing != camera.posed.standing
+        replaced = previous is None or previous.pose_and_lens != camera.posed.pose_and_lens
         if camera.id not in since or (cause == "put" and replaced):
             since[camera.id] = number
     firsts = {first: _cameras_at(connection, venue.id, first) for first in set(since.values()) - {number}}
@@ -187,7 +254,7 @@ def _changed(venue: Venue, before: dict[str, PosedCamera]) -> list[str]:
     return [
         camera.id
         for camera in venue.cameras
-        if camera.id not in before or before[camera.id].standing != camera.posed.standing
+        if camera.id not in before or before[camera.id].pose_and_lens != camera.posed.pose_and_lens
     ]
 
 
@@ -203,6 +270,12 @@ def _movement(
     return Movement(moved=from_there(last), drift=from_there(firsts.get(camera.id, camera)), drift_since=since)
 
 
+def _newest_row_by(connection: sa.Connection, quality: VenueQuality) -> Any:
+    if quality.newest_revision is None:
+        quality.newest_revision = _newest_row(connection, quality.venue_id)
+    return quality.newest_revision
+
+
 def _newest_row(connection: sa.Connection, venue_id: str) -> Any:
     query = sa.select(tables.revisions).where(r.venue == venue_id).order_by(r.number.desc()).limit(1)
     return connection.execute(query).one_or_none()
@@ -216,23 +289,19 @@ def _cameras_at(connection: sa.Connection, venue_id: str, number: int) -> dict[s
 def _cameras(row: Any) -> dict[str, PosedCamera]:
     if row is None:
         return {}
-    return {camera["id"]: PosedCamera.model_validate(camera) for camera in row.cameras}
+    return {camera["id"]: PosedCamera.model_validate(camera, **TOLERANTLY) for camera in row.cameras}
 
 
 def _revision(row: Any) -> Revision:
-    return Revision(
-        revision=row.number,
-        at=row.at,
-        cause=row.cause,
-        job=row.job,
-        restored_from=row.restored_from,
-        stitch_error_px=row.stitch_error_px,
-        ridge=row.ridge,
-        cameras=[
-            RevisionCamera.model_validate({"id": camera["id"], "pose": camera["pose"], **row.movements[camera["id"]]})
-            for camera in row.cameras
-        ],
-    )
+    names = ("at", "cause", "job", "restored_from", "stitch_error_px", "ridge")
+    cameras = [{"id": camera["id"], "pose": camera["pose"], **row.movements[camera["id"]]} for camera in row.cameras]
+    values = {
+        "revision": row.number,
+        "cameras": cameras,
+        "by": actor_in(row),
+        "field_numbers": row.field_numbers or {},
+    }
+    return Revision.model_validate(values | {name: getattr(row, name) for name in names}, **TOLERANTLY)
 
 
 def _in_words(sizes: dict[str, list[int]]) -> str:

@@ -7,14 +7,14 @@ from datetime import UTC, datetime, timedelta
 
 import sqlalchemy as sa
 
-from service.store.engine import Repository, reading, writing
-from service.store.keys import Key, hash_of
+from service.store.database import Repository, reading, writing
+from service.store.keys import Key, hash_of, key_in
 from service.store.tables import api_keys, sessions
 
 s = sessions.c
 
 
-class Sessions(Repository):
+class SessionRepository(Repository):
     """The sessions in the database."""
 
     def begin(self, key: Key, lasts: timedelta) -> str:
@@ -35,7 +35,7 @@ class Sessions(Repository):
         )
         with reading(self._engine) as connection:
             row = connection.execute(query).one_or_none()
-        return None if row is None else Key(**row._mapping)
+        return None if row is None else key_in(row)
 
     def end(self, hash_: str) -> None:
         """Forget a session."""

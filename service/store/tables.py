@@ -25,8 +25,9 @@ venues = sa.Table(
     "venues",
     metadata,
     sa.Column("id", sa.String(64), primary_key=True),
-    # wire.venue.Venue, with the poses that hold now.
+    # schemas.venue.Venue, with the poses that hold now; both columns are told of in documents.py.
     sa.Column("document", sa.JSON, nullable=False),
+    sa.Column("additions", sa.JSON(none_as_null=True)),
     sa.Column("updated_at", Instant, nullable=False),
 )
 
@@ -39,17 +40,23 @@ revisions = sa.Table(
     # Counts from 1 in each venue.
     sa.Column("number", sa.Integer, nullable=False),
     sa.Column("at", Instant, nullable=False),
-    # wire.history.Cause.
+    # schemas.history.Cause.
     sa.Column("cause", sa.String(16), nullable=False),
     # Whose poses they are, or, of what was put back, whose were rejected by hand.
     sa.Column("job", sa.String(26)),
     sa.Column("restored_from", sa.Integer),
     sa.Column("stitch_error_px", sa.Double),
-    # wire.geometry.PosedCamera of each, and the ridge that their poses belong to.
+    # schemas.geometry.PosedCamera of each, and the ridge that their poses belong to.
     sa.Column("cameras", sa.JSON, nullable=False),
     sa.Column("ridge", sa.JSON, nullable=False),
-    # wire.geometry.Movement by camera.
+    # schemas.history.NumberChange by the name of a number of the field that was adopted or put back; null: none was.
+    sa.Column("field_numbers", sa.JSON(none_as_null=True)),
+    # schemas.geometry.Movement by camera.
     sa.Column("movements", sa.JSON, nullable=False),
+    # Who made it, see actors.py; null: the service by itself, or before 0.2.0.
+    sa.Column("asked_by", sa.String(80)),
+    sa.Column("address", sa.String(64)),
+    sa.Column("request_id", sa.String(64)),
     sa.Index("revisions_by_venue", "venue", "number", unique=True),
     sa.Index("revisions_by_job", "job"),
     sa.Index("revisions_by_time", "cause", "at"),
@@ -73,28 +80,30 @@ jobs = sa.Table(
     "jobs",
     metadata,
     sa.Column("id", sa.String(26), primary_key=True),
-    # wire.job.Kind.
+    # schemas.job.Kind.
     sa.Column("kind", sa.String(16), nullable=False, server_default="calibration"),
     # Null: the photos of a lens belong to no venue.
     sa.Column("venue", sa.String(64)),
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("priority", sa.Integer, nullable=False),
-    # What was asked: wire.options.Options or FieldOptions (the seed filled in), IntrinsicsOptions or LocateOptions.
+    # What was asked: schemas.options.Options or FieldOptions (the seed filled in), IntrinsicsOptions or LocateOptions.
     sa.Column("options", sa.JSON, nullable=False),
     # Of the frames and options as they were sent: the same content is the same job.
     sa.Column("content_hash", sa.String(64), nullable=False),
     sa.Column("idempotency_key", sa.String(255)),
     # The venue as it was when the frames were checked against it; JSON's null where there is none.
     sa.Column("venue_document", sa.JSON, nullable=False),
+    sa.Column("venue_additions", sa.JSON(none_as_null=True)),
     # Camera id (of photos: their names) to the paths of its frames in the blob store.
     sa.Column("frames", sa.JSON, nullable=False),
     sa.Column("attempt", sa.Integer, nullable=False, default=0),
-    # Of the attempt that may write: a worker that lost its job finds another token here and stops.
+    # Fencing token of the attempt that may write: a worker that lost its job finds another token here and stops.
     sa.Column("run_token", sa.String(32)),
     # Counts every change of the row, so that waiters need to read nothing else.
     sa.Column("revision", sa.Integer, nullable=False, default=1),
     sa.Column("progress", sa.JSON(none_as_null=True)),
     sa.Column("result", sa.JSON(none_as_null=True)),
+    sa.Column("result_additions", sa.JSON(none_as_null=True)),
     # Names of the pictures that were made: not every pose can be drawn.
     sa.Column("pictures", sa.JSON(none_as_null=True)),
     sa.Column("error", sa.JSON(none_as_null=True)),
@@ -105,8 +114,10 @@ jobs = sa.Table(
     # From then on the row answers for none of its files, whether or not the store is rid of them.
     sa.Column("frames_deleted_at", Instant),
     sa.Column("pictures_deleted_at", Instant),
-    # wire.job.Job's.
+    # schemas.job.Job's.
     sa.Column("asked_by", sa.String(80)),
+    # The client's; null: there was none, or it came before 0.2.0.
+    sa.Column("address", sa.String(64)),
     # The request that it came with, as its log and its trace call it.
     sa.Column("request_id", sa.String(64)),
     sa.Column("traceparent", sa.String(55)),
@@ -159,12 +170,16 @@ events = sa.Table(
     # Never given twice, also after the last one was deleted: clients go on from it.
     sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True),
     sa.Column("venue", sa.String(64), nullable=False),
-    # Of wire.told.events.Event.
+    # Of schemas.events.venue_event.Event.
     sa.Column("type", sa.String(32), nullable=False),
     sa.Column("at", Instant, nullable=False),
-    # Its data; of a job, which is read when it is told, null.
+    # Its data; of a job that ended, which is read when it is told, null.
     sa.Column("data", sa.JSON(none_as_null=True)),
     sa.Column("job", sa.String(26)),
+    # Who made it, see actors.py; null: the service by itself, or before 0.2.0.
+    sa.Column("asked_by", sa.String(80)),
+    sa.Column("address", sa.String(64)),
+    sa.Column("request_id", sa.String(64)),
     sa.Index("events_by_venue", "venue", "id"),
     sqlite_autoincrement=True,
 )
@@ -190,7 +205,7 @@ deliveries = sa.Table(
     sa.Index("deliveries_by_due", "status", "due_at"),
 )
 
-# Counts that outlive processes, see tallies.py.
+# Counts that outlive processes, see statistics/counters.py.
 tallies = sa.Table(
     "tallies",
     metadata,
@@ -200,7 +215,7 @@ tallies = sa.Table(
     sa.Column("value", sa.Double, nullable=False),
 )
 
-# What the last result of each venue said, see figures.VenueQuality.
+# What the last result of each venue said, see statistics/venue_quality.py.
 venue_quality = sa.Table(
     "venue_quality",
     metadata,
@@ -213,9 +228,9 @@ venue_quality = sa.Table(
     sa.Column("drift_px", sa.Double),
     # Calibrations since then that brought no pose for any camera; dry runs do not count.
     sa.Column("rejected_in_a_row", sa.Integer, nullable=False, server_default="0"),
-    # counts.courses.Course by camera.
+    # statistics.camera_history.CameraHistory by camera.
     sa.Column("cameras", sa.JSON(none_as_null=True)),
-    # counts.glances.Glance; null: it was never calibrated.
+    # statistics.venue_summary.CalibrationSummary; null: it was never calibrated.
     sa.Column("glance", sa.JSON(none_as_null=True)),
     # When an alarm rings if nothing happens before.
     sa.Column("alarm_due_at", Instant),
@@ -232,13 +247,13 @@ camera_anchors = sa.Table(
     sa.Column("camera", sa.String(64), primary_key=True),
     # Of the venue, in which that happened.
     sa.Column("revision", sa.Integer, primary_key=True, autoincrement=False),
-    # When the first pose was accepted since then, and wire.geometry.PosedCamera as it then was; null: none was yet.
+    # When the first pose was accepted since then, and schemas.geometry.PosedCamera as it then was; null: none was yet.
     sa.Column("at", Instant),
     sa.Column("posed", sa.JSON(none_as_null=True)),
     # By quantity: control_charts.Baseline, once it is settled.
     sa.Column("baselines", sa.JSON, nullable=False),
-    # What the charts said after the last night, see wire.trend.Trend: whether a mean has moved, by how much at the far
-    # touchline (null: of an anchor that counts no more, too), the largest cumulative sum, and all of it in words.
+    # What the charts said after the last night, see schemas.trend.Trend: whether a mean has moved, by how much at the
+    # far touchline (null: of an anchor that counts no more, too), the largest cumulative sum, and all of it in words.
     sa.Column("beyond", sa.Boolean, nullable=False),
     sa.Column("moved_m", sa.Double),
     sa.Column("cusum", sa.Double),
@@ -246,7 +261,7 @@ camera_anchors = sa.Table(
     sa.Index("camera_anchors_by_move", "moved_m"),
 )
 
-# How far each accepted job found each camera from its anchor: wire.trend.Displacement, and the sigma of the pose.
+# How far each accepted job found each camera from its anchor: schemas.trend.Displacement, and the sigma of the pose.
 camera_trend = sa.Table(
     "camera_trend",
     metadata,
@@ -279,7 +294,7 @@ alarms = sa.Table(
     "alarms",
     metadata,
     sa.Column("venue", sa.String(64), primary_key=True),
-    # wire.health.AlarmRule.
+    # schemas.health.AlarmRule.
     sa.Column("rule", sa.String(32), primary_key=True),
     # Empty: of the whole venue.
     sa.Column("camera", sa.String(64), primary_key=True),
@@ -302,6 +317,11 @@ schedules = sa.Table(
     sa.Column("last_at", Instant),
     sa.Column("last_job", sa.String(26)),
     sa.Column("last_error", sa.String(500)),
+    # While a worker is at it: until when nobody else is. Null: nobody is.
+    sa.Column("claimed_until", Instant),
+    # Fetches in a row without a frame, and whether the last one with frames took long: see schedules.py, lanes.
+    sa.Column("failures", sa.Integer, nullable=False, server_default="0"),
+    sa.Column("slow", sa.Boolean, nullable=False, server_default=sa.false()),
     sa.Index("schedules_by_look", "look_at"),
 )
 
@@ -321,8 +341,16 @@ workers = sa.Table(
     sa.Column("name", sa.String(255), primary_key=True),
     # Of the model file the worker computes with; null: the file is missing.
     sa.Column("model_sha256", sa.String(64)),
+    # Of the program; null: 0.1.0, which does not say.
+    sa.Column("version", sa.String(64)),
+    # Jobs that wait and that it cannot read, because a newer version wrote them.
+    sa.Column("unreadable_jobs", sa.Integer),
     sa.Column("started_at", Instant, nullable=False),
     sa.Column("seen_at", Instant, nullable=False),
+    # One for each start, by which two workers of one name are told apart; null: of a release that had none.
+    sa.Column("token", sa.String(32)),
+    # The folder and the start of the machine where only one worker of a name can run, hashed; null: it has ended.
+    sa.Column("place", sa.String(64)),
 )
 
 api_keys = sa.Table(
@@ -331,13 +359,15 @@ api_keys = sa.Table(
     sa.Column("name", sa.String(64), primary_key=True),
     # SHA-256 of the key, which itself is nowhere.
     sa.Column("hash", sa.String(64), nullable=False),
-    # wire.base.Scope.
+    # schemas.base.Scope.
     sa.Column("scope", sa.String(16), nullable=False),
     sa.Column("created_at", Instant, nullable=False),
     # Null: never.
     sa.Column("expires_at", Instant),
     # To the minute; null: not yet.
     sa.Column("last_used_at", Instant),
+    # The ids of the venues that it is for; null: all.
+    sa.Column("venues", sa.JSON(none_as_null=True)),
     sa.Index("api_keys_by_hash", "hash", unique=True),
 )
 

@@ -22,7 +22,7 @@ from service.control_charts import (
     Night,
     charted,
 )
-from service.wire.trend import Chart, Quantity, Trend, TrendPoint, TrendState
+from service.schemas.trend import Chart, Quantity, Trend, TrendPoint, TrendState
 
 ALARM_M = 0.05
 """At the far touchline: what a shift amounts to that is an alarm, where the venue says nothing else."""

@@ -14,13 +14,15 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.control_charts import Baseline
+from service.schemas.base import TOLERANTLY
+from service.schemas.geometry import PosedCamera
+from service.schemas.results import CameraResult
+from service.schemas.trend import Anchor, Displacement, Trend, TrendState
+from service.schemas.venue import Venue
 from service.store import tables
-from service.store.engine import Repository, clock, reading
+from service.store.database import Repository, clock, reading
+from service.store.documents import to_document
 from service.store.trend_charts import ALARM_M, CameraCharts, state_of
-from service.wire.geometry import PosedCamera
-from service.wire.results import CameraResult
-from service.wire.trend import Anchor, Displacement, Trend, TrendState
-from service.wire.venue import Venue
 
 KEPT_ROWS = 1100
 """Of each camera: three years of nights."""
@@ -44,7 +46,7 @@ class CameraTrend:
         return state_of(beyond=self.beyond, moved_m=self.moved_m or 0.0, alarm_m=alarm_m)
 
 
-class Trends(Repository):
+class TrendRepository(Repository):
     """The trends of the cameras in the database."""
 
     def of(self, venue: Venue, camera: str, since: datetime | None = None) -> Trend:
@@ -65,7 +67,7 @@ def anchors_of(connection: sa.Connection, venue_id: str) -> dict[str, Anchor]:
     """What to compare cameras with, by camera, of those that have had a pose accepted since they were put."""
     newest = _newest_anchors(connection, venue_id)
     return {
-        camera: Anchor(revision=row.revision, posed=PosedCamera.model_validate(row.posed))
+        camera: Anchor(revision=row.revision, posed=PosedCamera.model_validate(row.posed, **TOLERANTLY))
         for camera, row in newest.items()
         if row.posed is not None
     }
@@ -107,7 +109,8 @@ def go_back(connection: sa.Connection, venue: Venue, revision: int) -> None:
     """A revision of a venue holds again: what came after it is forgotten, and the trends are those of that time."""
     connection.execute(sa.delete(tables.camera_anchors).where(c.venue == venue.id, c.revision > revision))
     connection.execute(sa.delete(tables.camera_trend).where(t.venue == venue.id, t.revision > revision))
-    _chart(connection, venue.id, [camera.id for camera in venue.cameras])
+    cameras = [camera.id for camera in venue.cameras]
+    _chart(connection, venue.id, cameras, _newest_anchors(connection, venue.id))
 
 
 def note_night(
@@ -126,12 +129,14 @@ def note_night(
     """
     posed = {camera.id: camera.posed for camera in venue.cameras}
     anchors, at = _newest_anchors(connection, venue.id), clock(connection)
+    is_another = False
     for result in results:
         moved, anchor = result.displacement, anchors.get(result.id)
         anew = by_hand and anchor is not None and anchor.revision != revision
         if moved is None:
             if anew:
                 _add_anchor(connection, venue.id, result.id, revision)
+                is_another = True
             continue
         if anew:
             # What is longer than the anchor before says nothing beside the lens that holds now.
@@ -142,13 +147,15 @@ def note_night(
         else:
             number, is_new = anchor.revision, anchor.posed is None
         if is_new:
+            is_another = True
             moved = moved.as_anchor()
             _set_anchor(connection, venue.id, posed[result.id], number, at)
         elif moved.anchor != number:
             # It was compared with another one than the camera now has.
             continue
         _add_row(connection, venue.id, result, moved, number, revision, job_id, at)
-    _chart(connection, venue.id, [result.id for result in results])
+    anchors = _newest_anchors(connection, venue.id) if is_another else anchors
+    _chart(connection, venue.id, [result.id for result in results], anchors)
 
 
 def _add_anchor(connection: sa.Connection, venue_id: str, camera: str, revision: int) -> None:
@@ -172,7 +179,7 @@ def _nothing_said(camera: str) -> dict[str, Any]:
 
 
 def _set_anchor(connection: sa.Connection, venue_id: str, camera: PosedCamera, revision: int, at: datetime) -> None:
-    posed = {"at": at, "posed": camera.model_dump(mode="json")}
+    posed = {"at": at, "posed": to_document(camera)}
     connection.execute(sa.update(tables.camera_anchors).where(*_is(venue_id, camera.id, revision)).values(**posed))
 
 
@@ -205,9 +212,10 @@ def _add_row(
     )
 
 
-def _chart(connection: sa.Connection, venue_id: str, cameras: Collection[str]) -> None:
-    """Write down what the charts of cameras say now, and forget the rows that are too many."""
-    anchors = _newest_anchors(connection, venue_id)
+def _chart(
+    connection: sa.Connection, venue_id: str, cameras: Collection[str], anchors: Mapping[str, sa.Row[Any]]
+) -> None:
+    """Write down what the charts of cameras say now, by their `anchors`, and forget the rows that are too many."""
     for camera in anchors.keys() & cameras:
         anchor, rows = anchors[camera], _rows(connection, venue_id, camera)
         _trim(connection, rows)

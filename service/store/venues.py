@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Literal
 
 import sqlalchemy as sa
 
+from service.schemas.actor import Actor
+from service.schemas.addresses import HIDDEN
+from service.schemas.health import VenueHealth
+from service.schemas.history import Cause, Revision
+from service.schemas.names import OPEN_STATUSES
+from service.schemas.results import Result
+from service.schemas.source_urls import SourceSecrets, secrets_of
+from service.schemas.venue import Venue
 from service.store import tables
-from service.store.alarms import health_of, settle_alarms
-from service.store.counts.courses import note_held
-from service.store.counts.figures import note
-from service.store.engine import Repository, clock, reading, serialise, writing
+from service.store.alarms import health_of, update_alarms
+from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.documents import stored_venue, venue_columns, with_unknown_fields_of
+from service.store.events.event_log import add_venue_event
 from service.store.memories import (
     Memories,
     forget_memories,
@@ -19,16 +30,12 @@ from service.store.memories import (
     newest_memories,
     without_those_that_changed,
 )
-from service.store.revisions import add_revision, revisions_of, state_at
-from service.store.schedules import plan
-from service.store.told.events import add_venue_event
+from service.store.revisions import add_revision, revisions_of, revisions_that_fit, state_at
+from service.store.schedules import plan_schedule
+from service.store.statistics.venue_quality import VenueQuality, update_quality
 from service.store.trends import forget_trends, note_night
-from service.wire.health import VenueHealth
-from service.wire.history import Cause, Revision
-from service.wire.names import OPEN
-from service.wire.results import Result
-from service.wire.venue import Venue
 
+v = tables.venues.c
 # What goes with a venue.
 OF_VENUES = (
     tables.revisions,
@@ -42,7 +49,15 @@ OF_VENUES = (
 )
 
 
-class Venues(Repository):
+@dataclass(frozen=True)
+class StoredVenue:
+    """A venue, and its document as it was read, with what other versions have written into it."""
+
+    venue: Venue
+    document: dict[str, Any]
+
+
+class VenueRepository(Repository):
     """The venues in the database."""
 
     def get(self, venue_id: str) -> Venue | None:
@@ -50,19 +65,39 @@ class Venues(Repository):
         with reading(self._engine) as connection:
             return find_venue(connection, venue_id)
 
-    def page(self, after: str | None, limit: int) -> list[Venue]:
-        """Up to `limit` venues by id, those after `after`."""
-        query = sa.select(tables.venues.c.document).order_by(tables.venues.c.id).limit(limit)
+    def page(
+        self,
+        after: str | None,
+        limit: int,
+        only: Collection[str] | None = None,
+        q: str | None = None,
+        state: Literal["ok", "alarm"] | None = None,
+    ) -> list[Venue]:
+        """Up to `limit` venues by id, those after `after`; of `only` these, None: of all.
+
+        `q`: those whose id or name contains it; large letters are small ones (on SQLite those of ASCII). `state`: those
+        of which an alarm rings, or none does.
+        """
+        query = sa.select(v.document, v.additions).order_by(v.id).limit(limit)
         if after is not None:
-            query = query.where(tables.venues.c.id > after)
+            query = query.where(v.id > after)
+        if only is not None:
+            query = query.where(v.id.in_(only))
+        if q is not None:
+            name = v.document["name"].as_string()
+            query = query.where(sa.or_(v.id.icontains(q, autoescape=True), name.icontains(q, autoescape=True)))
+        if state is not None:
+            rings = sa.exists().where(tables.alarms.c.venue == v.id)
+            query = query.where(rings if state == "alarm" else sa.not_(rings))
         with reading(self._engine) as connection:
-            return [Venue.model_validate(document) for document in connection.scalars(query)]
+            return [stored_venue(row.document, row.additions) for row in connection.execute(query)]
 
     def put(
         self,
         venue: Venue,
         allow: Callable[[Venue | None], None],
         credentials: Callable[[Venue | None, dict[str, str]], dict[str, str]] = lambda _, __: {},
+        by: Actor | None = None,
     ) -> bool:
         """Store a venue unless `allow` raises at the sight of what is there; says whether it is new.
 
@@ -73,51 +108,65 @@ class Venues(Repository):
             allow(before)
             return venue, credentials(before, known)
 
-        return self.change(venue.id, put)[1]
+        return self.change(venue.id, put, by)[1]
 
     def change(
-        self, venue_id: str, change: Callable[[Venue | None, dict[str, str]], tuple[Venue, dict[str, str]]]
+        self,
+        venue_id: str,
+        change: Callable[[Venue | None, dict[str, str]], tuple[Venue, dict[str, str]]],
+        by: Actor | None = None,
     ) -> tuple[Venue, bool]:
         """Store what `change` makes of a venue and of the credentials of its sources, unless it raises at the sight.
 
         Gives the venue, and says whether it is new.
         """
         with writing(self._engine) as connection:
-            serialise(connection, venue_lock(venue_id))
-            before = find_venue(connection, venue_id)
+            advisory_lock(connection, venue_lock(venue_id))
+            stored = find_stored(connection, venue_id)
+            before = None if stored is None else stored.venue
             venue, credentials = change(before, _credentials(connection, venue_id))
             _keep(connection, venue_id, credentials)
-            save_venue(connection, venue)
+            save_venue(connection, venue, clock(connection), stored)
             if before is None:
-                add_venue_event(connection, venue, "venue.created", [])
-            elif changed := venue.differs_in(before):
-                add_venue_event(connection, venue, "venue.changed", changed)
-            _note_put(connection, before, venue)
-            settle_alarms(connection, venue)
-            plan(connection, venue)
+                add_venue_event(connection, venue, "venue.created", [], by)
+            elif changed := venue.changed_parts(before):
+                add_venue_event(connection, venue, "venue.changed", changed, by)
+            with update_quality(connection, venue_id) as quality:
+                _note_put(connection, quality, before, venue, by)
+                update_alarms(connection, quality, venue)
+            plan_schedule(connection, venue)
             return venue, before is None
 
-    def restore(self, venue_id: str, number: int, allow: Callable[[Venue | None], None]) -> Venue:
+    def restore(
+        self, venue_id: str, number: int, allow: Callable[[Venue | None], None], by: Actor | None = None
+    ) -> Venue:
         """Let a revision hold again unless `allow` raises at the sight of the venue.
 
         Raises `NoSuchRevision` and `RevisionUnfit`. Nothing is written if it holds anyway.
         """
         with writing(self._engine) as connection:
-            serialise(connection, venue_lock(venue_id))
-            before = find_venue(connection, venue_id)
-            allow(before)
+            advisory_lock(connection, venue_lock(venue_id))
+            before = find_stored(connection, venue_id)
+            allow(None if before is None else before.venue)
             assert before is not None
-            restored = put_back(connection, before, number)
-            settle_alarms(connection, restored)
+            with update_quality(connection, venue_id) as quality:
+                restored = restore_state(connection, quality, before, number, by)
+                update_alarms(connection, quality, restored)
             return restored
 
-    def settle_alarms(self, venue_id: str) -> None:
-        """Let the alarms of a venue begin and end that go by the time."""
+    def restorable(self, venue: Venue, numbers: Collection[int]) -> set[int]:
+        """Return the revisions of a venue that `restore` would not refuse: of these cameras and this pitch."""
+        with reading(self._engine) as connection:
+            return revisions_that_fit(connection, venue, numbers)
+
+    def update_alarms(self, venue_id: str) -> None:
+        """Begin and end the alarms of a venue that go by the time."""
         with writing(self._engine) as connection:
-            serialise(connection, venue_lock(venue_id))
+            advisory_lock(connection, venue_lock(venue_id))
             venue = find_venue(connection, venue_id)
             if venue is not None:
-                settle_alarms(connection, venue)
+                with update_quality(connection, venue_id) as quality:
+                    update_alarms(connection, quality, venue)
 
     def with_alarms_due(self, limit: int) -> list[str]:
         """Up to `limit` venues of which a time has passed that an alarm goes by."""
@@ -131,16 +180,16 @@ class Venues(Repository):
         with reading(self._engine) as connection:
             return health_of(connection, venue_id)
 
-    def delete(self, venue_id: str, allow: Callable[[Venue | None, str | None], None]) -> None:
+    def delete(self, venue_id: str, allow: Callable[[Venue | None, str | None], None], by: Actor | None = None) -> None:
         """Forget a venue and its poses unless `allow` raises at the sight of it or of its active job."""
         with writing(self._engine) as connection:
-            serialise(connection, venue_lock(venue_id))
+            advisory_lock(connection, venue_lock(venue_id))
             j = tables.jobs.c
-            active = connection.scalar(sa.select(j.id).where(j.venue == venue_id, j.status.in_(OPEN)))
+            active = connection.scalar(sa.select(j.id).where(j.venue == venue_id, j.status.in_(OPEN_STATUSES)))
             venue = find_venue(connection, venue_id)
             allow(venue, active)
             if venue is not None:
-                add_venue_event(connection, venue, "venue.deleted", [])
+                add_venue_event(connection, venue, "venue.deleted", [], by)
             for table in OF_VENUES:
                 connection.execute(sa.delete(table).where(table.c.venue == venue_id))
             connection.execute(sa.delete(tables.venues).where(tables.venues.c.id == venue_id))
@@ -166,20 +215,30 @@ def venue_lock(venue_id: str) -> str:
 
 def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:
     """One venue, inside the caller's transaction."""
-    document = connection.scalar(sa.select(tables.venues.c.document).where(tables.venues.c.id == venue_id))
-    return None if document is None else Venue.model_validate(document)
+    stored = find_stored(connection, venue_id)
+    return None if stored is None else stored.venue
 
 
-def save_venue(connection: sa.Connection, venue: Venue) -> None:
-    """Create or replace a venue, inside the caller's serialised transaction."""
-    values = {"document": venue.model_dump(mode="json"), "updated_at": clock(connection)}
-    table = tables.venues
-    replaced = connection.execute(sa.update(table).where(table.c.id == venue.id).values(**values))
-    if replaced.rowcount == 0:
-        connection.execute(sa.insert(table).values(id=venue.id, **values))
+def find_stored(connection: sa.Connection, venue_id: str) -> StoredVenue | None:
+    """One venue, for a transaction that may replace it."""
+    row = connection.execute(sa.select(v.document, v.additions).where(v.id == venue_id)).one_or_none()
+    return None if row is None else StoredVenue(stored_venue(row.document, row.additions), row.document)
 
 
-def _note_put(connection: sa.Connection, before: Venue | None, venue: Venue) -> None:
+def save_venue(connection: sa.Connection, venue: Venue, now: datetime, before: StoredVenue | None) -> None:
+    """Create or replace a venue, inside the caller's serialised transaction; `before`: what is stored of it so far."""
+    document, additions = venue_columns(venue)
+    values = {"additions": additions, "updated_at": now}
+    if before is None:
+        connection.execute(sa.insert(tables.venues).values(id=venue.id, document=document, **values))
+    else:
+        whole = with_unknown_fields_of(before.document, document)
+        connection.execute(sa.update(tables.venues).where(v.id == venue.id).values(document=whole, **values))
+
+
+def _note_put(
+    connection: sa.Connection, quality: VenueQuality, before: Venue | None, venue: Venue, by: Actor | None
+) -> None:
     """Write down the revision that a PUT may be, with the memories that it leaves.
 
     A camera that was put elsewhere, or has another lens, begins anew, and on another field all of them do.
@@ -187,33 +246,35 @@ def _note_put(connection: sa.Connection, before: Venue | None, venue: Venue) -> 
     if before is not None and before.field != venue.field:
         forget_memories(connection, venue.id)
         forget_trends(connection, venue.id)
-    if before is None or not venue.stands_like(before):
+    if before is None or not venue.has_same_poses_as(before):
         memories = newest_memories(connection, venue.id)
         left = {} if before is None else without_those_that_changed(memories, before, venue)
-        keep_memories(connection, venue.id, add_revision(connection, venue, "put"), left)
+        keep_memories(connection, venue.id, add_revision(connection, quality, venue, "put", by=by), left)
 
 
-def let_hold(
+def apply_result(
     connection: sa.Connection,
-    venue: Venue,
+    quality: VenueQuality,
+    stored: StoredVenue,
     result: Result,
     cameras: Collection[str],
     cause: Cause,
     job_id: str,
     memories: Memories,
+    by: Actor | None,
 ) -> None:
     """Let some cameras of a venue be as a calibration found them, inside the caller's serialised transaction.
 
     `memories`: those that the venue then has.
     """
-    found = with_result(venue, result, cameras)
-    save_venue(connection, found)
-    note_held(connection, venue.id, result, cameras, clock(connection))
-    number = add_revision(connection, found, cause, job_id, stitch_error_px=result.stitch_error_px)
-    keep_memories(connection, venue.id, number, memories)
+    found = with_result(stored.venue, result, cameras)
+    save_venue(connection, found, quality.now, stored)
+    quality.hold(result, cameras)
+    number = add_revision(connection, quality, found, cause, job_id, stitch_error_px=result.stitch_error_px, by=by)
+    keep_memories(connection, found.id, number, memories)
     night = [camera for camera in result.cameras if camera.id in cameras]
     note_night(connection, found, night, job_id, number, by_hand=cause == "accepted")
-    settle_alarms(connection, found)
+    update_alarms(connection, quality, found)
 
 
 def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = None) -> Venue:
@@ -238,21 +299,42 @@ def with_result(venue: Venue, result: Result, cameras: Collection[str] | None = 
     return venue.model_copy(update={"cameras": standing, "field": field})
 
 
-def put_back(connection: sa.Connection, venue: Venue, number: int, rejected_job: str | None = None) -> Venue:
+def restore_state(
+    connection: sa.Connection,
+    quality: VenueQuality,
+    stored: StoredVenue,
+    number: int,
+    by: Actor | None,
+    rejected_job: str | None = None,
+) -> Venue:
     """Let a revision of a venue hold again with its memories, inside the caller's serialised transaction."""
-    then, revision = state_at(connection, venue, number)
-    if not then.stands_like(venue):
-        save_venue(connection, then)
-        memories = memories_at(connection, venue.id, number)
-        restored = add_revision(connection, then, "restored", rejected_job, revision, revision.stitch_error_px)
-        keep_memories(connection, venue.id, restored, memories)
-        note(connection, venue.id, stitch_error_px=revision.stitch_error_px)
+    before = stored.venue
+    then, revision = state_at(connection, before, number)
+    if not then.has_same_calibration_input_as(before):
+        save_venue(connection, then, quality.now, stored)
+        if then.field.size != before.field.size:
+            add_venue_event(connection, then, "venue.changed", ["field"], by)
+        memories = memories_at(connection, then.id, number)
+        px = revision.stitch_error_px
+        restored = add_revision(
+            connection, quality, then, "restored", rejected_job, revision, px, by, field_before=before.field
+        )
+        keep_memories(connection, then.id, restored, memories)
+        quality.row.stitch_error_px = revision.stitch_error_px
     return then
 
 
 def _credentials(connection: sa.Connection, venue_id: str) -> dict[str, str]:
     rows = connection.execute(sa.select(tables.credentials).where(tables.credentials.c.venue == venue_id))
-    return {row.camera: row.userinfo for row in rows}
+    known = {row.camera: row.userinfo for row in rows}
+    document = connection.scalar(sa.select(tables.venues.c.document).where(tables.venues.c.id == venue_id))
+    # What was put by 0.1.0 has the parameters of its sources in the venue itself.
+    for camera in document["cameras"] if document else ():
+        there = secrets_of(camera.get("source") or "")
+        if any(value != HIDDEN for _, value in there.parameters):
+            userinfo = SourceSecrets.decoded(known.get(camera["id"], "")).userinfo
+            known[camera["id"]] = SourceSecrets(userinfo, there.parameters).encoded()
+    return known
 
 
 def _keep(connection: sa.Connection, venue_id: str, credentials: dict[str, str]) -> None:

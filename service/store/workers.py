@@ -1,4 +1,7 @@
-"""The heartbeat of the workers: all SQL about it."""
+"""The heartbeat of the workers: all SQL about it.
+
+A worker has a row by its name, and each of its starts a token in it: two workers of one name are told apart by that.
+"""
 
 from __future__ import annotations
 
@@ -7,55 +10,116 @@ from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
-from service.store.engine import Repository, clock, reading, writing
+from service.store.database import Repository, clock, reading, writing
 from service.store.tables import workers
+
+w = workers.c
+# A heartbeat that lies further ahead was given by a clock that has been put right since.
+CLOCK_TOLERANCE = timedelta(seconds=5)
 
 
 @dataclass(frozen=True)
-class SeenWorker:
-    """A worker, the seconds since its last sign of life, and the hash of its model file (None: missing)."""
+class WorkerHeartbeat:
+    """A worker, the seconds since its last sign of life, and the hash of its model file (None: missing).
+
+    `silent_s` is None while nobody knows: the clock was put back behind its last sign of life. `version` is None of
+    0.1.0, which does not say. `unreadable_jobs` wait for a worker of a newer version.
+    """
 
     name: str
-    silent_s: float
+    silent_s: float | None
     model_sha256: str | None
+    version: str | None
+    unreadable_jobs: int
+
+    def is_alive(self, silence_s: float) -> bool:
+        """Whether it was seen within `silence_s`."""
+        return self.silent_s is not None and self.silent_s <= silence_s
+
+    def is_silent(self, silence_s: float) -> bool:
+        """Whether it surely was not."""
+        return self.silent_s is not None and self.silent_s > silence_s
 
 
-class Workers(Repository):
+@dataclass(frozen=True)
+class WorkerStart:
+    """The start of a worker that its row is of, and its last sign of life.
+
+    `place` is where no other worker of its name can run beside it; None: it has ended, or is of a release without.
+    """
+
+    token: str | None
+    place: str | None
+    seen_at: datetime
+
+
+class WorkerRepository(Repository):
     """The workers in the database. Their times are the database's: the clocks of several machines differ."""
 
-    def enter(self, name: str, model_sha256: str | None) -> None:
-        """A worker starts."""
+    def register(
+        self,
+        name: str,
+        model_sha256: str | None,
+        token: str | None = None,
+        place: str | None = None,
+        version: str | None = None,
+    ) -> None:
+        """Register the start of a worker."""
         with writing(self._engine) as connection:
             now = clock(connection)
-            connection.execute(sa.delete(workers).where(workers.c.name == name))
-            connection.execute(
-                sa.insert(workers).values(name=name, model_sha256=model_sha256, started_at=now, seen_at=now)
-            )
+            connection.execute(sa.delete(workers).where(w.name == name))
+            row = {"name": name, "model_sha256": model_sha256, "token": token, "place": place, "version": version}
+            connection.execute(sa.insert(workers).values(started_at=now, seen_at=now, **row))
 
-    def beat(self, name: str) -> bool:
-        """A worker is alive; False if the others have given it up, then it must enter again."""
+    def beat(self, name: str, token: str | None = None, unreadable_jobs: int = 0) -> bool:
+        """A worker is alive; False if the row is no longer of this start: `start_of` says whose it is.
+
+        A sign of life of another one that lies in the future is put to now, so that its silence counts from here on.
+        """
         with writing(self._engine) as connection:
-            beat = sa.update(workers).where(workers.c.name == name).values(seen_at=clock(connection))
+            now = clock(connection)
+            ahead = sa.update(workers).where(w.seen_at > now + CLOCK_TOLERANCE).values(seen_at=now)
+            connection.execute(ahead)
+            of_this_start = [w.name == name, w.token.is_not_distinct_from(token)]
+            beat = sa.update(workers).where(*of_this_start).values(seen_at=now, unreadable_jobs=unreadable_jobs)
             return connection.execute(beat).rowcount == 1
 
-    def alive(self, silence_s: float) -> list[SeenWorker]:
+    def start_of(self, name: str) -> WorkerStart | None:
+        """The start that the row of a worker is of; None: it has none, or the others have given it up."""
+        with reading(self._engine) as connection:
+            row = connection.execute(sa.select(workers).where(w.name == name)).one_or_none()
+        return None if row is None else WorkerStart(row.token, row.place, row.seen_at)
+
+    def end(self, name: str, token: str) -> None:
+        """A worker ends; its row goes when it has been silent, and with it what it may have left behind."""
+        with writing(self._engine) as connection:
+            connection.execute(sa.update(workers).where(w.name == name, w.token == token).values(place=None))
+
+    def alive(self, silence_s: float) -> list[WorkerHeartbeat]:
         """The workers that were seen within `silence_s`."""
         with reading(self._engine) as connection:
-            return [worker for worker in seen(connection, clock(connection)) if worker.silent_s <= silence_s]
+            return [worker for worker in heartbeats(connection, clock(connection)) if worker.is_alive(silence_s)]
 
     def silent(self, silence_s: float) -> list[str]:
         """The workers that were not."""
         with reading(self._engine) as connection:
-            return [worker.name for worker in seen(connection, clock(connection)) if worker.silent_s > silence_s]
+            return [worker.name for worker in heartbeats(connection, clock(connection)) if worker.is_silent(silence_s)]
 
-    def leave(self, name: str, silence_s: float) -> None:
+    def forget(self, name: str, silence_s: float) -> None:
         """Forget a worker, unless it has come back meanwhile."""
         with writing(self._engine) as connection:
-            old = workers.c.seen_at < clock(connection) - timedelta(seconds=silence_s)
-            connection.execute(sa.delete(workers).where(workers.c.name == name, old))
+            old = w.seen_at < clock(connection) - timedelta(seconds=silence_s)
+            connection.execute(sa.delete(workers).where(w.name == name, old))
 
 
-def seen(connection: sa.Connection, now: datetime) -> list[SeenWorker]:
-    """All that were not given up, by name."""
-    rows = connection.execute(sa.select(workers).order_by(workers.c.name))
-    return [SeenWorker(row.name, max(0.0, (now - row.seen_at).total_seconds()), row.model_sha256) for row in rows]
+def heartbeats(connection: sa.Connection, now: datetime) -> list[WorkerHeartbeat]:
+    """Return the heartbeats of all workers that were not given up, by name."""
+    rows = connection.execute(sa.select(workers).order_by(w.name))
+    return [
+        WorkerHeartbeat(row.name, _silent_s(row.seen_at, now), row.model_sha256, row.version, row.unreadable_jobs or 0)
+        for row in rows
+    ]
+
+
+def _silent_s(seen_at: datetime, now: datetime) -> float | None:
+    return None if seen_at > now + CLOCK_TOLERANCE else max(0.0, (now - seen_at).total_seconds())

@@ -7,8 +7,8 @@ import asyncio
 from starlette.concurrency import run_in_threadpool
 
 from service.api.programs.running import OneAtATime
+from service.schemas.programs.clicked_pose import ClickedPose, ClickedPoseRequest
 from service.settings import Settings
-from service.wire.programs.clicked_pose import ClickedCamera, ClickedPose
 
 # Clicks come a second apart; a pose takes less.
 PATIENCE_S = 10.0
@@ -22,7 +22,7 @@ class ClickedPoses:
         self._program = OneAtATime("first pose", longest_s=60, again_s=1)
         self._turn = asyncio.Lock()
 
-    async def find(self, asked: ClickedCamera) -> ClickedPose:
+    async def find(self, asked: ClickedPoseRequest) -> ClickedPose:
         """Where the camera stands. Who waits for a turn holds no thread: all other requests need them."""
         try:
             async with asyncio.timeout(PATIENCE_S):
@@ -34,7 +34,7 @@ class ClickedPoses:
         finally:
             self._turn.release()
 
-    def _find(self, asked: ClickedCamera) -> ClickedPose:
+    def _find(self, asked: ClickedPoseRequest) -> ClickedPose:
         given = asked.model_dump_json().encode()
         answer = self._program.run(self._settings.pose_program, self._settings.native_environment, given)
         return ClickedPose.model_validate_json(answer)

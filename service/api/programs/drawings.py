@@ -14,13 +14,13 @@ from weakref import WeakValueDictionary
 
 from starlette.concurrency import run_in_threadpool
 
-from service.api.programs.running import answer
+from service.api.programs.running import run_program
+from service.schemas.problems import Problem
+from service.schemas.programs.drawing import DrawingRequest, DrawnPictures, decode_files, encode_message
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.jobs.files import drawn_together, picture_file, pictures_folder, source_file
-from service.store.jobs.reading import Drawable, Jobs, Pictures
-from service.wire.problems import Problem
-from service.wire.programs.drawing import Drawing, Drawn, packed, unpacked
+from service.store.jobs.queries import Drawable, JobRepository, Pictures
 
 LONGEST_S = 60.0
 # The first picture takes about a second, and a page asks for several at once.
@@ -31,7 +31,7 @@ AGAIN_S = 2
 class Drawings:
     """Asks the program that draws them, for so many at once."""
 
-    def __init__(self, settings: Settings, jobs: Jobs, blobs: Blobs) -> None:
+    def __init__(self, settings: Settings, jobs: JobRepository, blobs: Blobs) -> None:
         self._settings, self._jobs, self._blobs = settings, jobs, blobs
         self._turns = asyncio.Semaphore(settings.pictures_at_once)
         # Of pictures that are drawn together: whoever asks for one while they are drawn waits for them.
@@ -44,11 +44,11 @@ class Drawings:
         if stored is not None or not together:
             return stored
         lock = self._drawing.setdefault(f"{job_id}/{together[0]}", asyncio.Lock())
-        async with waited_for(lock):
+        async with turn_of(lock):
             stored = await run_in_threadpool(self._stored, pictures, name)
             if stored:
                 return stored
-            async with waited_for(self._turns):
+            async with turn_of(self._turns):
                 return await run_in_threadpool(self._draw, job_id, pictures, name)
 
     def _draw(self, job_id: str, pictures: Pictures, name: str) -> bytes | None:
@@ -57,10 +57,10 @@ class Drawings:
         if job is None or None in frames.values():
             return None
         files = {camera: frame for camera, frame in frames.items() if frame is not None}
-        asked = Drawing.of(job.venue, job.result, [name], self._settings.threads, files)
+        asked = DrawingRequest.of(job.venue, job.result, [name], self._settings.threads, files)
         program, environment = self._settings.picture_program, self._settings.native_environment
-        said = answer("picture", program, environment, packed(asked, files), LONGEST_S)
-        drawn = unpacked(Drawn.model_validate_json(said[: said.index(b"\n")]).sizes, said)
+        said = run_program("picture", program, environment, encode_message(asked, files), LONGEST_S)
+        drawn = decode_files(DrawnPictures.model_validate_json(said[: said.index(b"\n")]).sizes, said)
         for each, picture in drawn.items():
             self._blobs.put(f"{pictures.folder}/{picture_file(each)}", picture)
         self._forget_if_gone(job_id)
@@ -86,14 +86,16 @@ class Drawings:
 
 
 @asynccontextmanager
-async def waited_for(turn: asyncio.Lock | asyncio.Semaphore) -> AsyncIterator[None]:
-    """In one's turn, if it comes soon; who has waited long is told to come again."""
+async def turn_of(
+    turn: asyncio.Lock | asyncio.Semaphore, why: str = "Other pictures are being drawn."
+) -> AsyncIterator[None]:
+    """In one's turn, if it comes soon; who has waited long is told why, and to come again."""
     try:
         async with asyncio.timeout(PATIENCE_S):
             await turn.acquire()
     except TimeoutError:
         headers = {"Retry-After": str(AGAIN_S)}
-        raise Problem("unavailable", "Other pictures are being drawn.", headers=headers) from None
+        raise Problem("unavailable", why, headers=headers) from None
     try:
         yield
     finally:

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 
 import structlog
 
-from service import lifeline
-from service.wire.problems import Problem
+from service import child_process
+from service.schemas.problems import Problem
 
 log = structlog.get_logger()
 # What a program ends with that cannot do what it was asked, and has said why on its standard error.
@@ -25,11 +25,11 @@ class OneAtATime:
         self._turn = threading.Lock()
 
     def run(self, command: Sequence[str], environment: Mapping[str, str], given: bytes) -> bytes:
-        """As `answer`, in this turn."""
+        """As `run_program`, in this turn."""
         if not self._turn.acquire(blocking=False):
             raise self.busy()
         try:
-            return answer(self._what, command, environment, given, self._longest_s)
+            return run_program(self._what, command, environment, given, self._longest_s)
         finally:
             self._turn.release()
 
@@ -39,7 +39,9 @@ class OneAtATime:
         return Problem("unavailable", f"Another {self._what} is being made.", headers=headers)
 
 
-def answer(what: str, command: Sequence[str], environment: Mapping[str, str], given: bytes, longest_s: float) -> bytes:
+def run_program(
+    what: str, command: Sequence[str], environment: Mapping[str, str], given: bytes, longest_s: float
+) -> bytes:
     """What a program writes to its standard output for what it is `given` on its input.
 
     One that cannot do it says why on its standard error and ends with one of `REFUSALS`.
@@ -48,7 +50,7 @@ def answer(what: str, command: Sequence[str], environment: Mapping[str, str], gi
         done = subprocess.run(
             command,
             input=given,
-            env={**lifeline.without_secrets(), **environment},
+            env={**child_process.without_secrets(), **environment},
             capture_output=True,
             timeout=longest_s,
             check=True,

@@ -1,25 +1,30 @@
 // The stitched view before and after: slider, seam, and a magnifier that goes along it.
 
+import {whenShown} from "./parts.js";
+
 const STEP = 5;
 const REACH = 40;
 const SHORTEST = 20;
-
-const stage = document.querySelector(".compare");
-const slider = stage && stage.querySelector("img-comparison-slider");
+/** How far around a place of the seam a line is looked for, at each how many places, the noise of
+ * even ground, and by which share grounds of one field differ. */
+const WINDOW = 12;
+const EACH = 4;
+const EVEN = 8;
+const ALIKE = 0.4;
 
 /** The slider of the library moves; what screen readers hear and how keys work is said here. */
-function speak() {
+function speak(slider) {
   const value = Math.round(slider.value);
   slider.setAttribute("aria-valuenow", value);
   slider.setAttribute("aria-valuetext", `${value} % stored, ${100 - value} % new`);
 }
 
-function onKey(event) {
+function onKey(event, slider) {
   const steps = {ArrowLeft: -STEP, ArrowDown: -STEP, ArrowRight: STEP, ArrowUp: STEP, PageDown: -5 * STEP, PageUp: 5 * STEP, Home: -100, End: 100};
   if (!(event.key in steps)) return;
   event.preventDefault();
   slider.value = Math.min(100, Math.max(0, slider.value + steps[event.key]));
-  speak();
+  speak(slider);
 }
 
 /** Places along the seam, in pixels of the view: of each handover from its bottom to its top. */
@@ -40,8 +45,35 @@ function alongTheSeam(image) {
   return chains.filter((chain) => chain.length >= SHORTEST).flat();
 }
 
+/** The value below which this share of some values lies. */
+function quantile(values, share) {
+  return [...values].sort((one, other) => one - other)[Math.floor(share * (values.length - 1))];
+}
+
+/** The place of the seam that looks most like a line: bright, on even ground that is like the ground near the cameras. */
+function onALine(image, seam) {
+  const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight);
+  const context = canvas.getContext("2d", {willReadFrequently: true});
+  context.drawImage(image, 0, 0);
+  const side = 2 * WINDOW + 1;
+  const places = seam.map(({x, y}, number) => ({x, y, number})).filter(({number}) => number % EACH === 0);
+  for (const place of places) {
+    const {data} = context.getImageData(place.x - WINDOW, place.y - WINDOW, side, side);
+    const greys = Array.from({length: side * side}, (_, at) => Math.min(data[4 * at], data[4 * at + 1], data[4 * at + 2]));
+    place.ground = quantile(greys, 0.5);
+    place.like = (quantile(greys, 0.97) - place.ground) / (EVEN + quantile(greys, 0.75) - quantile(greys, 0.25));
+  }
+  // What lies beyond the field is high up in a view.
+  const below = places.filter(({y}) => y > image.naturalHeight / 2).map(({ground}) => ground);
+  const usual = quantile(below.length ? below : places.map(({ground}) => ground), 0.5);
+  const onTheField = places.filter(({ground}) => Math.abs(ground - usual) < ALIKE * usual);
+  const best = onTheField.reduce((most, one) => (one.like > (most?.like ?? 0) ? one : most), null);
+  return best ? best.number : Math.floor(seam.length / 2);
+}
+
 class Loupe {
-  constructor(box, before, after, seam) {
+  constructor(stage, box, before, after, seam) {
+    this.stage = stage;
     this.box = box;
     this.before = before;
     this.after = after;
@@ -51,6 +83,7 @@ class Loupe {
     this.seam = alongTheSeam(seam);
     this.place = {x: after.naturalWidth / 2, y: after.naturalHeight / 2};
     this.range.disabled = this.seam.length === 0;
+    if (this.seam.length > 1) this.range.value = Math.round((1000 * onALine(after, this.seam)) / (this.seam.length - 1));
     box.hidden = this.reticle.hidden = false;
     this.range.addEventListener("input", () => this.follow());
     this.times.addEventListener("change", () => this.draw());
@@ -65,7 +98,7 @@ class Loupe {
   }
 
   point(event) {
-    const rect = stage.getBoundingClientRect();
+    const rect = this.stage.getBoundingClientRect();
     const scale = this.after.naturalWidth / rect.width;
     this.place = {x: (event.clientX - rect.left) * scale, y: (event.clientY - rect.top) * scale};
     this.draw();
@@ -84,19 +117,28 @@ class Loupe {
       context.imageSmoothingEnabled = times < 4;
       context.drawImage(image, left, top, width, height, 0, 0, first.width, first.height);
     }
-    const scale = stage.clientWidth / wide;
+    const scale = this.stage.clientWidth / wide;
     for (const [side, value] of [["left", left], ["top", top], ["width", width], ["height", height]]) {
       this.reticle.style.setProperty(side, `${value * scale}px`);
     }
   }
 }
 
-if (slider) {
+function compare(stage, box) {
+  const slider = stage.querySelector("img-comparison-slider");
   const [before, after, seam] = ["#before", "#after", ".seam"].map((name) => stage.querySelector(name));
-  slider.addEventListener("slide", speak);
-  slider.addEventListener("keydown", onKey);
-  document.getElementById("seam-switch").addEventListener("change", (event) => { seam.hidden = !event.target.checked; });
+  const seamSwitch = document.getElementById("seam-switch");
+  const showSeam = () => { seam.hidden = !seamSwitch.checked; };
+  slider.addEventListener("slide", () => speak(slider));
+  slider.addEventListener("keydown", (event) => onKey(event, slider));
+  seamSwitch.addEventListener("change", showSeam);
+  showSeam();
   Promise.all([before, after, seam].map((image) => image.decode()))
-    .then(() => new Loupe(document.querySelector(".loupe"), before, after, seam))
+    .then(() => new Loupe(stage, box, before, after, seam))
     .catch(() => {});
 }
+
+whenShown((root) => {
+  const stage = root.querySelector(".compare");
+  if (stage) compare(stage, root.querySelector(".loupe"));
+});

@@ -2,9 +2,8 @@
 
 import {CLOCK, axis, fill} from "./chart.js";
 import {call, onScheme, say, styled} from "./page.js";
+import {whenShown} from "./parts.js";
 
-const place = document.getElementById("chart");
-const logarithmic = document.getElementById("log-scale");
 const CAMERA_COLOURS = ["--new", "--stored", "--mask", "--live", "--good"];
 const HOUR = 3600;
 
@@ -12,19 +11,19 @@ function px(plot, value) {
   return value === null || value === undefined ? "–" : `${value.toPrecision(3)} px`;
 }
 
-function draw(history) {
+function draw(place, history, isLogarithmic) {
   place.replaceChildren();
   // Of a single moment, some time before and after it.
   const around = (plot, first, last) => (history.at.length === 1 ? [history.at[0] - HOUR, history.at[0] + HOUR] : [first, last]);
   const limit = history.stitch_error_limit_px;
   const cameras = Object.keys(history.moved_px);
   // Nothing has a logarithm of zero.
-  const shown = (values) => (logarithmic.checked ? values.map((value) => (value ? value : null)) : values);
+  const shown = (values) => (isLogarithmic ? values.map((value) => (value ? value : null)) : values);
   const data = [history.at, shown(history.stitch_error_px), history.at.map(() => limit), ...cameras.map((camera) => shown(history.moved_px[camera]))];
   const points = {show: history.at.length < 80, size: 6};
-  const distr = logarithmic.checked ? 3 : 1;
-  const scale = logarithmic.checked ? {distr} : {distr, range: (plot, low, high) => [0, Math.max(high || 0, limit || 0, 0.1) * 1.08]};
-  const movement = logarithmic.checked ? {distr} : {distr, range: (plot, low, high) => [0, Math.max(high || 0, 1) * 1.08]};
+  const distr = isLogarithmic ? 3 : 1;
+  const scale = isLogarithmic ? {distr} : {distr, range: (plot, low, high) => [0, Math.max(high || 0, limit || 0, 0.1) * 1.08]};
+  const movement = isLogarithmic ? {distr} : {distr, range: (plot, low, high) => [0, Math.max(high || 0, 1) * 1.08]};
   fill(place, {
     scales: {x: {time: true, range: around}, px: scale, moved: movement},
     axes: [axis({values: CLOCK}), axis({scale: "px", label: "stitch error, px (10 cm on the pitch)", size: 60}), axis({scale: "moved", side: 1, label: "moved, px in the picture", size: 60, grid: {show: false}})],
@@ -37,10 +36,17 @@ function draw(history) {
   }, data);
 }
 
-if (place) {
-  call("GET", place.dataset.history).then((history) => {
-    draw(history);
-    logarithmic.addEventListener("change", () => draw(history));
-    onScheme(() => draw(history));
-  }).catch((refused) => say(refused.message, true));
-}
+whenShown(async (root, signal) => {
+  const place = root.querySelector("#chart");
+  if (!place) return;
+  const logarithmic = root.querySelector("#log-scale");
+  try {
+    const history = await call("GET", place.dataset.history);
+    const drawIt = () => draw(place, history, logarithmic.checked);
+    drawIt();
+    logarithmic.addEventListener("change", drawIt);
+    onScheme(drawIt, signal);
+  } catch (refused) {
+    say(refused.message, true);
+  }
+});

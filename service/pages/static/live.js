@@ -1,23 +1,30 @@
-// A job that is going on: its events move the bar, the stages and the curve of its loss; its end loads the page again.
+// A job that is going on: its events move the bar, the stages and the curve of its loss; its end shows the page anew.
 
 import {axis, fill} from "./chart.js";
 import {onScheme, styled} from "./page.js";
+import {refresh, whenShown} from "./parts.js";
+import {listen} from "./stream.js";
 
 const LEGENDS = {queued: "in the queue", running: "starting"};
+const ICONS = {queued: "wait", running: "run"};
 
 class Live {
-  constructor(box) {
+  constructor(box, signal) {
     this.box = box;
     this.generations = [];
     this.losses = [];
     this.drawLoss();
-    onScheme(() => this.drawLoss());
-    this.events = new EventSource(box.dataset.events);
-    this.events.addEventListener("progress", (event) => this.show(JSON.parse(event.data)));
-    this.events.addEventListener("end", () => {
-      this.events.close();
-      location.reload();
-    });
+    onScheme(() => this.drawLoss(), signal);
+    const ended = new AbortController();
+    signal.addEventListener("abort", () => ended.abort());
+    listen(box.dataset.events, {
+      progress: (event) => this.show(JSON.parse(event.data)),
+      end: () => {
+        ended.abort();
+        if ("partOfVenue" in box.dataset) refresh();
+        else location.reload();
+      },
+    }, ended.signal);
   }
 
   part(name) {
@@ -26,7 +33,7 @@ class Live {
 
   show(job) {
     const {progress} = job;
-    this.part("status").lastElementChild.textContent = job.status[0].toUpperCase() + job.status.slice(1);
+    showStatus(job);
     const place = job.queue_position ? `, place ${job.queue_position}` : "";
     const said = progress ? progress.stage : LEGENDS[job.status] + place;
     if (this.part("stage").textContent !== said) this.part("stage").textContent = said;
@@ -67,4 +74,15 @@ class Live {
   }
 }
 
-for (const box of document.querySelectorAll("[data-events]")) new Live(box);
+/** Every badge of a job says the same. */
+function showStatus({id, status}) {
+  for (const badge of document.querySelectorAll(`[data-status-of="${id}"]`)) {
+    const icon = badge.querySelector("use");
+    icon.setAttribute("href", icon.getAttribute("href").replace(/#.*/, `#${ICONS[status]}`));
+    badge.lastChild.textContent = status[0].toUpperCase() + status.slice(1);
+  }
+}
+
+whenShown((root, signal) => {
+  for (const box of root.querySelectorAll("[data-events]")) new Live(box, signal);
+});

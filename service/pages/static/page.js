@@ -1,12 +1,34 @@
-// What every page does: times that stay right, buttons that call the interface, lists that follow what happens.
+// What every page does: times that stay right, and buttons that call the interface.
 
 const token = document.querySelector('meta[name="token"]').content;
 const OFTEN = 5000;
 
+// What the interface says to programs by its own addresses, for who has the page before them.
+const IN_WORDS = {
+  "venue-moved-on": "The venue has been changed since this job. Load the page again to see how it is now.",
+  "venue-changed": "Somebody has changed the venue meanwhile. Load the page again.",
+  "venue-busy": "A job of this venue is still going on. Wait for its end or cancel it.",
+  "venue-not-found": "The venue was deleted.",
+  "job-not-found": "The job was deleted.",
+  "job-open": "The job has not ended.",
+  "revision-not-found": "The venue no longer has this revision.",
+  "refined-not-found": "No refined lens of this camera is kept any more. The next calibration that is accepted brings one.",
+};
+const OF_PROGRAMS = /\b(GET|PUT|POST|PATCH|DELETE) \//;
+
+/** What a problem says to somebody before the page: sentences that speak of requests are left out. */
+export function inWords(problem) {
+  const known = IN_WORDS[(problem.type || "").split("/").at(-1)];
+  if (known) return known;
+  const faults = (problem.errors || []).map((error) => error.message).join(" ");
+  const said = (faults || problem.detail || "").split(/(?<=[.!?])\s+/).filter((sentence) => !OF_PROGRAMS.test(sentence));
+  return said.join(" ") || problem.title;
+}
+
 /** What stands in the way of a call, as the service says it. */
 export class Refused extends Error {
   constructor(problem, status) {
-    super(problem.detail || problem.title || `The service answered ${status}.`);
+    super(inWords(problem) || `The service answered ${status}.`);
     this.problem = problem;
     this.status = status;
   }
@@ -27,7 +49,7 @@ export async function call(method, address, content, more = {}) {
     throw new Refused({detail: "The service cannot be reached."}, 0);
   }
   const text = await answer.text();
-  const json = (answer.headers.get("Content-Type") || "").includes("json") ? JSON.parse(text) : null;
+  const json = text && (answer.headers.get("Content-Type") || "").includes("json") ? JSON.parse(text) : null;
   if (!answer.ok) throw new Refused(json || {}, answer.status);
   return json;
 }
@@ -44,9 +66,9 @@ export function styled(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-/** Draw again when the page turns dark or light. */
-export function onScheme(draw) {
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+/** Draw again when the page turns dark or light, until the signal is aborted. */
+export function onScheme(draw, signal) {
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw, {signal});
 }
 
 export function ago(moment, now = Date.now()) {
@@ -63,7 +85,7 @@ export function onTheClock(moment) {
   return `${moment.toLocaleString("sv")} ${zone.find(({type}) => type === "timeZoneName").value}`;
 }
 
-function tellTimes() {
+export function tellTimes() {
   for (const time of document.querySelectorAll("time")) {
     const moment = new Date(time.dateTime);
     if ("ago" in time.dataset) time.textContent = ago(moment);
@@ -87,21 +109,9 @@ async function press(button) {
   }
 }
 
-/** Parts marked with data-refresh are fetched again and again, unless somebody is in them. */
-async function refresh() {
-  const here = document.querySelector("[data-refresh]");
-  if (!here || document.hidden || here.contains(document.activeElement)) return;
-  const answer = await fetch(location.href).catch(() => null);
-  if (!answer || !answer.ok || answer.redirected) return;
-  const there = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[data-refresh]");
-  if (there && there.innerHTML !== here.innerHTML && !here.contains(document.activeElement)) here.replaceWith(there);
-  tellTimes();
-}
-
 document.addEventListener("click", (event) => {
   const button = event.target.closest("button[data-call]");
   if (button) press(button);
 });
 tellTimes();
 setInterval(tellTimes, OFTEN);
-if (document.querySelector("[data-refresh]")) setInterval(refresh, OFTEN);

@@ -1,13 +1,10 @@
 // The schedule of a venue: saved with the sources that it needs, and tried.
 
 import {call, say} from "./page.js";
-
-const form = document.getElementById("schedule-form");
-const refused = document.getElementById("schedule-refused");
-const trying = document.getElementById("try-schedule");
+import {whenShown} from "./parts.js";
 
 /** What the form changes of the venue; options of the schedule stay as they are. */
-function patch() {
+function patch(form) {
   const {cron, time_zone: zone, exact} = form.elements;
   const sources = [...form.querySelectorAll("[data-camera]")].filter((field) => field.value !== field.defaultValue);
   const cameras = Object.fromEntries(sources.map((field) => [field.dataset.camera, {source: field.value.trim() || null}]));
@@ -15,19 +12,20 @@ function patch() {
   return {schedule, ...(sources.length ? {cameras} : {})};
 }
 
-async function save(event) {
+async function save(event, refused) {
   event.preventDefault();
+  const form = event.currentTarget;
   refused.hidden = true;
   try {
-    await call("PATCH", `/venues/${form.dataset.venue}`, patch());
+    await call("PATCH", `/venues/${form.dataset.venue}`, patch(form));
     location.reload();
-  } catch ({problem, message}) {
-    refused.textContent = (problem.errors || []).map((error) => error.message).join(" ") || message;
+  } catch (refusal) {
+    refused.textContent = refusal.message;
     refused.hidden = false;
   }
 }
 
-async function tryNow() {
+async function tryNow(trying) {
   trying.disabled = true;
   const body = new FormData();
   body.append("options", trying.dataset.options);
@@ -41,15 +39,23 @@ async function tryNow() {
   }
 }
 
-if (form) {
-  const here = Intl.DateTimeFormat().resolvedOptions().timeZone;
+function offerZones(form, list) {
   const zone = form.elements.time_zone;
-  if (!zone.value) zone.value = here || "UTC";
+  // Filled in here: nobody has begun to edit it.
+  zone.defaultValue ||= Intl.DateTimeFormat().resolvedOptions().timeZone || "UTC";
   for (const name of Intl.supportedValuesOf("timeZone")) {
     const option = document.createElement("option");
     option.value = name;
-    document.getElementById("zones").append(option);
+    list.append(option);
   }
-  form.addEventListener("submit", save);
 }
-if (trying) trying.addEventListener("click", tryNow);
+
+whenShown((root) => {
+  const form = root.querySelector("#schedule-form");
+  const trying = root.querySelector("#try-schedule");
+  if (form) {
+    offerZones(form, root.querySelector("#zones"));
+    form.addEventListener("submit", (event) => save(event, root.querySelector("#schedule-refused")));
+  }
+  trying?.addEventListener("click", () => tryNow(trying));
+});

@@ -1,94 +1,104 @@
 // The stitched view of a venue: its knobs, what they do to the last frames, and the packages of it for other tools.
 
 import {call} from "./page.js";
+import {whenShown} from "./parts.js";
 
 const PAUSE = 250;
-const form = document.getElementById("view-form");
-const angles = document.getElementById("view-angles");
-const refused = document.getElementById("view-refused");
-const picture = document.getElementById("view-picture");
-const seam = document.getElementById("view-seam");
-const packages = document.querySelectorAll("#view-packages [data-format]");
 const OF_SIZE = ["width_px", "height_px"];
 const OF_ANGLES = ["field_of_view_deg", "pan_deg", "horizon"];
-let shown = "";
-let drawing = false;
-let pause;
 
-/** The view that is chosen, as a venue keeps it; null: as it suits the cameras. */
-function chosen() {
-  const numbers = [...OF_SIZE, ...OF_ANGLES].map((name) => [name, form.elements[name].value]);
-  const view = Object.fromEntries(numbers.map(([name, value]) => [name, value === "" ? null : Number(value)]));
-  return {projection: form.elements.projection.value, ...view, pan_deg: view.pan_deg ?? 0};
-}
+class View {
+  constructor(form, root, signal) {
+    this.form = form;
+    this.angles = root.querySelector("#view-angles");
+    this.refused = root.querySelector("#view-refused");
+    this.picture = root.querySelector("#view-picture");
+    this.seam = root.querySelector("#view-seam");
+    this.packages = root.querySelectorAll("#view-packages [data-format]");
+    this.shown = "";
+    this.isDrawing = false;
+    form.addEventListener("input", (event) => this.turn(event.target));
+    form.addEventListener("submit", (event) => this.keep(event));
+    // The values are back after the event.
+    form.addEventListener("reset", () => setTimeout(() => this.changed()));
+    this.angles.disabled = form.elements.projection.value === "birds-eye";
+    if (!this.picture) return;
+    this.seam.addEventListener("change", () => this.draw());
+    // Not before somebody sees it: the frames are stitched anew.
+    const seen = new IntersectionObserver(([{isIntersecting}]) => isIntersecting && this.draw());
+    seen.observe(this.picture);
+    signal.addEventListener("abort", () => { seen.disconnect(); clearTimeout(this.pause); });
+  }
 
-/** The same as a request has it. */
-function query(more) {
-  const parts = Object.entries({...chosen(), ...more}).map(([name, value]) => [name, value === null ? "auto" : value]);
-  return new URLSearchParams(parts);
-}
+  /** The view that is chosen, as a venue keeps it; null: as it suits the cameras. */
+  get chosen() {
+    const numbers = [...OF_SIZE, ...OF_ANGLES].map((name) => [name, this.form.elements[name].value]);
+    const view = Object.fromEntries(numbers.map(([name, value]) => [name, value === "" ? null : Number(value)]));
+    return {projection: this.form.elements.projection.value, ...view, pan_deg: view.pan_deg ?? 0};
+  }
 
-function refuse(text) {
-  refused.textContent = text;
-  refused.hidden = !text;
-}
+  /** The same as a request has it. */
+  query(more) {
+    const parts = Object.entries({...this.chosen, ...more}).map(([name, value]) => [name, value === null ? "auto" : value]);
+    return new URLSearchParams(parts);
+  }
 
-/** Show the view, and then the one that was chosen meanwhile. */
-async function draw() {
-  if (!picture || drawing) return;
-  drawing = true;
-  picture.setAttribute("aria-busy", "true");
-  for (let wanted; (wanted = `${picture.dataset.address}?${query({seam: seam.checked})}`) !== shown && form.checkValidity(); shown = wanted) {
+  refuse(text) {
+    this.refused.textContent = text;
+    this.refused.hidden = !text;
+  }
+
+  /** Show the view, and then the one that was chosen meanwhile. */
+  async draw() {
+    const {picture} = this;
+    if (!picture || this.isDrawing) return;
+    this.isDrawing = true;
+    picture.setAttribute("aria-busy", "true");
+    for (let wanted; (wanted = `${picture.dataset.address}?${this.query({seam: this.seam.checked})}`) !== this.shown && this.form.checkValidity(); this.shown = wanted) {
+      try {
+        const answer = await fetch(wanted);
+        if (!answer.ok) throw new Error((await answer.json()).detail);
+        const view = await createImageBitmap(await answer.blob());
+        picture.width = view.width;
+        picture.height = view.height;
+        picture.getContext("2d").drawImage(view, 0, 0);
+        picture.classList.remove("waiting");
+        this.refuse("");
+      } catch (error) {
+        this.refuse(error.message);
+      }
+    }
+    picture.setAttribute("aria-busy", "false");
+    this.isDrawing = false;
+  }
+
+  changed() {
+    this.angles.disabled = this.form.elements.projection.value === "birds-eye";
+    for (const link of this.packages) link.href = `/venues/${this.form.dataset.venue}/stitch?${this.query({format: link.dataset.format})}`;
+    clearTimeout(this.pause);
+    this.pause = setTimeout(() => this.draw(), PAUSE);
+  }
+
+  /** A knob and the number beside it say the same. */
+  turn({dataset: {knob}, name, value}) {
+    if (knob) this.form.elements[knob].value = value;
+    else if (OF_ANGLES.includes(name) && value !== "") this.form.querySelector(`[data-knob="${name}"]`).value = value;
+    this.changed();
+  }
+
+  async keep(event) {
+    event.preventDefault();
+    const {tag} = document.querySelector("[data-tag]").dataset;
     try {
-      const answer = await fetch(wanted);
-      if (!answer.ok) throw new Error((await answer.json()).detail);
-      const view = await createImageBitmap(await answer.blob());
-      picture.width = view.width;
-      picture.height = view.height;
-      picture.getContext("2d").drawImage(view, 0, 0);
-      refuse("");
-    } catch (error) {
-      refuse(error.message);
+      await call("PATCH", `/venues/${this.form.dataset.venue}`, {view: this.chosen}, {"If-Match": tag});
+      location.reload();
+    } catch (refusal) {
+      this.refuse(refusal.message);
     }
   }
-  picture.setAttribute("aria-busy", "false");
-  drawing = false;
 }
 
-function changed() {
-  angles.disabled = form.elements.projection.value === "birds-eye";
-  for (const link of packages) link.href = `/venues/${form.dataset.venue}/stitch?${query({format: link.dataset.format})}`;
-  clearTimeout(pause);
-  pause = setTimeout(draw, PAUSE);
-}
-
-/** A knob and the number beside it say the same. */
-function turned({target}) {
-  const {knob} = target.dataset;
-  if (knob) form.elements[knob].value = target.value;
-  else if (OF_ANGLES.includes(target.name) && target.value !== "") form.querySelector(`[data-knob="${target.name}"]`).value = target.value;
-  changed();
-}
-
-async function keep(event) {
-  event.preventDefault();
-  try {
-    await call("PATCH", `/venues/${form.dataset.venue}`, {view: chosen()}, {"If-Match": form.dataset.tag});
-    location.reload();
-  } catch ({problem, status, message}) {
-    refuse(status === 412 ? "Somebody has changed the venue. Load the page again." : (problem.errors || []).map((error) => error.message).join(" ") || message);
-  }
-}
-
-if (form) {
-  form.addEventListener("input", turned);
-  form.addEventListener("submit", keep);
-  // The values are back after the event.
-  form.addEventListener("reset", () => setTimeout(changed));
-  angles.disabled = form.elements.projection.value === "birds-eye";
-}
-if (picture) {
-  seam.addEventListener("change", draw);
-  // Not before somebody sees it: the frames are stitched anew.
-  new IntersectionObserver(([{isIntersecting}]) => isIntersecting && draw()).observe(picture);
-}
+whenShown((root, signal) => {
+  const form = root.querySelector("#view-form");
+  if (form) new View(form, root, signal);
+});

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
@@ -9,12 +10,12 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
-from service.wire.health import AlarmEvent
-from service.wire.job import Job, JobEvent
-from service.wire.names import OPTIONS_PART, Scope
-from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
-from service.wire.problems import MEDIA_TYPE, ProblemDetails
-from service.wire.told.events import Event
+from service.schemas.events.venue_event import Event
+from service.schemas.health import AlarmEvent
+from service.schemas.job import Job, JobEvent
+from service.schemas.names import OPTIONS_PART, Scope
+from service.schemas.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.schemas.problems import MEDIA_TYPE, ProblemDetails
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
 MODELS = (Options, IntrinsicsOptions, LocateOptions, FieldOptions, ProblemDetails)
@@ -40,7 +41,7 @@ FOR_ALL: dict[str, Any] = {"security": []}
 
 
 class DocumentedApp(FastAPI):
-    """FastAPI with these models among the schemas of its document."""
+    """FastAPI with these models among the schemas of its document, and sentences as summaries of its routes."""
 
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document."""
@@ -49,7 +50,16 @@ class DocumentedApp(FastAPI):
             schema = model.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
             document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
         document["components"]["securitySchemes"] = SECURITY_SCHEMES
+        for path in document["paths"].values():
+            for operation in path.values():
+                operation["summary"], operation["description"] = _summary_first(operation["description"])
         return document
+
+
+def _summary_first(description: str) -> tuple[str, str]:
+    """The first sentence of a route's description, which says more than the name of its function, and all of it."""
+    first = re.split(r"(?<=\.)\s", description, maxsplit=1)[0]
+    return " ".join(first.removesuffix(".").split()), description
 
 
 def document_callback(app: FastAPI) -> None:
@@ -83,12 +93,12 @@ def document_events(app: FastAPI) -> None:
         """
 
 
-def reference(model: type[BaseModel]) -> dict[str, str]:
+def schema_reference(model: type[BaseModel]) -> dict[str, str]:
     """A schema that points to one of `MODELS`."""
     return {"$ref": f"{SCHEMAS}{model.__name__}"}
 
 
-def form(
+def form_body(
     options: type[BaseModel],
     description: str,
     *,
@@ -101,7 +111,7 @@ def form(
     schema = {
         "type": "object",
         "description": description,
-        "properties": {OPTIONS_PART: reference(options), **(parts or {})},
+        "properties": {OPTIONS_PART: schema_reference(options), **(parts or {})},
         "additionalProperties": others,
         **({"required": list(needed)} if needed else {}),
     }
@@ -110,10 +120,10 @@ def form(
     return {"requestBody": {"required": required, "content": content}}
 
 
-def frames_form(options: type[BaseModel], *, required: bool = True) -> dict[str, Any]:
+def frames_form_body(options: type[BaseModel], *, required: bool = True) -> dict[str, Any]:
     """The body of a route that takes frames of all cameras of a venue; or not `required`, fetches them."""
     # Its parts are no arrays: generators write code for a repeated part of any name that does not compile.
-    return form(
+    return form_body(
         options,
         "A JPEG or PNG file per camera, the part named by the camera's id; repeat a part to send several frames of a "
         "camera: they are laid onto each other, so that its shaking blurs no line, and what walks by vanishes.",
@@ -121,25 +131,25 @@ def frames_form(options: type[BaseModel], *, required: bool = True) -> dict[str,
     )
 
 
-def submitted(known: str = "This content is already a job") -> dict[int | str, dict[str, Any]]:
+def submission_responses(known: str = "This content is already a job") -> dict[int | str, dict[str, Any]]:
     """Entries for `responses=` of a route that makes a job; `known`: when there is no new one."""
     return {
-        200: {"model": Job, "description": known, **headers("ETag")},
-        202: headers("ETag", "Location", "Retry-After"),
+        200: {"model": Job, "description": known, **header_docs("ETag")},
+        202: header_docs("ETag", "Location", "Retry-After"),
     }
 
 
-def needs(scope: Scope) -> dict[str, Any]:
+def needs_scope(scope: Scope) -> dict[str, Any]:
     """Of a route that needs a key; OpenAPI 3.1 lets a requirement of any scheme list the roles it needs."""
     return {"security": [{KEY_SCHEME: [scope]}]}
 
 
-def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Entries for `responses=` of a route."""
-    content = {MEDIA_TYPE: {"schema": reference(ProblemDetails)}}
+    content = {MEDIA_TYPE: {"schema": schema_reference(ProblemDetails)}}
     return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
 
 
-def headers(*names: str) -> dict[str, Any]:
+def header_docs(*names: str) -> dict[str, Any]:
     """Of an entry for `responses=`: the headers that this answer always has."""
     return {"headers": {name: {"required": True, **HEADERS[name]} for name in names}}

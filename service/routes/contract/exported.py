@@ -10,15 +10,15 @@ from typing import Annotated, Any
 from fastapi import Query, Response
 
 from service.api.context import Context
-from service.formats.lens import Shot
-from service.formats.table import formats
-from service.routes.contract.documented import BINARY, headers
-from service.routes.contract.tagged import TAGGED, IfNoneMatch, unless_known
+from service.formats.lens import NumberedCamera
+from service.formats.table import export_formats
+from service.routes.contract.documented import BINARY, header_docs
+from service.routes.contract.tagged import TAGGED, IfNoneMatch, tagged_response
+from service.schemas.names import ID_PATTERN, FormatName, LensChoice
+from service.schemas.problems import Problem
+from service.schemas.results import Refined
+from service.schemas.venue import Venue
 from service.store.refined import with_refined
-from service.wire.names import ID_PATTERN, FormatName, LensChoice
-from service.wire.problems import Problem
-from service.wire.results import Refined
-from service.wire.venue import Venue
 
 # Of `responses=`: what a document can be.
 DOCUMENTS: dict[int | str, dict[str, Any]] = {
@@ -27,14 +27,14 @@ DOCUMENTS: dict[int | str, dict[str, Any]] = {
             **dict.fromkeys(("application/yaml", "application/zip", "application/octet-stream"), BINARY),
             "application/json": {},
         },
-        **headers("ETag"),
+        **header_docs("ETag"),
     },
     304: TAGGED[304],
 }
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExportQuery:
     """Which part of a document a caller asks for, and which he has."""
 
     camera: Annotated[str | None, Query(pattern=ID_PATTERN, description="One camera; absent: all.")] = None
@@ -48,9 +48,9 @@ class Wanted:
     if_none_match: IfNoneMatch = None
 
 
-def exported(context: Context, venue: Venue, called: str, form: FormatName, wanted: Wanted) -> Response:
+def export_response(context: Context, venue: Venue, called: str, form: FormatName, wanted: ExportQuery) -> Response:
     """The poses of a venue as a file whose name begins with `called`."""
-    shots = _shots(venue, wanted.camera)
+    shots = _numbered_cameras(venue, wanted.camera)
     if wanted.lens == "refined":
         called = f"{called}-refined"
     # What the document is made of names it: one that the caller has is not computed again.
@@ -58,20 +58,20 @@ def exported(context: Context, venue: Venue, called: str, form: FormatName, want
     made_of += [[shot.number, shot.camera.model_dump(mode="json")] for shot in shots]
 
     def document() -> Response:
-        written = formats(context.settings)[form].document(shots)
+        written = export_formats(context.settings)[form].document(shots)
         name = "-".join([called, *([wanted.camera] if wanted.camera else []), form])
         head = {"Content-Disposition": f'attachment; filename="{name}.{written.suffix}"'}
         return Response(written.content, headers=head, media_type=written.media_type)
 
-    return unless_known(json.dumps(made_of).encode(), wanted.if_none_match, document)
+    return tagged_response(json.dumps(made_of).encode(), wanted.if_none_match, document)
 
 
-def refined_venue(venue: Venue, refined: dict[str, Refined], camera: str | None, why_none: str) -> Venue:
+def with_refined_poses(venue: Venue, refined: dict[str, Refined], camera: str | None, why_none: str) -> Venue:
     """A venue with refined poses and lenses, of one camera or of all; a `Problem` where one that is asked for has none.
 
     `why_none`: what the problem says about that.
     """
-    lacking = [shot.id for shot in _shots(venue, camera) if shot.id not in refined]
+    lacking = [shot.id for shot in _numbered_cameras(venue, camera) if shot.id not in refined]
     if lacking:
         raise no_refined_pose(lacking[0], f"{why_none} Or ask for lens=stored.")
     return with_refined(venue, refined)
@@ -82,8 +82,8 @@ def no_refined_pose(camera: str, why: str) -> Problem:
     return Problem("refined-not-found", f"Camera {camera} has none: {why}", camera=camera)
 
 
-def _shots(venue: Venue, camera: str | None) -> list[Shot]:
-    shots = [Shot(each, number) for number, each in enumerate(venue.cameras, start=1)]
+def _numbered_cameras(venue: Venue, camera: str | None) -> list[NumberedCamera]:
+    shots = [NumberedCamera(each, number) for number, each in enumerate(venue.cameras, start=1)]
     chosen = [shot for shot in shots if camera in (None, shot.id)]
     if not chosen:
         ids = [shot.id for shot in shots]

@@ -11,14 +11,16 @@ from fastapi.routing import APIRoute
 
 from service.api.body_limit import is_form
 from service.api.problems import not_json
-from service.routes.contract.documented import KEY_SCHEME, problems
-from service.wire.names import Scope
+from service.routes.contract import restricted
+from service.routes.contract.documented import KEY_SCHEME, problem_responses
+from service.schemas.names import Scope
 
 
 class Guarded(APIRoute):
     """A route with `openapi_extra=needs(...)`: its security requirement is what is documented and what is checked.
 
-    It is checked before the body is read; FastAPI reads a body before it calls any dependency.
+    It is checked before the body is read; FastAPI reads a body before it calls any dependency. So is, for a key that is
+    for some venues, whether the route is about one of them.
     """
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **rest: Any) -> None:
@@ -27,20 +29,22 @@ class Guarded(APIRoute):
             raise TypeError(f"{path} must say who may call it: openapi_extra=needs(a scope) or =FOR_ALL")
         self.needed: Scope | None = security[0][KEY_SCHEME][0] if security else None
         if self.needed:
-            rest["responses"] = {**problems(401, 403, 421, 429), **(rest.get("responses") or {})}
+            rest["responses"] = {**problem_responses(401, 403, 421, 429), **(rest.get("responses") or {})}
         super().__init__(path, endpoint, **rest)
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Check, then handle."""
         handle, needed = super().get_route_handler(), self.needed
         takes_document = self.body_field is not None
+        lists = restricted.is_list(self.endpoint)
         if needed is None:
             return handle
 
         async def guarded(request: Request) -> Response:
-            request.state.key = key = await request.app.state.context.gate.admit(request, needed)
+            request.state.key = key = await request.app.state.context.authenticator.admit(request, needed)
             if key is not None:
                 request.state.origin = replace(request.state.origin, asked_by=f"key {key.name}")
+                await restricted.check(request, key, lists=lists)
             # Forms may be large, and here one would be held in memory only to be refused.
             if takes_document and is_form(request):
                 raise not_json(request)

@@ -12,15 +12,16 @@ from pydantic import ValidationError
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context
-from service.api.problems import invalid
-from service.intake import images
-from service.routes.venues import no_such_venue
+from service.api.problems import validation_problem
+from service.api.spool import Spool, parsed_form
+from service.intake import image_checks
+from service.routes.contract.missing import no_such_venue
+from service.schemas.events import callback_urls
+from service.schemas.names import OPTIONS_PART
+from service.schemas.options import Handling
+from service.schemas.problems import Problem
+from service.schemas.venue import Venue
 from service.settings import Settings
-from service.wire.names import OPTIONS_PART
-from service.wire.options import Handling
-from service.wire.problems import Problem
-from service.wire.told import callback_urls
-from service.wire.venue import Venue
 
 LONGEST_OPTIONS = 64 * 1024
 PARTS_TOO_MANY = 100
@@ -43,35 +44,35 @@ def has_no_frames(form: FormData) -> bool:
     return all(name == OPTIONS_PART for name in form)
 
 
-def require_room(context: Context) -> None:
+def require_disk_space(context: Context) -> None:
     """Refuse an upload that would fill the disk before it is read."""
-    if context.disk.short():
+    if context.disk.is_short():
         raise Problem(
             "disk-full",
-            f"Less than {context.disk.least_bytes / 1e6:.0f} MB are free where the service keeps its files. Free some, "
-            "keep frames and pictures for fewer days (ESC_KEEP_FRAMES_DAYS, ESC_KEEP_PICTURES_DAYS), or lower "
+            f"Less than {context.disk.min_free_bytes / 1e6:.0f} MB are free where the service keeps its files. Free "
+            "some, keep frames and pictures for fewer days (ESC_KEEP_FRAMES_DAYS, ESC_KEEP_PICTURES_DAYS), or lower "
             "ESC_MIN_FREE_MB.",
         )
 
 
-def expecting(context: Context, venue_id: str) -> Venue:
+def venue_for_upload(context: Context, venue_id: str) -> Venue:
     """The venue that frames arrive for, if there is room for them: the upload is not read before."""
     stored = context.venues.get(venue_id)
     if stored is None:
         raise no_such_venue(venue_id)
-    require_room(context)
+    require_disk_space(context)
     return stored
 
 
 @asynccontextmanager
-async def form_of(request: Request, context: Context, most_files: int) -> AsyncIterator[FormData]:
-    """The form of a request, with so many files at most; a few too many get the answer that names them."""
-    # A form's files beyond 1 MB are spooled to disk, so what is in memory is one frame at a time.
+async def parsed_upload(request: Request, context: Context, most_files: int) -> AsyncIterator[FormData]:
+    """The form of a request, with so many files at most; a few too many get the answer that names them.
+
+    Its files are on the disk; `context.uploads.content` reads one.
+    """
     files = most_files + PARTS_TOO_MANY
-    parsed = request.form(max_files=files, max_fields=PARTS_TOO_MANY, max_part_size=LONGEST_OPTIONS)
-    with context.uploads.admitted(request):
-        async with parsed as form:
-            yield form
+    with context.uploads.admitted(request), Spool() as spool:
+        yield await parsed_form(request, spool, files, PARTS_TOO_MANY, LONGEST_OPTIONS)
 
 
 def most_frames(context: Context, venue: Venue) -> int:
@@ -79,7 +80,7 @@ def most_frames(context: Context, venue: Venue) -> int:
     return len(venue.cameras) * context.settings.max_frames_per_camera
 
 
-def options_of(form: FormData, model: type[Chosen], settings: Settings) -> Chosen:
+def parse_options(form: FormData, model: type[Chosen], settings: Settings) -> Chosen:
     """The part `options`; without one, what the model is when nothing is chosen."""
     parts = form.getlist(OPTIONS_PART)
     if len(parts) > 1:
@@ -93,16 +94,16 @@ def options_of(form: FormData, model: type[Chosen], settings: Settings) -> Chose
     try:
         options = model.model_validate(document)
     except ValidationError as error:
-        raise invalid(error, model, document, OPTIONS_PART) from None
+        raise validation_problem(error, model, document, OPTIONS_PART) from None
     if options.callback_url is not None:
         callback_urls.check(options.callback_url, settings)
     return options
 
 
-def frames_of(venue: Venue, form: FormData, context: Context) -> dict[str, list[UploadFile]]:
+def frames_by_camera(venue: Venue, form: FormData, context: Context) -> dict[str, list[UploadFile]]:
     """The frames of each camera of a venue, none of which may be missing."""
     names = [name for name, _ in form.multi_items() if name != OPTIONS_PART]
-    images.check_cameras(venue, {name: names.count(name) for name in names}, context.settings)
+    image_checks.check_cameras(venue, {name: names.count(name) for name in names}, context.settings)
     files: dict[str, list[UploadFile]] = {camera.id: [] for camera in venue.cameras}
     for name, part in form.multi_items():
         if name == OPTIONS_PART:

@@ -7,14 +7,15 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.routes.contract.documented import frames_form, needs, problems, submitted
+from service.routes.contract.documented import frames_form_body, needs_scope, problem_responses, submission_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.submissions import forms, taking
-from service.routes.submissions.taking import FromSender, Sender
+from service.routes.submissions import forms, job_submission
+from service.routes.submissions.job_submission import FromSender, Sender
+from service.schemas.job import Job
+from service.schemas.names import JobKind
+from service.schemas.options import FieldOptions, Options
+from service.schemas.venue import Venue
 from service.store.jobs.submission import Refusal
-from service.wire.job import Job
-from service.wire.options import FieldOptions, Options
-from service.wire.venue import Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -23,8 +24,8 @@ router = APIRouter(tags=["jobs"], route_class=Guarded)
     "/venues/{venue_id}/calibrate",
     status_code=202,
     response_model=Job,
-    responses=submitted() | problems(400, 404, 408, 409, 413, 415, 422, 429, 502, 507),
-    openapi_extra=frames_form(Options, required=False) | needs("calibrate"),
+    responses=submission_responses() | problem_responses(400, 404, 408, 409, 413, 415, 422, 429, 502, 507),
+    openapi_extra=frames_form_body(Options, required=False) | needs_scope("calibrate"),
 )
 async def calibrate(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
     """Submit a frame (or several) per camera, or none at all. Follow the job at `Location`.
@@ -32,7 +33,7 @@ async def calibrate(venue_id: VenueIdPath, request: Request, context: InContext,
     Without frames (no body, or a form with `options` alone) the service fetches one from the source of each camera.
     """
     if forms.is_empty(request):
-        stored = await run_in_threadpool(forms.expecting, context, venue_id)
+        stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
         return await run_in_threadpool(fetch, context, stored.id, Options(), sender)
     return await _uploaded(Options, venue_id, request, context, sender)
 
@@ -41,8 +42,8 @@ async def calibrate(venue_id: VenueIdPath, request: Request, context: InContext,
     "/venues/{venue_id}/field/fit",
     status_code=202,
     response_model=Job,
-    responses=submitted() | problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
-    openapi_extra=frames_form(FieldOptions) | needs("calibrate"),
+    responses=submission_responses() | problem_responses(400, 404, 408, 409, 413, 415, 422, 429, 507),
+    openapi_extra=frames_form_body(FieldOptions) | needs_scope("calibrate"),
 )
 async def fit_field(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
     """Fit length, width and ridge of the pitch to the frames of all cameras. The stored venue stays as it is.
@@ -57,8 +58,10 @@ async def _uploaded(
     model: type[Options | FieldOptions], venue_id: str, request: Request, context: Context, sender: Sender
 ) -> Response:
     forms.require_form(request)
-    stored = await run_in_threadpool(forms.expecting, context, venue_id)
-    async with forms.form_of(request, context, forms.most_frames(context, stored)) as form:
+    stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
+    kind: JobKind = "calibration" if model is Options else "field"
+    await run_in_threadpool(job_submission.require_queue_room, context, stored, kind, sender)
+    async with forms.parsed_upload(request, context, forms.most_frames(context, stored)) as form:
         return await run_in_threadpool(submit, context, stored, form, model, sender)
 
 
@@ -66,12 +69,12 @@ def submit(
     context: Context, venue: Venue, form: FormData, model: type[Options | FieldOptions], sender: Sender
 ) -> Response:
     """Make a form, with options of this `model`, a job of `venue`, which is the venue before the form arrived."""
-    options = forms.options_of(form, model, context.settings)
+    options = forms.parse_options(form, model, context.settings)
     fetched = forms.has_no_frames(form) and any(camera.source for camera in venue.cameras)
     if fetched and isinstance(options, Options):
         return fetch(context, venue.id, options, sender)
-    files = forms.frames_of(venue, form, context)
-    return taking.answer(*taking.take(context, venue, options, files, sender))
+    files = forms.frames_by_camera(venue, form, context)
+    return job_submission.submission_response(*job_submission.submit_files(context, venue, options, files, sender))
 
 
 def fetch(context: Context, venue_id: str, options: Options, sender: Sender) -> Response:
@@ -79,5 +82,5 @@ def fetch(context: Context, venue_id: str, options: Options, sender: Sender) -> 
     try:
         job, new = context.from_sources.calibrate(venue_id, options, sender.idempotency_key, sender.origin)
     except Refusal as refusal:
-        raise taking.in_words(refusal, venue_id, context.settings) from None
-    return taking.answer(job, new)
+        raise job_submission.refusal_problem(refusal, venue_id, context.settings) from None
+    return job_submission.submission_response(job, new)

@@ -9,19 +9,19 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext
-from service.routes.contract.documented import FILE, form, needs, problems, submitted
+from service.routes.contract.documented import FILE, form_body, needs_scope, problem_responses, submission_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.submissions import forms, taking
-from service.routes.submissions.taking import FromSender, Sender
-from service.wire.job import Job
-from service.wire.names import OPTIONS_PART, PHOTOS_PART
-from service.wire.options import IntrinsicsOptions
-from service.wire.problems import Problem
+from service.routes.submissions import forms, job_submission
+from service.routes.submissions.job_submission import FromSender, Sender
+from service.schemas.job import Job
+from service.schemas.names import OPTIONS_PART, PHOTOS_PART
+from service.schemas.options import IntrinsicsOptions
+from service.schemas.problems import Problem
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
 LONGEST_NAME = 100
-UPLOAD = form(
+UPLOAD = form_body(
     IntrinsicsOptions,
     "JPEG or PNG photos of one board, all by one camera in one size, each a part `photos` with its file name.",
     needed=[OPTIONS_PART, PHOTOS_PART],
@@ -34,8 +34,8 @@ UPLOAD = form(
     "/intrinsics",
     status_code=202,
     response_model=Job,
-    responses=submitted() | problems(400, 408, 413, 415, 422, 429, 507),
-    openapi_extra=UPLOAD | needs("calibrate"),
+    responses=submission_responses() | problem_responses(400, 408, 413, 415, 422, 429, 507),
+    openapi_extra=UPLOAD | needs_scope("calibrate"),
 )
 async def intrinsics(
     request: Request,
@@ -44,14 +44,17 @@ async def intrinsics(
 ) -> Response:
     """Submit photos of a board: the job's result is the lens of the camera that took them, `coverage.jpg` its basis."""
     forms.require_form(request)
-    await run_in_threadpool(forms.require_room, context)
-    async with forms.form_of(request, context, context.settings.max_photos) as form:
+    await run_in_threadpool(forms.require_disk_space, context)
+    await run_in_threadpool(job_submission.require_queue_room, context, None, "intrinsics", sender)
+    async with forms.parsed_upload(request, context, context.settings.max_photos) as form:
         return await run_in_threadpool(_submit, context, form, sender)
 
 
 def _submit(context: Context, form: FormData, sender: Sender) -> Response:
-    options = forms.options_of(form, IntrinsicsOptions, context.settings)
-    return taking.answer(*taking.take(context, None, options, _photos(form, context), sender))
+    options = forms.parse_options(form, IntrinsicsOptions, context.settings)
+    return job_submission.submission_response(
+        *job_submission.submit_files(context, None, options, _photos(form, context), sender)
+    )
 
 
 def _photos(form: FormData, context: Context) -> dict[str, list[UploadFile]]:

@@ -9,21 +9,21 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from service.api.context import Context, InContext, VenueIdPath
-from service.routes.contract.documented import form, needs, problems, submitted
+from service.routes.contract.documented import form_body, needs_scope, problem_responses, submission_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.jobs import at_its_end, job_answer
-from service.routes.submissions import forms, taking
-from service.routes.submissions.taking import FromSender, Sender
+from service.routes.jobs import job_response, wait_for_end
+from service.routes.submissions import forms, job_submission
+from service.routes.submissions.job_submission import FromSender, Sender
 from service.routes.venues import camera_of
-from service.wire.job import Job
-from service.wire.names import ID_PATTERN, OPTIONS_PART
-from service.wire.options import LocateOptions
-from service.wire.problems import Problem
-from service.wire.venue import Camera, Venue
+from service.schemas.job import Job
+from service.schemas.names import ID_PATTERN, OPTIONS_PART
+from service.schemas.options import LocateOptions
+from service.schemas.problems import Problem
+from service.schemas.venue import Camera, Venue
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
-UPLOAD = form(
+UPLOAD = form_body(
     LocateOptions,
     "The points, and if you like the frame they were clicked in, its part named by the camera's id: then `points.jpg` "
     "shows them in it.",
@@ -35,9 +35,9 @@ UPLOAD = form(
     "/venues/{venue_id}/cameras/{camera}/locate",
     status_code=202,
     response_model=Job,
-    responses=submitted("The job has ended, or this content is already a job")
-    | problems(400, 404, 408, 409, 413, 415, 422, 429, 507),
-    openapi_extra=UPLOAD | needs("calibrate"),
+    responses=submission_responses("The job has ended, or this content is already a job")
+    | problem_responses(400, 404, 408, 409, 413, 415, 422, 429, 507),
+    openapi_extra=UPLOAD | needs_scope("calibrate"),
 )
 async def locate(
     venue_id: VenueIdPath,
@@ -54,17 +54,18 @@ async def locate(
     The job takes about a second and waits for no calibration; with `wait` the answer is its end.
     """
     forms.require_form(request)
-    stored = await run_in_threadpool(forms.expecting, context, venue_id)
-    async with forms.form_of(request, context, 1) as form:
+    stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
+    await run_in_threadpool(job_submission.require_queue_room, context, stored, "locate", sender)
+    async with forms.parsed_upload(request, context, 1) as form:
         job, new = await run_in_threadpool(_submit, context, stored, camera, form, sender)
-    job = await at_its_end(context, job, wait)
-    return job_answer(job, status=202 if new and job.open else 200)
+    job = await wait_for_end(context, job, wait)
+    return job_response(job, status=202 if new and job.open else 200)
 
 
 def _submit(context: Context, venue: Venue, camera_id: str, form: FormData, sender: Sender) -> tuple[Job, bool]:
     camera = camera_of(venue, camera_id)
-    options = forms.options_of(form, LocateOptions, context.settings)
-    return taking.take(context, venue, options, {camera_id: _frame(camera, form)}, sender)
+    options = forms.parse_options(form, LocateOptions, context.settings)
+    return job_submission.submit_files(context, venue, options, {camera_id: _frame(camera, form)}, sender)
 
 
 def _frame(camera: Camera, form: FormData) -> list[UploadFile]:

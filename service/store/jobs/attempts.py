@@ -1,45 +1,65 @@
-"""What workers do with jobs: begin an attempt, keep it, end it.
+"""What workers do with jobs: begin an attempt, renew its lease, end it.
 
-Every write of a worker carries the token of its attempt (`run_token`) and changes nothing when the job was cancelled or
-given to another attempt meanwhile.
+Every write of a worker carries the fencing token of its attempt (`run_token`) and changes nothing when the job was
+cancelled or given to another attempt meanwhile.
 """
 
 from __future__ import annotations
 
 import uuid
-from collections.abc import Sequence
-from datetime import timedelta
+from collections.abc import Callable, Collection, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from datetime import datetime, timedelta
 from types import MappingProxyType
 
 import sqlalchemy as sa
 
+from service.schemas.job import JobError, Progress
+from service.schemas.names import OPEN_STATUSES, JobKind
+from service.schemas.options import Options
+from service.schemas.results import AnyResult, Result
+from service.schemas.venue import Venue
 from service.store import tables
-from service.store.alarms import settle_alarms
-from service.store.counts.courses import note_missed, note_none_held, views_of
-from service.store.counts.figures import note_quality
-from service.store.engine import Repository, clock, reading, serialise, writing
-from service.store.jobs.ending import Still, changed, end, still_open
-from service.store.jobs.reading import ONE, asked
-from service.store.jobs.task import Task
+from service.store.alarms import update_alarms
+from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.jobs.ending import Still, changed, end_job, still_open
+from service.store.jobs.queries import ONE, job_input_values
+from service.store.jobs.task import Task, UnreadableJob, parse_job_input
 from service.store.memories import Memories, newest_memories
+from service.store.statistics.camera_history import last_accepted_views
+from service.store.statistics.venue_quality import VenueQuality, update_quality
 from service.store.trends import anchors_of
-from service.store.venues import find_venue, let_hold, venue_lock
-from service.wire.job import JobError, Progress
-from service.wire.names import OPEN
-from service.wire.options import Options
-from service.wire.results import AnyResult, Result
-from service.wire.venue import Venue
+from service.store.venues import apply_result, find_stored, find_venue, venue_lock
+from service.store.workers import CLOCK_TOLERANCE
 
+# Job, priority and kind, into the queue in the caller's transaction.
+Enqueue = Callable[[sa.Connection, str, int, JobKind], None]
 NO_MEMORIES: Memories = MappingProxyType({})
 DONE = Progress(stage="preview", fraction=1.0)
 j = tables.jobs.c
 
 
-class Attempts(Repository):
+@dataclass(frozen=True)
+class StrandedJob:
+    """A queued job that the queue has already begun, with what is needed to enqueue it again."""
+
+    priority: int
+    kind: JobKind
+
+
+class AttemptRepository(Repository):
     """The attempts of the jobs in the database."""
 
     def begin(self, job_id: str) -> Task | None:
-        """Start an attempt; None if there is nothing to do any more."""
+        """Start an attempt; None if there is nothing to do any more. Raises `UnreadableJob`, and the job waits."""
+        try:
+            return self._begin(job_id)
+        except UnreadableJob:
+            self._let_wait(job_id)
+            raise
+
+    def _begin(self, job_id: str) -> Task | None:
         with writing(self._engine) as connection:
             now = clock(connection)
             begin = (
@@ -57,36 +77,69 @@ class Attempts(Repository):
             if connection.execute(begin).rowcount == 0:
                 return None
             row = connection.execute(ONE, {"job_id": job_id}).one()
-            job = asked(row)
-            last_views = views_of(connection, row.venue) if row.venue else {}
+            job = job_input_values(row)
+            last_views = last_accepted_views(connection, row.venue) if row.venue else {}
             memories = newest_memories(connection, row.venue) if row.kind == "calibration" else {}
             anchors = anchors_of(connection, row.venue) if row.venue else {}
-            return Task(
-                **job,
-                run_token=row.run_token,
-                attempt=row.attempt,
-                last_views=last_views,
-                memories=dict(memories),
-                anchors=anchors,
-                taken_at=row.created_at,
-            )
+            attempt = {
+                "run_token": row.run_token,
+                "attempt": row.attempt,
+                "last_views": last_views,
+                "memories": dict(memories),
+                "anchors": anchors,
+                "taken_at": row.created_at,
+            }
+            return parse_job_input(Task, job | attempt)
 
-    def holds(self, task: Task) -> bool:
-        """Whether the job is still this attempt's; False if it has lost it, to a cancellation or to another attempt."""
-        with reading(self._engine) as connection:
-            return connection.scalar(sa.select(j.id).where(*_fence(task))) is not None
-
-    def keep(self, task: Task) -> bool:
-        """A sign of life of an attempt; False if it has lost the job."""
+    def _let_wait(self, job_id: str) -> None:
+        """Let a job wait whose earlier attempt, by a worker that could read it, is over."""
         with writing(self._engine) as connection:
-            alive = sa.update(tables.jobs).where(*_fence(task)).values(updated_at=clock(connection))
-            return connection.execute(alive).rowcount == 1
+            waits = {"status": "queued", "run_token": None, "progress": None, **changed(clock(connection))}
+            begun = [j.id == job_id, j.status == "running"]
+            connection.execute(sa.update(tables.jobs).where(*begun).values(**waits))
 
-    def report(self, task: Task, progress: Progress) -> None:
-        """Show how far the job is."""
+    def reclaim(self, job_id: str, seconds: float) -> StrandedJob | None:
+        """Reserve a job that has waited unchanged for so long, to put it into the queue again.
+
+        None: it is no longer so, or another worker was faster. Raises `UnreadableJob`, and nothing is reserved.
+        """
+        with writing(self._engine) as connection:
+            now = clock(connection)
+            unchanged = [j.id == job_id, j.status == "queued", _unheard_for(seconds, now)]
+            reserve = sa.update(tables.jobs).where(*unchanged).values(updated_at=now)
+            if connection.execute(reserve).rowcount == 0:
+                return None
+            row = connection.execute(ONE, {"job_id": job_id}).one()
+            parse_job_input(Task, job_input_values(row) | {"run_token": ""})
+            return StrandedJob(row.priority, row.kind)
+
+    def enqueue(self, job_id: str, left: StrandedJob, enqueue: Enqueue) -> None:
+        """Put a job that was taken back into the queue."""
+        with writing(self._engine) as connection:
+            enqueue(connection, job_id, left.priority, left.kind)
+
+    def still_waiting(self, job_ids: Collection[str]) -> set[str]:
+        """Return which of several jobs are waiting."""
+        query = sa.select(j.id).where(j.id.in_(job_ids), j.status == "queued")
+        with reading(self._engine) as connection:
+            return set(connection.scalars(query)) if job_ids else set()
+
+    def held_leases(self, tasks: Collection[Task]) -> set[str]:
+        """Return the fencing tokens of the attempts that still hold the lease of their job."""
+        with reading(self._engine) as connection:
+            return set(connection.scalars(sa.select(j.run_token).where(*_fences(tasks))))
+
+    def renew_leases(self, tasks: Collection[Task]) -> set[str]:
+        """Renew the leases of attempts; return the fencing tokens of those that still held theirs."""
+        with writing(self._engine) as connection:
+            alive = sa.update(tables.jobs).where(*_fences(tasks)).values(updated_at=clock(connection))
+            return set(connection.scalars(alive.returning(j.run_token)))
+
+    def report(self, task: Task, progress: Progress) -> bool:
+        """Show how far the job is; False if the attempt has lost it."""
         with writing(self._engine) as connection:
             shown = {"progress": progress.model_dump(), **changed(clock(connection))}
-            connection.execute(sa.update(tables.jobs).where(*_fence(task)).values(**shown))
+            return connection.execute(sa.update(tables.jobs).where(*_fence(task)).values(**shown)).rowcount == 1
 
     def finish(self, task: Task, result: AnyResult, pictures: Sequence[str], memories: Memories = NO_MEMORIES) -> None:
         """End a job with a result and the names of its pictures.
@@ -96,41 +149,66 @@ class Attempts(Repository):
         """
         with writing(self._engine) as connection:
             if task.venue is not None:
-                serialise(connection, venue_lock(task.venue.id))
+                advisory_lock(connection, venue_lock(task.venue.id))
             if not _locked(connection, _fence(task)):
                 return
-            if isinstance(result, Result):
-                result = _move_poses(connection, task, result, memories)
-            end(
-                connection,
-                task.job_id,
-                _fence(task),
-                "succeeded",
-                result=result,
-                pictures=list(pictures),
-                progress=DONE.model_dump(),
-            )
+            with nullcontext() if task.venue is None else update_quality(connection, task.venue.id) as quality:
+                if isinstance(result, Result) and quality is not None:
+                    result = _move_poses(connection, quality, task, result, memories)
+                end_job(
+                    connection,
+                    task.job_id,
+                    _fence(task),
+                    "succeeded",
+                    quality,
+                    result=result,
+                    pictures=list(pictures),
+                    progress=DONE.model_dump(),
+                )
 
     def fail(self, task: Task, error: JobError) -> None:
         """End a job without a result."""
         with writing(self._engine) as connection:
             end_without_result(connection, task.job_id, _fence(task), error)
 
-    def unchanged_for(self, seconds: float) -> list[str]:
-        """Open jobs that nothing was heard of for a while."""
+    def hand_back(self, task: Task) -> bool:
+        """Let a job wait again as if this attempt of it had not been; False if the attempt has ended or lost it."""
+        as_before = {"status": "queued", "run_token": None, "attempt": j.attempt - 1, "progress": None}
+        if task.attempt == 1:
+            as_before["started_at"] = None
+        with writing(self._engine) as connection:
+            back = sa.update(tables.jobs).where(*_fence(task)).values(**as_before, **changed(clock(connection)))
+            return connection.execute(back).rowcount == 1
+
+    def stale_jobs(self, seconds: float, but: Collection[str] = ()) -> list[str]:
+        """Open jobs that nothing was heard of for a while, or only by a clock that has been put back since.
+
+        `but`: without these.
+        """
         with reading(self._engine) as connection:
-            before = clock(connection) - timedelta(seconds=seconds)
-            query = sa.select(j.id).where(j.status.in_(OPEN), j.updated_at < before)
+            unheard = _unheard_for(seconds, clock(connection))
+            query = sa.select(j.id).where(j.status.in_(OPEN_STATUSES), unheard, j.id.not_in(but))
             return list(connection.scalars(query.order_by(j.updated_at).limit(100)))
 
-    def abandon(self, job_id: str, error: JobError) -> bool:
-        """End an open job that the queue has given up; False if it has ended meanwhile."""
+    def abandon(self, job_id: str, error: JobError, seconds: float) -> bool:
+        """End an open job that the queue has given up; False if it has ended or was heard of meanwhile."""
         with writing(self._engine) as connection:
-            return end_without_result(connection, job_id, still_open(job_id), error)
+            still = [*still_open(job_id), _unheard_for(seconds, clock(connection))]
+            return end_without_result(connection, job_id, still, error)
+
+
+def _unheard_for(seconds: float, now: datetime) -> sa.ColumnElement[bool]:
+    return sa.or_(j.updated_at < now - timedelta(seconds=seconds), j.updated_at > now + CLOCK_TOLERANCE)
 
 
 def _fence(task: Task) -> Still:
     return [j.id == task.job_id, j.run_token == task.run_token, j.status == "running"]
+
+
+def _fences(tasks: Collection[Task]) -> Still:
+    # Tokens are of one attempt each; the ids are what the index is by.
+    tokens = [task.run_token for task in tasks]
+    return [j.id.in_([task.job_id for task in tasks]), j.run_token.in_(tokens), j.status == "running"]
 
 
 def _locked(connection: sa.Connection, still: Still) -> bool:
@@ -138,7 +216,9 @@ def _locked(connection: sa.Connection, still: Still) -> bool:
     return connection.scalar(sa.select(j.id).where(*still).with_for_update()) is not None
 
 
-def _move_poses(connection: sa.Connection, task: Task, result: Result, memories: Memories) -> Result:
+def _move_poses(
+    connection: sa.Connection, quality: VenueQuality, task: Task, result: Result, memories: Memories
+) -> Result:
     """Let the poses hold that are accepted with the memories of their cameras, and note what the result says about the
     venue.
 
@@ -146,20 +226,20 @@ def _move_poses(connection: sa.Connection, task: Task, result: Result, memories:
     """
     assert task.venue is not None
     assert isinstance(task.options, Options)
-    now_stored = find_venue(connection, task.venue.id)
-    if now_stored is None or not now_stored.calibrates_like(task.venue):
+    stored = find_stored(connection, task.venue.id)
+    if stored is None or not stored.venue.has_same_calibration_input_as(task.venue):
         if not result.accepted_cameras:
             return result
         return result.refused("the venue was changed while the job ran", "venue-changed")
     held = [] if task.options.dry_run else result.accepted_cameras
-    note_quality(connection, task.venue.id, result, moved=bool(held))
+    quality.calibrated(result, moved=bool(held))
     if held:
-        note_missed(connection, task.venue.id, now_stored.poses.keys() - held)
+        quality.missed(stored.venue.poses.keys() - held)
         with_this_job = {camera: memory for camera, memory in memories.items() if camera in held}
         known = {**newest_memories(connection, task.venue.id), **with_this_job}
-        let_hold(connection, now_stored, result, held, "calibrated", task.job_id, known)
+        apply_result(connection, quality, stored, result, held, "calibrated", task.job_id, known, task.origin.actor)
     elif not task.options.dry_run:
-        _miss(connection, now_stored)
+        _miss(connection, quality, stored.venue)
     return result
 
 
@@ -168,17 +248,18 @@ def end_without_result(connection: sa.Connection, job_id: str, still: Still, err
     row = connection.execute(sa.select(j.kind, j.venue, j.options).where(j.id == job_id)).one()
     brought_none = row.kind == "calibration" and not row.options["dry_run"]
     if row.venue is not None:
-        serialise(connection, venue_lock(row.venue))
+        advisory_lock(connection, venue_lock(row.venue))
     if not _locked(connection, still):
         return False
     venue = find_venue(connection, row.venue) if brought_none else None
-    if venue is not None:
-        # Alarms are counted before ends wherever both are, so that no two transactions wait for each other.
-        _miss(connection, venue)
-    return end(connection, job_id, still, "failed", error=error)
+    with nullcontext() if row.venue is None else update_quality(connection, row.venue) as quality:
+        if venue is not None and quality is not None:
+            # Alarms are counted before ends wherever both are, so that no two transactions wait for each other.
+            _miss(connection, quality, venue)
+        return end_job(connection, job_id, still, "failed", quality, error=error)
 
 
-def _miss(connection: sa.Connection, venue: Venue) -> None:
+def _miss(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> None:
     """A calibration that was to bring poses brought none."""
-    note_none_held(connection, venue.id, venue.poses.keys())
-    settle_alarms(connection, venue)
+    quality.brought_none(venue.poses.keys())
+    update_alarms(connection, quality, venue)

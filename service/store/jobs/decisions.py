@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import nullcontext
+from dataclasses import dataclass
 
 import sqlalchemy as sa
 
+from service.schemas.actor import Actor
+from service.schemas.history import Revision
+from service.schemas.results import Result
+from service.schemas.venue import Venue
 from service.store import tables
-from service.store.alarms import settle_alarms
-from service.store.counts.figures import note_quality
-from service.store.engine import Repository, clock, serialise, writing
-from service.store.jobs.ending import changed, end, still_open
-from service.store.jobs.reading import found_poses
+from service.store.alarms import update_alarms
+from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.jobs.ending import changed, end_job, still_open
+from service.store.jobs.queries import found_poses
 from service.store.memories import Memories, newest_memories
-from service.store.revisions import TAKEN, newest_revision, revision_before, revision_of_job
+from service.store.revisions import CALIBRATION_CAUSES, newest_revision, revision_before, revision_of_job
+from service.store.statistics.venue_quality import update_quality
 from service.store.trends import note_night
-from service.store.venues import find_venue, let_hold, put_back, venue_lock, with_result
-from service.wire.history import Revision
-from service.wire.results import Result
-from service.wire.venue import Venue
+from service.store.venues import apply_result, find_stored, find_venue, restore_state, venue_lock, with_result
 
 j = tables.jobs.c
 
@@ -27,67 +30,103 @@ class NoPoses(Exception):  # noqa: N818
     """The job is no calibration that found poses (yet)."""
 
 
-class MovedOn(Exception):  # noqa: N818
+class VenueHasChanged(Exception):  # noqa: N818
     """The venue is not as the job left or found it: to decide about the job would undo other changes."""
 
     def __init__(self, newest: Revision | None) -> None:
         self.newest = newest
 
 
-class Decisions(Repository):
+@dataclass(frozen=True)
+class OpenDecisions:
+    """What can still be decided about a calibration.
+
+    `accept`: the cameras that do not stand as it found them and can be made to; `reject`: whether its poses hold and
+    can be given back.
+    """
+
+    accept: frozenset[str]
+    reject: bool
+
+
+class DecisionRepository(Repository):
     """The decisions about the jobs in the database."""
 
-    def cancel(self, job_id: str) -> None:
+    def decidable(self, job_id: str) -> OpenDecisions:
+        """Return what `accept` and `reject` would not refuse now."""
+        with reading(self._engine) as connection:
+            found = found_poses(connection, job_id)
+            if found is None:
+                return OpenDecisions(frozenset(), reject=False)
+            began_with, result = found
+            venue, newest = find_venue(connection, began_with.id), newest_revision(connection, began_with.id)
+            if venue is None or newest is None:
+                return OpenDecisions(frozenset(), reject=False)
+            taken = _was_taken(job_id, newest)
+            return OpenDecisions(
+                _not_taken(venue, result) if _untouched(venue, began_with, result, taken=taken) else frozenset(),
+                reject=taken,
+            )
+
+    def cancel(self, job_id: str, by: Actor | None = None) -> None:
         """End a job that is still open; its worker notices."""
         with writing(self._engine) as connection:
             venue_id = connection.scalar(sa.select(j.venue).where(j.id == job_id))
             if venue_id is not None:
-                serialise(connection, venue_lock(venue_id))
-            end(connection, job_id, still_open(job_id), "cancelled")
+                advisory_lock(connection, venue_lock(venue_id))
+            with nullcontext() if venue_id is None else update_quality(connection, venue_id) as quality:
+                end_job(connection, job_id, still_open(job_id), "cancelled", quality, by=by)
 
-    def accept(self, job_id: str, cameras: Collection[str] | None = None) -> None:
+    def accept(self, job_id: str, cameras: Collection[str] | None = None, by: Actor | None = None) -> None:
         """Let the poses that a calibration found hold, whatever the gate said.
 
         If they hold by themselves, a person now says so too: the trends of the cameras begin anew with them.
-        `cameras`: only theirs, None: those of all. Raises `MovedOn` if the venue is neither as the calibration began
-        with it nor as it left it, `NoPoses` if it found none.
+        `cameras`: only theirs, None: those of all. Raises `VenueHasChanged` if the venue is neither as the calibration
+        began with it nor as it left it, `NoPoses` if it found none.
         """
         with writing(self._engine) as connection:
             began_with, result, newest = _found(connection, job_id)
             chosen = list(began_with.poses) if cameras is None else cameras
-            now_stored = find_venue(connection, began_with.id)
-            left_by_it = newest is not None and newest.job == job_id and newest.cause in TAKEN
-            if now_stored and newest and left_by_it and with_result(now_stored, result, chosen).stands_like(now_stored):
+            stored = find_stored(connection, began_with.id)
+            now_stored = None if stored is None else stored.venue
+            left_by_it = _was_taken(job_id, newest)
+            if (
+                now_stored
+                and newest
+                and left_by_it
+                and with_result(now_stored, result, chosen).has_same_poses_as(now_stored)
+            ):
                 found = [camera for camera in result.cameras if camera.id in chosen]
                 note_night(connection, now_stored, found, job_id, newest.revision, by_hand=True)
-                settle_alarms(connection, now_stored)
+                with update_quality(connection, now_stored.id) as quality:
+                    update_alarms(connection, quality, now_stored)
                 return
-            untouched = _lies_between if left_by_it else _is_as_it_was
-            if now_stored is None or not untouched(now_stored, began_with, result):
-                raise MovedOn(newest)
-            note_quality(connection, began_with.id, result, moved=True)
-            memories = newest_memories(connection, began_with.id)
-            let_hold(
-                connection, now_stored, result, chosen, "accepted", job_id, _without_refused(memories, result, chosen)
-            )
+            if stored is None or not _untouched(stored.venue, began_with, result, taken=left_by_it):
+                raise VenueHasChanged(newest)
+            memories = _without_refused(newest_memories(connection, began_with.id), result, chosen)
+            with update_quality(connection, began_with.id) as quality:
+                quality.calibrated(result, moved=True)
+                apply_result(connection, quality, stored, result, chosen, "accepted", job_id, memories, by)
             _touch(connection, job_id)
 
-    def reject(self, job_id: str) -> None:
+    def reject(self, job_id: str, by: Actor | None = None) -> None:
         """Put back what was before a calibration's poses held; nothing to do if they never did or were put back.
 
-        Raises `MovedOn` if something else has come since, `NoPoses` if it found none.
+        Raises `VenueHasChanged` if something else has come since, `NoPoses` if it found none.
         """
         with writing(self._engine) as connection:
             began_with, _, newest = _found(connection, job_id)
             if newest is None or revision_of_job(connection, job_id) is None:
                 return
             if newest.job != job_id or newest.cause == "adopted":
-                raise MovedOn(newest)
-            if newest.cause in TAKEN:
-                now_stored = find_venue(connection, began_with.id)
-                assert now_stored is not None
-                before = revision_before(connection, now_stored.id, job_id)
-                settle_alarms(connection, put_back(connection, now_stored, before, rejected_job=job_id))
+                raise VenueHasChanged(newest)
+            if newest.cause in CALIBRATION_CAUSES:
+                stored = find_stored(connection, began_with.id)
+                assert stored is not None
+                before = revision_before(connection, began_with.id, job_id)
+                with update_quality(connection, began_with.id) as quality:
+                    restored = restore_state(connection, quality, stored, before, by, job_id)
+                    update_alarms(connection, quality, restored)
                 _touch(connection, job_id)
 
 
@@ -97,13 +136,30 @@ def _found(connection: sa.Connection, job_id: str) -> tuple[Venue, Result, Revis
     if found is None:
         raise NoPoses
     began_with, result = found
-    serialise(connection, venue_lock(began_with.id))
+    advisory_lock(connection, venue_lock(began_with.id))
     return began_with, result, newest_revision(connection, began_with.id)
+
+
+def _was_taken(job_id: str, newest: Revision | None) -> bool:
+    """Whether the poses that hold are those of a job."""
+    return newest is not None and newest.job == job_id and newest.cause in CALIBRATION_CAUSES
+
+
+def _untouched(now_stored: Venue, began_with: Venue, result: Result, *, taken: bool) -> bool:
+    """Whether nothing but a calibration itself has changed a venue since it began."""
+    return (_lies_between if taken else _is_as_it_was)(now_stored, began_with, result)
+
+
+def _not_taken(now_stored: Venue, result: Result) -> frozenset[str]:
+    """The cameras that stand otherwise than a calibration found them."""
+    found = with_result(now_stored, result)
+    pairs = zip(now_stored.cameras, now_stored.poses_and_lenses, found.poses_and_lenses, strict=True)
+    return frozenset(camera.id for camera, now, then in pairs if now != then)
 
 
 def _is_as_it_was(now_stored: Venue, began_with: Venue, _: Result) -> bool:
     """Whether a calibration would begin with the same again."""
-    return now_stored.calibrates_like(began_with)
+    return now_stored.has_same_calibration_input_as(began_with)
 
 
 def _lies_between(now_stored: Venue, began_with: Venue, result: Result) -> bool:
@@ -113,7 +169,10 @@ def _lies_between(now_stored: Venue, began_with: Venue, result: Result) -> bool:
         now_stored.field in (began_with.field, found.field)
         and now_stored.poses.keys() == began_with.poses.keys()
         and all(
-            now in ways for now, *ways in zip(now_stored.standing, began_with.standing, found.standing, strict=True)
+            now in ways
+            for now, *ways in zip(
+                now_stored.poses_and_lenses, began_with.poses_and_lenses, found.poses_and_lenses, strict=True
+            )
         )
     )
 

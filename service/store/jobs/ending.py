@@ -1,4 +1,4 @@
-"""The end of a job, whoever brings it: row, event, callback and tallies in one transaction.
+"""The end of a job: row, event, callback and counters in one transaction.
 
 Whoever ends a job of a venue is serialised about the venue from the beginning.
 """
@@ -10,19 +10,22 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from service.schemas.actor import Actor
+from service.schemas.base import TOLERANTLY
+from service.schemas.events.webhooks import Webhook
+from service.schemas.job import JobError
+from service.schemas.names import OPEN_STATUSES, JobStatus
+from service.schemas.options import Options
+from service.schemas.results import AnyResult
 from service.store import tables
-from service.store.counts import tallies
-from service.store.counts.endings import Ending
-from service.store.counts.glances import note_end
-from service.store.engine import clock
-from service.store.jobs.task import OPTIONS
-from service.store.told.deliveries import add_delivery
-from service.store.told.events import add_job_event
-from service.wire.job import JobError
-from service.wire.names import OPEN, Status
-from service.wire.options import Options
-from service.wire.results import AnyResult
-from service.wire.told.webhooks import Webhook
+from service.store.database import clock
+from service.store.documents import result_columns, to_document
+from service.store.events.event_log import add_job_event
+from service.store.events.outbox import add_delivery
+from service.store.jobs.task import stored_options
+from service.store.statistics import counters
+from service.store.statistics.job_outcome import JobOutcome
+from service.store.statistics.venue_quality import VenueQuality
 
 # What must still hold of a row when it is written.
 Still = list[sa.ColumnElement[bool]]
@@ -30,21 +33,27 @@ j = tables.jobs.c
 v = tables.venues.c
 
 
-def end(
+def end_job(
     connection: sa.Connection,
     job_id: str,
     still: Still,
-    status: Status,
+    status: JobStatus,
+    quality: VenueQuality | None,
     *,
     result: AnyResult | None = None,
     error: JobError | None = None,
+    by: Actor | None = None,
     **values: Any,
 ) -> bool:
-    """End a job, have it told and counted; False, and nothing is done, if the row is not `still` so."""
-    now = clock(connection)
-    for name, document in (("result", result), ("error", error)):
-        if document is not None:
-            values[name] = document.model_dump(mode="json")
+    """End a job with its event, callback and counters; False, and nothing is done, if the row is not `still` so.
+
+    `quality`: that of its venue; None: it has no venue. `by`: who ended it; None: it ended by itself.
+    """
+    now = clock(connection) if quality is None else quality.now
+    if result is not None:
+        values["result"], values["result_additions"] = result_columns(result)
+    if error is not None:
+        values["error"] = to_document(error)
     ended = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **changed(now))
     if connection.execute(ended).rowcount == 0:
         return False
@@ -53,24 +62,24 @@ def end(
     query = sa.select(j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt, webhooks)
     of_venue = tables.jobs.outerjoin(tables.venues, v.id == j.venue)
     row = connection.execute(query.select_from(of_venue).where(j.id == job_id)).one()
-    options = OPTIONS[row.kind].model_validate(row.options)
-    if isinstance(options, Options):
-        note_end(connection, row.venue, status, result, now, dry_run=options.dry_run)
+    options = stored_options(row.kind, row.options)
+    if isinstance(options, Options) and quality is not None:
+        quality.ended(status, result, dry_run=options.dry_run)
     if row.venue is not None:
-        told = [Webhook.model_validate(webhook) for webhook in row.webhooks or ()]
-        add_job_event(connection, row.venue, told, f"job.{status}", job_id, now)
+        told = [Webhook.model_validate(webhook, **TOLERANTLY) for webhook in row.webhooks or ()]
+        add_job_event(connection, row.venue, told, f"job.{status}", job_id, now, by)
     if options.callback_url is not None:
         add_delivery(connection, job_id, options.callback_url, now)
-    ending = Ending(row.kind, status, result, error, row.created_at, row.started_at, now, row.attempt)
-    tallies.add(connection, ending.tallies())
+    ending = JobOutcome(row.kind, status, result, error, row.created_at, row.started_at, now, row.attempt)
+    counters.add(connection, ending.tallies())
     return True
 
 
 def still_open(job_id: str) -> Still:
-    """It waits or runs."""
-    return [j.id == job_id, j.status.in_(OPEN)]
+    """Return the conditions under which a job is queued or running."""
+    return [j.id == job_id, j.status.in_(OPEN_STATUSES)]
 
 
 def changed(now: datetime) -> dict[str, Any]:
-    """What every change of a row that clients see writes beside it."""
+    """Return the columns that every change of a job which clients see updates: revision and time."""
     return {"revision": j.revision + 1, "updated_at": now}

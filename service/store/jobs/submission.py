@@ -3,34 +3,33 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
 
+from service.schemas.job import Job, JobError
+from service.schemas.names import JobKind, JobStatus
+from service.schemas.options import Options
+from service.schemas.venue import Venue
 from service.store import tables
-from service.store.engine import Repository, clock, reading, serialise, writing
-from service.store.jobs.attempts import end_without_result
+from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.documents import venue_columns
+from service.store.events.event_log import add_queued_event
+from service.store.jobs.attempts import Enqueue, end_without_result
 from service.store.jobs.files import frame_folder
-from service.store.jobs.reading import ONE, asked, read_job
-from service.store.jobs.task import Asked
-from service.store.told.events import add_job_event
+from service.store.jobs.queries import ONE, job_input_values, read_job
+from service.store.jobs.task import JobInput, parse_job_input
+from service.store.schedules import reserved_places
 from service.store.venues import find_venue, venue_lock
-from service.wire.job import Job, JobError
-from service.wire.names import Kind, Status
-from service.wire.options import Options
-from service.wire.venue import Venue
 
-# Job, priority and kind, into the queue in the caller's transaction.
-Enqueue = Callable[[sa.Connection, str, int, Kind], None]
 PRIORITIES = {"live": 1, "routine": 100}
 # How the content hash of a job begins whose frames were fetched.
 FETCHED = "fetched "
 j = tables.jobs.c
 
 
-class Submission(Asked):
+class Submission(JobInput):
     """What a client sent, checked: ready to become a job once its frames are stored."""
 
     content_hash: str
@@ -80,8 +79,13 @@ class VenueReplaced(Refusal):
 class QueueFull(Refusal):
     """As many jobs wait as may."""
 
+    def __init__(self, waiting: int, kept: int) -> None:
+        """`waiting`: the jobs that wait; `kept`: the places that are kept for schedules that are due."""
+        self.waiting = waiting
+        self.kept = kept
 
-class Submissions(Repository):
+
+class SubmissionRepository(Repository):
     """The beginning of the jobs in the database."""
 
     def submit(self, submission: Submission, queue_limit: int, enqueue: Enqueue) -> tuple[Job, bool]:
@@ -92,7 +96,7 @@ class Submissions(Repository):
         with writing(self._engine) as connection:
             venue_id = None if submission.venue is None else submission.venue.id
             # Those of no venue wait for each other, so that the same content sent twice at once is one job.
-            serialise(connection, submission.kind if venue_id is None else venue_lock(venue_id))
+            advisory_lock(connection, submission.kind if venue_id is None else venue_lock(venue_id))
             same = _duplicate(
                 connection, submission.kind, venue_id, submission.idempotency_key, submission.content_hash
             )
@@ -102,24 +106,22 @@ class Submissions(Repository):
             # From here on the frames are the job's.
             folder = frame_folder(submission.job_id)
             connection.execute(sa.delete(tables.leftovers).where(tables.leftovers.c.folder == folder))
-            now = clock(connection)
-            _insert(connection, submission, venue, "queued", now)
+            _insert(connection, submission, venue, "queued", clock(connection))
+            job = read_job(connection, submission.job_id)
             if venue is not None:
-                add_job_event(connection, venue.id, venue.webhooks, "job.queued", submission.job_id, now)
+                add_queued_event(connection, venue, job, submission.origin.actor)
             priority = PRIORITIES[submission.options.priority]
             enqueue(connection, submission.job_id, priority, submission.kind)
             # Last: from here to its end each submission holds up all others, so that none overshoots the limit.
-            serialise(connection, "queue")
-            if _waiting(connection) > queue_limit:
-                raise QueueFull
-        with reading(self._engine) as connection:
-            return read_job(connection, submission.job_id), True
+            advisory_lock(connection, "queue")
+            _require_place(connection, _waiting(connection) - 1, queue_limit, is_schedule=submission.origin.is_schedule)
+            return job, True
 
     def fail(self, submission: Submission, error: JobError) -> Job:
         """A job that failed before it had frames, or the job that the submission already is by its key."""
         assert submission.venue is not None
         with writing(self._engine) as connection:
-            serialise(connection, venue_lock(submission.venue.id))
+            advisory_lock(connection, venue_lock(submission.venue.id))
             same = _of_key(connection, submission.venue.id, submission.idempotency_key)
             if same is None:
                 venue, now = _as_it_is_now(connection, submission.venue), clock(connection)
@@ -133,8 +135,25 @@ class Submissions(Repository):
         with reading(self._engine) as connection:
             return _waiting(connection)
 
+    def require_place(self, queue_limit: int, *, is_schedule: bool) -> None:
+        """Raise `QueueFull` where what is submitted now would find no place."""
+        with reading(self._engine) as connection:
+            _require_place(connection, _waiting(connection), queue_limit, is_schedule=is_schedule)
+
+    def require_place_for(
+        self, venue_id: str | None, idempotency_key: str | None, kind: JobKind, queue_limit: int
+    ) -> None:
+        """Raise `QueueFull` where what is sent now would find no place, unless it may be an old job sent again."""
+        with reading(self._engine) as connection:
+            if _of_key(connection, venue_id, idempotency_key) is not None:
+                return
+            active = sa.select(j.id).where(j.venue == venue_id, tables.ACTIVE)
+            if kind == "calibration" and connection.execute(active).first() is not None:
+                return
+            _require_place(connection, _waiting(connection), queue_limit, is_schedule=False)
+
     def same_as(
-        self, venue_id: str | None, idempotency_key: str | None, content_hash: str, kind: Kind = "calibration"
+        self, venue_id: str | None, idempotency_key: str | None, content_hash: str, kind: JobKind = "calibration"
     ) -> Job | None:
         """The job that this content already is, so that nothing needs to be stored."""
         with reading(self._engine) as connection:
@@ -142,17 +161,24 @@ class Submissions(Repository):
             return None if job_id is None else read_job(connection, job_id)
 
     def of(self, job_id: str) -> Submission | None:
-        """What a job was made of; None if its frames are kept no more."""
+        """Return what a job was made of; None after its frames have expired. Raises `UnreadableJob`."""
         with reading(self._engine) as connection:
             row = connection.execute(ONE, {"job_id": job_id}).one_or_none()
         if row is None or row.frames_deleted_at is not None:
             return None
-        return Submission(**asked(row), content_hash=row.content_hash, idempotency_key=row.idempotency_key)
+        sent = {"content_hash": row.content_hash, "idempotency_key": row.idempotency_key}
+        return parse_job_input(Submission, job_input_values(row) | sent)
 
 
 def _insert(
-    connection: sa.Connection, submission: Submission, venue: Venue | None, status: Status, now: datetime, **more: Any
+    connection: sa.Connection,
+    submission: Submission,
+    venue: Venue | None,
+    status: JobStatus,
+    now: datetime,
+    **more: Any,
 ) -> None:
+    document, additions = (None, None) if venue is None else venue_columns(venue)
     values = {
         "id": submission.job_id,
         "kind": submission.kind,
@@ -162,15 +188,33 @@ def _insert(
         "options": submission.options.model_dump(mode="json"),
         "content_hash": submission.content_hash,
         "idempotency_key": submission.idempotency_key,
-        "venue_document": venue.model_dump(mode="json") if venue else None,
+        "venue_document": document,
+        "venue_additions": additions,
         "frames": submission.frames,
         "asked_by": submission.origin.asked_by,
+        "address": submission.origin.address,
         "request_id": submission.origin.request_id,
         "traceparent": submission.origin.traceparent,
         "created_at": now,
         "updated_at": now,
     }
     connection.execute(sa.insert(tables.jobs).values(values | more))
+
+
+def _require_place(connection: sa.Connection, before: int, queue_limit: int, *, is_schedule: bool) -> None:
+    """Raise `QueueFull` unless a job may wait behind the jobs that wait `before` it.
+
+    Whoever submits again and again would else take every place that becomes free before a schedule sees it. So a place
+    is kept for each schedule that is due, in half of the queue at most.
+    """
+    most_kept = (queue_limit + 1) // 2
+    if before >= queue_limit:
+        raise QueueFull(before, 0)
+    if is_schedule or before + most_kept < queue_limit:
+        return
+    kept = reserved_places(connection, clock(connection), most_kept)
+    if before + kept >= queue_limit:
+        raise QueueFull(before, kept)
 
 
 def _waiting(connection: sa.Connection) -> int:
@@ -182,13 +226,13 @@ def _as_it_is_now(connection: sa.Connection, read: Venue) -> Venue:
     venue = find_venue(connection, read.id)
     if venue is None:
         raise VenueGone
-    if not venue.films_like(read):
+    if not venue.accepts_frames_of(read):
         raise VenueReplaced
     return venue
 
 
 def _duplicate(
-    connection: sa.Connection, kind: Kind, venue_id: str | None, idempotency_key: str | None, content_hash: str
+    connection: sa.Connection, kind: JobKind, venue_id: str | None, idempotency_key: str | None, content_hash: str
 ) -> str | None:
     known = _of_key(connection, venue_id, idempotency_key)
     if known is not None:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Any
+from typing import Any, TypeVar, cast
 
-from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
-from service.wire.names import Kind
-from service.wire.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
-from service.wire.results import View
-from service.wire.trend import Anchor
-from service.wire.venue import Venue
+from service.schemas.actor import Actor
+from service.schemas.base import TOLERANTLY
+from service.schemas.names import JobKind
+from service.schemas.options import FieldOptions, Handling, IntrinsicsOptions, LocateOptions, Options
+from service.schemas.results import View
+from service.schemas.trend import Anchor
+from service.schemas.venue import Venue
 
+# Where no keys are asked for.
+ANYONE = "anyone"
 AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
-OPTIONS: dict[Kind, type[AnyOptions]] = {
+OPTIONS: dict[JobKind, type[AnyOptions]] = {
     "calibration": Options,
     "intrinsics": IntrinsicsOptions,
     "locate": LocateOptions,
@@ -24,7 +28,12 @@ OPTIONS: dict[Kind, type[AnyOptions]] = {
 }
 
 
-def kind_of(options: AnyOptions) -> Kind:
+def stored_options(kind: str, document: Any) -> Handling:
+    """The options of a stored job, those of a kind or with a field that only a newer version has as well."""
+    return OPTIONS.get(cast(JobKind, kind), Handling).model_validate(document, **TOLERANTLY)
+
+
+def kind_of(options: AnyOptions) -> JobKind:
     """Which kind of job has such options."""
     return next(kind for kind, model in OPTIONS.items() if type(options) is model)
 
@@ -36,14 +45,31 @@ def seeded(options: AnyOptions) -> AnyOptions:
     return options.model_copy(update={"seed": secrets.randbelow(2**31)})
 
 
+# Who asked for a job, where nobody did.
+SCHEDULE = "schedule"
+
+
 @dataclass(frozen=True)
 class Origin:
-    """The request that a job came with: how the log calls it, its place in a trace (W3C Trace Context), and who asked:
-    `key NAME`, or `schedule`."""
+    """The request that a job or another change came with: how the log calls it, its place in a trace (W3C Trace
+    Context), who asked: `key NAME`, or `schedule`, and the client's address."""
 
     request_id: str | None = None
     traceparent: str | None = None
     asked_by: str | None = None
+    address: str | None = None
+
+    @property
+    def actor(self) -> Actor | None:
+        """Who is said to have made the change; None: nothing is known of it."""
+        if self.request_id is None and self.asked_by is None:
+            return None
+        return Actor(name=self.asked_by or ANYONE, address=self.address, request_id=self.request_id)
+
+    @property
+    def is_schedule(self) -> bool:
+        """Whether the schedule of a venue asked."""
+        return self.asked_by == SCHEDULE
 
     def names(self) -> dict[str, str]:
         """For every line of the log that comes of it."""
@@ -51,16 +77,17 @@ class Origin:
         return {name: value for name, value in (("request", self.request_id), ("trace", trace)) if value}
 
 
-class Asked(BaseModel):
-    """What is asked of a job. `options` are those of its kind; only photos of a lens have no venue.
+class JobInput(BaseModel):
+    """The input of a job: venue snapshot, options, frames, origin.
 
+    `options` are those of its kind; only photos of a lens have no venue.
     `frames`: the paths in the blob store by camera, of photos by their names.
     """
 
     model_config = ConfigDict(frozen=True)
 
     job_id: str
-    kind: Kind = "calibration"
+    kind: JobKind = "calibration"
     venue: Venue | None
     options: AnyOptions
     frames: dict[str, list[str]]
@@ -69,11 +96,33 @@ class Asked(BaseModel):
     @field_validator("options", mode="before")
     @classmethod
     def _are_of_the_kind(cls, options: Any, others: ValidationInfo) -> Any:
-        # By their members alone, those of one kind could be those of another.
-        return OPTIONS[others.data["kind"]].model_validate(options) if isinstance(options, dict) else options
+        # By their members alone, those of one kind could be those of another. Options are never read tolerantly here:
+        # who does not know what was asked must not compute something else.
+        if isinstance(options, dict) and "kind" in others.data:
+            return OPTIONS[others.data["kind"]].model_validate(options)
+        return options
 
 
-class Task(Asked):
+class UnreadableJob(Exception):  # noqa: N818
+    """A newer version wrote the job, with something in it that this version does not know; the message says what."""
+
+
+Read = TypeVar("Read", bound=JobInput)
+
+
+def parse_job_input(model: type[Read], values: dict[str, Any]) -> Read:
+    """Validate the stored input of a job; raises `UnreadableJob`.
+
+    Of its venue, fields that this version does not know are ignored. Options and words that it does not know are not.
+    """
+    try:
+        return model.model_validate(values, extra="ignore")
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_input=False)[0]
+        raise UnreadableJob(f"{'.'.join(map(str, found['loc']))}: {found['msg']}") from error
+
+
+class Task(JobInput):
     """An attempt of a job: what a worker needs to compute it."""
 
     # A worker that lost its job holds another one than the row.
@@ -89,8 +138,8 @@ class Task(Asked):
     anchors: dict[str, Anchor] = {}
 
     def without_addresses(self) -> Task:
-        """The same but for who is told of it: to compute it nobody need know, and the addresses may be secrets."""
+        """Return the task without who is told of it and where its client is: to compute it nobody need know."""
         untold = self.venue and self.venue.model_copy(update={"webhooks": [], "alarms": None})
-        return self.model_copy(
-            update={"venue": untold, "options": self.options.model_copy(update={"callback_url": None})}
-        )
+        options = self.options.model_copy(update={"callback_url": None})
+        origin = replace(self.origin, address=None)
+        return self.model_copy(update={"venue": untold, "options": options, "origin": origin})

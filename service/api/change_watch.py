@@ -1,0 +1,97 @@
+"""Waiting for jobs and venues: one small query of each, a few times a second, for everybody who waits."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from typing import Generic, TypeVar
+
+import structlog
+from starlette.concurrency import run_in_threadpool
+
+from service.schemas.problems import Problem
+
+INTERVAL_S = 0.25
+# Whoever's connection broke finds the place that it had taken for a moment.
+AGAIN_S = 5
+State = TypeVar("State")
+log = structlog.get_logger()
+
+
+class ChangeWatch(Generic[State]):
+    """Wakes coroutines when a job or venue reaches the state that they wait for, by one polling query for all."""
+
+    def __init__(self, read: Callable[[Collection[str]], Mapping[str, State]]) -> None:
+        self._read = read
+        self._waiting: dict[asyncio.Future[None], tuple[str, Callable[[State], bool]]] = {}
+        self._has_waiters = asyncio.Event()
+        self._closed = False
+
+    @property
+    def closed(self) -> bool:
+        """Whether the service is going down, so that nobody should wait again."""
+        return self._closed
+
+    async def until(self, name: str, reached: Callable[[State], bool], timeout_s: float) -> None:
+        """Return when `reached` holds of what has this name, after `timeout_s`, or when the service goes down."""
+        if self._closed:
+            return
+        future: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiting[future] = (name, reached)
+        self._has_waiters.set()
+        try:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(future, timeout_s)
+        finally:
+            del self._waiting[future]
+
+    async def run(self) -> None:
+        """Look after the waiting ones, for as long as the service runs."""
+        while True:
+            await self._has_waiters.wait()
+            try:
+                states = await run_in_threadpool(self._read, {name for name, _ in self._waiting.values()})
+            except Exception:  # the database is away for a moment: they keep waiting, up to their time
+                log.warning("cannot read what is waited for", exc_info=True)
+                states = {}
+            for future, (name, reached) in self._waiting.items():
+                state = states.get(name)
+                if state is not None and reached(state) and not future.done():
+                    future.set_result(None)
+            if not self._waiting:
+                self._has_waiters.clear()
+            await asyncio.sleep(INTERVAL_S)
+
+    def close(self) -> None:
+        """Let everybody go, at once."""
+        self._closed = True
+        for future in self._waiting:
+            if not future.done():
+                future.set_result(None)
+
+
+class ClientSlots:
+    """Limits how many clients wait for an answer (long polls, event streams) at once. To be called in the event loop.
+
+    `what` they do, and the `setting` that says how many, are told to the next one.
+    """
+
+    def __init__(self, count: int, what: str, setting: str) -> None:
+        self._count = self._free = count
+        self._what, self._setting = what, setting
+
+    @contextmanager
+    def taken(self) -> Iterator[None]:
+        """Take a slot for as long as the block lasts; raises a `Problem` (503) if all are taken."""
+        if not self._free:
+            raise Problem(
+                "unavailable",
+                f"{self._count} {self._what} here already, and more may not at once ({self._setting}).",
+                headers={"Retry-After": str(AGAIN_S)},
+            )
+        self._free -= 1
+        try:
+            yield
+        finally:
+            self._free += 1

@@ -1,0 +1,35 @@
+"""The home of a service: its database, its files and its queue, and what brings frames into them."""
+
+from __future__ import annotations
+
+from service import queue
+from service.intake.from_sources import FromSources
+from service.intake.snapshots import Snapshots
+from service.intake.submit import Intake
+from service.observability.disk import Disk
+from service.settings import Settings
+from service.store.blobs import Blobs
+from service.store.repositories import Repositories
+
+# Somebody waits for the store: a client, who can come again, or the other folders of a round that deletes.
+BLOB_PATIENCE_S = 10.0
+
+
+class ApplicationState(Repositories):
+    """The repositories, queue, blobs and intake of a service, held by each API process and each worker."""
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__(settings.home_database_url)
+        queue.migrate(settings.home_database_url)
+        self.settings = settings
+        self.queue = queue.Queue(settings.home_database_url)
+        self.blobs = Blobs(settings.home_blob_url, BLOB_PATIENCE_S)
+        self.disk = Disk(settings)
+        self.snapshots = Snapshots(settings, self.source_timings.count)
+        self.intake = Intake(settings, self.submissions, self.expiry, self.blobs, self.queue.enqueue)
+        self.from_sources = FromSources(self.venues, self.submissions, self.snapshots, self.blobs, self.intake)
+
+    def close(self) -> None:
+        """Let the database go."""
+        self.queue.close()
+        self.engine.dispose()

@@ -1,0 +1,70 @@
+"""Child processes: they end with the one that started them, and those that read what strangers sent get no secrets."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+import time
+
+from service import confinement
+
+PARENT = "ESC_PARENT"
+PR_SET_PDEATHSIG = 1
+# The machine and its languages, and what interpreters, libraries and the runtimes of networks read.
+HARMLESS = {"PATH", "HOME", "USER", "TMPDIR", "TZ", "LANG"}
+HARMLESS_FROM = ("LC_", "LD_", "PYTHON", "SSL_CERT_", "CUDA_", "NVIDIA_", "ORT_", "OPENVINO_")
+
+
+def for_child() -> dict[str, str]:
+    """What the parent adds to the environment of a child that shall end with it."""
+    return {PARENT: str(os.getpid())}
+
+
+def without_secrets(*also: str) -> dict[str, str]:
+    """The environment of a child that shall end with it and that decodes, in native code, what strangers sent.
+
+    No password of a database, no secret that callbacks are signed with. `also`: how the names of others begin that it
+    needs, in capital letters.
+    """
+    inherited = {
+        name: value
+        for name, value in os.environ.items()
+        if name in HARMLESS or name.upper().startswith((*HARMLESS_FROM, *also))
+    }
+    return inherited | for_child()
+
+
+def end_with_parent() -> None:
+    """Have the kernel kill this process when its parent dies, SIGKILL of the parent included.
+
+    On Linux prctl(2), elsewhere a look every second. Without a parent that asked for it, nothing happens. The kernel
+    looks at the thread that started the child, so that thread must live as long as the parent wants the child.
+    """
+    parent = int(os.environ.pop(PARENT, "0"))
+    if not parent:
+        return
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    else:
+        threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    # It may have died before the kernel was asked.
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def begin_decoder() -> None:
+    """Begin a program that decodes, in native code, what strangers sent: it ends with its parent, and cannot read it.
+
+    To be called before anything is read and before other threads are started.
+    """
+    end_with_parent()
+    confinement.confine()
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(1)
+    os._exit(1)

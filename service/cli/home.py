@@ -1,0 +1,176 @@
+"""`esc home`: what a service keeps, moved to another place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli.arguments import load_settings
+from service.cli.printing import FAILED, USAGE, fail, print_note
+from service.cli.serve import report_database_errors
+
+if TYPE_CHECKING:
+    import sqlalchemy as sa
+
+    from service.store.blobs import Blobs
+
+# A bucket that does not answer is asked again for so long.
+BLOB_PATIENCE_S = 120.0
+LOCATION_HELP = (
+    "A data folder (with its esc.sqlite), or the URL of a database: postgresql://user:password@host:5432/name."
+)
+app = typer.Typer(no_args_is_help=True, help="The home of a service: its database and its files.")
+
+
+@app.callback()
+def home() -> None:
+    """The home of a service: its database and its files."""
+
+
+@dataclass(frozen=True)
+class ServiceLocation:
+    """Where a service keeps what it keeps; `blobs` None: it was not said."""
+
+    database: str
+    blobs: str | None
+
+
+@app.command("copy")
+def copy_home(
+    source: Annotated[str, typer.Argument(metavar="FROM", help=f"What is copied. {LOCATION_HELP}")],
+    target: Annotated[str, typer.Argument(metavar="TO", help="Where to, the same; empty, or not there yet.")],
+    blobs_from: Annotated[
+        str | None,
+        typer.Option(
+            "--blobs-from",
+            help="Store of frames and pictures of FROM, s3: or file: URL [default: in its folder; of a database "
+            "ESC_BLOB_URL, or the folder ESC_DATA]",
+        ),
+    ] = None,
+    blobs_to: Annotated[
+        str | None,
+        typer.Option("--blobs-to", help="That of TO [default: in its folder; of a database that of FROM: they stay]"),
+    ] = None,
+) -> None:
+    """Copy a stopped service to another database, SQLite or PostgreSQL: all that it keeps, or nothing.
+
+    Venues, history, memories, trends, charts, schedules, jobs and keys. Open jobs wait in the queue of the copy. FROM
+    stays as it is.
+    """
+    from service.store.blobs import BLOB_OUTAGES
+    from service.store.copying import CannotCopy
+
+    here, there = _parse_location(source, blobs_from), _parse_location(target, blobs_to)
+    if here.database == there.database:
+        fail("FROM and TO are one database.", USAGE)
+    blobs_here = here.blobs or load_settings().home_blob_url
+    blobs_there = there.blobs or blobs_here
+    with report_database_errors():
+        try:
+            files, rows = _copy(here.database, there.database, blobs_here, blobs_there)
+        except CannotCopy as refusal:
+            fail(f"Nothing was copied. {refusal}", USAGE)
+        except BLOB_OUTAGES as error:
+            fail(f"Nothing was copied. The files cannot be copied: {error}", FAILED)
+    for table, count in rows.items():
+        print(f"{table}\t{count}")
+    print(f"files\t{'they stay' if files is None else files}")
+    print_note("Start the service with what its settings now must say:")
+    print_note(f"  ESC_DATABASE_URL={_without_password(there.database)}\n  ESC_BLOB_URL={blobs_there}")
+
+
+def _copy(source: str, target: str, blobs_from: str, blobs_to: str) -> tuple[int | None, dict[str, int]]:
+    """Copy files and rows; gives how many files, None if they stay, and how many rows each table has."""
+    from service import queue
+    from service.store.blobs import Blobs
+    from service.store.copying import copy_rows, exclusive_snapshot
+
+    with ExitStack() as stack:
+        reading = stack.enter_context(exclusive_snapshot(source))
+        engine = stack.enter_context(_new_database(target))
+        files = None
+        if blobs_from != blobs_to:
+            here, there = Blobs(blobs_from, BLOB_PATIENCE_S), Blobs(blobs_to, BLOB_PATIENCE_S)
+            files = stack.enter_context(_copy_files(here, there, blobs_to))
+        queue.migrate(target)
+        waiting = queue.Queue(target)
+        stack.callback(waiting.close)
+        return files, copy_rows(reading, engine, waiting.enqueue)
+
+
+@contextmanager
+def _new_database(url: str) -> Iterator[sa.Engine]:
+    """An engine on an empty database; if what is done with it fails, what was made there is taken away again."""
+    import sqlalchemy as sa
+
+    from service import queue
+    from service.store.copying import require_empty
+    from service.store.database import connect, reading
+
+    file = Path(sa.make_url(url).database or "") if url.startswith("sqlite") else None
+    was_there = file is not None and file.exists()
+    engine = connect(url)
+    try:
+        with reading(engine) as connection:
+            require_empty(connection)
+            has_queue = queue.SCHEMA in sa.inspect(connection).get_schema_names()
+        try:
+            yield engine
+        except BaseException:
+            engine.dispose()
+            if file is None and not has_queue:
+                queue.remove(url)
+            raise
+    except BaseException:
+        engine.dispose()
+        if file is not None and not was_there:
+            for part in ("", "-wal", "-shm"):
+                file.with_name(file.name + part).unlink(missing_ok=True)
+        raise
+    engine.dispose()
+
+
+@contextmanager
+def _copy_files(here: Blobs, there: Blobs, url: str) -> Iterator[int]:
+    """Copy every file, and give how many; if what comes after fails, the copies are deleted again."""
+    from service.store.copying import CannotCopy
+
+    if next(there.paths(), None) is not None:
+        raise CannotCopy(f"{url} has files already: name an empty folder or part of a bucket with --blobs-to.")
+    copied: list[str] = []
+    try:
+        for path in here.paths():
+            data = here.get(path)
+            if data is None:
+                raise CannotCopy(f"{path} vanished while it was copied: something still deletes files of the source.")
+            copied.append(path)
+            there.put(path, data)
+        yield len(copied)
+    except BaseException:
+        there.delete(copied)
+        raise
+
+
+def _parse_location(text: str, blobs: str | None) -> ServiceLocation:
+    from service.settings import BLOB_URL, DATABASE_URL, Settings
+
+    if blobs is not None and not BLOB_URL.fullmatch(blobs):
+        fail("Expected is s3://bucket, s3://bucket/folder or file:///folder for files.", USAGE)
+    if DATABASE_URL.fullmatch(text):
+        return ServiceLocation(text, blobs)
+    if "://" in text:
+        fail("Expected is a folder, postgresql://user:password@host:5432/name or sqlite:////folder/esc.sqlite.", USAGE)
+    folder = Settings.model_construct(data=Path(text), database_url=None, blob_url=blobs)
+    return ServiceLocation(folder.home_database_url, folder.home_blob_url)
+
+
+def _without_password(url: str) -> str:
+    """A database's URL without its password."""
+    import sqlalchemy as sa
+
+    return sa.make_url(url).render_as_string(hide_password=True)

@@ -1,0 +1,284 @@
+"""`esc intrinsics`, `pose` and `field fit`: what comes before the first calibration."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.arguments import DEFAULT_URL, ApiKey, Frames, Url, parse_document, parse_frame_files
+from service.cli.printing import (
+    FAILED,
+    REJECTED,
+    USAGE,
+    fail,
+    follow_to_end,
+    job_exit_code,
+    job_progress_bar,
+    print_field_summary,
+    print_json,
+    print_lens_summary,
+    print_note,
+    print_pose_summary,
+)
+from service.cli.service_client import open_client
+from service.schemas.names import ID_PATTERN, LensModel
+
+if TYPE_CHECKING:
+    from service.schemas.options import FieldOptions, IntrinsicsOptions
+    from service.schemas.results import FieldResult
+    from service.schemas.venue import Venue
+
+LENS_EXAMPLE = (
+    '{"image_size": [3840, 2160], "intrinsics": {"matrix": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], '
+    '"distortion": [k1, k2, p1, p2, k3]}}'
+)
+# Help is marked up by words in brackets.
+LENS_IN_HELP = re.sub(r"\[(?=[a-z])", r"\\[", LENS_EXAMPLE)
+field_app = typer.Typer(no_args_is_help=True, help="The pitch of a venue: fit its length, width and ridge.")
+
+
+def _print_points(sport: str | None) -> None:
+    """Print every name that a point of a sport's field has, and end."""
+    if sport is None:
+        return
+    from fields.template import NAMES, load
+
+    if sport not in NAMES:
+        fail(f"There is no field of {sport!r}; there are {', '.join(NAMES)}", USAGE)
+    template = load(sport)
+    for name, (x, y) in template.places({}).items():
+        print(f"{name}\t{x:.2f}\t{y:.2f}")
+    for name in template.places_at({}, 0.0):
+        print(name)
+    raise typer.Exit
+
+
+def intrinsics(
+    photos: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="PHOTO...", exists=True, dir_okay=False, help="15 to 30 JPEG or PNG photos of the board."
+        ),
+    ],
+    board: Annotated[
+        str,
+        typer.Option(
+            "--board", metavar="9x6", help="Inner corners of the board across and down, where four squares meet."
+        ),
+    ],
+    square: Annotated[
+        float, typer.Option("--square", metavar="METRES", help="Side of a square of the board, in metres.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="JSON file to write the lens to, for `esc pose`.")],
+    charuco: Annotated[
+        str | None,
+        typer.Option(
+            "--charuco", metavar="4X4_50:0.022", help="Of a ChArUco board: dictionary, and side of a marker in metres."
+        ),
+    ] = None,
+    model: Annotated[
+        LensModel, typer.Option("--model", help="Lens model: opencv, or fisheye (Kannala-Brandt) for very wide lenses.")
+    ] = "opencv",
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="JPEG file to draw into where in the frame the board was seen.")
+    ] = None,
+) -> None:
+    """Find the lens of a camera from photos of a chessboard. Exit: 0 found (read the warnings), 1 not, 2 usage."""
+    from service.cli.local_engine import engine_settings, report_job_failures
+    from service.intake import image_checks
+
+    settings = engine_settings()
+    options = _parse_lens_options(board, square, charuco, model)
+    from worker.jobs import intrinsics
+
+    files = {str(path): path.read_bytes() for path in photos}
+    with report_job_failures(), job_progress_bar() as show:
+        for name, data in files.items():
+            image_checks.check_photo(name, data, settings)
+        solution = intrinsics.solve(files, options, lambda step: show(step, ""))
+    output.write_text(solution.result.model_dump_json(indent=2) + "\n")
+    if picture is not None:
+        picture.write_bytes(solution.pictures["coverage"])
+    print_lens_summary(solution.result)
+
+
+def pose(
+    site: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SITE.json",
+            exists=True,
+            dir_okay=False,
+            help="Id, name and field of the venue; cameras that have poses already, if any.",
+        ),
+    ],
+    points: Annotated[
+        Path,
+        typer.Argument(
+            metavar="POINTS.json", exists=True, dir_okay=False, help="Clicked points of the pitch by camera."
+        ),
+    ],
+    lenses: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="CAMERA=LENS.json...",
+            help=f"The lens of each camera, as `esc intrinsics` writes it or by hand: {LENS_IN_HELP}.",
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="JSON file to write the venue to, for `esc venue put` and `esc run`.")
+    ],
+    frame: Annotated[
+        list[str] | None,
+        typer.Option("--frame", metavar="CAMERA=FILE", help="The frame that the points of a camera were clicked in."),
+    ] = None,
+    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+    _: Annotated[
+        str | None,
+        typer.Option(
+            "--points",
+            metavar="SPORT",
+            is_eager=True,
+            callback=_print_points,
+            help="Print the names of a sport's points with their usual places [x, y] in metres, and do nothing else.",
+        ),
+    ] = None,
+) -> None:
+    """Find first poses of cameras from clicked points. Exit: 0 all found, 1 failed, 2 usage, 3 one rejected."""
+    from service.cli.local_engine import engine_settings
+    from service.schemas.geometry import LensFile, Pose, PoseIn
+    from service.schemas.options import ClickedPoints
+    from service.schemas.venue import CameraIn, Site, VenueIn
+
+    engine_settings()
+    place = parse_document(Site, site.read_bytes(), str(site))
+    clicks = parse_document(ClickedPoints, points.read_bytes(), str(points)).root
+    given = {
+        camera: parse_document(LensFile, path.read_bytes(), str(path), LENS_EXAMPLE)
+        for camera, (path, *_) in parse_frame_files(lenses).items()
+    }
+    seen = {camera: path.read_bytes() for camera, (path, *_) in parse_frame_files(frame or []).items()}
+    for camera in given.keys() - clicks.keys():
+        fail(f"{points} has no points of camera {camera}, only of {', '.join(clicks)}", USAGE)
+    from worker.jobs.from_schemas import JobFailedError, lens_of
+    from worker.jobs.locate_all import locate_all
+
+    engine_lenses = {camera: lens_of(lens.intrinsics, lens.image_size) for camera, lens in given.items()}
+    stored = {camera.id: Pose.from_input(camera.pose) for camera in place.cameras}
+    found = {camera.id: camera for camera in place.cameras}
+    results, failures = [], []
+    for camera, end in locate_all(place.field, engine_lenses, clicks, seen, stored).items():
+        if isinstance(end, JobFailedError):
+            failures.append(end.error.detail)
+            continue
+        result = end.result
+        results.append(result)
+        print_pose_summary(result)
+        if pictures is not None:
+            pictures.mkdir(parents=True, exist_ok=True)
+            (pictures / f"points_{camera}.jpg").write_bytes(end.pictures["points"])
+        stands = PoseIn(rotation=result.pose.rotation, position=result.pose.position)
+        if result.accepted:
+            found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
+    if failures:
+        fail("\n".join(failures), FAILED)
+    print(json.dumps([result.model_dump(mode="json") for result in results], indent=2))
+    if not all(result.accepted for result in results):
+        raise typer.Exit(REJECTED)
+    venue = VenueIn(id=place.id, name=place.name, field=place.field, cameras=list(found.values()))
+    output.write_text(venue.model_dump_json(indent=2, exclude_none=True) + "\n")
+
+
+@field_app.command("fit")
+def fit_field(
+    venue: Annotated[str, typer.Argument(metavar="VENUE", help="A venue's file, or the id of one that is stored.")],
+    frames: Frames,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="JSON file to write the venue with its fitted field to.")
+    ],
+    pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", min=0, help="Any number: the same one finds the same. Otherwise one is chosen."),
+    ] = None,
+    url: Url = DEFAULT_URL,
+    api_key: ApiKey = None,
+) -> None:
+    """Fit length, width and ridge of a pitch to frames of its cameras. Exit codes as of `calibrate`.
+
+    A venue's file is fitted here, a stored venue by its service. What is stored stays as it is until `venue put`.
+    """
+    import secrets
+
+    from service.schemas.options import FieldOptions
+
+    options = FieldOptions(seed=secrets.randbelow(2**31) if seed is None else seed)
+    if Path(venue).is_file():
+        stored, result, drawn = _fit_locally(Path(venue), frames, options)
+    else:
+        stored, result, drawn = _fit_by_service(venue, frames, options, url, api_key)
+    if pictures is not None:
+        pictures.mkdir(parents=True, exist_ok=True)
+        for name, picture in drawn.items():
+            (pictures / f"{name}.jpg").write_bytes(picture)
+    print_json(result)
+    print_field_summary(result)
+    if not result.accepted:
+        print_note(f"Rejected: {result.rejected_because}")
+        raise typer.Exit(REJECTED)
+    fitted = stored.with_poses({camera.id: camera.pose for camera in result.cameras})
+    fitted = fitted.model_copy(update={"field": result.field})
+    output.write_text(fitted.to_input().model_dump_json(indent=2, exclude_none=True) + "\n")
+
+
+def _fit_locally(file: Path, frames: list[str], options: FieldOptions) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    from service.cli.local_engine import checked_files, engine_settings, report_job_failures
+    from service.schemas.venue import VenueIn
+
+    settings = engine_settings()
+    from worker.jobs import field
+    from worker.protocol import ComputeResources
+
+    stored = parse_document(VenueIn, file.read_bytes(), str(file)).to_venue()
+    files = checked_files(stored, frames, settings)
+    with report_job_failures(), job_progress_bar() as show:
+        solution = field.solve(stored, files, options, ComputeResources.of(settings), lambda step: show(step, ""))
+    return stored, solution.result, solution.pictures
+
+
+def _fit_by_service(
+    venue: str, frames: list[str], options: FieldOptions, url: str, api_key: str | None
+) -> tuple[Venue, FieldResult, dict[str, bytes]]:
+    from service.schemas.results import FieldResult
+
+    files = parse_frame_files(frames)
+    if not re.fullmatch(ID_PATTERN, venue):
+        fail(f"There is no file {venue}, and it is no id of a venue", USAGE)
+    with open_client(url, api_key) as client:
+        stored = client.venue(venue)
+        job = client.fit_field(venue, files, options.model_dump(mode="json", exclude_unset=True))
+        job = follow_to_end(client, job)
+        if not isinstance(job.result, FieldResult):
+            raise typer.Exit(job_exit_code(job))
+        drawn = {f"overlay_{camera.id}": client.picture(job, f"overlay/{camera.id}") for camera in stored.cameras}
+    return stored, job.result, {name: picture for name, picture in drawn.items() if picture is not None}
+
+
+def _parse_lens_options(board: str, square: float, charuco: str | None, model: LensModel) -> IntrinsicsOptions:
+    from service.schemas.options import IntrinsicsOptions
+
+    counted = re.fullmatch(r"(\d+)[x×](\d+)", board)
+    if counted is None:
+        fail(f"{board!r} is not COLUMNSxROWS, for instance 9x6", USAGE)
+    described: dict[str, Any] = {"columns": int(counted[1]), "rows": int(counted[2]), "square_m": square}
+    if charuco is not None:
+        dictionary, _, marker = charuco.partition(":")
+        try:
+            described["charuco"] = {"dictionary": dictionary, "marker_m": float(marker)}
+        except ValueError:
+            fail(f"{charuco!r} is not DICTIONARY:METRES, for instance 4X4_50:0.022", USAGE)
+    return parse_document(IntrinsicsOptions, json.dumps({"board": described, "model": model}), "the board")

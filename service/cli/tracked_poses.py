@@ -1,0 +1,88 @@
+"""What `esc stitch --follow` makes beside the clip: poses in files, and what is to be said of how cameras moved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.cli.printing import FAILED, fail, print_note
+from service.formats.clip import ClipPoses, TrackedCamera
+from service.formats.lens import NumberedCamera
+from service.schemas.problems import Problem
+
+if TYPE_CHECKING:
+    from service.schemas.venue import Camera, Venue
+    from worker.calibration.geometry import camera as engine
+    from worker.calibration.tracking.follower import Moment, TrackedPose
+    from worker.video.tracking import MotionSummary, TrackedGeometryFactory
+
+
+@contextmanager
+def tracking(venue: Venue, every: int, stem: Path | None, freed_axes: str) -> Iterator[TrackedGeometryFactory]:
+    """What follows the cameras of a clip, which is made inside; their poses go into files beside `stem`, if any."""
+    from worker.video.tracking import TrackedGeometryFactory
+
+    if stem is None:
+        follow = TrackedGeometryFactory(every)
+        yield follow
+        follow.finish()
+        return
+    numbers = {camera.id: number for number, camera in enumerate(venue.cameras, 1)}
+    try:
+        with ClipPoses(
+            stem, [NumberedCamera(camera, numbers[camera.id]) for camera in venue.cameras], freed_axes
+        ) as poses:
+
+            def keep(moment: Moment, rate: Fraction) -> None:
+                poses.add([_tracked_camera(one, numbers) for one in moment.cameras], rate)
+
+            follow = TrackedGeometryFactory(every, keep)
+            yield follow
+            follow.finish()
+    except Problem as problem:
+        fail(problem.detail, FAILED)
+
+
+def print_motions(motions: Mapping[str, MotionSummary]) -> None:
+    """Lines for whoever looks."""
+    for camera, motion in motions.items():
+        unseen = motion.how["coasted"], motion.how["refused"]
+        print_note(
+            f"Camera {camera} turned by up to {motion.farthest_deg:.2f} degrees from its first picture; lines measured "
+            f"in {motion.how['measured']} of {motion.how.total()} pictures, not seen or not looked for in {unseen[0]}, "
+            f"not believed in {unseen[1]}"
+        )
+
+
+def motion_document(motion: MotionSummary) -> dict[str, Any]:
+    """The same for programs."""
+    return {
+        "farthest_deg": round(motion.farthest_deg, 4),
+        **{how: motion.how[how] for how in ("measured", "coasted", "refused")},
+    }
+
+
+def _tracked_camera(followed: TrackedPose, numbers: Mapping[str, int]) -> TrackedCamera:
+    sigma, motion = followed.sigma, followed.motion_sigma
+    return TrackedCamera(
+        NumberedCamera(_camera_schema(followed.camera), numbers[followed.camera.id]),
+        followed.how,
+        (sigma.rotation_deg, sigma.position_m),
+        (motion.rotation_deg, motion.position_m),
+    )
+
+
+def _camera_schema(camera: engine.Camera) -> Camera:
+    """For the wire: the lens is that of the clip's frames, which may be smaller than those it was measured in."""
+    from service.schemas.venue import Camera
+    from worker.jobs.to_schemas import lens_to_schema, pose_to_schema
+
+    return Camera(
+        id=camera.id,
+        image_size=list(camera.intrinsics.size),
+        intrinsics=lens_to_schema(camera.intrinsics),
+        pose=pose_to_schema(camera.pose),
+    )

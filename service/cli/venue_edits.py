@@ -1,0 +1,137 @@
+"""What changes a venue by hand: what would be lost by a file, patches in words, and an editor."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shlex
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.cli.printing import USAGE, fail
+
+if TYPE_CHECKING:
+    from service.schemas.geometry import Pose
+    from service.schemas.history import Revision
+    from service.schemas.venue import Camera, Venue, VenueIn
+
+# Of a rotation in radians and a position in metres.
+POSE_TOLERANCE = 1e-9
+
+
+def describe_losses(venue: Venue, stored: Venue, newest: Revision) -> list[str]:
+    """A line for each thing that somebody or a calibration gave a stored venue and that another one has not."""
+    return [*_lost_poses(venue, stored, newest), *_lost_settings(venue, stored)]
+
+
+def _lost_poses(venue: Venue, stored: Venue, newest: Revision) -> list[str]:
+    if newest.cause == "put":
+        return []
+    wanted = {camera.id: camera.pose for camera in venue.cameras}
+    others = [camera for camera in stored.cameras if _differ(camera.pose, wanted.get(camera.id))]
+    since = f"{newest.cause} {newest.at:%Y-%m-%d %H:%M} UTC, revision {newest.revision}"
+    return [f"the pose of camera {camera.id} ({since}); {_pose_difference_text(camera, wanted)}" for camera in others]
+
+
+def _differ(pose: Pose, other: Pose | None) -> bool:
+    """Whether two poses are two; what one of them has lost by being written down and read again is none."""
+    return other is None or math.dist(pose.rotation + pose.position, other.rotation + other.position) > POSE_TOLERANCE
+
+
+def _pose_difference_text(camera: Camera, wanted: Mapping[str, Pose]) -> str:
+    if camera.id not in wanted:
+        return "the file has no such camera"
+    metres = math.dist(camera.pose.position, wanted[camera.id].position)
+    return f"by the file it stands {metres:.3f} m from there"
+
+
+def _lost_settings(venue: Venue, stored: Venue) -> list[str]:
+    parts = ("alarms", "schedule", "webhooks", "view")
+    lost = [f"{part}: the file has none" for part in parts if getattr(stored, part) and not getattr(venue, part)]
+    fetched = {camera.id for camera in venue.cameras if camera.source}
+    blind = [camera.id for camera in stored.cameras if camera.source and camera.id not in fetched]
+    told = {camera.id for camera in venue.cameras if camera.intrinsics.sigma}
+    untold = [camera.id for camera in stored.cameras if camera.intrinsics.sigma and camera.id not in told]
+    kept = {camera.id for camera in venue.cameras if camera.ignore}
+    seen_again = [camera.id for camera in stored.cameras if camera.ignore and camera.id not in kept]
+    return [
+        *lost,
+        *(f"the ignored areas of camera {camera}: the file has none" for camera in seen_again),
+        *(f"the source of camera {camera}: the file has none" for camera in blind),
+        *(f"the sigma of the lens of camera {camera}: the file has none" for camera in untold),
+    ]
+
+
+def with_poses_of(venue: VenueIn, stored: Venue) -> VenueIn:
+    """A venue with the poses of another, and the lenses and the ridge that they belong to."""
+    from service.schemas.venue import VenueIn
+
+    # To the last digit: with both places, not with what one of them gives the other.
+    known = {camera.id: camera for camera in VenueIn.model_validate(stored.model_dump()).cameras}
+    cameras = [
+        camera.model_copy(
+            update={
+                "pose": known[camera.id].pose,
+                "intrinsics": known[camera.id].intrinsics.with_sigma_of(camera.intrinsics),
+            }
+        )
+        if camera.id in known
+        else camera
+        for camera in venue.cameras
+    ]
+    field = venue.field.model_copy(update={"ridge": stored.field.ridge})
+    return venue.model_copy(update={"cameras": cameras, "field": field})
+
+
+def parse_patch(changes: Sequence[str]) -> dict[str, Any]:
+    """A merge patch of arguments PART=VALUE; after a dot comes a part of a part."""
+    patch: dict[str, Any] = {}
+    for change in changes:
+        path, equals, text = change.partition("=")
+        *way, last = path.split(".")
+        if not (equals and all((*way, last))):
+            fail(f"{change!r} is not PART=VALUE, for instance alarms.rejected_in_a_row=3", USAGE)
+        place = patch
+        for step in way:
+            place = place.setdefault(step, {})
+            if not isinstance(place, dict):
+                fail(f"{change!r}: {step} has another value already", USAGE)
+        place[last] = _parse_value(text)
+    return patch
+
+
+def merge_patch_between(before: Any, after: Any) -> Any:
+    """The merge patch that makes the one of the other; of what has ids, by them."""
+    before, after = _by_id(before), _by_id(after)
+    if not (isinstance(before, dict) and isinstance(after, dict)):
+        return after
+    gone = dict.fromkeys(before.keys() - after.keys())
+    others = {name: value for name, value in after.items() if name not in before or before[name] != value}
+    return gone | {name: merge_patch_between(before.get(name), value) for name, value in others.items()}
+
+
+def _by_id(document: Any) -> Any:
+    has_ids = isinstance(document, list) and document and all(isinstance(one, dict) and "id" in one for one in document)
+    return {one["id"]: one for one in document} if has_ids else document
+
+
+def _parse_value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+def edit_text(text: str) -> str:
+    """What somebody makes of a text in the editor of their choice."""
+    editor = shlex.split(os.environ.get("VISUAL") or os.environ.get("EDITOR") or "vi")
+    with tempfile.TemporaryDirectory(prefix="esc-edit-") as folder:
+        file = Path(folder) / "venue.json"
+        file.write_text(text)
+        if subprocess.run([*editor, file], check=False).returncode:
+            fail(f"{editor[0]} ended with an error: nothing was put.", USAGE)
+        return file.read_text()

@@ -1,0 +1,216 @@
+"""Is this upload a whole picture of the right size? Answered from its bytes, before anything decodes it.
+
+JPEG: ITU-T T.81, annex B. PNG: ISO/IEC 15948, clause 5. Decoders are lenient where a calibration must not be: OpenCV
+fills the missing part of a truncated JPEG with grey and says nothing. Sizes are read here and not by a package: those
+turn them by the EXIF orientation, and what the calibration sees is not turned.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from service.schemas.problems import Problem
+from service.schemas.venue import Camera, Venue
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+JPEG_START = b"\xff\xd8\xff"
+PNG_START = b"\x89PNG\r\n\x1a\n"
+# A marker inside entropy-coded data: FF and neither a stuffed 00, nor a restart (D0 to D7), nor a fill byte FF.
+JPEG_MARKER = re.compile(rb"\xff([^\x00\xd0-\xd7\xff])")
+JPEG_END, JPEG_SCAN = 0xD9, 0xDA
+# Bytes FF before a marker fill up, as many as there are.
+NOT_FILLED = re.compile(rb"[^\xff]")
+# Of a file: a camera's JPEG has tens, a progressive one hundreds. PNG encoders cut pixels into chunks of 4 kB and more.
+# Walking a million would take seconds, in which nobody else is answered.
+MOST_SEGMENTS, MOST_CHUNKS = 10_000, 50_000
+# Start of frame, of all processes; C4, C8 and CC are something else.
+JPEG_FRAMES = set(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+
+
+class TooManyParts(Exception):  # noqa: N818
+    """A file is made of more parts than any encoder writes; the message says how many."""
+
+
+def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -> None:
+    """Every camera of the venue has frames, not too many, and no other camera has."""
+    ids = [camera.id for camera in venue.cameras]
+    for name in counts:
+        if name not in ids:
+            raise Problem(
+                "unknown-camera",
+                f"Venue {venue.id} has the cameras {', '.join(ids)} and no {name[:64]!r}; name each file part by its "
+                "camera.",
+                camera=name[:64],
+                expected=ids,
+            )
+    for camera in ids:
+        if not counts.get(camera):
+            raise Problem("missing-camera", f"Send at least one frame of camera {camera}.", camera=camera, expected=ids)
+        if counts[camera] > settings.max_frames_per_camera:
+            raise Problem(
+                "too-many-frames",
+                f"Send at most {settings.max_frames_per_camera} frames of camera {camera}.",
+                camera=camera,
+                expected=settings.max_frames_per_camera,
+                got=counts[camera],
+            )
+
+
+def check(camera: Camera, data: bytes, settings: Settings) -> None:
+    """One frame: an entire JPEG or PNG of the camera's size."""
+    size = _size_of_whole_picture(data, settings, camera=camera.id)
+    wanted = camera.image_size
+    if size != wanted:
+        exchanged = tuple(size) == tuple(reversed(wanted))
+        asked = " The frame has them the other way round: are width and height of the venue's image_size exchanged?"
+        raise Problem(
+            "frame-size",
+            f"Send camera {camera.id} in {wanted[0]}x{wanted[1]} pixels, the size of its intrinsics."
+            + (asked if exchanged else ""),
+            camera=camera.id,
+            expected=wanted,
+            got=size,
+        )
+
+
+def check_photo(name: str, data: bytes, settings: Settings) -> None:
+    """One photo of a board: an entire JPEG or PNG of any size."""
+    _size_of_whole_picture(data, settings, photo=name)
+
+
+def check_length(length: int, settings: Settings, **part: Any) -> None:
+    """So many bytes are not too many for one picture; `part`, a camera or a photo by its name, is whose they are."""
+    if length > settings.max_frame_mb * 1e6:
+        raise Problem(
+            "frame-too-large",
+            f"Send {_in_words(part)} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
+            **part,
+        )
+
+
+def _in_words(part: Mapping[str, Any]) -> str:
+    return " ".join(f"{kind} {name}" for kind, name in part.items())
+
+
+def _size_of_whole_picture(data: bytes, settings: Settings, **parts: Any) -> list[int]:
+    """Width and height of a picture that is all there; `parts` name it in a problem."""
+    subject = _in_words(parts)
+    if not data:
+        raise Problem("empty-frame", f"The file of {subject} is empty; was it still being written?", **parts)
+    check_length(len(data), settings, **parts)
+    if not data.startswith((JPEG_START, PNG_START)):
+        raise Problem("not-an-image", f"Send {subject} as JPEG or PNG.", **parts)
+    try:
+        outline = _jpeg(data) if data.startswith(JPEG_START) else _png(data)
+    except TooManyParts as error:
+        raise Problem("broken-image", f"The file of {subject} has {error}; encode it again.", **parts) from None
+    except (struct.error, IndexError, ValueError):
+        raise Problem("broken-image", f"The file of {subject} is damaged; grab it again.", **parts) from None
+    width, height = outline.size
+    if width * height > settings.max_frame_pixels:
+        raise Problem(
+            "too-many-pixels",
+            f"The picture of {subject} has {width}x{height} pixels; {settings.max_frame_pixels} are allowed.",
+            **parts,
+            expected=settings.max_frame_pixels,
+            got=outline.size,
+        )
+    if not outline.whole:
+        raise Problem(
+            "truncated-image",
+            f"The file of {subject} ends before its picture does; was it still being written?",
+            **parts,
+        )
+    return outline.size
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What a file says about its picture: `size` (width, height) as stored, and whether the file goes to its end.
+
+    As stored: an orientation that the camera notes in its EXIF data turns nothing, here and when it is decoded.
+    """
+
+    size: list[int]
+    whole: bool
+
+
+def _jpeg(data: bytes) -> Outline:
+    """Walk the segments to the end-of-image marker; whatever follows it is the camera's business."""
+    position, size = 2, None
+    for number, (position, marker) in enumerate(_jpeg_segments(data)):
+        if number >= MOST_SEGMENTS:
+            raise TooManyParts(f"more than {MOST_SEGMENTS} segments")
+        if marker in JPEG_FRAMES:
+            if size is not None:
+                raise ValueError("two frame headers")
+            height, width = struct.unpack_from(">HH", data, position + 5)
+            size = [width, height]
+        if marker == JPEG_SCAN and size is None:
+            raise ValueError("a scan of no frame")
+    if not size or min(size) < 1:
+        raise ValueError("no size")
+    return Outline(size, data[position : position + 2] == b"\xff\xd9")
+
+
+def _jpeg_segments(data: bytes) -> Iterator[tuple[int, int]]:
+    """Position and code of each marker, up to end-of-image after a scan or to the end of the data."""
+    position, scanned = 2, False
+    while position + 2 <= len(data):
+        if data[position] != 0xFF:
+            raise ValueError("no marker where one must be")
+        marker = data[position + 1]
+        if marker == 0xFF:
+            filled = NOT_FILLED.search(data, position)
+            if filled is None:
+                return
+            position = filled.start() - 1
+            continue
+        yield position, marker
+        if marker == JPEG_END:
+            if not scanned:
+                raise ValueError("no picture")
+            return
+        if position + 4 > len(data):
+            return
+        position += 2 + struct.unpack_from(">H", data, position + 2)[0]
+        if marker == JPEG_SCAN:
+            scanned = True
+            following = JPEG_MARKER.search(data, position)
+            if following is None:
+                return
+            position = following.start()
+
+
+def _png(data: bytes) -> Outline:
+    """Walk the chunks to IEND, each with a right checksum."""
+    width, height = struct.unpack_from(">II", data, len(PNG_START) + 8)
+    if data[12:16] != b"IHDR" or min(width, height) < 1:
+        raise ValueError("no size")
+    kinds = list(islice(_png_chunks(data), MOST_CHUNKS + 1))
+    if len(kinds) > MOST_CHUNKS:
+        raise TooManyParts(f"more than {MOST_CHUNKS} chunks")
+    return Outline([width, height], b"IDAT" in kinds and kinds[-1] == b"IEND")
+
+
+def _png_chunks(data: bytes) -> Iterator[bytes]:
+    position, content = len(PNG_START), memoryview(data)
+    while position + 12 <= len(data):
+        length, kind = struct.unpack_from(">I4s", data, position)
+        end = position + 8 + length
+        if end + 4 > len(data):
+            return
+        if zlib.crc32(content[position + 4 : end]) != struct.unpack_from(">I", data, end)[0]:
+            raise ValueError("wrong checksum")
+        yield kind
+        if kind == b"IEND":
+            return
+        position = end + 4

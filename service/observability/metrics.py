@@ -1,0 +1,281 @@
+"""What Prometheus reads.
+
+Requests are counted by the process that answers them. All else is read from the database at the moment it is asked for,
+so it is the same whichever API process is asked, however many workers there are and however often they were restarted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import get_args
+
+import structlog
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, InfoMetricFamily
+from prometheus_client.metrics_core import Metric
+from prometheus_client.registry import Collector
+
+from service import build
+from service.observability.disk import Disk, spool_free_bytes
+from service.schemas.health import AlarmRule
+from service.store.alarms import BEGUN
+from service.store.database import DATABASE_OUTAGES
+from service.store.events.outbox import CALLBACKS
+from service.store.jobs.submission import PRIORITIES
+from service.store.statistics.counters import DURATION, STAGE, STITCH_ERROR, WAIT, CounterKey, HistogramBuckets
+from service.store.statistics.job_outcome import (
+    ENDED,
+    OTHER_OUTCOMES,
+    OTHERS_ENDED,
+    OUTCOMES,
+    RESTARTS,
+    STAGES,
+    VIEW_CONDITIONS,
+    VIEWS,
+)
+from service.store.statistics.snapshot import StatisticsSnapshot, VenueGauges
+from service.store.statistics.source_timings import FETCH, FRAME, NONE
+from service.store.trends import CameraTrend
+from service.store.workers import WorkerHeartbeat
+
+# Name, meaning and figure; a figure that is not known is no sample.
+OF_VENUES: tuple[tuple[str, str, Callable[[VenueGauges], float | None]], ...] = (
+    (
+        "esc_venue_stitch_error_pixels",
+        "Of the poses that hold, by the last result; 1 px is 10 cm.",
+        lambda venue: venue.stitch_error_px,
+    ),
+    ("esc_venue_moved_pixels", "How far the last result found its worst camera moved.", lambda venue: venue.moved_px),
+    ("esc_venue_drift_pixels", "How far its worst camera is from where it was put.", lambda venue: venue.drift_px),
+    (
+        "esc_venue_accepted_timestamp_seconds",
+        "When poses were last accepted.",
+        lambda venue: None if venue.accepted_at is None else venue.accepted_at.timestamp(),
+    ),
+)
+OF_CAMERAS: tuple[tuple[str, str, Callable[[CameraTrend], float | None]], ...] = (
+    (
+        "esc_camera_trend_meters",
+        "How far its moving average is from what is usual, at the far touchline.",
+        lambda camera: camera.moved_m,
+    ),
+    (
+        "esc_camera_trend_cusum",
+        "The largest cumulative sum of its control charts, in standard deviations; above 5 its mean has moved.",
+        lambda camera: camera.cusum,
+    ),
+    (
+        "esc_camera_trend_beyond",
+        "1 while a control chart, EWMA or CUSUM, says that its mean has moved.",
+        lambda camera: float(camera.beyond),
+    ),
+)
+log = structlog.get_logger()
+
+
+class Metrics:
+    """The figures of one API process and, through `look`, those of the service."""
+
+    def __init__(self, look: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
+        self.registry = CollectorRegistry()
+        self.requests = Counter(
+            "esc_http_requests", "Requests answered.", ["method", "route", "status"], registry=self.registry
+        )
+        self.seconds = Histogram(
+            "esc_http_request_duration_seconds",
+            "Time to answer; a route that ends in ?wait holds its answer.",
+            ["method", "route"],
+            registry=self.registry,
+        )
+        self.parts = Gauge(
+            "esc_part_up",
+            "Whether a part of the service is there, as /readyz of this process says.",
+            ["part"],
+            registry=self.registry,
+        )
+        ProcessCollector(registry=self.registry)
+        self.registry.register(_Stored(look, disk, silence_s))
+
+
+class _Stored(Collector):
+    def __init__(self, look: Callable[[], StatisticsSnapshot], disk: Disk, silence_s: float) -> None:
+        self._look = look
+        self._disk = disk
+        self._silence_s = silence_s
+
+    def describe(self) -> Iterator[Metric]:
+        """Nothing: registering must not read the database."""
+        yield from ()
+
+    def collect(self) -> Iterator[Metric]:
+        """Read the database, and how full the disk is; what cannot be read is missing, the rest is told."""
+        yield InfoMetricFamily(
+            "esc_build", "The version.", {"version": build.version(), "commit": build.commit() or ""}
+        )
+        yield from self._room()
+        try:
+            figures = self._look()
+        except DATABASE_OUTAGES:
+            log.warning("no figures for Prometheus", exc_info=True)
+            yield _gauge("esc_database_up", "Whether the database answers.", 0)
+            return
+        yield _gauge("esc_database_up", "Whether the database answers.", 1)
+        yield from _queue(figures)
+        yield from _jobs(figures.counters)
+        yield from _schedules(figures)
+        yield from _venues(figures.venues)
+        yield from _trends(figures.trends)
+        yield from _alarms(figures)
+        yield from _workers(figures.workers, self._silence_s)
+        yield from _callbacks(figures)
+
+    def _room(self) -> Iterator[Metric]:
+        try:
+            free, spool = self._disk.free_bytes(), spool_free_bytes()
+        except OSError:
+            log.warning("cannot read how full the disk is", exc_info=True)
+            return
+        yield _gauge("esc_upload_free_bytes", "Free where uploads lie while they arrive, on this machine.", spool)
+        if free is not None:
+            yield _gauge("esc_disk_free_bytes", "Free where database and files grow.", free)
+            yield _gauge("esc_disk_needed_bytes", "With less free, uploads are refused.", self._disk.min_free_bytes)
+
+
+def _queue(figures: StatisticsSnapshot) -> Iterator[Metric]:
+    jobs = GaugeMetricFamily("esc_queue_jobs", "Jobs that wait.", labels=["priority"])
+    oldest = GaugeMetricFamily(
+        "esc_queue_oldest_age_seconds", "How long the oldest of them has waited.", labels=["priority"]
+    )
+    for name, number in PRIORITIES.items():
+        waiting = figures.queue.get(number)
+        jobs.add_metric([name], waiting.jobs if waiting else 0)
+        oldest.add_metric([name], waiting.oldest_s if waiting else 0)
+    yield jobs
+    yield oldest
+    yield _gauge("esc_jobs_running", "Jobs that are being computed.", figures.running)
+
+
+def _jobs(counters: Mapping[CounterKey, float]) -> Iterator[Metric]:
+    ended = CounterMetricFamily("esc_jobs_ended", "Calibrations by their end.", labels=["status", "verdict", "error"])
+    for outcome in OUTCOMES:
+        ended.add_metric(outcome, counters.get((ENDED, outcome), 0))
+    yield ended
+    others = CounterMetricFamily(
+        "esc_other_jobs_ended", "Jobs of other kinds than calibrations by their end.", labels=["kind", "status"]
+    )
+    for other in OTHER_OUTCOMES:
+        others.add_metric(other, counters.get((OTHERS_ENDED, other), 0))
+    yield others
+    views = CounterMetricFamily(
+        "esc_views", "Cameras of calibrations by what their frames were like: usable, or why not.", labels=["condition"]
+    )
+    for condition in VIEW_CONDITIONS:
+        views.add_metric([condition], counters.get((VIEWS, (condition,)), 0))
+    yield views
+    restarts = counters.get((RESTARTS, ()), 0)
+    yield CounterMetricFamily(
+        "esc_job_restarts", "Attempts after a job's first: its worker died or was stopped.", value=restarts
+    )
+    yield _histogram("esc_job_wait_seconds", "Of calibrations, from submission to the first attempt.", WAIT, counters)
+    yield _histogram(
+        "esc_job_duration_seconds", "Of calibrations, from the first attempt to the end.", DURATION, counters
+    )
+    stages = HistogramMetricFamily("esc_job_stage_duration_seconds", "Of jobs with a result.", labels=["stage"])
+    for stage in STAGES:
+        stages.add_metric([stage], *STAGE.read(counters, stage))
+    yield stages
+    yield _histogram(
+        "esc_job_stitch_error_pixels", "Of the poses that were found; 1 px is 10 cm.", STITCH_ERROR, counters
+    )
+
+
+def _schedules(figures: StatisticsSnapshot) -> Iterator[Metric]:
+    late = GaugeMetricFamily(
+        "esc_schedule_late_seconds",
+        "For how long the schedule has been due that has waited longest, by what its cameras did the last time.",
+        labels=["cameras"],
+    )
+    for cameras, seconds in zip(("answered", "slow-or-silent"), figures.schedules_late_s, strict=True):
+        late.add_metric([cameras], seconds)
+    yield late
+    fetches = HistogramMetricFamily(
+        "esc_source_fetch_seconds", "Of each source of a camera, by what came.", labels=["outcome"]
+    )
+    for outcome in (FRAME, NONE):
+        fetches.add_metric([outcome], *FETCH.read(figures.counters, outcome))
+    yield fetches
+
+
+def _venues(venues: list[VenueGauges]) -> Iterator[Metric]:
+    """Those with the worst stitch errors: how many at most is a setting."""
+    for name, meaning, figure in OF_VENUES:
+        family = GaugeMetricFamily(name, meaning, labels=["venue"])
+        for venue in venues:
+            value = figure(venue)
+            if value is not None:
+                family.add_metric([venue.venue], value)
+        yield family
+
+
+def _trends(trends: list[CameraTrend]) -> Iterator[Metric]:
+    """Of the cameras that have moved farthest: how many at most is a setting."""
+    for name, meaning, figure in OF_CAMERAS:
+        family = GaugeMetricFamily(name, meaning, labels=["venue", "camera"])
+        for camera in trends:
+            value = figure(camera)
+            if value is not None:
+                family.add_metric([camera.venue, camera.camera], value)
+        yield family
+
+
+def _alarms(figures: StatisticsSnapshot) -> Iterator[Metric]:
+    ringing = GaugeMetricFamily("esc_alarms", "Alarms of venues and cameras that ring.", labels=["rule"])
+    begun = CounterMetricFamily("esc_alarms_begun", "Alarms that began to ring.", labels=["rule"])
+    for rule in get_args(AlarmRule):
+        ringing.add_metric([rule], figures.alarms.get(rule, 0))
+        begun.add_metric([rule], figures.counters.get((BEGUN, (rule,)), 0))
+    of_venues = GaugeMetricFamily("esc_venue_alarm", "1 for what rings, the longest first.", labels=["venue", "rule"])
+    for alarm in figures.ringing:
+        of_venues.add_metric([alarm.venue, alarm.rule], 1)
+    yield from (ringing, begun, of_venues)
+
+
+def _workers(workers: list[WorkerHeartbeat], silence_s: float) -> Iterator[Metric]:
+    alive = [worker for worker in workers if worker.is_alive(silence_s)]
+    yield _gauge("esc_workers", "Workers that gave a sign of life.", len(alive))
+    up = GaugeMetricFamily(
+        "esc_worker_up", "Whether it gave one, until another takes its jobs over.", labels=["worker"]
+    )
+    age = GaugeMetricFamily("esc_worker_heartbeat_age_seconds", "Since its last one.", labels=["worker"])
+    model = InfoMetricFamily("esc_worker_model", "Its network; empty: missing.", labels=["worker"])
+    builds = InfoMetricFamily("esc_worker_build", "Its version; empty: 0.1.0.", labels=["worker"])
+    unreadable = GaugeMetricFamily(
+        "esc_worker_unreadable_jobs",
+        "Jobs that wait and that it cannot read: a newer version wrote them. They need a worker of that version.",
+        labels=["worker"],
+    )
+    for worker in workers:
+        up.add_metric([worker.name], float(worker in alive))
+        if worker.silent_s is not None:
+            age.add_metric([worker.name], worker.silent_s)
+        model.add_metric([worker.name], {"sha256": worker.model_sha256 or ""})
+        builds.add_metric([worker.name], {"version": worker.version or ""})
+        unreadable.add_metric([worker.name], worker.unreadable_jobs)
+    yield from (up, age, model, builds, unreadable)
+
+
+def _callbacks(figures: StatisticsSnapshot) -> Iterator[Metric]:
+    yield _gauge("esc_callbacks_waiting", "Callbacks that are due or will be tried again.", figures.callbacks_waiting)
+    told = CounterMetricFamily("esc_callbacks", "Callbacks that will not be tried again.", labels=["outcome"])
+    for outcome in ("delivered", "given-up", "expired"):
+        told.add_metric([outcome], figures.counters.get((CALLBACKS, (outcome,)), 0))
+    yield told
+
+
+def _gauge(name: str, meaning: str, value: float) -> Metric:
+    return GaugeMetricFamily(name, meaning, value=value)
+
+
+def _histogram(name: str, meaning: str, buckets: HistogramBuckets, counters: Mapping[CounterKey, float]) -> Metric:
+    cumulative, total = buckets.read(counters)
+    return HistogramMetricFamily(name, meaning, buckets=cumulative, sum_value=total)

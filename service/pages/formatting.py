@@ -1,0 +1,76 @@
+"""How the page says figures and times. The numbers of the interface stay exact; here they are read by people."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from service.schemas.health import AlarmRule
+
+NONE = "–"
+# A stitch error of 1 px is so much on the pitch.
+CM_PER_STITCH_PX = 10.0
+ALARMS: dict[AlarmRule, str] = {
+    "moved-since-last": "Moved",
+    "moved-since-first": "Drifted",
+    "rejected-in-a-row": "Rejected again",
+    "not-calibrated": "Overdue",
+    "trend": "Drifting",
+}
+STEPS = ((60.0, 1.0, "s"), (3600.0, 60.0, "min"), (86400.0, 3600.0, "h"), (float("inf"), 86400.0, "d"))
+
+
+def figure(value: float | None, unit: str = "", digits: int = 2) -> str:
+    """A number with its unit, three significant places at most: 0.04 px, 13.5 px, 135 px."""
+    if value is None:
+        return NONE
+    places = max(0, digits - (abs(value) >= 10) - (abs(value) >= 100))
+    return f"{value:.{places}f}{' ' + unit if unit else ''}"
+
+
+def centimetres(metres: float | None) -> str:
+    """A length of a pose."""
+    return NONE if metres is None else figure(100 * metres, "cm")
+
+
+def on_the_pitch(stitch_error_px: float | None) -> str:
+    """A stitch error as a length on the pitch."""
+    return NONE if stitch_error_px is None else figure(CM_PER_STITCH_PX * stitch_error_px, "cm", 1)
+
+
+def degrees(value: float | None) -> str:
+    """An angle of a pose."""
+    return NONE if value is None else f"{value:.3f}°"
+
+
+def percent(share: float | None) -> str:
+    """A share of 0..1."""
+    return NONE if share is None else f"{100 * share:.0f} %"
+
+
+def length_change(share: float) -> str:
+    """How much longer a focal length is than another one, of which it is this share longer: 0.12 % shorter."""
+    return f"{100 * abs(share):.2f} % {'longer' if share >= 0 else 'shorter'}"
+
+
+def capitalised(words: str) -> str:
+    """Words that begin a sentence; the rest stays as it is."""
+    return words[:1].upper() + words[1:]
+
+
+def ago(moment: datetime, now: datetime | None = None) -> str:
+    """How long it is since."""
+    seconds = max(0.0, ((now or datetime.now(UTC)) - moment).total_seconds())
+    if seconds < 5:
+        return "just now"
+    _, length, unit = next(step for step in STEPS if seconds < step[0])
+    return f"{seconds / length:.0f} {unit} ago"
+
+
+def moment(when: datetime) -> str:
+    """A date and a time of day, UTC."""
+    return f"{when.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def seconds(value: float | None) -> str:
+    """A duration."""
+    return NONE if value is None else figure(value, "s")

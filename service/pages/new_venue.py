@@ -1,0 +1,72 @@
+"""The way to a first calibration: the pitch, the lenses, the first poses, and off it goes."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, get_args
+
+from fastapi import APIRouter, Query, Request, Response
+
+from fields.shapes import Arc, Line, Point, Shape
+from fields.template import NAMES
+from service.api.context import InContext
+from service.pages.page_rendering import Page, render_page
+from service.routes.contract.documented import needs_scope
+from service.routes.contract.guarded import Guarded
+from service.schemas.field import FieldOfPlay
+from service.schemas.names import ID_PATTERN, LensModel
+from service.schemas.programs.clicked_pose import ClickedPose, ClickedPoseRequest
+
+ARC_STEP_RAD = math.radians(4)
+router = APIRouter(route_class=Page, include_in_schema=False)
+data = APIRouter(prefix="/ui/new-venue", route_class=Guarded, include_in_schema=False)
+
+
+@router.get("/ui/new-venue", openapi_extra=needs_scope("admin"))
+def new_venue(request: Request, context: InContext) -> Response:
+    """The guided way; what it gathers stays in the browser until the venue is created."""
+    return render_page(
+        request,
+        "new_venue.html",
+        templates=NAMES,
+        models=get_args(LensModel),
+        most=round(context.settings.max_frame_mb * 1e6),
+    )
+
+
+@data.get("/taken", openapi_extra=needs_scope("read"))
+def is_id_taken(context: InContext, venue_id: Annotated[str, Query(alias="id", pattern=ID_PATTERN)]) -> dict[str, bool]:
+    """Whether there is a venue of this id already."""
+    return {"taken": context.venues.get(venue_id) is not None}
+
+
+@data.post("/plan", openapi_extra=needs_scope("read"))
+def plan(field: FieldOfPlay) -> dict[str, Any]:
+    """A pitch from above: the field with all its measures, its lines and its named points, in metres."""
+    return {
+        "field": field.model_dump(mode="json"),
+        "lines": [_polyline(shape) for shape in field.plan.markings(field.size)],
+        "points": field.plan.places(field.size),
+    }
+
+
+@data.post("/pose", openapi_extra=needs_scope("calibrate"))
+async def pose(asked: ClickedPoseRequest, context: InContext) -> ClickedPose:
+    """Where a camera stands by what was clicked so far."""
+    return await context.clicked_poses.find(asked)
+
+
+def _polyline(shape: Shape) -> list[Point]:
+    match shape:
+        case Line():
+            return list(shape.points)
+        case Arc():
+            return _around(shape.centre, shape.radius, shape.start, shape.end)
+        case _:
+            return _around(shape.centre, shape.diameter / 2, 0.0, 2 * math.pi)
+
+
+def _around(centre: Point, radius: float, start: float, end: float) -> list[Point]:
+    steps = max(2, math.ceil((end - start) / ARC_STEP_RAD))
+    angles = [start + (end - start) * step / steps for step in range(steps + 1)]
+    return [(centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle)) for angle in angles]

@@ -1,0 +1,134 @@
+"""How a page leaves: rendered with what every page needs, under a strict policy, and with problems as pages too."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable, Coroutine
+from http import HTTPStatus
+from importlib.metadata import version
+from typing import Any
+from urllib.parse import quote
+
+import structlog
+from fastapi import Request, Response
+from fastapi.exceptions import RequestValidationError
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from starlette.responses import HTMLResponse, RedirectResponse
+
+from service.api.auth import COOKIE, SCOPES, page_token
+from service.pages import formatting
+from service.pages.assets import address
+from service.pages.seam import seam_curve
+from service.pages.trend_curves import trend_curves
+from service.routes.contract.guarded import Guarded
+from service.schemas.names import Scope
+from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, Problem
+from service.store.database import DATABASE_OUTAGES
+from service.store.keys import Key
+
+SIGN_IN = "/ui/sign-in"
+# Scripts, styles and pictures are files of this service; nothing inline, nobody frames it.
+POLICY = "default-src 'self'; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+HEADERS = {
+    "Content-Security-Policy": POLICY,
+    "Referrer-Policy": "same-origin",
+    # The numbers are of this moment, and whoever signs out leaves nothing behind.
+    "Cache-Control": "no-store",
+}
+log = structlog.get_logger()
+# How long ago something was changes by itself.
+TIME = re.compile(r"(<time\b[^>]*>)[^<]*")
+
+
+def part_version(part: str) -> str:
+    """A name of what a part of a page says: another one where it says something else, however long ago it was."""
+    return hashlib.blake2s(TIME.sub(r"\1", part).encode(), digest_size=8).hexdigest()
+
+
+templates = Environment(
+    loader=PackageLoader("service.pages"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+templates.globals |= {
+    "static": address,
+    "version": version("esc-calibration"),
+    "seam_curve": seam_curve,
+    "trend_curves": trend_curves,
+    "reasons": REFUSAL_REASONS,
+    "alarm_words": formatting.ALARMS,
+}
+templates.filters |= {
+    "figure": formatting.figure,
+    "cm": formatting.centimetres,
+    "on_the_pitch": formatting.on_the_pitch,
+    "degrees": formatting.degrees,
+    "percent": formatting.percent,
+    "longer": formatting.length_change,
+    "capitalised": formatting.capitalised,
+    "ago": formatting.ago,
+    "moment": formatting.moment,
+    "seconds": formatting.seconds,
+    "edition": part_version,
+}
+
+
+class Page(Guarded):
+    """A route that answers with a page, whatever happens; who is not signed in is sent to where one does it."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Handle, and put into words what goes wrong."""
+        handle = super().get_route_handler()
+
+        async def shown(request: Request) -> Response:
+            try:
+                return await handle(request)
+            except Problem as problem:
+                return problem_page(request, problem)
+            except RequestValidationError:
+                return problem_page(request, Problem("not-found", "The address is not one of this service's."))
+            except DATABASE_OUTAGES:
+                log.warning("cannot show a page", exc_info=True)
+                return problem_page(
+                    request, Problem("unavailable", "Its storage does not answer. Try again in a moment.")
+                )
+
+        return shown
+
+
+def render_page(request: Request, template: str, status: int = 200, **content: Any) -> Response:
+    """A page from its template."""
+    key: Key | None = getattr(request.state, "key", None)
+    token = request.cookies.get(COOKIE)
+    text = templates.get_template(template).render(
+        key=key,
+        token=page_token(token) if key and token else "",
+        may=lambda scope: has_scope(key, scope),
+        path=request.url.path,
+        **content,
+    )
+    return HTMLResponse(text, status, HEADERS)
+
+
+def has_scope(key: Key | None, needed: Scope) -> bool:
+    """Whether the owner of a key may do what needs this scope; anybody may where no keys are asked for."""
+    return key is None or SCOPES.index(key.scope) >= SCOPES.index(needed)
+
+
+def problem_page(request: Request, problem: Problem) -> Response:
+    """A problem as a page, or the way to sign in."""
+    status = PROBLEM_TYPES[problem.kind].status
+    if status == HTTPStatus.UNAUTHORIZED:
+        wanted = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+        return RedirectResponse(f"{SIGN_IN}?next={quote(wanted)}", HTTPStatus.SEE_OTHER)
+    return render_page(request, "problem.html", status, problem=problem, title=PROBLEM_TYPES[problem.kind].title)
+
+
+def local_target(target: str) -> str:
+    """An address of this service to go on to, whatever somebody wrote into a link."""
+    # As browsers read it: without tabs and line ends, and a second slash of any kind begins the name of a host.
+    read = re.sub(r"[\t\r\n]", "", target).replace("\\", "/")
+    return target if read.startswith("/") and not read.startswith("//") else "/"

@@ -1,0 +1,106 @@
+"""What refusals and problems mean, for people: the addresses that programs get JSON at, as pages for browsers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Request, Response
+from starlette.datastructures import Headers
+from starlette.routing import Match
+
+from service.pages import documents
+from service.pages.page_rendering import Page, render_page
+from service.routes.contract.documented import FOR_ALL
+from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, REFUSALS_DOCUMENT, Problem
+
+DOCUMENT_NAME = REFUSALS_DOCUMENT.rpartition("/")[2].removesuffix(".md")
+JOBS_THAT_FAIL = "jobs-that-fail"
+Name = Annotated[str, Path(max_length=64)]
+
+
+class ForBrowsers(Page):
+    """A page at an address that answers everybody else with JSON."""
+
+    def matches(self, scope: Any) -> tuple[Match, Any]:
+        """Not where JSON is wanted as well, or nothing is said of pages."""
+        match, child = super().matches(scope)
+        if match is not Match.NONE and not wants_page(Headers(scope=scope).get("accept", "")):
+            return Match.NONE, {}
+        return match, child
+
+
+router = APIRouter(route_class=ForBrowsers, include_in_schema=False)
+document_router = APIRouter(route_class=Page, include_in_schema=False)
+
+
+def wants_page(accept: str) -> bool:
+    """Whether a client names HTML and likes nothing with JSON in its name as well (RFC 9110, section 12.5.1)."""
+    quality = {"html": 0.0, "json": 0.0}
+    for part in accept.lower().split(","):
+        media_type, *parameters = (piece.strip() for piece in part.split(";"))
+        for kind in quality:
+            if media_type == f"text/{kind}" or (kind == "json" and media_type.endswith(("/json", "+json"))):
+                quality[kind] = max(quality[kind], _quality(parameters))
+    return quality["html"] > quality["json"]
+
+
+def _quality(parameters: list[str]) -> float:
+    for parameter in parameters:
+        name, _, value = parameter.partition("=")
+        if name.strip() == "q":
+            try:
+                return float(value)
+            except ValueError:
+                return 0.0
+    return 1.0
+
+
+@router.get("/refusals/{reason}", openapi_extra=FOR_ALL)
+def refusal(reason: Name, request: Request) -> Response:
+    """What a reason for a refusal means, looks like, and what to do."""
+    if reason not in REFUSAL_REASONS:
+        raise Problem("not-found", "There is no such reason for a refusal.")
+    known = REFUSAL_REASONS[reason]
+    return _explained(
+        request,
+        known.title,
+        documents.reason(DOCUMENT_NAME, known.anchor, reason),
+        known.anchor,
+        looks_like=known.looks_like,
+        do=known.do,
+    )
+
+
+@router.get("/problems/{kind}", openapi_extra=FOR_ALL)
+def problem(kind: Name, request: Request) -> Response:
+    """What a kind of problem means; of those that jobs end with, what to do."""
+    if kind not in PROBLEM_TYPES:
+        raise Problem("not-found", "There is no such kind of problem.")
+    of_jobs = documents.section(DOCUMENT_NAME, JOBS_THAT_FAIL)
+    body = of_jobs if f"<code>{kind}</code>" in of_jobs else None
+    return _explained(
+        request, PROBLEM_TYPES[kind].title, body, JOBS_THAT_FAIL, answered_with=PROBLEM_TYPES[kind].status
+    )
+
+
+@document_router.get("/ui/documents/{name}", openapi_extra=FOR_ALL)
+def document(name: Name, request: Request) -> Response:
+    """A document."""
+    if name not in documents.NAMES:
+        raise Problem("not-found", f"The documents that are shown here are {', '.join(documents.NAMES)}.")
+    return render_page(request, "document.html", title=documents.title(name), body=documents.whole(name))
+
+
+def _explained(request: Request, title: str, body: Any, anchor: str, **more: Any) -> Response:
+    answer = render_page(
+        request,
+        "explained.html",
+        title=title,
+        body=body,
+        document=documents.address(DOCUMENT_NAME, anchor),
+        document_title=documents.title(DOCUMENT_NAME),
+        **{"looks_like": None, "do": None, "answered_with": None} | more,
+    )
+    # The same address is JSON for others.
+    answer.headers["Vary"] = "Accept"
+    return answer

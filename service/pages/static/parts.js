@@ -1,0 +1,95 @@
+// Parts of a page that follow what happens: fetched anew, and replaced where the service says something else of them.
+
+import {say, tellTimes} from "./page.js";
+
+const WHOLE = new AbortController();
+const REACHABLE = "a[href], button, input, select, textarea, summary, [tabindex]";
+const acts = [];
+const ends = new WeakMap();
+let asking = null;
+let askAgain = false;
+
+function parts(page = document) {
+  return [...page.querySelectorAll("[data-part]")];
+}
+
+/** Call `act(root, signal)` for what the page shows, and again for each part that takes the place of another.
+ *
+ * The signal is aborted when the part goes: streams and listeners outside of it end with it.
+ */
+export function whenShown(act) {
+  acts.push(act);
+  if (!parts().length) act(document, WHOLE.signal);
+  for (const part of parts()) act(part, signalOf(part));
+}
+
+function signalOf(part) {
+  if (!ends.has(part)) ends.set(part, new AbortController());
+  return ends.get(part).signal;
+}
+
+/** Whether somebody has begun to fill in a form of a part: that would be lost. */
+function isEdited(part) {
+  return [...part.querySelectorAll("form :is(input, select, textarea)")].some((field) => {
+    if (field.type === "checkbox" || field.type === "radio") return field.checked !== field.defaultChecked;
+    if (field.type === "range") return false;
+    if (field instanceof HTMLSelectElement) return [...field.options].some((one) => one.selected !== one.defaultSelected) && [...field.options].some((one) => one.defaultSelected);
+    return field.value !== field.defaultValue;
+  });
+}
+
+/** Puts the switches, the opened details and the focus of a part into the one that takes its place. */
+function takeOver(before, after) {
+  const known = (part) => [...part.querySelectorAll("input, select")].filter((field) => !field.form && (field.id || field.name));
+  for (const field of known(before)) {
+    const same = known(after).find((one) => one.id === field.id && one.name === field.name);
+    if (same && field.type === "checkbox") same.checked = field.checked;
+    else if (same) same.value = field.value;
+  }
+  const [opened, toOpen] = [before, after].map((part) => [...part.querySelectorAll("details")]);
+  if (opened.length === toOpen.length) toOpen.forEach((one, number) => { one.open = opened[number].open || (one.open && !one.matches(".fold")); });
+  const focused = [...before.querySelectorAll(REACHABLE)].indexOf(document.activeElement);
+  return focused < 0 ? () => {} : () => [...after.querySelectorAll(REACHABLE)][focused]?.focus({preventScroll: true});
+}
+
+function replace(part, other) {
+  const focus = takeOver(part, other);
+  signalOf(part);
+  ends.get(part).abort();
+  part.replaceWith(other);
+  focus();
+  for (const act of acts) act(other, signalOf(other));
+}
+
+async function fetchAndReplace() {
+  const answer = await fetch(location.href).catch(() => null);
+  // Whoever is signed out meanwhile, or looks at what was deleted, is shown so.
+  if (answer && (answer.redirected || answer.status === 404)) return location.reload();
+  if (!answer || !answer.ok) return null;
+  const there = new DOMParser().parseFromString(await answer.text(), "text/html");
+  let isWhole = true;
+  for (const part of parts()) {
+    const other = parts(there).find((one) => one.dataset.part === part.dataset.part);
+    if (!other || other.dataset.edition === part.dataset.edition) continue;
+    if (isEdited(part)) isWhole = false;
+    else replace(part, other);
+  }
+  const [seen, now] = [document, there].map((page) => page.querySelector("[data-tag]"));
+  // Who changes the venue changes the one that this page shows: of a form that was kept back, the one before.
+  if (seen && now && isWhole) seen.dataset.tag = now.dataset.tag;
+  tellTimes();
+  return null;
+}
+
+/** Show the page as the service has it now; what is asked for meanwhile is asked for once more. */
+export async function refresh() {
+  askAgain = Boolean(asking);
+  if (asking) return asking;
+  do {
+    askAgain = false;
+    asking = fetchAndReplace();
+    await asking.catch((error) => say(error.message, true));
+  } while (askAgain);
+  asking = null;
+  return null;
+}

@@ -1,0 +1,47 @@
+"""Changing a venue that is there: its settings, and new first poses of its cameras."""
+
+from __future__ import annotations
+
+import json
+from typing import get_args
+
+from fastapi import APIRouter, Request, Response
+
+from service.api import etags
+from service.api.context import InContext
+from service.pages.page_rendering import Page, render_page
+from service.routes.contract.documented import needs_scope
+from service.routes.venues import ExistingVenue, venue_etag
+from service.schemas.geometry import Intrinsics
+from service.schemas.health import Alarms
+from service.schemas.names import LensModel
+
+router = APIRouter(route_class=Page, include_in_schema=False)
+
+
+@router.get("/ui/venues/{venue_id}/settings", openapi_extra=needs_scope("admin"))
+def settings(venue: ExistingVenue, request: Request) -> Response:
+    """Alarms, lenses, and the end of a venue."""
+    lenses = {camera.id: _readable(camera.intrinsics) for camera in venue.cameras}
+    shown = venue.model_copy(update={"alarms": venue.alarms or Alarms()})
+    return render_page(request, "settings.html", venue=shown, lenses=lenses, tag=etags.quoted(venue_etag(venue)))
+
+
+@router.get("/ui/venues/{venue_id}/first-pose", openapi_extra=needs_scope("admin"))
+def first_pose(venue: ExistingVenue, request: Request, context: InContext) -> Response:
+    """Clicking points in new frames of a venue's cameras."""
+    return render_page(
+        request,
+        "first_pose.html",
+        venue=venue,
+        venue_json=venue.model_dump_json(include={"id", "field", "cameras"}),
+        models=get_args(LensModel),
+        most=round(context.settings.max_frame_mb * 1e6),
+        tag=etags.quoted(venue_etag(venue)),
+    )
+
+
+def _readable(lens: Intrinsics) -> str:
+    """JSON with a line for each part."""
+    parts = [f"  {json.dumps(name)}: {json.dumps(value)}" for name, value in lens.model_dump(mode="json").items()]
+    return "{\n" + ",\n".join(parts) + "\n}"

@@ -1,0 +1,88 @@
+"""Following a venue: its poses now, and from then on whatever happens to it, as server-sent events."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterable, AsyncIterator
+from typing import Annotated
+
+import structlog
+from fastapi import APIRouter, Depends, Header, Query
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from starlette.concurrency import run_in_threadpool
+
+from service.api.context import InContext
+from service.routes.contract.documented import needs_scope, problem_responses
+from service.routes.contract.guarded import Guarded
+from service.routes.venues import ExistingVenue
+from service.schemas.events.venue_event import FINAL_EVENT
+from service.schemas.names import EventKind
+from service.store.database import DATABASE_OUTAGES
+from service.store.events.feed import NumberedEvent
+
+log = structlog.get_logger()
+router = APIRouter(tags=["venues"], route_class=Guarded)
+# Events that are read at once.
+PAGE = 50
+# Then the client connects again, with a key that must be good still.
+LONGEST_S = 3600
+# Between two looks, should one that was waited for be missed; the stream itself says ": ping" every 15 s.
+LONGEST_POLL_INTERVAL_S = 30
+# Of 64 bits.
+LONGEST_NUMBER = 19
+
+
+async def _follower_place(context: InContext) -> AsyncIterator[None]:
+    with context.followers.taken():
+        yield
+
+
+def _last_seen_number(
+    last_event_id: Annotated[str | None, Header(description="The id of the last event that arrived.")] = None,
+) -> int | None:
+    """The number of the last event that a client has seen; what is no number was given by nobody here."""
+    given = last_event_id or ""
+    return int(given) if given.isascii() and given.isdecimal() and len(given) < LONGEST_NUMBER else None
+
+
+@router.get(
+    "/venues/{venue_id}/events",
+    openapi_extra=needs_scope("read"),
+    response_class=EventSourceResponse,
+    responses=problem_responses(404),
+    dependencies=[Depends(_follower_place)],
+)
+async def venue_events(
+    venue: ExistingVenue,
+    context: InContext,
+    seen: Annotated[int | None, Depends(_last_seen_number)],
+    events: Annotated[list[EventKind], Query(max_length=4, description="Only these; absent: all.")] = [],  # noqa: B006
+) -> AsyncIterable[ServerSentEvent]:
+    """Stream what happens to a venue as server-sent events: each has the name of its `type`, and the body of a webhook.
+
+    The first is `poses.current`, the poses that hold. Who comes back with the id of the last event that arrived
+    (`Last-Event-ID`) gets what was missed instead; if that is more than is kept, `poses.current` again. The stream ends
+    after `venue.deleted`, and otherwise after an hour: connect again.
+    """
+    until, number = time.monotonic() + LONGEST_S, seen or 0
+    try:
+        beginning = await run_in_threadpool(context.events.beginning, venue.id, seen)
+        if beginning is not None:
+            number = beginning.number
+            yield _server_sent_event(beginning)
+        while not context.venue_watch.closed and time.monotonic() < until:
+            page = await run_in_threadpool(context.events.since, venue.id, number, events, PAGE)
+            number = page.up_to
+            for event in page.events:
+                yield _server_sent_event(event)
+                if event.event.type == FINAL_EVENT:
+                    return
+            if not page.more:
+                await context.venue_watch.until(venue.id, number.__lt__, LONGEST_POLL_INTERVAL_S)
+    except DATABASE_OUTAGES:
+        # The client connects again, as after any stream that broke off.
+        log.warning("cannot tell of a venue", exc_info=True)
+
+
+def _server_sent_event(event: NumberedEvent) -> ServerSentEvent:
+    return ServerSentEvent(data=event.event, event=event.event.type, id=str(event.number))

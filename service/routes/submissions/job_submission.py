@@ -1,0 +1,150 @@
+"""What all routes that take pictures share once the form is there: its files are checked, stored, and become a job."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Header, Request, Response
+from starlette.datastructures import UploadFile
+
+from service.api.context import Context
+from service.intake import image_checks
+from service.intake.submit import frame_paths
+from service.routes.contract.missing import no_such_venue
+from service.routes.jobs import job_response
+from service.routes.venues import RETRY_AFTER_S, venue_busy
+from service.schemas.job import Job
+from service.schemas.names import JobKind
+from service.schemas.problems import Problem
+from service.schemas.venue import Venue
+from service.settings import Settings
+from service.store.ids import new_id
+from service.store.jobs.files import frame_folder
+from service.store.jobs.submission import KeyReused, QueueFull, Refusal, Submission, VenueBusy, VenueGone, VenueReplaced
+from service.store.jobs.task import AnyOptions, Origin, kind_of, seeded
+
+# By camera, of photos by their names.
+Files = Mapping[str, Sequence[UploadFile]]
+
+
+@dataclass(frozen=True)
+class Sender:
+    """Whom a job comes from, and what they call it so that it is one job if they send it twice."""
+
+    idempotency_key: str | None
+    origin: Origin
+
+
+def _sender(
+    request: Request,
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            pattern=r"^[\x21-\x7e]{1,255}$",
+            description="The same key and the same content are the same job, for as long as that job is kept.",
+        ),
+    ] = None,
+) -> Sender:
+    return Sender(idempotency_key, request.state.origin)
+
+
+FromSender = Annotated[Sender, Depends(_sender)]
+
+
+def submit_files(
+    context: Context, venue: Venue | None, options: AnyOptions, files: Files, sender: Sender
+) -> tuple[Job, bool]:
+    """Check and store the files, and make them a job or find the job that they already are; says if it is new."""
+    submission = _submission(context, venue, options, files, sender)
+
+    def store() -> None:
+        for name, paths in submission.frames.items():
+            for path, upload in zip(paths, files[name], strict=True):
+                with context.uploads.content(upload) as data:
+                    context.blobs.put(path, data)
+                # Or it would lie beside the next one.
+                del data
+
+    return enqueue(context, submission, store)
+
+
+def enqueue(context: Context, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
+    """A submission as a job, or the job that it already is; says if it is new. `store` puts its frames in place."""
+    try:
+        return context.intake.take(submission, store)
+    except Refusal as refusal:
+        raise refusal_problem(
+            refusal, "" if submission.venue is None else submission.venue.id, context.settings
+        ) from None
+
+
+def require_queue_room(context: Context, venue: Venue | None, kind: JobKind, sender: Sender) -> None:
+    """Refuse an upload that a full queue will refuse, before it is read."""
+    venue_id = None if venue is None else venue.id
+    try:
+        context.submissions.require_place_for(venue_id, sender.idempotency_key, kind, context.settings.queue_limit)
+    except QueueFull as full:
+        raise refusal_problem(full, venue_id or "", context.settings) from None
+
+
+def submission_response(job: Job, new: bool) -> Response:
+    """To whoever submitted it: accepted, or what it already is."""
+    return job_response(job, status=202 if new else 200)
+
+
+def _submission(context: Context, venue: Venue | None, options: AnyOptions, files: Files, sender: Sender) -> Submission:
+    kind, job_id = kind_of(options), new_id()
+    # The kind too: the same frames with the same key may be those of another job.
+    content = hashlib.sha256(f"{kind} {options.model_dump_json()}".encode())
+    part = "photo" if venue is None else "camera"
+    for name, upload in ((name, upload) for name, several in files.items() for upload in several):
+        # All of them before the first is read: a size costs nothing.
+        image_checks.check_length(upload.size or 0, context.settings, **{part: name})
+    cameras = {camera.id: camera for camera in venue.cameras} if venue else {}
+    for name, several in files.items():
+        content.update(f"\n{name}".encode())
+        for upload in several:
+            with context.uploads.content(upload) as data:
+                if venue is None:
+                    image_checks.check_photo(name, data, context.settings)
+                else:
+                    image_checks.check(cameras[name], data, context.settings)
+                content.update(hashlib.sha256(data).digest())
+            del data
+    # A photo may be called anything.
+    photos = {name: [f"{frame_folder(job_id)}/photos/{number}"] for number, name in enumerate(files)}
+    return Submission(
+        job_id=job_id,
+        kind=kind,
+        venue=venue,
+        options=seeded(options),
+        frames=frame_paths(job_id, {name: len(several) for name, several in files.items()}) if venue else photos,
+        origin=sender.origin,
+        content_hash=content.hexdigest(),
+        idempotency_key=sender.idempotency_key,
+    )
+
+
+def refusal_problem(refusal: Refusal, venue_id: str, settings: Settings) -> Problem:
+    """Why a submission becomes no job."""
+    match refusal:
+        case KeyReused():
+            return Problem("idempotency-key-reused", "Use a new key for new frames.", job=refusal.job_id)
+        case VenueBusy():
+            return venue_busy(refusal.job_id)
+        case VenueGone():
+            return no_such_venue(venue_id)
+        case VenueReplaced():
+            return Problem(
+                "venue-replaced",
+                "Its pitch, cameras or lenses were changed while the frames arrived; see that they fit and send again.",
+                headers={"Retry-After": str(RETRY_AFTER_S)},
+            )
+        case QueueFull():
+            kept = f", and {refusal.kept} of {settings.queue_limit} places are kept for schedules that are due"
+            detail = f"{refusal.waiting} jobs wait{kept if refusal.kept else ''}; try again."
+            return Problem("queue-full", detail, headers={"Retry-After": "30"})
+    raise refusal

@@ -1,0 +1,39 @@
+"""Addresses in what is sent: where frames are fetched, who is told of an end, and what is an IP address."""
+
+from __future__ import annotations
+
+from ipaddress import IPv4Address, IPv6Address, ip_address
+from typing import Annotated
+from urllib.parse import urlsplit
+
+from pydantic import AfterValidator, HttpUrl, StringConstraints
+
+IpAddress = IPv4Address | IPv6Address
+# Written as browsers understand it: 0x7f.1 is 127.0.0.1 from here on, for whoever looks at it.
+CallbackUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(lambda url: str(HttpUrl(url)))]
+# Stands where a secret was in an address that is shown.
+HIDDEN = "***"
+SOURCE_SCHEMES = ("http", "https", "rtsp", "rtsps")
+
+
+def _is_a_source(url: str) -> str:
+    """Written as it is kept; an address with user or password in it is no reason to repeat them in an error."""
+    try:
+        parts = urlsplit(url)
+        complete = parts.scheme in SOURCE_SCHEMES and parts.hostname and (parts.port is None or parts.port > 0)
+    except ValueError:
+        complete = False
+    if not complete or not url.isascii() or not url.isprintable() or " " in url or "#" in url:
+        raise ValueError(f"a source is an address that begins with one of {', '.join(SOURCE_SCHEMES)} and names a host")
+    return url
+
+
+SourceUrl = Annotated[str, StringConstraints(max_length=1024), AfterValidator(_is_a_source)]
+
+
+def ip_of(host: str) -> IpAddress | None:
+    """The address that a host is written as; None: it is a name."""
+    try:
+        return ip_address(host)
+    except ValueError:
+        return None

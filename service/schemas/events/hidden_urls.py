@@ -1,0 +1,33 @@
+"""Addresses that are told of something, as they are shown: whoever knows the path of one may often post there."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Collection
+from urllib.parse import urlsplit
+
+from service.schemas.addresses import HIDDEN
+from service.schemas.problems import Problem
+
+HIDDEN_URL = re.compile(rf"https?://[^/]+/{re.escape(HIDDEN)}-[0-9a-f]{{8}}")
+
+
+def hide_path(url: str) -> str:
+    """An address as it is shown: the host, and in place of the rest a mark by which the service knows it again."""
+    parts = urlsplit(url)
+    if parts.path in ("", "/") and not parts.query and not parts.fragment:
+        return url
+    return f"{parts.scheme}://{parts.netloc}/{HIDDEN}-{hashlib.sha256(url.encode()).hexdigest()[:8]}"
+
+
+def restore_url(url: str, known: Collection[str]) -> str:
+    """The address that a client means who sends back what was shown; any other is itself."""
+    if not HIDDEN_URL.fullmatch(url):
+        return url
+    for address in known:
+        if hide_path(address) == url:
+            return address
+    raise Problem(
+        "callback-refused", f"This venue has no address that is shown as {url}: send the address itself.", got=url
+    )

@@ -1,0 +1,24 @@
+"""Who is told of what happens to a venue: a part of the venue, so apart from all that can happen."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+from service.schemas.addresses import CallbackUrl
+from service.schemas.base import OPEN_WORD, Schema
+from service.schemas.names import EventKind
+
+WEBHOOK_EXAMPLE: dict[str, Any] = {"url": "https://example.com/poses", "events": ["poses.changed"]}
+
+
+class Webhook(Schema):
+    """An address that is told of what happens to a venue, signed (Standard Webhooks), again for a day if need be."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [WEBHOOK_EXAMPLE]})
+
+    url: CallbackUrl
+    events: Annotated[list[Annotated[EventKind, OPEN_WORD]], Field(min_length=1, max_length=4)] = Field(
+        ["poses.changed"]
+    )

@@ -1,0 +1,313 @@
+"""The pitch: a sport's template or markings of one's own, its measures and its roof."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    ValidationInfo,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
+
+from fields.shapes import COLOUR_PATTERN, WHITE, Shape
+from fields.template import NAMES, Extent, Template, load
+from service.schemas.base import Name, Number, Schema, is_tolerant
+from service.schemas.geometry import Row
+from service.schemas.names import FieldNumber
+
+PitchPoint = Annotated[list[Annotated[Number, Field(ge=-200, le=200)]], Field(min_length=2, max_length=2)]
+Length = Annotated[Number, Field(gt=0, le=400)]
+PaintWidth = Annotated[Number, Field(ge=0.01, le=1)]
+Colour = Annotated[str, StringConstraints(pattern=COLOUR_PATTERN)]
+# Further than this beside the field nothing counts as a marking of it.
+MARGIN_M = 2.0
+# Of other sports on the same ground.
+MAX_OTHER_FIELDS = 16
+
+
+class ArcIn(Schema):
+    """Counter-clockwise, seen from above, around `centre` from `start` to `end`, all on the middle of the paint."""
+
+    centre: PitchPoint
+    start: PitchPoint
+    end: PitchPoint
+
+    @model_validator(mode="after")
+    def _round(self) -> Self:
+        first, last = math.dist(self.centre, self.start), math.dist(self.centre, self.end)
+        if first == 0 or abs(first - last) > 0.01:
+            raise ValueError(f"start is {first:.2f} m from the centre, end {last:.2f} m: one radius is needed")
+        return self
+
+
+class CircleIn(Schema):
+    """A full circle, `radius_m` to the middle of the paint."""
+
+    centre: PitchPoint
+    radius_m: Length
+
+
+class SpotIn(Schema):
+    """A disc of paint."""
+
+    centre: PitchPoint
+    diameter_m: PaintWidth
+
+
+class MarkingIn(Schema):
+    """One thing painted, exactly one of `line`, `arc`, `circle` and `spot`; places are x, y from the centre, m."""
+
+    name: Annotated[Name, Field(min_length=1)]
+    line: Annotated[list[PitchPoint], Field(min_length=2, max_length=200)] | None = None
+    arc: ArcIn | None = None
+    circle: CircleIn | None = None
+    spot: SpotIn | None = None
+    width_m: PaintWidth | None = Field(None, description="Of the paint; absent: the field's `line_width_m`.")
+    colour: Colour = Field(
+        WHITE,
+        description="Of the paint: white, yellow, black, blue, red, green, orange or `#rrggbb`.",
+        examples=["yellow", "#0a5fa8"],
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        if sum(shape is not None for shape in (self.line, self.arc, self.circle, self.spot)) != 1:
+            raise ValueError(f"marking {self.name} must be exactly one of line, arc, circle and spot")
+        if self.line and any(a == b for a, b in pairwise(self.line)):
+            raise ValueError(f"marking {self.name} has the same point twice in a row")
+        return self
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """As `fields.template` reads it."""
+        entry: dict[str, Any] = {"name": self.name, "colour": self.colour}
+        entry |= {} if self.width_m is None else {"width": self.width_m}
+        if self.circle:
+            return entry | {"circle": {"centre": self.circle.centre, "radius": self.circle.radius_m}}
+        if self.spot:
+            return entry | {"spot": {"centre": self.spot.centre, "diameter": self.spot.diameter_m}}
+        return entry | ({"arc": self.arc.model_dump()} if self.arc else {"line": self.line})
+
+
+class Layout(Schema):
+    """Markings of one's own in place of a template's name, and names for points of them."""
+
+    markings: Annotated[list[MarkingIn], Field(min_length=1, max_length=500)]
+    points: Annotated[dict[Annotated[Name, Field(min_length=1)], PitchPoint], Field(max_length=1000)] = Field({})
+
+
+def _is_a_template(name: str, info: ValidationInfo) -> str:
+    if name not in NAMES and not is_tolerant(info):
+        raise ValueError(f"{name} is none of the templates {', '.join(NAMES)}, nor markings of your own")
+    return name
+
+
+TemplateName = Annotated[str, AfterValidator(_is_a_template), WithJsonSchema({"type": "string", "enum": list(NAMES)})]
+# Of a field, and what a template calls them.
+TEMPLATE_MEASURES = {"length_m": "length", "width_m": "width", "line_width_m": "line"}
+
+
+class OtherField(Schema):
+    """The field of another sport on the same ground; it has its template's measures unless given."""
+
+    template: TemplateName
+    length_m: Length | None = None
+    width_m: Length | None = None
+    line_width_m: PaintWidth | None = None
+    measures_m: dict[str, Number] = Field({})
+    centre: PitchPoint = Field([0.0, 0.0], description="Where its centre is on the venue's field.")
+    turned_deg: Annotated[Number, Field(ge=-360, le=360)] = Field(
+        0.0, description="From the venue's x to its own, counter-clockwise seen from above."
+    )
+
+    @model_validator(mode="after")
+    def _of_this_template(self) -> Self:
+        if self.template not in NAMES:
+            return self
+        extents = load(self.template).size
+        for name, measure in self.size.items():
+            if name not in extents:
+                raise ValueError(f"{name} is not among what {self.template} leaves open: {', '.join(extents)}")
+            _must_lie(measure, extents[name], f"{self.template}, {name}")
+        return self
+
+    @property
+    def size(self) -> dict[str, float]:
+        """What its plan is drawn by, where that is not as usual."""
+        given = {measure: getattr(self, name) for name, measure in TEMPLATE_MEASURES.items()}
+        return {name: measure for name, measure in given.items() if measure is not None} | self.measures_m
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """What is painted of it, on the venue's field."""
+        x, y = self.centre
+        turn = math.radians(self.turned_deg)
+        return [shape.turned(turn).shifted((x, y)) for shape in load(self.template).markings(self.size)]
+
+
+def _kind_of_other(given: Any) -> str:
+    whole = isinstance(given, OtherField) or (isinstance(given, dict) and "template" in given)
+    return "field" if whole else "marking"
+
+
+OtherMarking = Annotated[
+    Annotated[OtherField, Tag("field")] | Annotated[MarkingIn, Tag("marking")], Discriminator(_kind_of_other)
+]
+
+
+def _usual_need_not_be_given(schema: dict[str, Any]) -> None:
+    schema["required"] = [name for name in schema["required"] if name not in TEMPLATE_MEASURES]
+
+
+class FieldOfPlay(Schema):
+    """The pitch. `ridge`: the two ends of the roof's ridge (same y, same z), absent or null = flat."""
+
+    model_config = ConfigDict(json_schema_extra=_usual_need_not_be_given)
+
+    template: Annotated[
+        Annotated[TemplateName, Tag("name")] | Annotated[Layout, Tag("layout")],
+        Discriminator(lambda given: "name" if isinstance(given, str) else "layout"),
+    ] = Field("football", description="The name of a sport's template, or markings of your own.")
+    length_m: Length = Field(description="Along x; absent: the template's.")
+    width_m: Length = Field(description="Along y; absent: the template's.")
+    line_width_m: PaintWidth = Field(description="Absent: the template's.")
+    measures_m: dict[str, Number] = Field({}, description="What else a template leaves open, by name.")
+    ridge: Annotated[list[Row], Field(min_length=2, max_length=2)] | None = None
+    uneven_m: Annotated[Number, Field(ge=0.001, le=0.1)] | None = Field(
+        None,
+        description="How far the ground is above or below its plane, or its roof: a standard deviation, m. Absent: as "
+        "usual for the template (0.015 on turf, 0.005 in a hall), that of turf for markings of your own.",
+    )
+    other_markings: Annotated[list[OtherMarking], Field(max_length=500)] = Field(
+        [],
+        description="What else is painted on the ground: fields of other sports by their templates, or markings one by "
+        "one. Nothing is calibrated by them, and they do not count against a frame.",
+        examples=[[{"template": "american-football", "length_m": 109.728, "width_m": 48.768}]],
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_usual(cls, given: Any) -> Any:
+        template = given.get("template", "football") if isinstance(given, dict) else None
+        if not isinstance(template, str) or template not in NAMES:
+            return given
+        return {name: load(template).size[measure].default for name, measure in TEMPLATE_MEASURES.items()} | given
+
+    @field_validator(*TEMPLATE_MEASURES)
+    @classmethod
+    def _as_the_sport_has_it(cls, given: float, info: ValidationInfo) -> float:
+        template = info.data.get("template")
+        if isinstance(template, str) and template in NAMES and info.field_name:
+            _must_lie(given, load(template).size[TEMPLATE_MEASURES[info.field_name]], template)
+        return given
+
+    @field_validator("measures_m")
+    @classmethod
+    def _are_left_open(cls, given: dict[str, float], info: ValidationInfo) -> dict[str, float]:
+        template = info.data.get("template")
+        if isinstance(template, str) and template not in NAMES:
+            return given
+        extents = load(template).size if isinstance(template, str) else {}
+        others = {name: extent for name, extent in extents.items() if name not in TEMPLATE_MEASURES.values()}
+        for name, measure in given.items():
+            if name not in others:
+                raise ValueError(f"{name} is not among what the template leaves open: {', '.join(others) or 'nothing'}")
+            _must_lie(measure, others[name], f"{template}, {name}")
+        return given
+
+    @model_validator(mode="after")
+    def _a_field(self) -> Self:
+        if not self.is_known:
+            return self
+        for shape in self.plan.markings(self.size):
+            x, y = shape.reach
+            if x > self.length_m / 2 + MARGIN_M or y > self.width_m / 2 + MARGIN_M:
+                raise ValueError(
+                    f"{shape.name} leaves the {self.length_m:g} x {self.width_m:g} m of the field, "
+                    "whose centre is the origin"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _shared_by_few(self) -> Self:
+        others = sum(isinstance(other, OtherField) for other in self.other_markings)
+        if others > MAX_OTHER_FIELDS:
+            raise ValueError(f"other_markings has {others} fields of other sports: at most {MAX_OTHER_FIELDS}")
+        return self
+
+    @model_validator(mode="after")
+    def _a_roof(self) -> Self:
+        if self.ridge is None:
+            return self
+        (x1, y1, z1), (x2, y2, z2) = self.ridge
+        if y1 != y2 or z1 != z2:
+            raise ValueError("both ends of the ridge need the same y and the same z")
+        if max(abs(x1), abs(x2)) >= self.length_m / 2 or abs(y1) >= self.width_m / 2:
+            raise ValueError("the ridge must lie inside the pitch")
+        if not 0 <= z1 <= 3:
+            raise ValueError("the ridge must be 0 to 3 m high")
+        return self
+
+    def number(self, name: FieldNumber) -> float:
+        """A number of the field, m; the ridge of a flat one is 0 m high."""
+        if name == "ridge_height_m":
+            return 0.0 if self.ridge is None else self.ridge[0][2]
+        value: float = getattr(self, name)
+        return value
+
+    def with_number(self, name: FieldNumber, value: float) -> FieldOfPlay:
+        """Return the field with another number, m. Raises `ValidationError` where its sport has no such field."""
+        return self.changed({"ridge": self._ridge_at(value)} if name == "ridge_height_m" else {name: value})
+
+    def changed(self, values: dict[str, Any]) -> FieldOfPlay:
+        """Return the field with other values. Raises `ValidationError` where its sport has no such field."""
+        return FieldOfPlay.model_validate(self.model_dump() | values)
+
+    def _ridge_at(self, height_m: float) -> list[Row]:
+        """The ridge at another height; that of a flat field lies between hips of 45°, as calibrations take it to."""
+        if self.ridge is not None:
+            return [[x, y, height_m] for x, y, _ in self.ridge]
+        end = max((self.length_m - self.width_m) / 2, 0.0)
+        return [[0.0 - end, 0.0, height_m], [end, 0.0, height_m]]
+
+    @property
+    def is_known(self) -> bool:
+        """False if it is drawn by a template that only a newer version has."""
+        return not isinstance(self.template, str) or self.template in NAMES
+
+    @property
+    def plan(self) -> Template:
+        """Markings and named points, and how uneven their ground is."""
+        if isinstance(self.template, str):
+            plan = load(self.template)
+        else:
+            plan = Template(marking=[one.entry for one in self.template.markings], points=self.template.points)
+        return plan if self.uneven_m is None else replace(plan, uneven=self.uneven_m)
+
+    @property
+    def others(self) -> list[Shape]:
+        """What else is painted on the ground."""
+        own = [marking.entry for marking in self.other_markings if isinstance(marking, MarkingIn)]
+        fields = [field for field in self.other_markings if isinstance(field, OtherField)]
+        return [*Template(marking=own).markings(self.size), *(shape for field in fields for shape in field.shapes)]
+
+    @property
+    def size(self) -> dict[str, float]:
+        """What the plan is drawn by."""
+        return {"length": self.length_m, "width": self.width_m, "line": self.line_width_m, **self.measures_m}
+
+
+def _must_lie(given: float, extent: Extent, what: str) -> None:
+    if not extent.least <= given <= extent.most:
+        raise ValueError(f"{what}: {extent.least:g} to {extent.most:g} m, not {given:g}")

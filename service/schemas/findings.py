@@ -1,0 +1,148 @@
+"""What a schema found wrong with a document, in words that name the part as whoever wrote it does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+Location = tuple[str | int, ...]
+MAX_PREVIEW_LENGTH = 40
+MAX_NAME_LENGTH = 64
+MAX_SUGGESTIONS = 20
+"""So many misspelt names are looked up: that of all in a document made for it would take the service minutes."""
+
+EXPECTED = {
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "string_type": "text",
+    "list_type": "a list",
+    "dict_type": "an object",
+    "model_type": "an object",
+    "model_attributes_type": "an object",
+    "literal_error": "{expected}",
+    "greater_than": "more than {gt}",
+    "greater_than_equal": "{ge} or more",
+    "less_than": "less than {lt}",
+    "less_than_equal": "{le} or less",
+}
+"""By the kinds of pydantic, with what it says of each."""
+EXPECTED_LENGTH = {
+    "too_short": "at least {min_length} entries, came {actual_length}",
+    "too_long": "at most {max_length} entries, came {actual_length}",
+    "string_too_short": "at least {min_length} characters",
+    "string_too_long": "at most {max_length} characters",
+    "string_pattern_mismatch": "text of the pattern {pattern}",
+}
+"""What came is too long to be shown, or a secret."""
+NOT_METRES = "it is in metres, and these look like centimetres or millimetres"
+OTHER_UNITS = {
+    "rotation": "it is a Rodrigues vector in radians, and these look like degrees",
+    "position": NOT_METRES,
+    "translation": NOT_METRES,
+}
+"""By the name of a vector, what a number beyond its limits says of all of them."""
+
+
+def describe_errors(findings: Sequence[Mapping[str, Any]], model: Any, document: Any) -> list[str]:
+    """Each of pydantic's errors. `model`: the type that the `document` should have had; None: not known."""
+    unknown = [finding["loc"] for finding in findings if finding["type"] == "extra_forbidden"]
+    meant = {place: _suggestion(place, model) for place in unknown[:MAX_SUGGESTIONS]}
+    return [_describe_error(finding, _path_with_ids(finding["loc"], document), meant) for finding in findings]
+
+
+def _describe_error(finding: Mapping[str, Any], place: str, meant: Mapping[Location, str]) -> str:
+    match finding["type"]:
+        case "missing":
+            return f"{place} is missing"
+        case "extra_forbidden":
+            return f"{place} is not known{meant.get(finding['loc'], '')}"
+        case kind if kind in EXPECTED:
+            expected = EXPECTED[kind].format(**finding.get("ctx", {}))
+            said = f"expected {expected}, came {_preview(finding['input'])}{_other_unit(finding)}"
+        case kind if kind in EXPECTED_LENGTH:
+            said = f"expected {EXPECTED_LENGTH[kind].format(**finding['ctx'])}"
+        case _:
+            said = finding["msg"].removeprefix("Value error, ")
+    return f"{place}: {said}" if place else said
+
+
+def _other_unit(finding: Mapping[str, Any]) -> str:
+    """The unit that a number beyond its limits was most likely written in."""
+    if finding["type"] not in ("less_than_equal", "greater_than_equal"):
+        return ""
+    of = [OTHER_UNITS[step] for step in finding["loc"] if step in OTHER_UNITS]
+    return f"; {of[-1]}" if of else ""
+
+
+def _path_with_ids(place: Location, document: Any) -> str:
+    """Where something is, with the ids of what has one, and nothing of how the schema came there."""
+    steps = []
+    for number, step in enumerate(place, start=1):
+        inside = _member(document, step)
+        if inside is None and document is not None and number < len(place):
+            continue
+        steps.append(str(inside["id"] if isinstance(step, int) and _has_id(inside) else step))
+        document = inside
+    return ".".join(steps)
+
+
+def _member(document: Any, step: str | int) -> Any:
+    if isinstance(document, dict):
+        return document.get(step)
+    if isinstance(document, list) and isinstance(step, int) and step < len(document):
+        return document[step]
+    return None
+
+
+def _has_id(document: Any) -> bool:
+    name = document.get("id") if isinstance(document, dict) else None
+    return isinstance(name, str) and len(name) <= MAX_NAME_LENGTH
+
+
+def _suggestion(place: Location, model: Any) -> str:
+    """The field that was most likely meant, or else all that there are."""
+    *way, wrong = place
+    models = _models(model)
+    for step in way:
+        fields = [found.model_fields[step] for found in models if isinstance(step, str) and step in found.model_fields]
+        if fields:
+            models = [inner for field in fields for inner in _models(field.annotation)]
+    known = list(dict.fromkeys(field.alias or name for found in models for name, field in found.model_fields.items()))
+    near = get_close_matches(str(wrong)[:MAX_NAME_LENGTH], known, n=1)
+    if near:
+        return f"; did you mean {near[0]}?"
+    return f"; known are {', '.join(known)}" if known else ""
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """The models that something of this type may be, or be made of."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        root = annotation.model_fields.get("root")
+        return [annotation] if root is None else _models(root.annotation)
+    return [model for inner in get_args(annotation) for model in _models(inner)]
+
+
+def _preview(value: Any) -> str:
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true" if value else "false"
+        case str() | int() | float():
+            shown = repr(value)
+            return shown if len(shown) <= MAX_PREVIEW_LENGTH else f"{shown[:MAX_PREVIEW_LENGTH]}..."
+        case list():
+            return "a list"
+        case dict():
+            return "an object"
+        case _:
+            return f"a {type(value).__name__}"

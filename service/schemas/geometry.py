@@ -1,0 +1,224 @@
+"""Poses, lenses and how far a camera moved.
+
+World: right-handed, metres, origin at the pitch centre on z = 0, x along the touchline, y across the pitch, z up.
+Cameras are OpenCV's: x right, y down, z forward, pixel centres at integers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Self
+
+from pydantic import BaseModel, Field, model_validator
+
+from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
+from service.schemas.names import OPTIONS_PART, LensModel
+
+DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
+COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
+    "opencv": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"),
+    "fisheye": ("k1", "k2", "k3", "k4"),
+}
+# Of a camera matrix: both focal lengths, the ratio fy/fx, the principal point.
+MATRIX_NUMBERS = ("fx", "fy", "aspect", "cx", "cy")
+LEAST_SIGMA, LARGEST_SIGMA = 1e-9, 1e6
+LARGEST_SIDE = 16384
+LARGEST_COEFFICIENT = 1000
+# A position and a translation that are less apart say the same: more is not lost by writing them down.
+AGREEING_M = 1e-6
+Metres = Annotated[Number, Field(ge=-2000, le=2000)]
+Radians = Annotated[Number, Field(ge=-10, le=10)]
+Position = Annotated[list[Metres], Field(min_length=3, max_length=3)]
+Rotation = Annotated[list[Radians], Field(min_length=3, max_length=3)]
+Row = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Side = Annotated[Integer, Field(ge=32, le=LARGEST_SIDE)]
+Deviation = Annotated[Number, Field(ge=LEAST_SIGMA, le=LARGEST_SIGMA)]
+
+
+class PoseIn(Schema):
+    """Where a camera stands and looks: `rotation` with `position`, `translation`, or both where they agree."""
+
+    rotation: Rotation = Field(description="Rodrigues vector, rad, world to camera.")
+    position: Position | None = Field(None, description="Camera centre in the world, m.")
+    translation: Position | None = Field(None, description="OpenCV's tvec = -R·position, m.")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if self.position is None and self.translation is None:
+            raise ValueError("give position or translation")
+        if self.position is not None and self.translation is not None:
+            apart = math.dist(Pose.from_position(self.rotation, self.position).translation, self.translation)
+            if apart > AGREEING_M and math.dist(self.position, self.translation) <= AGREEING_M:
+                raise ValueError(
+                    "translation is the same as position: OpenCV's tvec is -R·position; leave out translation where "
+                    "this is the place of the camera, and position where it is tvec"
+                )
+            if apart > AGREEING_M:
+                raise ValueError(
+                    f"translation is {apart:.3g} m from -R·position: leave out the one that is not meant to hold"
+                )
+        return self
+
+
+class Pose(Schema):
+    """Where a camera stands and looks, in both conventions."""
+
+    rotation: list[float] = Field(description="Rodrigues vector, rad, world to camera.")
+    position: list[float] = Field(description="Camera centre in the world, m.")
+    translation: list[float] = Field(description="OpenCV's tvec = -R·position, m.")
+
+    @classmethod
+    def from_position(cls, rotation: list[float], position: list[float]) -> Pose:
+        """From rotation vector and camera centre."""
+        translation = [-component for component in rotate(rotation, position)]
+        return cls(rotation=rotation, position=position, translation=translation)
+
+    @classmethod
+    def from_input(cls, pose: PoseIn) -> Pose:
+        """From a pose as it was sent, which stays to the last digit what it was when it was read."""
+        if pose.translation is None:
+            assert pose.position is not None
+            return cls.from_position(pose.rotation, pose.position)
+        backwards = rotate([-component for component in pose.rotation], pose.translation)
+        position = pose.position or [-component for component in backwards]
+        return cls(rotation=pose.rotation, position=position, translation=pose.translation)
+
+
+def rotate(rotation: list[float], vector: list[float]) -> list[float]:
+    """A vector turned by a Rodrigues vector (rad): Rodrigues' formula."""
+    angle = math.hypot(*rotation)
+    if angle == 0.0:
+        return list(vector)
+    ax, ay, az = (component / angle for component in rotation)
+    x, y, z = vector
+    cos, sin = math.cos(angle), math.sin(angle)
+    along = (ax * x + ay * y + az * z) * (1 - cos)
+    return [
+        x * cos + (ay * z - az * y) * sin + ax * along,
+        y * cos + (az * x - ax * z) * sin + ay * along,
+        z * cos + (ax * y - ay * x) * sin + az * along,
+    ]
+
+
+class Intrinsics(Schema):
+    """The lens: OpenCV's camera matrix in pixels and its distortion coefficients in OpenCV's order."""
+
+    model: Annotated[LensModel, OPEN_WORD] = Field(
+        "opencv", description="`fisheye`: OpenCV's fisheye module (Kannala-Brandt)."
+    )
+    matrix: Annotated[list[Row], Field(min_length=3, max_length=3)]
+    distortion: Annotated[
+        list[Annotated[Number, Field(ge=-LARGEST_COEFFICIENT, le=LARGEST_COEFFICIENT)]], Field(max_length=14)
+    ] = Field(description="0, 4, 5, 8, 12 or 14 numbers; of a fisheye 0 or 4.")
+    sigma: dict[str, Deviation] | None = Field(
+        None,
+        description="How well the lens is known: one standard deviation by name, of fx, fy, cx and cy in pixels, of "
+        "aspect (fy/fx) and of the coefficients (k1, k2, p1 ... in OpenCV's order) as they are. Numbers that are not "
+        "named are taken to be as sure as photos of a board leave them that reached every corner of the picture.",
+        examples=[{"fx": 4.0, "fy": 4.0, "cx": 6.0, "cy": 5.0, "k1": 0.002, "k2": 0.004}],
+        json_schema_extra={"propertyNames": {"enum": [*MATRIX_NUMBERS, *COEFFICIENTS["opencv"]]}},
+    )
+
+    @model_validator(mode="after")
+    def _a_lens(self) -> Self:
+        if self.model not in DISTORTION_LENGTHS:
+            return self
+        (fx, _, _), (lower, fy, _), last = self.matrix
+        if lower != 0 or last != [0, 0, 1]:
+            raise ValueError("matrix must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]")
+        if fx <= 0 or fy <= 0:
+            raise ValueError("focal lengths must be above 0 pixels")
+        if len(self.distortion) not in DISTORTION_LENGTHS[self.model]:
+            *most, last_length = DISTORTION_LENGTHS[self.model]
+            expected = f"{', '.join(map(str, most))} or {last_length}"
+            raise ValueError(f"distortion must have {expected} numbers with the model {self.model}")
+        return self
+
+    @model_validator(mode="after")
+    def _sigma_of_this_lens(self) -> Self:
+        if self.model not in COEFFICIENTS:
+            return self
+        known = (*MATRIX_NUMBERS, *COEFFICIENTS[self.model])
+        unknown = [name for name in self.sigma or {} if name not in known]
+        if unknown:
+            raise ValueError(f"sigma has {', '.join(unknown)}: with the model {self.model} it takes {', '.join(known)}")
+        return self
+
+    @property
+    def without_sigma(self) -> Intrinsics:
+        """The lens itself, and not how well it is known: lenses that image alike have the same."""
+        return self.model_copy(update={"sigma": None})
+
+    def with_sigma_of(self, other: Intrinsics) -> Intrinsics:
+        """This lens; where the other one is the same, as well known as that."""
+        return other if other.without_sigma == self.without_sigma else self
+
+
+class Light(Schema):
+    """What is done to a camera's picture so that it agrees with the others' where they overlap in a stitched view.
+
+    A tone t of 0 to 255 becomes `gain` * 100 * (t / 100) ** (1 + `contrast`), and that is multiplied by
+    exp(`falloff` * r²), r from 0 in the middle of the frame to 1 in its corners. `reach`: the logarithm by which the
+    camera counts more than how finely it sees, which moves the seams between it and others.
+    """
+
+    gain: Annotated[list[Annotated[Number, Field(ge=0.25, le=4)]], Field(min_length=3, max_length=3)] = Field(
+        description="Of red, green and blue.", examples=[[1.06, 1.0, 0.94]]
+    )
+    contrast: Annotated[Number, Field(ge=-0.5, le=0.5)] = 0.0
+    falloff: Annotated[Number, Field(ge=-1, le=1)] = 0.0
+    reach: Annotated[Number, Field(ge=-3, le=3)] = 0.0
+
+
+class UnposedCamera(Schema):
+    """What a camera is, but for its pose."""
+
+    id: Id
+    image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] = Field(description="Width, height in pixels.")
+    intrinsics: Intrinsics
+
+    @model_validator(mode="after")
+    def _plausible(self) -> Self:
+        if self.id == OPTIONS_PART:
+            raise ValueError("a camera cannot be called 'options': that is a part of the upload")
+        (fx, _, cx), (_, fy, cy), _ = self.intrinsics.matrix
+        width, height = self.image_size
+        for focal, centre, size in ((fx, cx, width), (fy, cy, height)):
+            # From wider than any fisheye to longer than any broadcast lens; a matrix of another resolution shows here.
+            if not 0.1 * size <= focal <= 200 * size or not -size <= centre <= 2 * size:
+                raise ValueError(f"the camera matrix does not belong to an image of {width}x{height} pixels")
+        return self
+
+
+class PosedCamera(UnposedCamera):
+    """A camera as it stands: its lens, and where it is and looks."""
+
+    pose: Pose
+
+    @property
+    def pose_and_lens(self) -> PosedCamera:
+        """Where it stands and how it images, and not how well its lens is known."""
+        return self.model_copy(update={"intrinsics": self.intrinsics.without_sigma})
+
+
+class LensFile(BaseModel):
+    """The part of the file of a lens, as `esc intrinsics` writes it, that a camera needs."""
+
+    image_size: Annotated[list[Side], Field(min_length=2, max_length=2)]
+    intrinsics: Intrinsics
+
+
+class Moved(Schema):
+    """From the stored pose to the new one; `pixels`: mean shift of the visible pitch."""
+
+    rotation_deg: float
+    position_m: float
+    pixels: float | None
+
+
+class Movement(Schema):
+    """How a camera stands against others of its states; null: there was none, or it is not known."""
+
+    moved: Moved | None = Field(description="Since the revision before.")
+    drift: Moved | None = Field(description="Since the revision `drift_since`.")
+    drift_since: int = Field(description="The last revision in which the camera was put where it is: the first pose.")

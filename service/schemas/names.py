@@ -1,0 +1,34 @@
+"""Names and words of the interface, without its models: what the help of the command line is made of."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
+# Parts of an upload.
+OPTIONS_PART = "options"
+PHOTOS_PART = "photos"
+
+LensModel = Literal["opencv", "fisheye"]
+# Of files that poses leave in; `service.formats.table` has what is behind the names.
+FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
+# What a list says of each of its entries.
+ListFields = Literal["all", "summary"]
+# With which lens: the one that the venue has, or the one that the lines have.
+LensChoice = Literal["stored", "refined"]
+# What a stitched view is projected by, and what its package is made for.
+Projection = Literal["pannini", "cylinder", "rectilinear", "birds-eye"]
+StitchFormat = Literal["ffmpeg", "st-map", "st-map-unreal", "opencv"]
+# Numbers of a field that calibrations ask the lines for, as `field` of a venue has them but for the ridge.
+FieldNumber = Literal["ridge_height_m", "length_m", "width_m"]
+# What a key allows; each one includes those before it.
+Scope = Literal["read", "calibrate", "admin"]
+# Of what happens to venues; `venue.*`: whatever begins so.
+EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
+# Of jobs.
+JobKind = Literal["calibration", "intrinsics", "locate", "field"]
+JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]
+# Of calibrations.
+Verdict = Literal["accepted", "partly", "rejected"]
+OPEN_STATUSES: tuple[JobStatus, ...] = ("queued", "running")

@@ -1,0 +1,327 @@
+"""A venue as it is sent and as it is kept: a pitch and the cameras around it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, Self, TypeVar
+
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
+
+from service.schemas import source_urls
+from service.schemas.addresses import HIDDEN, SourceUrl
+from service.schemas.base import OPEN_WORD, Id, Name, Number, Schema, is_none
+from service.schemas.events import hidden_urls
+from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
+from service.schemas.health import Alarm, Alarms, CalibrationEnd
+from service.schemas.options import Options
+from service.schemas.schedule import Schedule
+from service.schemas.view import VIEW_EXAMPLE, ViewChoice
+
+T = TypeVar("T", Alarms | None, Options | None)
+Accept = Annotated[
+    Literal["each", "all"],
+    OPEN_WORD,
+    Field(description="Of a calibration: `each` pose that passes the gate, or `all` of them if all do and else none."),
+]
+Lens = Annotated[
+    Literal["fixed", "may-drift"],
+    OPEN_WORD,
+    Field(
+        description="Of cameras whose zoom or focus moved: `fixed` rejects the pose, `may-drift` accepts it with the "
+        "focal length that was found."
+    ),
+]
+
+Webhooks = Annotated[
+    list[Webhook], Field(max_length=8, description="Told of what happens to the venue, and of new poses with them.")
+]
+
+
+Pixel = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Polygon = Annotated[list[Pixel], Field(min_length=3, max_length=200)]
+Ignore = Annotated[
+    list[Polygon],
+    Field(
+        max_length=50,
+        description="Areas of the frame that are of no use, polygons of [x, y] in pixels: nothing in them counts as a "
+        "marking, is measured or is missed.",
+        examples=[[[[0, 1900], [900, 1900], [900, 2159], [0, 2159]]]],
+    ),
+]
+
+# What the engine takes the focal length of a lens without a sigma to be known to, one standard deviation.
+BOARD_FOCAL_PERCENT = 0.03
+LIGHT = "How it is evened out with the others in a stitched view; accepted calibrations find it and keep it steady."
+
+
+class CameraIn(UnposedCamera):
+    """A camera of a venue as it is sent."""
+
+    pose: PoseIn
+    ignore: Ignore = Field([])
+    light: Light | None = Field(None, description=LIGHT)
+    source: SourceUrl | None = Field(
+        None,
+        description="Where its frames can be fetched: the address of a JPEG or PNG, of motion JPEG, or an RTSP stream. "
+        f"User and password, also in parameters such as `pwd=`, are not shown again: `{HIDDEN}` stands for them, and "
+        "sent back keeps them.",
+        examples=["http://user:password@10.1.0.7/snapshot.jpg"],
+    )
+
+    @model_validator(mode="after")
+    def _ignores_what_is_in_its_picture(self) -> Self:
+        width, height = self.image_size
+        for x, y in (corner for polygon in self.ignore for corner in polygon):
+            if not (-0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5):
+                raise ValueError(
+                    f"ignore: the corner ({x:g}, {y:g}) lies outside the {width}x{height} pixels of camera {self.id}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _above_the_pitch(self) -> Self:
+        height = Pose.from_input(self.pose).position[2]
+        if height <= 0:
+            raise ValueError(
+                f"camera {self.id} stands at z = {height:.6g} m: z points up, and a camera must be above the pitch"
+            )
+        return self
+
+
+class Camera(PosedCamera):
+    """A camera of a venue with its stored pose."""
+
+    ignore: Ignore = Field([])
+    light: Light | None = Field(None, description=LIGHT)
+    # What was put before parameters counted as secret has them here still.
+    source: Annotated[str, AfterValidator(source_urls.hide_secrets)] | None = Field(
+        None, description="Where its frames can be fetched."
+    )
+
+    @property
+    def posed(self) -> PosedCamera:
+        """What a calibration says of it, and nothing else."""
+        return PosedCamera(id=self.id, image_size=self.image_size, intrinsics=self.intrinsics, pose=self.pose)
+
+
+VENUE_EXAMPLE: dict[str, Any] = {
+    "id": "tsukuba",
+    "name": "University pitch",
+    "field": {
+        "template": "football",
+        "length_m": 105.0,
+        "width_m": 68.0,
+        "line_width_m": 0.12,
+        "ridge": [[-18.5, 0.0, 0.2367], [18.5, 0.0, 0.2367]],
+    },
+    "cameras": [
+        {
+            "id": "left",
+            "image_size": [3072, 1728],
+            "intrinsics": {
+                "matrix": [[2122.4, 0, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
+                "distortion": [-0.3402, 0.1042, 0, 0, 0],
+            },
+            "pose": {"rotation": [1.675, 0.372, -0.462], "position": [-1.48, -49.49, 7.84]},
+        }
+    ],
+}
+
+
+PATCH_EXAMPLES: dict[str, Any] = {
+    "an alarm": {"value": {"alarms": {"rejected_in_a_row": 3}}},
+    "who is told of new poses": {"value": {"webhooks": [WEBHOOK_EXAMPLE]}},
+    "no schedule": {"value": {"schedule": None}},
+    "what its stitched view shows": {"value": {"view": VIEW_EXAMPLE}},
+    "the source of a camera": {"value": {"cameras": {"left": {"source": "http://10.1.0.7/snapshot.jpg"}}}},
+}
+
+
+class _Place(Schema):
+    id: Id
+    name: Name = ""
+    field: FieldOfPlay
+
+
+class Site(_Place):
+    """The file of a venue before its cameras have poses: the pitch, and the cameras that are known."""
+
+    cameras: list[CameraIn] = Field([])
+
+
+class VenueIn(_Place):
+    """A venue as it is sent."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
+
+    cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
+    accept: Accept = "each"
+    lens: Lens = "fixed"
+    alarms: Alarms | None = None
+    schedule: Schedule | None = None
+    webhooks: Webhooks = Field([])
+    view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
+    warnings: list[str] = Field(
+        [], exclude=True, description="Ignored: so that what answers a PUT can be put again as it is."
+    )
+
+    @model_validator(mode="after")
+    def _can_be_fetched(self) -> Self:
+        blind = [camera.id for camera in self.cameras if camera.source is None]
+        if self.schedule is not None and blind:
+            have = "has" if len(blind) == 1 else "have"
+            raise ValueError(f"a schedule needs a source of every camera, and {', '.join(blind)} {have} none")
+        return self
+
+    @model_validator(mode="after")
+    def _cameras_differ(self) -> Self:
+        ids = [camera.id for camera in self.cameras]
+        if len(set(ids)) < len(ids):
+            raise ValueError("two cameras have the same id")
+        return self
+
+    @property
+    def secrets(self) -> dict[str, source_urls.SourceSecrets]:
+        """Return the secrets in the source of each camera, as they were sent."""
+        return {
+            camera.id: source_urls.secrets_of(camera.source) for camera in self.cameras if camera.source is not None
+        }
+
+    def to_venue(self) -> Venue:
+        """The venue with poses in both conventions."""
+        cameras = [Camera(**dict(camera) | {"pose": Pose.from_input(camera.pose)}) for camera in self.cameras]
+        parts = {name: value for name, value in self if name != "warnings"}
+        return Venue(**parts | {"cameras": cameras})
+
+
+class Venue(_Place):
+    """A venue with the poses that hold now."""
+
+    cameras: list[Camera]
+    accept: Accept = "each"
+    lens: Lens = "fixed"
+    alarms: Alarms | None = None
+    schedule: Schedule | None = None
+    webhooks: Webhooks = Field([])
+    view: ViewChoice | None = Field(None, description="What its stitched view shows; null: what suits the cameras.")
+
+    @property
+    def poses(self) -> dict[str, Pose]:
+        """Where each camera stands and looks, by its id."""
+        return {camera.id: camera.pose for camera in self.cameras}
+
+    @property
+    def lights(self) -> dict[str, Light]:
+        """How cameras are evened out with the others, by the ids of those of which it is known."""
+        return {camera.id: camera.light for camera in self.cameras if camera.light is not None}
+
+    @property
+    def lens_warnings(self) -> list[str]:
+        """A line for each camera whose lens is taken to be well known because nobody said how well it is."""
+        return [
+            f"camera {camera.id}: its lens has no sigma and is taken to be as sure as a good board leaves it, "
+            f"{BOARD_FOCAL_PERCENT:g} % of the focal length"
+            for camera in self.cameras
+            if not camera.intrinsics.sigma
+        ]
+
+    @property
+    def poses_and_lenses(self) -> list[PosedCamera]:
+        """Where the cameras stand and how they image: the same, however well their lenses are known."""
+        return [camera.posed.pose_and_lens for camera in self.cameras]
+
+    @property
+    def callbacks(self) -> list[str]:
+        """All addresses that are told of something."""
+        told = (self.alarms, None if self.schedule is None else self.schedule.options)
+        others = [one.callback_url for one in told if one is not None and one.callback_url is not None]
+        return [webhook.url for webhook in self.webhooks] + others
+
+    def with_hidden_callbacks(self) -> Self:
+        """The venue as it is shown: without the addresses that it tells, which may be secrets."""
+        return self._with_callbacks(hidden_urls.hide_path)
+
+    def with_callbacks_of(self, before: Venue | None) -> Self:
+        """The venue with the addresses that it had before wherever it has what was shown of them."""
+        known = [] if before is None else before.callbacks
+        return self._with_callbacks(lambda url: hidden_urls.restore_url(url, known))
+
+    def _with_callbacks(self, change: Callable[[str], str]) -> Self:
+        def changed(told: T) -> T:
+            url = None if told is None or told.callback_url is None else change(told.callback_url)
+            return told if told is None else told.model_copy(update={"callback_url": url})
+
+        schedule = self.schedule and self.schedule.model_copy(update={"options": changed(self.schedule.options)})
+        webhooks = [webhook.model_copy(update={"url": change(webhook.url)}) for webhook in self.webhooks]
+        return self.model_copy(update={"alarms": changed(self.alarms), "schedule": schedule, "webhooks": webhooks})
+
+    def with_poses(self, poses: dict[str, Pose]) -> Venue:
+        """The same venue, cameras moved."""
+        cameras = [camera.model_copy(update={"pose": poses.get(camera.id, camera.pose)}) for camera in self.cameras]
+        return self.model_copy(update={"cameras": cameras})
+
+    def to_input(self) -> VenueIn:
+        """The venue as one sends it."""
+        once = {"cameras": {"__all__": {"pose": {"translation"}}}}
+        return VenueIn.model_validate(self.model_dump(exclude=once))
+
+    def changed_parts(self, other: Venue) -> list[str]:
+        """The parts of the venue that are not as those of another one."""
+        return [name for name in type(self).model_fields if getattr(self, name) != getattr(other, name)]
+
+    def has_same_poses_as(self, other: Venue) -> bool:
+        """Whether the cameras of both are the same and stand alike, with the ridge that their poses belong to."""
+        return self.poses_and_lenses == other.poses_and_lenses and self.field.ridge == other.field.ridge
+
+    def has_same_calibration_input_as(self, other: Venue) -> bool:
+        """Whether a calibration of the one is a calibration of the other: same pitch, lenses and stored poses."""
+        return self.field == other.field and self.poses_and_lenses == other.poses_and_lenses
+
+    def accepts_frames_of(self, other: Venue) -> bool:
+        """Whether frames of the one are frames of the other: same pitch and lenses, wherever the cameras stand."""
+        return self.has_same_calibration_input_as(other.with_poses(self.poses))
+
+
+class ChangedVenue(Venue):
+    """A venue as it was put or patched, with what it leaves to be assumed."""
+
+    warnings: list[str] = Field(
+        [],
+        description="Of poses from which no field is filmed, with the convention that would explain them, and of "
+        "lenses without a `sigma`. Not kept: GET does not show it, and PUT takes it and ignores it.",
+        examples=[
+            [
+                "camera west: its lens has no sigma and is taken to be as sure as a good board leaves it, "
+                "0.03 % of the focal length"
+            ]
+        ],
+    )
+
+    @classmethod
+    def of(cls, venue: Venue, pose_warnings: list[str]) -> ChangedVenue:
+        """The answer to whoever changed a venue."""
+        return cls(**dict(venue), warnings=pose_warnings + venue.lens_warnings)
+
+
+class VenueSummary(Schema):
+    """A venue in a line: its name and its cameras, what rings, and how its last calibration ended."""
+
+    id: Id
+    name: Name
+    cameras: list[Id]
+    scheduled: bool
+    state: Annotated[Literal["ok", "alarm"], OPEN_WORD]
+    alarms: list[Alarm]
+    last: CalibrationEnd | None = Field(description="Null before the first calibration has ended.")
+
+
+class Venues(Schema):
+    """A page of venues, by id. `next_cursor`: null on the last page."""
+
+    venues: list[Venue]
+    summaries: list[VenueSummary] | None = Field(
+        None, exclude_if=is_none, description="With `fields=summary`, where `venues` is empty; not there otherwise."
+    )
+    next_cursor: str | None = None

@@ -1,0 +1,43 @@
+"""Secrets that stand in files, as Docker and Kubernetes mount them: `NAME_FILE` names the file of the secret `NAME`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+# What the object store would read from the environment itself.
+BucketSecret = Literal["access_key_id", "secret_access_key", "session_token"]
+BUCKET_SECRETS: tuple[BucketSecret, ...] = ("access_key_id", "secret_access_key", "session_token")
+
+
+class SecretFileError(ValueError):
+    """A secret is given twice, or its file gives none; the message says which, and never what is in it."""
+
+
+def read_secret(name: str, given: Mapping[str, str | None]) -> str | None:
+    """Return the secret in the file that `NAME_FILE` names, without its line end; None where no file is named.
+
+    `given`: variables by name. Raises `SecretFileError` where the secret stands in a variable of its own as well, and
+    where the file cannot be read or is empty.
+    """
+    file = given.get(f"{name}_FILE")
+    if not file:
+        return None
+    if given.get(name):
+        raise SecretFileError(f"{name} and {name}_FILE are both given: take one of them away.")
+    try:
+        secret = Path(file).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise SecretFileError(f"{name}_FILE: {file} cannot be read: {error.strerror}.") from None
+    except UnicodeDecodeError:
+        raise SecretFileError(f"{name}_FILE: {file} is no text.") from None
+    if not secret:
+        raise SecretFileError(f"{name}_FILE: {file} is empty.")
+    return secret
+
+
+def bucket_credentials(given: Mapping[str, str | None]) -> dict[BucketSecret, str]:
+    """Return the credentials of an S3 bucket that stand in files, by the names that the object store has for them."""
+    found = {name: read_secret(f"AWS_{name.upper()}", given) for name in BUCKET_SECRETS}
+    return {name: secret for name, secret in found.items() if secret is not None}

@@ -1,0 +1,233 @@
+"""The database: one engine, transactions for reading and for writing, and the schema brought up to date."""
+
+from __future__ import annotations
+
+import select
+import sqlite3
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+from alembic import command
+from alembic.config import Config
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy.dialects.sqlite.base import SQLiteCompiler
+
+MIGRATIONS = Path(__file__).parent / "migrations"
+# Which schema a database has. Before the first release its name was that of Alembic's default, and the numbers of the
+# schemas in it were those that releases count by now.
+SCHEMA_TABLE, UNRELEASED_SCHEMA_TABLE = "esc_schema", "alembic_version"
+WRITES = "esc_writes"
+# How a transaction that reads is to see one state; every transaction of SQLite does.
+SNAPSHOT: dict[str, dict[str, Any]] = {"sqlite": {}, "postgresql": {"isolation_level": "REPEATABLE READ"}}
+# What is raised while the database is away, locked or changing its machine: trying again later can help.
+DATABASE_OUTAGES = (sa.exc.OperationalError, sa.exc.InterfaceError, sa.exc.InternalError, sa.exc.TimeoutError)
+# By their code, errors of PostgreSQL that gave a statement up.
+GIVEN_UP = {
+    "57014": "Its database took too long for an answer and was interrupted.",
+    "55P03": "What the request needs is locked in its database by another transaction.",
+}
+# Any number, the same everywhere: of the locks by which writers wait for each other on PostgreSQL.
+LOCK = 0x45_53_43
+# How long a thread waits for a connection while all of them are busy. There are fewer connections than threads.
+POOL_TIMEOUT_S = 5.0
+# Server settings of each connection. What a machine held that vanished in the middle of a transaction is free again
+# within a minute. One locked table must not hold every thread that answers: statements have limits, below which all of
+# ours stay by far. Schema changes and retention have their own.
+SESSION = "-c idle_in_transaction_session_timeout=60s"
+LIMITS = "-c statement_timeout=15s -c lock_timeout=5s"
+UNLIMITED, LONGEST = "esc_unlimited", "10min"
+# What libpq is told unless the URL says otherwise: a server that is out of reach is given up after seconds.
+PATIENCE = {
+    "connect_timeout": "5",
+    "keepalives_idle": "10",
+    "keepalives_interval": "5",
+    "keepalives_count": "3",
+    "tcp_user_timeout": "30000",
+}
+
+
+class UnsupportedDatabase(Exception):  # noqa: N818
+    """This program, or this machine, cannot run the service on this database; the message says what to do."""
+
+
+def connect(url: str) -> sa.Engine:
+    """An engine on SQLite in WAL mode or on PostgreSQL."""
+    parsed = sa.make_url(url)
+    if parsed.get_backend_name() != "sqlite":
+        return postgresql(url)
+    if sys.version_info >= (3, 12) and sqlite3.sqlite_version_info < (3, 42):
+        raise UnsupportedDatabase(
+            f"Python {sys.version_info.major}.{sys.version_info.minor} here has SQLite {sqlite3.sqlite_version}; "
+            "the job queue needs 3.42 with it. Use Python 3.11, a Python with a newer SQLite, or PostgreSQL."
+        )
+    if parsed.database:
+        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+    engine = sa.create_engine(parsed, pool_timeout=POOL_TIMEOUT_S)
+    engine.dialect.statement_compiler = _Hinting
+    sa.event.listen(engine, "connect", _set_up_sqlite)
+    sa.event.listen(engine, "begin", _begin_sqlite)
+    return engine
+
+
+class _Hinting(SQLiteCompiler):
+    """SQLite has hints (INDEXED BY), which SQLAlchemy takes and leaves out."""
+
+    def get_from_hint_text(self, table: sa.FromClause, text: str | None) -> str | None:  # noqa: ARG002
+        """What follows the name of a table."""
+        return text
+
+
+def postgresql(url: str, limits: str = LIMITS) -> sa.Engine:
+    """An engine on PostgreSQL. `options` in the URL count before ours: `?options=-c%20statement_timeout%3D60s`.
+
+    Connections are not tried before each use, which would double the transactions. One that a server closed as it ended
+    is made anew; one whose server vanished fails at its first use (`DATABASE_OUTAGES`), and then all of them are made
+    anew.
+    """
+    parsed = sa.make_url(url)
+    given = parsed.query.get("options", ())
+    options = [SESSION, limits, *([given] if isinstance(given, str) else given)]
+    query = PATIENCE | parsed.query | {"options": " ".join(options)}
+    target = parsed.set(drivername="postgresql+psycopg", query=query)
+    engine = sa.create_engine(target, pool_timeout=POOL_TIMEOUT_S)
+    sa.event.listen(engine, "begin", _lift_limits)
+    sa.event.listen(engine, "checkout", _require_open)
+    return engine
+
+
+def without_timeouts(engine: sa.Engine) -> sa.Engine:
+    """The same connections, for transactions whose statements may take minutes, and nobody waits for."""
+    return engine.execution_options(**{UNLIMITED: True})
+
+
+def _require_open(connection: Any, _record: object, _fairy: object) -> None:
+    """Have connections replaced that their server has closed: on one that waits, nothing else arrives."""
+    arrived = select.poll()
+    arrived.register(connection.fileno(), select.POLLIN)
+    if arrived.poll(0):
+        raise sa.exc.InvalidatePoolError
+
+
+def _lift_limits(connection: sa.Connection) -> None:
+    if connection.get_execution_options().get(UNLIMITED, False):
+        limits = [sa.func.set_config(name, LONGEST, True) for name in ("statement_timeout", "lock_timeout")]
+        connection.execute(sa.select(*limits))
+
+
+def outage_reason(error: Exception) -> str:
+    """Why one of `DATABASE_OUTAGES` was raised, for whoever asks the service for something."""
+    if isinstance(error, sa.exc.TimeoutError):
+        return "All connections to its database are busy."
+    state = getattr(getattr(error, "orig", None), "sqlstate", None)
+    return GIVEN_UP.get(str(state), "Its storage does not answer.")
+
+
+def _set_up_sqlite(connection: sqlite3.Connection, _: object) -> None:
+    # Transactions are begun by hand below: the driver would begin one only at the first write.
+    connection.isolation_level = None
+    connection.execute("PRAGMA busy_timeout=30000")
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("PRAGMA foreign_keys=ON")
+
+
+def _begin_sqlite(connection: sa.Connection) -> None:
+    # A transaction that reads first and writes later fails at once when another writer was faster, whatever the
+    # busy timeout: writers take the lock at their beginning.
+    writes = connection.get_execution_options().get(WRITES, False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+@contextmanager
+def reading(engine: sa.Engine) -> Iterator[sa.Connection]:
+    """A transaction that sees one state of the database and takes no lock."""
+    with engine.connect().execution_options(**SNAPSHOT[engine.dialect.name]) as connection, connection.begin():
+        yield connection
+
+
+@contextmanager
+def writing(engine: sa.Engine) -> Iterator[sa.Connection]:
+    """A transaction alone with the database (SQLite) or at least with its rows (PostgreSQL)."""
+    with engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+        yield connection
+
+
+def advisory_lock(connection: sa.Connection, about: str) -> None:
+    """Wait until no other transaction that called this about the same is open; on SQLite a writer is alone anyway.
+
+    Each wait costs whoever comes next, so take it about as little and as late as what you read allows.
+    """
+    if connection.dialect.name == "postgresql":
+        connection.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK, sa.func.hashtext(about))))
+
+
+def clock(connection: sa.Connection) -> datetime:
+    """The time by the one clock that every process of the service goes by, on whatever machine it runs."""
+    if connection.dialect.name == "postgresql":
+        now: datetime = connection.execute(sa.select(sa.func.clock_timestamp())).scalar_one()
+        return now
+    return datetime.now(UTC)
+
+
+class Repository:
+    """What is kept in a database about one subject, with all SQL about it."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+
+    def now(self) -> datetime:
+        """The time that all processes go by, see `clock`."""
+        with reading(self._engine) as connection:
+            return clock(connection)
+
+
+def migrate(engine: sa.Engine) -> None:
+    """Bring the schema up to date; of several processes that start together one does it.
+
+    Raises `UnsupportedDatabase` for one that a newer program made, or one from before the first release.
+    """
+    with writing(without_timeouts(engine)) as connection:
+        advisory_lock(connection, "schema")
+        upgrade(connection)
+
+
+def upgrade(connection: sa.Connection) -> None:
+    """Bring the schema up to date, inside the caller's transaction that is serialised about it."""
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS))
+    config.attributes["connection"] = connection
+    _require_a_known_schema(connection, ScriptDirectory.from_config(config))
+    command.upgrade(config, "head")
+
+
+def schema_of(connection: sa.Connection) -> str | None:
+    """The schema that a database has; None: none of a service."""
+    return MigrationContext.configure(connection, opts={"version_table": SCHEMA_TABLE}).get_current_revision()
+
+
+def newest_schema() -> str | None:
+    """The schema of this program."""
+    return ScriptDirectory(str(MIGRATIONS)).get_current_head()
+
+
+def _require_a_known_schema(connection: sa.Connection, known: ScriptDirectory) -> None:
+    found = schema_of(connection)
+    program, newest = f"ESC {version('esc-calibration')}", known.get_current_head()
+    if found is None and {UNRELEASED_SCHEMA_TABLE, "jobs"} <= {*sa.inspect(connection).get_table_names()}:
+        raise UnsupportedDatabase(
+            "This database was made by a development version from before the first release, which cannot be brought up "
+            f"to date: {program} begins with schema {newest} on an empty one. Set ESC_DATA, or ESC_DATABASE_URL, to a "
+            "new place and PUT the venues there as the old version gives them (GET /venues)."
+        )
+    if found not in (None, *(script.revision for script in known.walk_revisions())):
+        raise UnsupportedDatabase(
+            f"This database has schema {found}, and {program} knows none after {newest}: a newer version has been at "
+            "it. Start that version again, or restore the backup from before the upgrade; there is no way back."
+        )

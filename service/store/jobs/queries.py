@@ -1,0 +1,254 @@
+"""Jobs as clients see them, and what waits for them watches."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+import sqlalchemy as sa
+
+from service.schemas.base import TOLERANTLY
+from service.schemas.job import CallbackState, Job, JobSummary
+from service.schemas.names import JobStatus
+from service.schemas.results import Result
+from service.schemas.venue import Venue
+from service.store import tables
+from service.store.database import Repository, reading
+from service.store.documents import join_additions, stored_result, stored_venue
+from service.store.events.outbox import deliveries_of
+from service.store.jobs.files import picture_file, picture_folder
+from service.store.jobs.task import Origin
+from service.store.revisions import revisions_of_jobs
+from service.store.venues import with_result
+
+j = tables.jobs.c
+# What pollers ask for, hundreds of times a second: to put the statement together takes longer than to run it.
+ONE = sa.select(tables.jobs).where(j.id == sa.bindparam("job_id"))
+# First poses have a queue of their own.
+PLACE = sa.func.row_number().over(partition_by=j.kind == "locate", order_by=(j.priority, j.id))
+QUEUE = sa.select(j.id, PLACE.label("position")).where(j.status == "queued").subquery()
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """The pictures of a job that has a result: where they lie in the blob store, and whether they still do."""
+
+    folder: str
+    names: list[str]
+    deleted: bool
+
+
+@dataclass(frozen=True)
+class Drawable:
+    """What a calibration began with and found, and the path of a frame of each camera."""
+
+    venue: Venue
+    result: Result
+    frames: dict[str, str]
+
+
+@dataclass(frozen=True)
+class JobState:
+    """The state of a job that long polls and streams watch: `revision` grows with every change."""
+
+    revision: int
+    status: JobStatus
+
+
+@dataclass(frozen=True)
+class JobPage:
+    """Which jobs a page of them has: up to `limit`, newest first, by whatever filters are not None.
+
+    `before`: those older than this job. `only`: those of these venues; None: all, also those that belong to no venue.
+    """
+
+    limit: int
+    before: str | None = None
+    venue: str | None = None
+    status: str | None = None
+    kind: str | None = None
+    only: Collection[str] | None = None
+
+    def query(self, *columns: Any) -> sa.Select[Any]:
+        """Return the query for these columns of the page's jobs."""
+        query = sa.select(*columns).order_by(j.id.desc()).limit(self.limit)
+        if self.venue is not None:
+            query = query.with_hint(*tables.BY_VENUE)
+        for column, value in ((j.venue, self.venue), (j.status, self.status), (j.kind, self.kind)):
+            if value is not None:
+                query = query.where(column == value)
+        if self.before is not None:
+            query = query.where(j.id < self.before)
+        if self.only is not None:
+            query = query.where(j.venue.in_(self.only))
+        return query
+
+
+class JobRepository(Repository):
+    """The jobs in the database."""
+
+    def get(self, job_id: str) -> Job | None:
+        """One job as clients see it."""
+        with reading(self._engine) as connection:
+            try:
+                return read_job(connection, job_id)
+            except sa.exc.NoResultFound:
+                return None
+
+    def several(self, job_ids: Collection[str]) -> dict[str, Job]:
+        """Those of several jobs that are there, by their ids."""
+        with reading(self._engine) as connection:
+            return jobs_of(connection, job_ids)
+
+    def page(self, wanted: JobPage) -> list[Job]:
+        """Return the jobs of a page, newest first."""
+        with reading(self._engine) as connection:
+            return _jobs(connection, connection.execute(wanted.query(tables.jobs)).all())
+
+    def summaries(self, wanted: JobPage) -> list[JobSummary]:
+        """Return a line for each job of a page, newest first, without reading their results."""
+        found = {
+            "verdict": j.result["verdict"].as_string().label("verdict"),
+            "stitch_error_px": j.result["stitch_error_px"].as_float().label("stitch_error_px"),
+        }
+        columns = [found[name] if name in found else j[name] for name in JobSummary.model_fields]
+        with reading(self._engine) as connection:
+            rows = connection.execute(wanted.query(*columns))
+            return [JobSummary.model_validate(dict(row._mapping), **TOLERANTLY) for row in rows]
+
+    def venue_of(self, job_id: str) -> str | None:
+        """The id of the venue of a job; None: it belongs to none, or there is no such job."""
+        with reading(self._engine) as connection:
+            venue_id: str | None = connection.scalar(sa.select(j.venue).where(j.id == job_id))
+            return venue_id
+
+    def states(self, job_ids: Collection[str]) -> dict[str, JobState]:
+        """What waiters need to know about several jobs."""
+        query = sa.select(j.id, j.revision, j.status).where(j.id.in_(job_ids))
+        with reading(self._engine) as connection:
+            return {row.id: JobState(row.revision, row.status) for row in connection.execute(query)}
+
+    def pictures(self, job_id: str) -> Pictures | None:
+        """The pictures of a job, None if it has no result (yet)."""
+        query = sa.select(j.run_token, j.pictures, j.pictures_deleted_at).where(j.id == job_id, j.result.is_not(None))
+        with reading(self._engine) as connection:
+            row = connection.execute(query).one_or_none()
+        if row is None:
+            return None
+        return Pictures(picture_folder(job_id, row.run_token), row.pictures or [], row.pictures_deleted_at is not None)
+
+    def drawable(self, job_id: str) -> Drawable | None:
+        """What pictures of a calibration can be drawn of; None: it has no result, or is no calibration."""
+        with reading(self._engine) as connection:
+            found = found_poses(connection, job_id)
+            if found is None:
+                return None
+            frames = connection.execute(sa.select(j.frames).where(j.id == job_id)).scalar_one()
+        return Drawable(*found, {camera: paths[0] for camera, paths in frames.items()})
+
+    def posed(self, job_id: str) -> Venue | None:
+        """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
+        with reading(self._engine) as connection:
+            found = found_poses(connection, job_id)
+        return None if found is None else with_result(*found)
+
+    def frame(self, job_id: str, number: int) -> str | None:
+        """Where a frame of a job lies in the blob store, counted through all of them; None: there is none."""
+        query = sa.select(j.frames).where(j.id == job_id, j.frames_deleted_at.is_(None))
+        with reading(self._engine) as connection:
+            frames = connection.execute(query).scalar_one_or_none() or {}
+        paths = [path for several in frames.values() for path in several]
+        return paths[number] if number < len(paths) else None
+
+    def check(self) -> None:
+        """Raise unless the database answers, and has them."""
+        with reading(self._engine) as connection:
+            connection.execute(sa.select(j.id).limit(1))
+
+
+def read_job(connection: sa.Connection, job_id: str) -> Job:
+    """One job as clients see it, which is there."""
+    return _jobs(connection, [connection.execute(ONE, {"job_id": job_id}).one()])[0]
+
+
+def jobs_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, Job]:
+    """Those of several jobs that are there, as clients see them."""
+    rows = connection.execute(sa.select(tables.jobs).where(j.id.in_(job_ids))).all() if job_ids else []
+    return {job.id: job for job in _jobs(connection, rows)}
+
+
+def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] | None:
+    """What a calibration began with and what it found; None: it found no poses (yet), or the job is no calibration."""
+    done = [j.id == job_id, j.kind == "calibration", j.result.is_not(None)]
+    query = sa.select(j.venue_document, j.venue_additions, j.result, j.result_additions)
+    row = connection.execute(query.where(*done)).one_or_none()
+    if row is None:
+        return None
+    return stored_venue(row.venue_document, row.venue_additions), stored_result(row.result, row.result_additions)
+
+
+def job_input_values(row: Any) -> dict[str, Any]:
+    """What was asked of a job, as the members of `Asked`."""
+    return {
+        "job_id": row.id,
+        "kind": row.kind,
+        "venue": row.venue_document and join_additions(row.venue_document, row.venue_additions),
+        "options": row.options,
+        "frames": row.frames,
+        "origin": Origin(row.request_id, row.traceparent, row.asked_by, row.address),
+    }
+
+
+def _jobs(connection: sa.Connection, rows: Sequence[Any]) -> list[Job]:
+    """What is known of them beside their rows is read of all at once."""
+    positions = _positions(connection, [row.id for row in rows if row.status == "queued"])
+    callbacks = deliveries_of(connection, [row.id for row in rows if row.finished_at and row.options["callback_url"]])
+    taken = revisions_of_jobs(connection, [row.id for row in rows if row.kind == "calibration" and row.result])
+    return [_job(row, positions.get(row.id), callbacks.get(row.id), taken.get(row.id)) for row in rows]
+
+
+def _job(row: Any, position: int | None, callback: CallbackState | None, revision: int | None) -> Job:
+    columns = ("id", "kind", "venue", "status", "progress", "attempt", "error", "asked_by")
+    moments = ("created_at", "started_at", "finished_at")
+    return Job.model_validate(
+        {name: getattr(row, name) for name in (*columns, *moments)}
+        | {
+            "queue_position": position,
+            "result": row.result and join_additions(row.result, row.result_additions),
+            "callback": callback,
+            # An address may be a secret, and how far its telling has come is said by `callback`.
+            "options": {name: value for name, value in row.options.items() if name != "callback_url"},
+            "frames": _frames(row),
+            "venue_revision": revision,
+            "links": _links(row),
+        },
+        **TOLERANTLY,
+    )
+
+
+def _frames(row: Any) -> dict[str, list[str]]:
+    """By camera, or by the names of photos, addresses that count through all of them."""
+    if row.frames_deleted_at is not None:
+        return {}
+    number = count()
+    return {name: [f"/jobs/{row.id}/frames/{next(number)}" for _ in paths] for name, paths in row.frames.items()}
+
+
+def _positions(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:
+    """The places of jobs that wait, from 1."""
+    if not job_ids:
+        return {}
+    query = sa.select(QUEUE).where(QUEUE.c.id.in_(job_ids))
+    return {row.id: row.position for row in connection.execute(query)}
+
+
+def _links(row: Any) -> dict[str, str]:
+    base = f"/jobs/{row.id}"
+    links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel"}
+    if row.venue is not None:
+        links["venue"] = f"/venues/{row.venue}"
+    # `overlay_left` in the store is `overlay/left` in an address.
+    names = row.pictures or () if row.pictures_deleted_at is None else ()
+    return links | {name.replace("_", "/", 1): f"{base}/{picture_file(name).replace('_', '/', 1)}" for name in names}

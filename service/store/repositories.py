@@ -1,0 +1,49 @@
+"""Everything that has SQL, on one database."""
+
+from __future__ import annotations
+
+from service.store.adopted_fields import AdoptedFieldRepository
+from service.store.database import connect, migrate
+from service.store.events.feed import EventRepository
+from service.store.events.outbox import OutboxRepository
+from service.store.expiry import ExpiryRepository
+from service.store.jobs.attempts import AttemptRepository
+from service.store.jobs.decisions import DecisionRepository
+from service.store.jobs.queries import JobRepository
+from service.store.jobs.submission import SubmissionRepository
+from service.store.keys import KeyRepository
+from service.store.refined import RefinedPoseRepository
+from service.store.schedules import ScheduleRepository
+from service.store.sessions import SessionRepository
+from service.store.statistics.past_calibrations import PastCalibrationRepository
+from service.store.statistics.source_timings import SourceTimingRepository
+from service.store.statistics.venue_summary import VenueSummaryRepository
+from service.store.trends import TrendRepository
+from service.store.venues import VenueRepository
+from service.store.workers import WorkerRepository
+
+
+class Repositories:
+    """All repositories of one database, whose schema is brought up to date first."""
+
+    def __init__(self, url: str) -> None:
+        self.engine = engine = connect(url)
+        migrate(engine)
+        self.venues = VenueRepository(engine)
+        self.trends = TrendRepository(engine)
+        self.schedules = ScheduleRepository(engine)
+        self.refined = RefinedPoseRepository(engine)
+        self.adopted_fields = AdoptedFieldRepository(engine)
+        self.submissions = SubmissionRepository(engine)
+        self.jobs = JobRepository(engine)
+        self.attempts = AttemptRepository(engine)
+        self.decisions = DecisionRepository(engine)
+        self.venue_summaries = VenueSummaryRepository(engine)
+        self.past_calibrations = PastCalibrationRepository(engine)
+        self.source_timings = SourceTimingRepository(engine)
+        self.outbox = OutboxRepository(engine)
+        self.events = EventRepository(engine)
+        self.expiry = ExpiryRepository(engine)
+        self.workers = WorkerRepository(engine)
+        self.keys = KeyRepository(engine)
+        self.sessions = SessionRepository(engine)

@@ -1,0 +1,41 @@
+"""How the calibrations of each camera of a venue went, one after the other. All SQL about it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+import sqlalchemy as sa
+
+from service.schemas.base import TOLERANTLY, Schema
+from service.schemas.results import View
+from service.store import tables
+
+q = tables.venue_quality.c
+
+
+class CameraHistory(Schema):
+    """When a camera's pose was accepted last, how often it was not since then, and what its frames were like then.
+
+    `accepted_at`: None if never. Calibrations that failed count, dry runs and cancelled ones do not. `view`: of frames
+    that could be used.
+    """
+
+    accepted_at: datetime | None = None
+    rejected_in_a_row: int = 0
+    view: View | None = None
+
+    def missed(self) -> CameraHistory:
+        """Return the history after one more calibration that brought no pose."""
+        return self.model_copy(update={"rejected_in_a_row": self.rejected_in_a_row + 1})
+
+
+def camera_histories(connection: sa.Connection, venue_id: str) -> dict[str, CameraHistory]:
+    """Return the history of every camera that was ever calibrated, and maybe of some that the venue no longer has."""
+    courses = connection.scalar(sa.select(q.cameras).where(q.venue == venue_id)) or {}
+    return {camera: CameraHistory.model_validate(course, **TOLERANTLY) for camera, course in courses.items()}
+
+
+def last_accepted_views(connection: sa.Connection, venue_id: str) -> dict[str, View]:
+    """What the frames were like from which each camera's pose was accepted last."""
+    courses = camera_histories(connection, venue_id)
+    return {camera: course.view for camera, course in courses.items() if course.view is not None}

@@ -1,0 +1,107 @@
+"""How the calibrations of a venue ended, one after the other: what a page or a chart shows of hundreds of jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+
+from service.schemas.geometry import Moved
+from service.schemas.names import OPEN_STATUSES, JobStatus, Verdict
+from service.store import tables
+from service.store.database import Repository, reading
+from service.store.revisions import CALIBRATION_CAUSES
+
+j = tables.jobs.c
+r = tables.revisions.c
+
+
+@dataclass(frozen=True)
+class PastCalibration:
+    """A calibration that has ended; what needs a result is None, or empty, without one.
+
+    `verdict`: the gate's; `accepted`: of all cameras. `moved` by camera, from the stored pose to the new one.
+    """
+
+    job: str
+    status: JobStatus
+    finished_at: datetime
+    verdict: Verdict | None
+    accepted: bool | None
+    rejected_because: str | None
+    error: str | None
+    stitch_error_px: float | None
+    stitch_error_before_px: float | None
+    stitch_error_limit_px: float | None
+    moved: dict[str, Moved]
+    dry_run: bool
+
+    @property
+    def moved_px(self) -> float | None:
+        """Of the camera that moved most."""
+        return max((moved.pixels for moved in self.moved.values() if moved.pixels is not None), default=None)
+
+
+class PastCalibrationRepository(Repository):
+    """The calibrations in the database that have ended, and which have not."""
+
+    def of(self, venue: str, limit: int) -> list[PastCalibration]:
+        """The last `limit` calibrations of a venue that have ended, newest first."""
+        query = (
+            sa.select(j.id, j.status, j.finished_at, j.result, j.error, j.options)
+            .where(j.venue == venue, j.kind == "calibration", j.finished_at.is_not(None))
+            .with_hint(*tables.BY_VENUE)
+            .order_by(j.id.desc())
+            .limit(limit)
+        )
+        with reading(self._engine) as connection:
+            return [_past(row) for row in connection.execute(query)]
+
+    def newest_result(self, venue: str) -> str | None:
+        """The job of a venue's newest calibration that has a result, accepted or not."""
+        query = (
+            sa.select(j.id)
+            .where(j.venue == venue, j.kind == "calibration", j.result.is_not(None))
+            .with_hint(*tables.BY_VENUE)
+            .order_by(j.id.desc())
+            .limit(1)
+        )
+        with reading(self._engine) as connection:
+            return connection.scalar(query)
+
+    def last_taken(self, venue: str) -> str | None:
+        """The last job whose poses a venue took: of all its jobs, the one whose frames and pictures stay."""
+        query = (
+            sa.select(r.job).where(r.venue == venue, r.cause.in_(CALIBRATION_CAUSES)).order_by(r.number.desc()).limit(1)
+        )
+        with reading(self._engine) as connection:
+            return connection.scalar(query)
+
+    def active(self, venues: Collection[str]) -> dict[str, str]:
+        """The calibration that waits or runs now, by venue."""
+        query = sa.select(j.venue, j.id).where(
+            j.status.in_(OPEN_STATUSES), j.kind == "calibration", j.venue.in_(venues)
+        )
+        with reading(self._engine) as connection:
+            return {row.venue: row.id for row in connection.execute(query)}
+
+
+def _past(row: Any) -> PastCalibration:
+    result = row.result or {}
+    return PastCalibration(
+        job=row.id,
+        status=row.status,
+        finished_at=row.finished_at,
+        verdict=result.get("verdict"),
+        accepted=result.get("accepted"),
+        rejected_because=result.get("rejected_because"),
+        error=(row.error or {}).get("detail"),
+        stitch_error_px=result.get("stitch_error_px"),
+        stitch_error_before_px=result.get("stitch_error_before_px"),
+        stitch_error_limit_px=result.get("stitch_error_limit_px"),
+        moved={camera["id"]: Moved.model_construct(**camera["moved"]) for camera in result.get("cameras", [])},
+        dry_run=row.options["dry_run"],
+    )

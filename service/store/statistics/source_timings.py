@@ -1,0 +1,30 @@
+"""How long the sources of cameras take to give a frame, counted over all fetches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import structlog
+
+from service.schemas.programs.fetching import SourceFetch
+from service.store.database import DATABASE_OUTAGES, Repository, writing
+from service.store.statistics import counters
+from service.store.statistics.counters import HistogramBuckets
+
+FETCH = HistogramBuckets("source_fetch", (0.1, 0.25, 0.5, 1, 2, 4, 8, 15, 30, 60, 120))
+# What came: a frame, or none.
+FRAME, NONE = "frame", "none"
+log = structlog.get_logger()
+
+
+class SourceTimingRepository(Repository):
+    """The fetches that the database has counted."""
+
+    def count(self, fetches: Sequence[SourceFetch]) -> None:
+        """Count some, each a source of its own."""
+        amounts = counters.total(FETCH.of(fetch.seconds, FRAME if fetch.got_frame else NONE) for fetch in fetches)
+        try:
+            with writing(self._engine) as connection:
+                counters.add(connection, amounts)
+        except DATABASE_OUTAGES:  # the frames are there all the same
+            log.warning("fetches are not counted", exc_info=True)

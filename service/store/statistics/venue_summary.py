@@ -1,0 +1,51 @@
+"""What the list of all venues shows of each: how its last calibration ended, and the curve of those before.
+
+It is put together when a calibration ends: a list of fifty venues would else read two thousand results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import sqlalchemy as sa
+from pydantic import Field
+
+from service.schemas.base import TOLERANTLY, Schema
+from service.schemas.health import Alarm, CalibrationEnd
+from service.store import tables
+from service.store.database import Repository, reading
+from service.store.documents import stored_alarm
+
+IN_CURVE = 40
+q = tables.venue_quality.c
+a = tables.alarms.c
+
+
+class CalibrationSummary(Schema):
+    """How the last calibration of a venue ended, and recent stitch errors, oldest first, with the gate's limit."""
+
+    last: CalibrationEnd
+    errors: list[float | None] = Field([])
+    limit_px: float | None = None
+
+
+class VenueSummaryRepository(Repository):
+    """The calibration summaries and active alarms of venues."""
+
+    def of(self, venues: Collection[str]) -> dict[str, CalibrationSummary]:
+        """Return the summaries of venues that were ever calibrated, by venue."""
+        query = sa.select(q.venue, q.glance).where(q.venue.in_(venues), q.glance.is_not(None))
+        with reading(self._engine) as connection:
+            return {
+                row.venue: CalibrationSummary.model_validate(row.glance, **TOLERANTLY)
+                for row in connection.execute(query)
+            }
+
+    def alarms(self, venues: Collection[str]) -> dict[str, list[Alarm]]:
+        """Return the active alarms of venues, the oldest first, by venue."""
+        query = sa.select(tables.alarms).where(a.venue.in_(venues)).order_by(a.since, a.rule, a.camera)
+        ringing: dict[str, list[Alarm]] = {}
+        with reading(self._engine) as connection:
+            for row in connection.execute(query):
+                ringing.setdefault(row.venue, []).append(stored_alarm(row))
+        return ringing

@@ -1,0 +1,44 @@
+"""The lock by which only one worker of a name runs on a folder, and what tells such places apart."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+from pathlib import Path
+from typing import IO
+
+from service.settings import Settings
+
+# What a worker ends with that cannot run, most often because another one has its name.
+REFUSED = 2
+# Another one at each start of the machine; where there is none, the folder alone tells.
+BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+
+
+class AlreadyRunning(Exception):  # noqa: N818
+    """A worker of this name runs already; the message says where, and what to do."""
+
+
+def lock_worker(settings: Settings) -> IO[bytes]:
+    """Lock the name of a worker on its folder; the lock ends with the process, however it ends.
+
+    Two workers of one name would compute each job twice. Raises `AlreadyRunning`.
+    """
+    settings.data.mkdir(parents=True, exist_ok=True)
+    lock = (settings.data / f"worker-{settings.worker_name}.lock").open("ab")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        lock.close()
+        raise AlreadyRunning(
+            f"A worker called {settings.worker_name} already runs on {settings.data}, that of another `esc up` or "
+            "`esc worker`: end that one, or give this one another folder (--data) or another name (ESC_WORKER_NAME)."
+        ) from None
+    return lock
+
+
+def lock_identity(lock: IO[bytes]) -> str:
+    """Name the place where a lock excludes all others: this file, as long as this machine runs."""
+    boot = BOOT_ID.read_text() if BOOT_ID.exists() else ""
+    file = Path(lock.name).stat()
+    return hashlib.sha256(f"{boot} {file.st_dev} {file.st_ino}".encode()).hexdigest()
