@@ -14,7 +14,7 @@ import hypothesis
 import pytest
 import structlog
 
-from service.store.engine import connect, migrate
+from service.store.database import connect
 from tests.homes import Embedded, Servers, postgres_binaries, postgres_server, s3_server
 from tests.worker.stock import Stock
 
@@ -28,7 +28,7 @@ structlog.configure(
 )
 
 # Tests of the whole service, and of its pages in a browser.
-WHOLE_SERVICE = [Path(__file__).parent / folder for folder in ("e2e", "pages")]
+WHOLE_SERVICE = [Path(__file__).parent / folder for folder in ("e2e", "pages", "released")]
 # What tests can do without, and how to enable those that cannot.
 PARTS = {
     "postgres": "install PostgreSQL (Debian: apt-get install postgresql)",
@@ -38,6 +38,7 @@ PARTS = {
     "browser": "install Chromium (Debian: apt-get install chromium)",
     "nginx": "install nginx (Debian: apt-get install nginx)",
     "caddy": "install Caddy (Debian: apt-get install caddy)",
+    "released": "fetch the whole history, which release 0.1.0 is built from (git fetch --unshallow)",
     "ffmpeg": "install FFmpeg (Debian: apt-get install ffmpeg)",
 }
 
@@ -130,8 +131,8 @@ def home(request):
 @pytest.fixture
 def engine(home, tmp_path):
     """A database of the test's own."""
+    home.make_database(tmp_path)
     engine = connect(home.database_url(tmp_path))
-    migrate(engine)
     yield engine
     engine.dispose()
 
@@ -139,6 +140,7 @@ def engine(home, tmp_path):
 @pytest.fixture
 def stock(home, tmp_path):
     """A database and files of the test's own, and what fills them."""
+    home.make_database(tmp_path)
     stock = Stock(tmp_path, **home.settings(tmp_path))
     yield stock
     stock.engine.dispose()

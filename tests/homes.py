@@ -1,5 +1,7 @@
 """The two homes of the service: a folder, and servers that are started for the tests from what the machine has."""
 
+import atexit
+import functools
 import os
 import pwd
 import shutil
@@ -21,6 +23,8 @@ import psycopg
 import pytest
 from obstore.store import from_url
 
+from service.store.database import connect, migrate
+
 STARTING_S = 60
 BUCKET = "esc-tests"
 # Nothing of a test's database must survive a power cut.
@@ -35,6 +39,13 @@ class Embedded:
 
     def database_url(self, folder: Path) -> str:
         return f"sqlite:///{folder}/esc.sqlite"
+
+    def make_database(self, folder: Path) -> None:
+        """With the service's tables, in a hundredth of the time that migrations take; one that is there stays."""
+        database = folder / "esc.sqlite"
+        if not database.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(_migrated(), database)
 
     def blob_url(self, folder: Path) -> str:
         return (folder / "blobs").as_uri()
@@ -72,10 +83,23 @@ class Servers:
 
     def database_url(self, folder: Path) -> str:
         if folder not in self._names:
-            self._names[folder] = f"home_{len(self._names)}"
-            with psycopg.connect(self._postgres.url("postgres"), autocommit=True) as connection:
-                connection.execute(f"CREATE DATABASE {self._names[folder]}")
+            self._create_database(folder)
         return self._postgres.url(self._names[folder])
+
+    def make_database(self, folder: Path) -> None:
+        """With the service's tables, in a tenth of the time that migrations take; one that is there stays."""
+        template = Path("migrated")
+        if template not in self._names:
+            _make_tables(self.database_url(template))
+        if folder not in self._names:
+            # Without fsync, files are copied faster than by the log.
+            by_files = " STRATEGY FILE_COPY" if self._postgres.version >= 15 else ""
+            self._create_database(folder, f" TEMPLATE {self._names[template]}{by_files}")
+
+    def _create_database(self, folder: Path, how: str = "") -> None:
+        self._names[folder] = f"home_{len(self._names)}"
+        with psycopg.connect(self._postgres.url("postgres"), autocommit=True) as connection:
+            connection.execute(f"CREATE DATABASE {self._names[folder]}{how}")
 
     def blob_url(self, folder: Path) -> str:
         return f"{self._bucket.url}/{folder.relative_to(folder.anchor)}"
@@ -90,6 +114,14 @@ class Servers:
             yield
         finally:
             self._postgres.start()
+
+    @contextmanager
+    def table_locked(self, folder: Path, table: str) -> Iterator[None]:
+        """Another transaction has a table to itself, and goes on and on."""
+        with psycopg.connect(self.database_url(folder)) as connection:
+            connection.execute(f"LOCK TABLE {table} IN ACCESS EXCLUSIVE MODE")
+            yield
+            connection.rollback()
 
     def kill_database(self) -> None:
         """All its processes at once, as a crash would; it is started again."""
@@ -107,6 +139,24 @@ class Servers:
 
 
 Home = Embedded | Servers
+
+
+def _make_tables(url: str) -> None:
+    engine = connect(url)
+    migrate(engine)
+    engine.dispose()
+
+
+@functools.cache
+def _migrated() -> Path:
+    """A file that SQLite databases of tests begin as."""
+    folder = Path(tempfile.mkdtemp(prefix="esc-migrated-"))
+    atexit.register(shutil.rmtree, folder)
+    _make_tables(f"sqlite:///{folder}/esc.sqlite")
+    with closing(sqlite3.connect(folder / "esc.sqlite")) as migrated:
+        # All of it into the one file.
+        migrated.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    return folder / "esc.sqlite"
 
 
 def environment(settings: dict[str, str]) -> dict[str, str]:
@@ -156,6 +206,12 @@ class Postgres:
                 **self._as_somebody,
             )
         self.start()
+
+    @property
+    def version(self) -> int:
+        """The major one."""
+        with psycopg.connect(self.url("postgres")) as connection:
+            return connection.info.server_version // 10_000
 
     def url(self, database: str) -> str:
         return f"postgresql://esc@/{database}?host={self._folder}"

@@ -6,9 +6,9 @@ from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
+from service.schemas.results import Sigma
+from service.schemas.trend import Displacement
 from service.store import tables
-from service.wire.results import Sigma
-from service.wire.trend import Displacement
 from tests.worker.stock import Stock, result
 
 SIGMA_M, SIGMA_FOCAL = 0.01, 0.0004

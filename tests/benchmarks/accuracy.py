@@ -23,8 +23,8 @@ from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, VENUES, Scene, scene, started
 from tests.benchmarks.truth import Errors, apart, errors
 from worker.calibration.calibrate import calibrate
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.records import Options, Progress
-from worker.calibration.scene.camera import Camera
 
 CAUGHT_M, CAUGHT_DEG = 0.01, 0.01
 PULLED_IN_DEG = 0.5
@@ -55,6 +55,9 @@ def main() -> None:
         "--quick", action="store_true", help="five minutes: three venues, one seed, ten starts, no slow presets"
     )
     parser.add_argument("--only", nargs="+", choices=SECTIONS, help="instead of all, or of the quick ones")
+    parser.add_argument(
+        "--methods", nargs="+", default=[""], help="of the table: those whose names contain one of these"
+    )
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of each method on each venue")
     parser.add_argument("--slow-seeds", type=int, help="of the presets that take a minute")
     parser.add_argument("--slow-starts", type=int, default=SLOW_STARTS, help="of each of those presets")
@@ -79,7 +82,7 @@ def table(options: argparse.Namespace) -> Iterator[str]:
         row
         for venue in options.venues
         for method in METHODS
-        if method not in left_out
+        if method not in left_out and any(part in method for part in options.methods)
         for row in _rows(venue, method, _seeds(options, venue, method))
     ]
     for title, matches in (("Lens and roof match the model", True), ("They do not, as in reality", False)):
@@ -287,7 +290,7 @@ def _timed(chosen: Scene, **options: int) -> str:
     for seed in range(3):
         said = engine(**options)(seen, started(chosen.cameras, np.random.default_rng([seed, 1])), seed).said
         assert said is not None
-        runs.append((said.spent.seconds["evolution"], said.spent.seconds["refinement"]))
+        runs.append((said.timings.seconds["evolution"], said.timings.seconds["refinement"]))
     evolution, refinement = np.median(runs, axis=0)
     return f"{evolution:.2f} | {refinement:.2f}"
 

@@ -24,8 +24,8 @@ from tests.benchmarks.scenes import FOLDER, Scene, scene
 from tests.benchmarks.truth import apart
 from tests.real.pair import FOLDER as REAL
 from tests.real.pair import RealPair
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.motion import moved
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.derivatives import moved
 
 DRIFTS_PX = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0)
 SHIFT_M = 0.01

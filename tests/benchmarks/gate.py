@@ -26,10 +26,10 @@ from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER, HOURS, LAYOUTS, Layout, Scene, as_built, placed_cameras, rendered, seen_well
 from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
-from tests.worker.calibration.see.spoiling import blocked, fogged
-from worker.calibration.scene.camera import Camera, Frame
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.parameters import with_focal_length
+from tests.worker.calibration.detection.spoiling import blocked, fogged
+from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.parameters import with_focal_length
 
 RIDGE = np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]])
 PITCH = Field(105.0, 68.0, 0.12, RIDGE)

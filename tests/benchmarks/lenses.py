@@ -23,9 +23,9 @@ from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER, HOURS, SIZE, Scene, rendered, seen_well
 from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics, Lens
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics, Lens
 
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
 FOCAL_LENGTHS = (2200.0, 4000.0, 6000.0)

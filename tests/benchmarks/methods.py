@@ -17,11 +17,11 @@ from tests.benchmarks.learned.weights import missing
 from tests.benchmarks.scenes import Scene
 from tests.benchmarks.truth import apart_by_homography_px, overlapping
 from worker.calibration.calibrate import calibrate
-from worker.calibration.records import Calibration, Options, Spent
-from worker.calibration.scene.camera import Camera, Frame, inside
+from worker.calibration.detection.segmentation import Region, Segmenter, whole_frame
+from worker.calibration.geometry.camera import Camera, Frame, inside
+from worker.calibration.records import Calibration, Options, StageTimings
 from worker.calibration.search.genome import genome_of, with_genome
 from worker.calibration.search.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD
-from worker.calibration.see.segmentation import Region, Segmenter, whole_frame
 
 THREADS = 2
 CLICK_NOISE_PX = 2.0
@@ -69,7 +69,7 @@ class Answer:
     stitch_px: float | None = None
 
     @classmethod
-    def of(cls, cameras: list[Camera], spent: Spent, **other: Any) -> Answer:
+    def of(cls, cameras: list[Camera], spent: StageTimings, **other: Any) -> Answer:
         """An answer that took what was spent on all stages together."""
         return cls(cameras, sum(spent.seconds.values()), sum(spent.core_seconds.values()), **other)
 
@@ -90,8 +90,8 @@ def start(_seen: Seen, cameras: list[Camera], _seed: int) -> Answer:
 def zhang(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
     """Corners of the markings clicked with 2 px of noise, each camera's pose by OpenCV."""
     rng = np.random.default_rng([seed, 3])
-    spent = Spent()
-    with spent.measuring("poses"):
+    spent = StageTimings()
+    with spent.timed("poses"):
         pairs = zip(cameras, seen.scene.real, strict=True)
         found = [posed_by(camera, *_clicked(seen, real, rng)) for camera, real in pairs]
     return Answer.of(found, spent)
@@ -110,9 +110,9 @@ def homography(seen: Seen, _cameras: list[Camera], _seed: int) -> Answer:
 
     The worst pair that could be matched; nothing is said of those that could not.
     """
-    spent = Spent()
+    spent = StageTimings()
     errors = []
-    with spent.measuring("pairs"):
+    with spent.timed("pairs"):
         for i, j in overlapping(seen.scene):
             found = _matched(*(_features(seen, k) for k in (i, j)))
             if found is not None:
@@ -164,18 +164,29 @@ def engine(**options: object) -> Method:
         said = calibrate(seen.scene.pitch, cameras, seen.scene.frames, seen.segment, asked)
         poses = [camera.with_pose(result.camera.pose) for camera, result in zip(cameras, said.cameras, strict=True)]
         seconds, core_seconds = (
-            spent["evolution"] + spent["refinement"] for spent in (said.spent.seconds, said.spent.core_seconds)
+            spent["evolution"] + spent["refinement"] for spent in (said.timings.seconds, said.timings.core_seconds)
         )
         return Answer(poses, seconds, core_seconds, said)
 
     return run
 
 
+def refined(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
+    """The engine's refined answer: poses together with the lenses that fit them best."""
+    answer = engine()(seen, cameras, seed)
+    assert answer.said is not None
+    both = [
+        camera if result.refined is None else result.refined.camera
+        for camera, result in zip(answer.cameras, answer.said.cameras, strict=True)
+    ]
+    return replace(answer, cameras=both)
+
+
 def cma_es(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
     """CMA-ES (pycma) in place of the paper's strategy: our objective level by level, as many evaluations, no finish."""
     options = Options()
-    spent = Spent()
-    with spent.measuring("evolution"):
+    spent = StageTimings()
+    with spent.timed("evolution"):
         here = _by_cma_es(seen, cameras, options, seed)
     return Answer.of(here, spent)
 
@@ -204,8 +215,8 @@ def by_homography(find: Displacement) -> Method:
     """Each camera for itself: its segmentation seen from above is laid onto the template, and the pose follows."""
 
     def run(seen: Seen, cameras: list[Camera], _seed: int) -> Answer:
-        spent = Spent()
-        with spent.measuring("poses"):
+        spent = StageTimings()
+        with spent.timed("poses"):
             found = [corrected(camera, seen.scene.pitch, seen.response(camera), find) for camera in cameras]
         return Answer.of(found, spent)
 
@@ -241,6 +252,7 @@ METHODS: dict[str, Method] = {
     "SCPR": engine(preset="scpr"),
     "ESC `paper`": engine(preset="paper"),
     "ESC `esc`": engine(),
+    "ESC `esc`, refined lens": refined,
     "ESC `esc`, flat": engine(flat=True),
     "ESC `esc`, no stitch term": engine(stitch_weight=0.0),
 }

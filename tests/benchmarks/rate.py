@@ -25,16 +25,16 @@ import psycopg
 import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
+from service.schemas.geometry import Moved, Pose
+from service.schemas.job import Progress
+from service.schemas.options import Options
+from service.schemas.results import CameraResult, Provenance, Result
+from service.schemas.venue import VenueIn
 from service.store import tables
-from service.store.engine import connect, migrate, writing
-from service.wire.geometry import Moved, Pose
-from service.wire.job import Progress
-from service.wire.options import Options
-from service.wire.results import CameraResult, Provenance, Result
-from service.wire.venue import VenueIn
+from service.store.database import connect, migrate, writing
 from tests.e2e.running import upload, venue, wait_for
 from tests.homes import postgres_binaries, postgres_server
-from worker.message import Message
+from worker.protocol import Message
 
 CAMERAS = ("left", "right")
 SAMPLE_EVERY_S = 5
@@ -122,7 +122,9 @@ def settings(folder: Path, database_url: str, chosen: argparse.Namespace) -> dic
 
 def result() -> Message:
     """Accepted, two cameras, every number there: a result as large as they are."""
-    pose = Pose.at([1.6123456789, 0.1123456789, -0.2123456789], [-1.0123456789, -50.0123456789, 8.0123456789])
+    pose = Pose.from_position(
+        [1.6123456789, 0.1123456789, -0.2123456789], [-1.0123456789, -50.0123456789, 8.0123456789]
+    )
     moved = Moved(rotation_deg=0.8123456789, position_m=0.1123456789, pixels=22.0123456789)
     cameras = [
         CameraResult(
@@ -160,7 +162,7 @@ def register_venues(database_url: str, count: int) -> None:
     """Straight into the table: how fast venues are put is not the question."""
     engine = connect(database_url)
     migrate(engine)
-    document = VenueIn.model_validate(venue("v", cameras=CAMERAS)).stored().model_dump(mode="json")
+    document = VenueIn.model_validate(venue("v", cameras=CAMERAS)).to_venue().model_dump(mode="json")
     now = datetime.now(UTC)
     rows = [
         {"id": name(number), "document": document | {"id": name(number)}, "updated_at": now} for number in range(count)

@@ -19,12 +19,12 @@ import numpy as np
 from rich.console import Console
 
 from service.client import Client
-from service.wire.job import Job
-from service.wire.venue import VenueIn
+from service.schemas.job import Job
+from service.schemas.venue import VenueIn
 from tests.demo.__main__ import service
 from tests.real.pair import FOLDER, RealPair
-from worker.calibration.scene.camera import Pose
-from worker.calibration.scene.rotation import rotation_angles_deg
+from worker.calibration.geometry.camera import Pose
+from worker.calibration.geometry.rotation import rotation_angles_deg
 
 CAUGHT_PX = 5.0
 console = Console(highlight=False, soft_wrap=True)

@@ -18,9 +18,9 @@ import numpy as np
 from models.training.pitches.conditions import Conditions
 from models.training.pitches.render import render_frame
 from tests.demo.render import outdated
-from worker.calibration.scene.camera import Camera, Frame, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.geometry.camera import Camera, Frame, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
 
 FOLDER = Path("runs/bench")
 SIZE = (3840, 2160)

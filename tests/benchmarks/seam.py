@@ -20,17 +20,17 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from service.client import Client
-from service.wire.job import Job
-from service.wire.venue import Venue, VenueIn
+from service.schemas.job import Job
+from service.schemas.venue import Venue, VenueIn
 from tests.benchmarks.real_pair import calibrate
 from tests.demo.__main__ import HERE as DEMO
 from tests.demo.__main__ import service
 from tests.real.pair import FOLDER, RealPair
-from worker.calibration.scene.camera import Frame
-from worker.calibration.stitch.light import NEUTRAL, Light
-from worker.calibration.stitch.panorama import Panorama, panorama
-from worker.calibration.stitch.views import ViewChoice, chosen_view
-from worker.jobs.reading import camera_of, light_of, pitch_of
+from worker.calibration.geometry.camera import Frame
+from worker.calibration.stitching.panorama import Panorama, panorama
+from worker.calibration.stitching.photometry import NEUTRAL, Light
+from worker.calibration.stitching.views import ViewChoice, chosen_view
+from worker.jobs.from_schemas import camera_of, light_of, pitch_of
 
 WIDTH = 1920
 # Beside the seam, and in pieces of so many rows, both in pixels of the view.

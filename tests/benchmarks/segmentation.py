@@ -23,10 +23,10 @@ from models import MODEL_PATH
 from models.training import ablation
 from models.training.evaluate import by_condition, read_venue, real, rendered
 from tests.real.pair import FOLDER as REAL_PAIR
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
-from worker.calibration.see.segmentation import Segmenter, reachable_regions
-from worker.calibration.settle import CAPTURE_RAD
+from worker.calibration.detection.segmentation import Segmenter, reachable_regions
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.solve import CAPTURE_RAD
 
 DEMO = Path(__file__).parents[1] / "demo"
 THREADS = 2

@@ -24,12 +24,12 @@ from tests.benchmarks.scenes import as_built
 from tests.demo.render import FIELD, HERE, cameras, outdated
 from tests.real.pair import FOLDER as PAIR_FOLDER
 from tests.real.pair import RealPair, picture
-from worker.calibration.follow.follower import Follower, Moment
-from worker.calibration.scene.camera import Array, Camera, Frame, inside
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.motion import change_between, moved
-from worker.calibration.stitch.moving import MovingPanorama
-from worker.calibration.stitch.views import View, ViewChoice, chosen_view
+from worker.calibration.geometry.camera import Array, Camera, Frame, inside
+from worker.calibration.geometry.derivatives import change_between, moved
+from worker.calibration.geometry.field import Field
+from worker.calibration.stitching.moving_panorama import MovingPanorama
+from worker.calibration.stitching.views import View, ViewChoice, chosen_view
+from worker.calibration.tracking.follower import CameraTracker, Moment
 
 SWING_DEG, SWING_HZ = 0.3, 0.5
 TREMBLE_DEG, TREMBLE_HZ = 0.03, 3.0
@@ -142,7 +142,7 @@ class Told:
 
     run: Run
     moments: list[Moment]
-    follower: Follower
+    follower: CameraTracker
     milliseconds: float
 
 
@@ -276,7 +276,7 @@ def followed(film: Film, run: Run, lens: str) -> Told:
     follower = None
     for frames in film.frames():
         if follower is None:
-            follower = Follower(film.pitch, stored, frames, FRAMES_PER_SECOND, run.every, run.look_ahead)
+            follower = CameraTracker(film.pitch, stored, frames, FRAMES_PER_SECOND, run.every, run.look_ahead)
             continue
         begun = time.process_time()
         follower.see(frames)

@@ -21,7 +21,7 @@ import obstore
 from obstore.store import from_url
 
 from service.settings import Settings
-from tests.e2e.running import children, wait_for
+from tests.e2e.running import children, ready, wait_for
 
 DEMO = Path(__file__).parents[1] / "demo"
 FLEETS = (100, 10_000, 1_000_000)
@@ -197,7 +197,7 @@ def measure() -> None:
         with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) as service:
             address = service.stdout.readline().decode().split()[-1]
             with closing(httpx.Client(base_url=address, timeout=120)) as http:
-                wait_for(lambda: http.get("/readyz").status_code == 200)
+                wait_for(lambda: ready(http))
                 http.put("/venues/demo", json=json.loads((DEMO / "venue.json").read_text())).raise_for_status()
                 (worker,) = children(service.pid)
                 jobs = [_real_job(http, worker) for _ in range(JOBS_MEASURED)]

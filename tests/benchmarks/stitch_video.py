@@ -24,13 +24,13 @@ import av
 import cv2
 import numpy as np
 
-from service.wire.venue import VenueIn
-from worker.calibration.stitch.evening import evened_out
-from worker.calibration.stitch.light import MIDDLE, NEUTRAL
-from worker.calibration.stitch.panorama import Panorama, panorama
-from worker.calibration.stitch.views import ViewChoice, chosen_view
-from worker.jobs.reading import camera_of, pitch_of
-from worker.jobs.wire import wire_light
+from service.schemas.venue import VenueIn
+from worker.calibration.stitching.panorama import Panorama, panorama
+from worker.calibration.stitching.photometric_alignment import evened_out
+from worker.calibration.stitching.photometry import MIDDLE, NEUTRAL
+from worker.calibration.stitching.views import ViewChoice, chosen_view
+from worker.jobs.from_schemas import camera_of, pitch_of
+from worker.jobs.to_schemas import light_to_schema
 
 DEMO = Path(__file__).parents[1] / "demo"
 RATE, NOISE = 25, 2.0
@@ -113,12 +113,12 @@ def _panorama(home: Path, frames: dict[str, np.ndarray], lit: bool) -> Panorama:
     truth = json.loads((DEMO / "truth.json").read_text())["poses"]
     for camera in document["cameras"]:
         camera["pose"] = truth[camera["id"]]
-    venue = VenueIn.model_validate(document).stored()
+    venue = VenueIn.model_validate(document).to_venue()
     pitch, cameras = pitch_of(venue.field), [camera_of(camera) for camera in venue.cameras]
     found = evened_out(pitch, cameras, frames) if lit else {}
     for camera in document["cameras"]:
         light = found.get(camera["id"])
-        camera["light"] = wire_light(light or NEUTRAL).model_dump()
+        camera["light"] = light_to_schema(light or NEUTRAL).model_dump()
     (home / "venue.json").write_text(json.dumps(document))
     return panorama(pitch, chosen_view(pitch, cameras, CHOICE), cameras, found)
 

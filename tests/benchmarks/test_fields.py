@@ -9,7 +9,7 @@ from tests.benchmarks.fields.engine import Engine
 from tests.benchmarks.fields.judging import caught, far_off, near, outcome, overconfident, reason, reasons, share
 from tests.benchmarks.fields.rendered import LARGE_M, random_camera, usual_field
 from tests.benchmarks.rows import Rows
-from worker.calibration.scene.camera import inside
+from worker.calibration.geometry.camera import inside
 
 
 def found(**other: object) -> dict:

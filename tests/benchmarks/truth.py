@@ -9,9 +9,9 @@ from itertools import combinations
 import numpy as np
 
 from tests.benchmarks.scenes import Scene
-from worker.calibration.scene.camera import Camera, inside
-from worker.calibration.scene.lens import Lens
-from worker.calibration.scene.rotation import rotation_angles_deg
+from worker.calibration.geometry.camera import Camera, inside
+from worker.calibration.geometry.lens import Lens
+from worker.calibration.geometry.rotation import rotation_angles_deg
 
 GRID_M = 0.5
 

@@ -16,11 +16,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service.client import Client
-from service.wire.job import Job
-from service.wire.venue import VenueIn
+from service.schemas.job import Job
+from service.schemas.venue import VenueIn
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent.parent / "build" / "demo"
+DRAWING_S = 120
 STARTING_S = 60
 console = Console(highlight=False, soft_wrap=True)
 
@@ -106,7 +107,8 @@ def save(url: str, job: Job, name: str) -> Path:
     """Keep a picture of the job."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     path = PICTURES / name
-    path.write_bytes(httpx.get(f"{url}/jobs/{job.id}/{name}").raise_for_status().content)
+    # It is drawn when it is asked for, which takes seconds, and longer where the machine has other work.
+    path.write_bytes(httpx.get(f"{url}/jobs/{job.id}/{name}", timeout=DRAWING_S).raise_for_status().content)
     return path
 
 

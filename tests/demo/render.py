@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 
 from models.training.pitches.render import Conditions, render_frame
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
-from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
+from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
 
 HERE = Path(__file__).parent
 SIZE = (3840, 2160)

@@ -9,9 +9,9 @@ from urllib.parse import unquote, urlparse
 
 import sqlalchemy as sa
 
+from service.schemas.names import OPEN_STATUSES
 from service.store import tables
 from service.store.jobs.files import picture_folder
-from service.wire.names import OPEN
 from tests.e2e.running import Service, wait_for
 from tests.homes import files
 
@@ -31,7 +31,7 @@ def settle(service: Service) -> None:
 def unsettled(service: Service) -> Iterator[str]:
     """What is still to be done."""
     with service.database() as connection:
-        yield from connection.scalars(sa.select(tables.jobs.c.id).where(tables.jobs.c.status.in_(OPEN)))
+        yield from connection.scalars(sa.select(tables.jobs.c.id).where(tables.jobs.c.status.in_(OPEN_STATUSES)))
         yield from connection.scalars(sa.select(tables.leftovers.c.folder))
         yield from (job for job, status in queued(connection).items() if status in ("ENQUEUED", "PENDING"))
 

@@ -2,15 +2,15 @@
 
 import io
 import os
-import subprocess
 import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
-from subprocess import CompletedProcess
+from subprocess import PIPE, CompletedProcess
 from unittest.mock import patch
 
 from service.cli.main import main
-from service.observe import logs
+from service.observability import logs
+from tests.e2e import warm
 
 
 def esc_here(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:
@@ -41,4 +41,10 @@ def esc_here(folder: Path, *arguments: str, **environment: str) -> CompletedProc
 def esc_process(folder: Path, *arguments: str, **environment: str) -> CompletedProcess:
     """The same in a process of its own, with this beside the environment of the tests."""
     command = [sys.executable, "-m", "service.cli", *arguments]
-    return subprocess.run(command, cwd=folder, env=os.environ | environment, capture_output=True, text=True, timeout=60)
+    with warm.Popen(command, cwd=folder, env=os.environ | environment, stdout=PIPE, stderr=PIPE, text=True) as process:
+        try:
+            out, err = process.communicate(timeout=60)
+        except BaseException:
+            process.kill()
+            raise
+    return CompletedProcess(command, process.returncode, out, err)

@@ -43,7 +43,7 @@ def shared(folder, **settings):
 @pytest.fixture(scope="session")
 def service_with_engine(tmp_path_factory):
     """Its jobs are computed, by the real network."""
-    program = json.dumps([sys.executable, "-m", "worker.jobs.job"])
+    program = json.dumps([sys.executable, "-m", "worker.jobs.program"])
     real = {"ESC_JOB_PROGRAM": program, "ESC_MODEL": str(MODEL_BESIDE_THE_CODE), "ESC_MAX_PHOTOS": "8"}
     yield from shared(tmp_path_factory.mktemp("engine"), **real)
 
@@ -75,6 +75,7 @@ def unusual(tmp_path_factory):
     settings = {
         "ESC_QUEUE_LIMIT": "2",
         "ESC_MAX_FRAME_MB": "0.001",
+        "ESC_MAX_FRAMES_PER_CAMERA": "2",
         "ESC_MAX_BODY_MB": "0.01",
         "ESC_FREED_AXES": "y -x z -pan+90 tilt roll",
         "ESC_SOURCE_TIMEOUT_S": "1",

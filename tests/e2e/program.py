@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from service import lifeline
+from service import child_process
 
 JPEG = b"\xff\xd8\xff\xd9"
 # Where cameras end, of the way from the middle of the pitch to where they were. Their translation shrinks alike.
@@ -51,7 +51,7 @@ def done(result: dict, pictures: list[str], memories: dict | None = None) -> Non
 
 
 def main() -> None:
-    lifeline.end_with_parent()
+    child_process.end_with_parent()
     given = json.loads(sys.stdin.buffer.readline())
     task = given["task"]
     behaviour, _, seconds = task["venue"]["name"].partition(" ") if task["venue"] else ("", "", "")
@@ -114,7 +114,8 @@ def main() -> None:
                 "stitch_error_before_px": 10.0,
                 "loss": 0.1,
                 "generations": 10,
-            },
+            }
+            | (contradicted(task["venue"]["field"]) if behaviour == "contradict" else {}),
             pictures,
             memories,
         )
@@ -153,6 +154,27 @@ def refined(camera: dict, memories: dict) -> dict:
             "words": "focal length 0.6 ± 0.1 % longer than on 3 November: zoom ring or focus",
         },
         "nights": memories[camera["id"]]["jobs"],
+    }
+
+
+def contradicted(field: dict) -> dict:
+    """A ridge that is 0.332 m high, and a pitch that is longer than any law allows."""
+    told = {"ridge_height_m": (0.0, 0.332, 0.051, "a ridge"), "length_m": (field["length_m"], 131.5, 0.2, "a length")}
+    return {
+        "diagnosis": [
+            {
+                "camera": None,
+                "quantity": name,
+                "deviation": value - given,
+                "sigma": sigma,
+                "detail": f"the lines fit {what}",
+            }
+            for name, (given, value, sigma, what) in told.items()
+        ],
+        "adoptable": [
+            {"name": name, "given": given, "value": value, "sigma": sigma, "moves_m": {"left": 0.081, "right": 0.079}}
+            for name, (given, value, sigma, _) in told.items()
+        ],
     }
 
 

@@ -15,10 +15,11 @@ from pathlib import Path
 import httpx
 import sqlalchemy as sa
 
-from service import lifeline
+from service import child_process
 from service.settings import Settings
-from service.store.engine import connect, migrate, writing
-from service.store.keys import Keys
+from service.store.database import connect, migrate, writing
+from service.store.keys import KeyRepository
+from tests.e2e import warm
 from tests.homes import files
 
 PROGRAM = [sys.executable, str(Path(__file__).parent / "program.py")]
@@ -31,8 +32,10 @@ FRAMES = ("left=left.png", "right=right.png")
 class Service:
     """`esc up` (or `esc serve`) on a folder and a free port."""
 
-    def __init__(self, data: Path, *arguments: str, **settings: str) -> None:
+    def __init__(self, data: Path, *arguments: str, cold: bool = False, **settings: str) -> None:
+        """`cold`: by an interpreter of its own, as everywhere but in tests."""
         self.data = data
+        self._popen = subprocess.Popen if cold else warm.Popen
         self.arguments = arguments or ("up",)
         model = data / "model.onnx"
         data.mkdir(parents=True, exist_ok=True)
@@ -49,14 +52,15 @@ class Service:
     def start(self, port: int = 0) -> None:
         command = [sys.executable, "-m", "service.cli", *self.arguments, "--port", str(port)]
         self.log = (self.data / "log").open("ab")
-        environment = self.environment | lifeline.for_child()
-        self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=self.log)
+        environment = self.environment | child_process.for_child()
+        self.process = self._popen(command, env=environment, stdout=subprocess.PIPE, stderr=self.log)
         self.url = self.process.stdout.readline().decode().strip().rpartition(" ")[2]
         assert self.url.startswith("http"), (self.data / "log").read_text()
         self.http = httpx.Client(base_url=self.url, timeout=DEADLINE_S)
 
     def ready(self) -> "Service":
-        wait_for(lambda: self.http.get("/readyz").status_code == 200)
+        """Wait until it answers and has all that jobs need."""
+        wait_for(lambda: ready(self.http))
         return self
 
     def kill(self) -> None:
@@ -83,7 +87,7 @@ class Service:
         """A worker as on another machine, with nothing but the addresses of its home."""
         command = [sys.executable, "-m", "service.cli", "worker", "--name", name]
         home = {"ESC_DATA": str(folder), "ESC_DATABASE_URL": self.database_url, "ESC_BLOB_URL": self.blob_url}
-        return subprocess.Popen(command, env=self.environment | home | lifeline.for_child(), stderr=self.log)
+        return warm.Popen(command, env=self.environment | home | child_process.for_child(), stderr=self.log)
 
     def venue(self, name: str, behaviour: str = "accept", cameras: tuple[str, ...] = ("left", "right")) -> str:
         self.http.put(f"/venues/{name}", json=venue(name, behaviour, cameras)).raise_for_status()
@@ -177,11 +181,17 @@ def upload(shade: int = 0, cameras: tuple[str, ...] = ("left", "right")) -> list
     return [(camera, (f"{camera}.png", png(shade=shade))) for camera in cameras]
 
 
-def keys_in(data: Path) -> Keys:
+def keys_in(data: Path) -> KeyRepository:
     """The keys of the service of a folder, which need not have been started yet."""
     engine = connect(Settings(data=data).home_database_url)
     migrate(engine)
-    return Keys(engine)
+    return KeyRepository(engine)
+
+
+def ready(http: httpx.Client) -> bool:
+    """Whether a service answers and has all that jobs need; earlier releases said so by the status alone."""
+    said = http.get("/readyz")
+    return said.status_code == 200 and not said.json().get("warnings")
 
 
 def wait_for(condition: Callable, deadline_s: float = DEADLINE_S):

@@ -15,7 +15,7 @@ import pytest
 
 from tests.e2e.routes.test_following import Stream
 from tests.e2e.running import DEADLINE_S, Service, keys_in, png, venue, wait_for
-from tests.worker.duties.test_delivering import certificate
+from tests.worker.duties.test_webhook_delivery import certificate
 
 SAMPLES = Path(__file__).parents[2] / "docker" / "proxy"
 NAME = "localhost"

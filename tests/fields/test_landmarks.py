@@ -55,6 +55,21 @@ def test_a_name_like_no_other_suggests_nothing():
         football("qqq")
 
 
+@pytest.mark.parametrize(
+    ("name", "like"),
+    [
+        ("baseline", "near doubles sideline, {distance} m from the left baseline"),
+        ("baseline right far", "far doubles sideline, {distance} m from the right baseline"),
+        ("service", "left service line, near end"),
+        ("servise", "left service line, near end"),
+    ],
+)
+def test_a_word_of_a_name_suggests_those_that_have_it(name, like):
+    with pytest.raises(UnknownLandmark) as unknown:
+        find(name, load("tennis"), {})
+    assert like in unknown.value.near
+
+
 def test_a_distance_needs_a_number():
     with pytest.raises(UnknownLandmark, match=r"near touchline, \{distance\} m from the left goal line"):
         football("near touchline, some m from the left goal line")

@@ -8,9 +8,9 @@ from models.training.courts.court import paint, random_court, render_court
 from models.training.courts.floors import hard_court
 from models.training.courts.layouts import field_layout
 from models.training.data import makers
-from worker.calibration.scene.camera import Camera, Pose, inside
-from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.geometry.camera import Camera, Pose, inside
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.lens import Intrinsics
 
 SIZE = (640, 640)
 

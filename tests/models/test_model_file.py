@@ -9,10 +9,10 @@ import pytest
 from models import MODEL_PATH
 from models.training.evaluate import judge
 from models.training.pitches.render import Conditions, render_frame
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
-from worker.calibration.see.segmentation import Segmenter, whole_frame
+from worker.calibration.detection.segmentation import Segmenter, whole_frame
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from models.training.pitches.conditions import LIGHTS, NAMED
 from models.training.pitches.crops import random_view
 from models.training.pitches.render import Conditions, render_frame, render_window
 from models.training.pitches.venues import random_camera, random_field
-from worker.calibration.scene.camera import Camera, Pose, inside
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.geometry.camera import Camera, Pose, inside
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
 
 FIELD = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
 SIZE = (480, 270)

@@ -23,6 +23,9 @@ ARGUMENTS = [
 ]
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 PATIENCE_MS = 120_000
+LOADED = """
+part => Promise.all([...part.querySelectorAll("img")].filter((one) => one.checkVisibility()).map((one) => one.decode()))
+"""
 # Called before any script of a page: what the policy refuses is no console message in every browser.
 WATCH_POLICY = """
 addEventListener("securitypolicyviolation", (event) => violated(`${event.violatedDirective}: ${event.blockedURI}`));
@@ -79,7 +82,11 @@ def tab(context: BrowserContext, forgiven: tuple[str, ...] = ()) -> Iterator[Pag
 
 
 def look(part: Page | Locator) -> np.ndarray:
-    """What is to be seen of it: BGR."""
+    """What is to be seen of it, once the pictures inside it have been loaded: BGR."""
+    if isinstance(part, Locator):
+        # Pictures are loaded when they are about to be seen, and those of a layer when it is first switched on.
+        part.scroll_into_view_if_needed()
+        part.evaluate(LOADED)
     return cv2.imdecode(np.frombuffer(part.screenshot(), np.uint8), cv2.IMREAD_COLOR)
 
 

@@ -7,7 +7,7 @@ from functools import cache
 import pytest
 
 from tests.demo.__main__ import service
-from tests.e2e.running import Service, wait_for
+from tests.e2e.running import Service, ready, wait_for
 from tests.once import made_once
 from tests.pages import newcomer
 from tests.pages.browsing import browser_at, chromium, person, tab
@@ -28,9 +28,13 @@ def browser(missing):
 
 @pytest.fixture(scope="package")
 def stub(tmp_path_factory):
-    """A service whose engine does what the names of the venues say."""
+    """A service whose engine does what the names of the venues say.
+
+    Fixtures that put something into it live as long as it does: tests are shared out as processes become free, so that
+    a module may begin twice on one service.
+    """
     running = Service(tmp_path_factory.mktemp("stub"))
-    wait_for(lambda: running.http.get("/readyz").status_code == 200, STARTING_S)
+    wait_for(lambda: ready(running.http), STARTING_S)
     yield running
     assert running.stop() == 0
 

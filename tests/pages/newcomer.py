@@ -6,15 +6,18 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Page, expect
 
-from service.wire.geometry import Pose
-from service.wire.venue import VenueIn
+from service.schemas.geometry import Pose
+from service.schemas.venue import VenueIn
 from tests import demo
-from worker.calibration.scene.camera import Camera
-from worker.jobs.reading import camera_of, pitch_of
+from worker.calibration.geometry.camera import Camera
+from worker.jobs.from_schemas import camera_of, pitch_of
 
 DEMO = Path(demo.__file__).parent
-VENUE = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).stored()
-TRUTH = {camera: Pose.at(**pose) for camera, pose in json.loads((DEMO / "truth.json").read_text())["poses"].items()}
+VENUE = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).to_venue()
+TRUTH = {
+    camera: Pose.from_position(**pose)
+    for camera, pose in json.loads((DEMO / "truth.json").read_text())["poses"].items()
+}
 # What can be clicked well: crossings of lines, on both sides of each frame.
 CLICKED = 7
 

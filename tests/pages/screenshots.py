@@ -14,7 +14,7 @@ import numpy as np
 from playwright.sync_api import Browser, Page
 
 from service.settings import Settings
-from service.store.engine import connect, writing
+from service.store.database import connect, writing
 from tests.demo.__main__ import service
 from tests.e2e.running import venue
 from tests.pages import newcomer
@@ -62,6 +62,8 @@ def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) ->
             ("job", f"/ui/jobs/{job}"),
             ("calibrate", "/ui/venues/newcomer/calibrate"),
             ("ignore", "/ui/venues/newcomer/ignore"),
+            ("settings", "/ui/venues/newcomer/settings"),
+            ("refusal", "/refusals/residual"),
         ):
             page.goto(address)
             page.wait_for_load_state("networkidle")
@@ -74,6 +76,7 @@ def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) ->
             save(page, folder / f"{name}-{scheme}.webp")
         page.goto("/ui/new-venue")
         newcomer.describe_the_pitch(page)
+        page.get_by_label("Id", exact=True).first.fill("south-pitch")
         newcomer.describe_a_camera(page, 0)
         newcomer.click_points(page, 0, "left")
         save(page, folder / f"new-venue-{scheme}.webp")

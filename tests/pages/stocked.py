@@ -4,19 +4,20 @@ from datetime import UTC, datetime, timedelta
 
 import sqlalchemy as sa
 
+from service.schemas.geometry import Moved
+from service.schemas.options import Options
+from service.schemas.venue import Venue, VenueIn
 from service.store import tables
-from service.store.counts.glances import IN_CURVE, note_end
 from service.store.ids import new_id
-from service.wire.geometry import Moved
-from service.wire.options import Options
-from service.wire.venue import Venue, VenueIn
+from service.store.statistics.venue_quality import update_quality
+from service.store.statistics.venue_summary import IN_CURVE
 from tests.e2e import running
 from tests.worker.stock import result
 
 
 def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:
     """So many of them, a quarter of an hour apart; every tenth was rejected."""
-    venue: Venue = VenueIn.model_validate(running.venue(venue_id)).stored()
+    venue: Venue = VenueIn.model_validate(running.venue(venue_id)).to_venue()
     now = datetime.now(UTC)
     rows = []
     # They sort by time.
@@ -55,5 +56,7 @@ def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:
             }
         )
         if number >= count - IN_CURVE:
-            note_end(connection, venue_id, "succeeded", found, at, dry_run=False)
+            with update_quality(connection, venue_id) as quality:
+                quality.now = at
+                quality.ended("succeeded", found, dry_run=False)
     connection.execute(sa.insert(tables.jobs), rows)

@@ -5,14 +5,14 @@ from datetime import UTC, datetime
 import pytest
 import sqlalchemy as sa
 
+from service.schemas.options import Board, ClickedPoint, IntrinsicsOptions, LocateOptions
+from service.schemas.results import CoverageResult, IntrinsicsResult, LocateResult, LocateSigma, PointResult
+from service.schemas.venue import VenueIn
 from service.store import tables
 from service.store.ids import new_id
-from service.wire.options import Board, ClickedPoint, IntrinsicsOptions, LocateOptions
-from service.wire.results import CoverageResult, IntrinsicsResult, LocateResult, LocateSigma, PointResult
-from service.wire.venue import VenueIn
 from tests.e2e.running import venue
 
-CAMERA = VenueIn.model_validate(venue("kinds")).stored().cameras[0]
+CAMERA = VenueIn.model_validate(venue("kinds")).to_venue().cameras[0]
 POINT = PointResult(world="centre spot", residual_px=1.5, doubted=False, exchanged_with=None, looks_like=None)
 KNOWN = CAMERA.intrinsics.model_copy(update={"sigma": {"fx": 2.345, "k1": 0.0123}})
 LENS = {"intrinsics": KNOWN, "image_size": CAMERA.image_size, "timings_s": {"fit": 0.3}, "software": "0"}

@@ -13,7 +13,7 @@ from tests.pages.stocked import calibrations
 DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 800}
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def years(stub):
     """A venue with calibrations enough for a chart."""
     stub.venue("years")
@@ -22,7 +22,7 @@ def years(stub):
     return "years"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def ended(stub):
     """A job that was accepted, and one that was rejected."""
     return {

@@ -4,7 +4,7 @@ import httpx
 import pytest
 from playwright.sync_api import expect
 
-from service.pages.shown import local
+from service.pages.page_rendering import local_target
 from tests.e2e.running import Service, keys_in, venue, wait_for
 from tests.pages.browsing import grave
 
@@ -69,12 +69,12 @@ def test_a_link_leads_nobody_to_another_site_by_way_of_signing_in(guarded, visit
     ],
 )
 def test_an_address_of_another_site_is_none_to_go_on_to(target):
-    assert local(target) == "/"
+    assert local_target(target) == "/"
 
 
 @pytest.mark.parametrize("target", ["/", "/ui/venues/field", "/ui/jobs?status=failed&next=//x", "/a//b"])
 def test_an_address_of_this_site_is_one_to_go_on_to(target):
-    assert local(target) == target
+    assert local_target(target) == target
 
 
 def test_a_wrong_key_is_told_so(guarded, visit):

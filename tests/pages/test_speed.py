@@ -8,7 +8,7 @@ from tests.pages.stocked import calibrations
 FIRST_PAINT_MS = 1000
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def years(stub):
     stub.venue("decade")
     with stub.database() as connection:

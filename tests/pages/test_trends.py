@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from service.pages.trend_curves import trend_curves
-from service.wire.trend import Chart, Trend, TrendPoint
+from service.schemas.trend import Chart, Trend, TrendPoint
 from tests.pages.browsing import differs, look
 from tests.trending import nights, noisy
 from tests.worker.stock import Stock
@@ -15,7 +15,7 @@ from tests.worker.stock import Stock
 SUMMER = datetime(2026, 6, 1, 2, tzinfo=UTC)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def drifted(stub):
     """A venue whose cameras were quiet for thirty nights and have drifted for thirty more."""
     stock = Stock(stub.data)
@@ -61,6 +61,7 @@ def test_band_average_and_dots_can_be_told_from_the_ground(stub, drifted, visit,
 def test_the_charts_fit_a_phone(stub, drifted, visit):
     page = visit(stub.url, drifted)
     page.set_viewport_size({"width": 390, "height": 800})
+    page.locator("summary", has_text="Trend of each camera").click()
     box = page.get_by_role("img", name="Camera left. Moved").bounding_box()
     assert box["x"] >= 0
     assert box["x"] + box["width"] <= 390

@@ -16,7 +16,7 @@ DEMO = Path(demo.__file__).parent
 TRUTH = json.loads((DEMO / "truth.json").read_text())["poses"]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def pitch(stub):
     """A venue with true poses whose frames show something."""
     venue = json.loads((DEMO / "venue.json").read_text()) | {"id": "viewed", "name": "accept"}

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from models.training.evaluate import real_cameras
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
 
 FOLDER = Path(__file__).parents[3] / "shared" / "real" / "tsukuba"
 

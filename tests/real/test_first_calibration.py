@@ -13,9 +13,9 @@ import pytest
 
 from tests.once import made_once
 from tests.real.pair import FOLDER
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
 
 pytestmark = [pytest.mark.long, pytest.mark.real, pytest.mark.timeout(1200)]
 DOCUMENT = Path(__file__).parents[2] / "docs" / "first-calibration.md"

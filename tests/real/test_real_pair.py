@@ -5,8 +5,8 @@ import pytest
 
 from service.settings import MODEL_BESIDE_THE_CODE
 from worker.calibration.calibrate import calibrate
+from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.records import Options
-from worker.calibration.see.segmentation import Segmenter
 
 pytestmark = pytest.mark.real
 

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from service.wire.field import FieldOfPlay
-from service.wire.venue import Camera
+from service.schemas.field import FieldOfPlay
+from service.schemas.venue import Camera
 from tests.real.pair import FOLDER
-from tests.worker.calibration.see import spoiling
-from worker.calibration.see.view import look_at
-from worker.jobs.reading import camera_of, pitch_of
+from tests.worker.calibration.detection import spoiling
+from worker.calibration.detection.view_condition import look_at
+from worker.jobs.from_schemas import camera_of, pitch_of
 
 pytestmark = pytest.mark.real
 FIELDS = FOLDER.parent / "fields"

@@ -19,7 +19,7 @@ def machine(monkeypatch, tmp_path):
             file = tmp_path / "groups" / name.replace("__", "/").replace("cpu_max", "cpu.max")
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text)
-        return cores.usable(tmp_path / "cgroup", tmp_path / "groups")
+        return cores.usable_cores(tmp_path / "cgroup", tmp_path / "groups")
 
     return machine
 
@@ -51,5 +51,5 @@ def test_a_mask_of_cores_holds(machine, monkeypatch):
 
 def test_threads_are_as_many_unless_somebody_says_otherwise(monkeypatch):
     monkeypatch.delenv("ESC_THREADS")
-    assert Settings().threads == cores.usable()
+    assert Settings().threads == cores.usable_cores()
     assert Settings(threads=7).threads == 7

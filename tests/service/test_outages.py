@@ -45,7 +45,7 @@ def test_a_full_disk_is_storage_that_is_away(ask, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("service.routes.submissions.forms.frames_of", full)
+    monkeypatch.setattr("service.routes.submissions.forms.frames_by_camera", full)
     assert ask("POST", "/venues/v/calibrate", FRAMES)["type"] == "/problems/unavailable"
 
 

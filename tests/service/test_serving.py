@@ -25,7 +25,7 @@ def starts(tmp_path, monkeypatch):
 
 
 def test_a_worker_that_refuses_to_start_is_started_ever_more_rarely(starts, tmp_path):
-    with serving.KeptWorker(Settings(data=tmp_path)):
+    with serving.KeptWorker(Settings(data=tmp_path), lambda: False):
         wait_for(lambda: len(starts()) >= 5)
     pauses = [after - before for before, after in pairwise(starts())]
     assert all(pause >= least for pause, least in zip(pauses, (0.1, 0.2, 0.4, 0.4), strict=False))
@@ -34,7 +34,7 @@ def test_a_worker_that_refuses_to_start_is_started_ever_more_rarely(starts, tmp_
 def test_a_worker_that_cannot_be_started_is_tried_again(starts, tmp_path):
     script = tmp_path / "script"
     script.rename(tmp_path / "away")
-    with capture_logs() as logs, serving.KeptWorker(Settings(data=tmp_path)):
+    with capture_logs() as logs, serving.KeptWorker(Settings(data=tmp_path), lambda: False):
         wait_for(lambda: "no worker can be started" in [entry["event"] for entry in logs])
         (tmp_path / "away").rename(script)
         wait_for(starts)

@@ -1,6 +1,7 @@
 import pytest
 from pydantic import ValidationError
 
+from service.secret_files import SecretFileError
 from service.settings import Settings
 
 
@@ -47,3 +48,51 @@ def test_axes_of_freed_may_be_turned(axes):
 def test_a_name_of_a_worker_that_can_name_no_file_is_refused(name):
     with pytest.raises(ValidationError, match="worker_name"):
         Settings(worker_name=name)
+
+
+SECRETS = {
+    "ESC_DATABASE_URL": "postgresql://esc:pa55@db/esc",
+    "ESC_WEBHOOK_SECRET": "whsec_" + "c2VjcmV0" * 4,
+}
+
+
+@pytest.mark.parametrize("name", SECRETS)
+@pytest.mark.parametrize("where", ["environment", ".env"])
+def test_a_secret_may_stand_in_a_file_that_a_variable_names(tmp_path, monkeypatch, name, where):
+    (tmp_path / "secret").write_text(SECRETS[name] + "\n")
+    monkeypatch.chdir(tmp_path)
+    if where == ".env":
+        (tmp_path / ".env").write_text(f"{name}_FILE={tmp_path}/secret\n")
+    else:
+        monkeypatch.setenv(f"{name}_FILE", f"{tmp_path}/secret")
+    settings = Settings()
+    if name == "ESC_DATABASE_URL":
+        assert settings.home_database_url == SECRETS[name]
+    else:
+        assert settings.webhook_keys == [b"secret" * 4]
+
+
+def test_a_secret_that_is_given_twice_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "secret").write_text(SECRETS["ESC_DATABASE_URL"])
+    monkeypatch.setenv("ESC_DATABASE_URL", "postgresql://esc:pa55@db/other")
+    monkeypatch.setenv("ESC_DATABASE_URL_FILE", f"{tmp_path}/secret")
+    with pytest.raises(SecretFileError, match="ESC_DATABASE_URL and ESC_DATABASE_URL_FILE are both given") as refused:
+        Settings()
+    assert "pa55" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("content", "says"), [(None, "No such file"), ("\n", "is empty"), (b"\xff\xfe", "is no text")])
+def test_a_file_that_gives_no_secret_is_named(tmp_path, monkeypatch, content, says):
+    if content is not None:
+        (tmp_path / "secret").write_bytes(content if isinstance(content, bytes) else content.encode())
+    monkeypatch.setenv("ESC_WEBHOOK_SECRET_FILE", f"{tmp_path}/secret")
+    with pytest.raises(SecretFileError, match=f"ESC_WEBHOOK_SECRET_FILE: {tmp_path}/secret .*{says}"):
+        Settings()
+
+
+def test_a_secret_in_a_file_is_checked_as_one_in_a_variable_is(tmp_path, monkeypatch):
+    (tmp_path / "secret").write_text("mysql://u:pa55@h/d")
+    monkeypatch.setenv("ESC_DATABASE_URL_FILE", f"{tmp_path}/secret")
+    with pytest.raises(ValidationError, match=r"expected is postgresql://") as refused:
+        Settings()
+    assert "pa55" not in str(refused.value)

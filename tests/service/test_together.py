@@ -9,18 +9,19 @@ import pytest
 
 from service.queue import Queue
 from service.queue import migrate as migrate_queue
-from service.store.counts import tallies
-from service.store.engine import connect, migrate
+from service.schemas.geometry import Moved, Pose
+from service.schemas.health import Alarms as Rules
+from service.schemas.job import JobError
+from service.schemas.options import Options
+from service.schemas.results import CameraResult, Provenance, Result
+from service.schemas.venue import VenueIn
+from service.store.database import connect, migrate
 from service.store.ids import new_id
 from service.store.jobs import attempts
+from service.store.jobs.queries import JobPage
 from service.store.jobs.submission import QueueFull, Submission
-from service.store.workers import Workers
-from service.wire.geometry import Moved, Pose
-from service.wire.health import Alarms as Rules
-from service.wire.job import JobError
-from service.wire.options import Options
-from service.wire.results import CameraResult, Provenance, Result
-from service.wire.venue import VenueIn
+from service.store.statistics import counters
+from service.store.workers import WorkerRepository
 from tests.e2e.running import venue
 from tests.homes import in_both_homes, on_servers
 from tests.worker.stock import anyway, result
@@ -30,7 +31,7 @@ SHIFTED = [0.0, -55.0, 9.0]
 
 
 def stored(name):
-    return VenueIn.model_validate(venue(name, cameras=("left",))).stored()
+    return VenueIn.model_validate(venue(name, cameras=("left",))).to_venue()
 
 
 def submission(name, content="c"):
@@ -49,7 +50,7 @@ def found():
         id="left",
         accepted=True,
         rejected_because=None,
-        pose=Pose.at([1.6, 0.1, -0.2], SHIFTED),
+        pose=Pose.from_position([1.6, 0.1, -0.2], SHIFTED),
         sigma=None,
         moved=Moved(rotation_deg=0, position_m=1, pixels=None),
         iou=0.9,
@@ -88,7 +89,7 @@ def test_processes_that_start_together_make_the_schema_once(home, tmp_path):
     engines = [connect(home.database_url(tmp_path)) for _ in range(4)]
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(migrate, engines))
-    assert Workers(engines[0]).silent(0) == []
+    assert WorkerRepository(engines[0]).silent(0) == []
     for engine in engines:
         engine.dispose()
 
@@ -109,7 +110,7 @@ def test_the_queue_takes_no_more_than_its_limit_however_many_come_at_once(stock,
 
     with ThreadPoolExecutor(crowd) as pool:
         assert sum(pool.map(submit, range(crowd))) == LIMIT
-    assert [job.status for job in stock.jobs.page(None, None, None, 100)] == ["queued"] * LIMIT
+    assert [job.status for job in stock.jobs.page(JobPage(100))] == ["queued"] * LIMIT
 
 
 @in_both_homes
@@ -121,16 +122,16 @@ def test_the_poses_move_only_with_the_job_that_ends_with_them(stock, running, mo
         "fail": lambda: stock.attempts.fail(running, JobError(type="/problems/job-crashed", title="", detail="")),
     }
     meddler = Thread(target=meddle[other])
-    find_venue = attempts.find_venue
+    find_stored = attempts.find_stored
 
-    def find_venue_slowly(*arguments):
+    def find_stored_slowly(*arguments):
         # Who meddles may look for the venue too.
         if meddler.ident is None:
             meddler.start()
             meddler.join(0.5)
-        return find_venue(*arguments)
+        return find_stored(*arguments)
 
-    monkeypatch.setattr(attempts, "find_venue", find_venue_slowly)
+    monkeypatch.setattr(attempts, "find_stored", find_stored_slowly)
     stock.attempts.finish(running, found(), [])
     meddler.join()
     moved = stock.venues.get("v").cameras[0].pose.position == SHIFTED
@@ -141,15 +142,15 @@ def test_the_poses_move_only_with_the_job_that_ends_with_them(stock, running, mo
 def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(stock, monkeypatch):
     wrong = type("Wrong", (datetime,), {"now": lambda zone: datetime.now(zone) + timedelta(days=3)})
     with monkeypatch.context() as patch:
-        patch.setattr("service.store.engine.datetime", wrong)
+        patch.setattr("service.store.database.datetime", wrong)
         job = stock.jobs.get(stock.submitted("v", callback_url="https://example.com/"))
         stock.decisions.cancel(job.id)
-        stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", timedelta(hours=1))
+        stock.expiry.register_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", timedelta(hours=1))
         assert stock.expiry.leftovers(stock.expiry.now(), 10) == []
-        assert stock.deliveries.attempt(stock.deliveries.now(), stock.deliveries.now(), 10)
+        assert stock.outbox.claim_due(stock.outbox.now(), stock.outbox.now(), 10)
         assert stock.expiry.old_frames(stock.expiry.now() - timedelta(days=2), 10) == []
     now, ended = datetime.now(UTC), stock.jobs.get(job.id)
-    for moment in (job.created_at, ended.finished_at, stock.expiry.now(), stock.deliveries.now()):
+    for moment in (job.created_at, ended.finished_at, stock.expiry.now(), stock.outbox.now()):
         assert abs(now - moment) < timedelta(minutes=10)
 
 
@@ -157,9 +158,21 @@ def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(stock, mo
 def test_workers_are_not_dead_because_the_clock_of_their_machine_is_wrong(engine, monkeypatch):
     late = type("Late", (datetime,), {"now": lambda zone: datetime.now(zone) - timedelta(hours=1)})
     with monkeypatch.context() as patch:
-        patch.setattr("service.store.engine.datetime", late)
-        Workers(engine).enter("w", None)
-    assert Workers(engine).silent(10) == []
+        patch.setattr("service.store.database.datetime", late)
+        WorkerRepository(engine).register("w", None)
+    assert WorkerRepository(engine).silent(10) == []
+
+
+def two_count_at_once(monkeypatch):
+    """Each of two transactions has counted something before either goes on."""
+    add, counted = counters.add, Barrier(2)
+
+    def add_slowly(connection, amounts):
+        add(connection, amounts)
+        with suppress(BrokenBarrierError):
+            counted.wait(1)
+
+    monkeypatch.setattr(counters, "add", add_slowly)
 
 
 @on_servers
@@ -169,14 +182,7 @@ def test_a_job_that_is_rejected_and_one_that_fails_do_not_wait_for_each_other(st
         stock.venues.put(stored(name).model_copy(update={"alarms": rules}), anyway)
     rejected, failed = (stock.attempts.begin(stock.submitted(name)) for name in ("v", "w"))
     # Both count an alarm and an end; each has counted one of them before either counts the other.
-    add, counted = tallies.add, Barrier(2)
-
-    def add_slowly(connection, amounts):
-        add(connection, amounts)
-        with suppress(BrokenBarrierError):
-            counted.wait(1)
-
-    monkeypatch.setattr(tallies, "add", add_slowly)
+    two_count_at_once(monkeypatch)
     error = JobError(type="/problems/job-crashed", title="", detail="")
     with ThreadPoolExecutor(2) as both:
         ends = [
@@ -185,3 +191,38 @@ def test_a_job_that_is_rejected_and_one_that_fails_do_not_wait_for_each_other(st
         ]
     assert [end.exception() for end in ends] == [None, None]
     assert [stock.jobs.get(task.job_id).status for task in (rejected, failed)] == ["succeeded", "failed"]
+
+
+@on_servers
+def test_alarms_that_begin_in_another_order_at_another_venue_do_not_wait_for_each_other(stock, monkeypatch):
+    moved_at_once(stock, "v", {"left": 1.0, "right": 0.0})
+    # The camera that comes first has drifted for longer, the second one has moved just now.
+    moved_at_once(stock, "w", {"left": 1.0, "right": 0.0}, {"left": 0.001, "right": 0.3})
+    left, right = stock.venues.health("w").cameras
+    rules = Rules(
+        moved_since_last_px=right.moved.pixels / 2, moved_since_first_px=(left.drift.pixels + right.drift.pixels) / 2
+    )
+    two_count_at_once(monkeypatch)
+    watched = [stock.venues.get(name).model_copy(update={"alarms": rules}) for name in ("v", "w")]
+    with ThreadPoolExecutor(2) as both:
+        puts = [both.submit(stock.venues.put, venue, anyway) for venue in watched]
+    assert [put.exception() for put in puts] == [None, None]
+    ringing = {name: {(alarm.rule, alarm.camera) for alarm in stock.venues.health(name).alarms} for name in ("v", "w")}
+    assert ringing == {
+        "v": {("moved-since-last", "left"), ("moved-since-first", "left")},
+        "w": {("moved-since-first", "left"), ("moved-since-last", "right")},
+    }
+
+
+def moved_at_once(stock, name, *jobs):
+    """Calibrations of a venue that each move its cameras along the pitch by so many metres."""
+    for metres in jobs:
+        task = stock.attempts.begin(stock.submitted(name))
+        said = result(task.venue, True)
+        cameras = [
+            camera.model_copy(update={"pose": Pose.from_position(camera.pose.rotation, [x + metres[camera.id], y, z])})
+            for camera, (x, y, z) in (
+                (camera, stood.pose.position) for camera, stood in zip(said.cameras, task.venue.cameras, strict=True)
+            )
+        ]
+        stock.attempts.finish(task, said.model_copy(update={"cameras": cameras}), [])

@@ -62,12 +62,12 @@ class Receiver:
         self._server.server_close()
 
 
-class NulSaying(Receiver):
-    """Says what no database keeps."""
+class Talkative(Receiver):
+    """Says what only those shall read who may ask it."""
 
     def respond(self, request: BaseHTTPRequestHandler, status: int) -> None:
         super().respond(request, status)
-        request.wfile.write(b"no\0use")
+        request.wfile.write(b"its secret")
 
 
 class Silent(Receiver):

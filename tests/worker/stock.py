@@ -6,24 +6,24 @@ from pathlib import Path
 
 import sqlalchemy as sa
 
+from service.schemas.geometry import Moved, Pose
+from service.schemas.health import AlarmEvent
+from service.schemas.job import JobError
+from service.schemas.options import Options
+from service.schemas.results import CameraResult, Provenance, Result
+from service.schemas.venue import Venue, VenueIn
 from service.settings import Settings
 from service.store import tables
 from service.store.blobs import Blobs
 from service.store.ids import new_id
 from service.store.jobs.files import picture_folder
 from service.store.jobs.submission import Submission
-from service.store.stores import Stores
-from service.wire.geometry import Moved, Pose
-from service.wire.health import AlarmEvent
-from service.wire.job import JobError
-from service.wire.options import Options
-from service.wire.results import CameraResult, Provenance, Result
-from service.wire.venue import Venue, VenueIn
+from service.store.repositories import Repositories
 from tests.e2e.running import venue
 from tests.homes import files
 
 
-class Stock(Stores):
+class Stock(Repositories):
     def __init__(self, data: Path, **settings) -> None:
         self.settings = Settings(data=data, worker_name="w", **settings)
         super().__init__(self.settings.home_database_url)
@@ -74,7 +74,7 @@ class Stock(Stores):
         """Put the venue again, its first camera moved along the pitch."""
         venue = self.venue(venue_id)
         first, *others = venue.cameras
-        pose = Pose.at(first.pose.rotation, [x, *first.pose.position[1:]])
+        pose = Pose.from_position(first.pose.rotation, [x, *first.pose.position[1:]])
         cameras = [first.model_copy(update={"pose": pose, **camera}), *others]
         self.venues.put(venue.model_copy(update={"cameras": cameras}), anyway)
 
@@ -95,7 +95,7 @@ class Stock(Stores):
         d = tables.deliveries.c
         with self.engine.connect() as connection:
             numbers = connection.scalars(sa.select(d.event).where(d.event.is_not(None))).all()
-        told = [self.following.get(number) for number in numbers]
+        told = [self.events.get(number) for number in numbers]
         return sorted(told, key=lambda event: (event.timestamp, event.data.rule, event.data.camera or ""))
 
     def callbacks(self) -> dict[str, int]:
@@ -113,7 +113,7 @@ class Stock(Stores):
         """The stored venue, after it was put if need be."""
         stored = self.venues.get(venue_id)
         if stored is None:
-            stored = VenueIn.model_validate(venue(venue_id)).stored()
+            stored = VenueIn.model_validate(venue(venue_id)).to_venue()
             self.venues.put(stored, anyway)
         return stored
 
@@ -130,7 +130,7 @@ def result(of: Venue, accepted: bool | Collection[str]) -> Result:
             id=camera.id,
             accepted=camera.id in good,
             rejected_because=None if camera.id in good else "the lines do not fit",
-            pose=Pose.at(camera.pose.rotation, [camera.pose.position[0] + 0.001, *camera.pose.position[1:]]),
+            pose=Pose.from_position(camera.pose.rotation, [camera.pose.position[0] + 0.001, *camera.pose.position[1:]]),
             sigma=None,
             moved=Moved(rotation_deg=0, position_m=0.001, pixels=1.0),
             iou=0.9,

@@ -30,7 +30,7 @@ import httpx
 from tests.benchmarks.cost import metered
 from tests.benchmarks.cost.cases import Case, case
 from tests.benchmarks.rows import Rows
-from tests.e2e.running import wait_for
+from tests.e2e.running import ready, wait_for
 
 HERE = Path.cwd()
 ROWS = Rows(Path("runs/bench/cost.jsonl"))
@@ -139,7 +139,7 @@ def running(name: str, folder: Path) -> Iterator[Release]:
         ) as service:
             try:
                 with httpx.Client(base_url=service.stdout.readline().split()[-1], timeout=120) as http:
-                    wait_for(lambda: http.get("/readyz").status_code == 200)
+                    wait_for(lambda: ready(http))
                     yield Release(name, commit, folder, program, notes, http)
             finally:
                 service.terminate()

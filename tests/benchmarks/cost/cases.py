@@ -12,9 +12,9 @@ import numpy as np
 from models.training.pitches.conditions import Conditions
 from tests.benchmarks.scenes import SIZE, START_DEG, START_M, rendered
 from tests.demo.render import outdated
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
 
 DEMO = Path(__file__).parents[2] / "demo"
 # How far off the stored poses are, metres and degrees: those of a quarter of an hour ago, and the paper's Start.

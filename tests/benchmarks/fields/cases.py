@@ -11,12 +11,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from service.wire.field import FieldOfPlay
-from worker.calibration.scene.camera import Camera, Frame, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import LENSES
-from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
-from worker.jobs.reading import pitch_of
+from service.schemas.field import FieldOfPlay
+from worker.calibration.geometry.camera import Camera, Frame, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import LENSES
+from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
+from worker.jobs.from_schemas import pitch_of
 
 FOLDER = Path(__file__).parents[4] / "shared" / "real" / "fields"
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 from tests.benchmarks.rows import Rows
 from worker.calibration.calibrate import NOTHING_USUAL, calibrate
-from worker.calibration.judge.quality import CameraResult
+from worker.calibration.detection.segmentation import Segmenter
+from worker.calibration.detection.view_condition import UsualView
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, CalibrationError, Options
-from worker.calibration.scene.camera import Camera, Frame
-from worker.calibration.scene.field import Field
-from worker.calibration.see.segmentation import Segmenter
-from worker.calibration.see.view import UsualView
 
 THREADS = 2
 

@@ -18,11 +18,11 @@ from tests.benchmarks.fields.engine import Engine, camera_row
 from tests.benchmarks.fields.judging import caught, far_off, overconfident, reasons, share
 from tests.benchmarks.scenes import started
 from tests.benchmarks.truth import apart
-from worker.calibration.scene.camera import Camera, Frame, Pose, inside
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
-from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
-from worker.calibration.scene.visibility import SeenLines
+from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
+from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
+from worker.calibration.geometry.visibility import VisibleLines
 
 SIZE_PX = 1280
 LARGE_M = 45.0
@@ -192,7 +192,7 @@ def random_camera(rng: np.random.Generator, pitch: Field) -> Camera:
 
 def _position_sigma(pitch: Field, camera: Camera) -> float:
     """Metres that the camera's place is unsure by if lines are measured, across themselves, with `NOISE_PX`."""
-    seen = SeenLines.from_camera(pitch.line_points(), camera)
+    seen = VisibleLines.from_camera(pitch.line_points(), camera)
     step = 1e-5
     columns = []
     for direction in np.eye(6):

@@ -10,14 +10,14 @@ import cv2
 import numpy as np
 
 from tests.benchmarks.fields.cases import Case
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.evidence import evidence_of
+from worker.calibration.detection.segmentation import reachable_regions, whole_frame
+from worker.calibration.detection.view_condition import look_at
+from worker.calibration.geometry.camera import Camera, inside
+from worker.calibration.geometry.field import LinePoints
 from worker.calibration.records import Segment
-from worker.calibration.scene.camera import Camera, inside
-from worker.calibration.scene.field import LinePoints
-from worker.calibration.see.contrast import Channels
-from worker.calibration.see.evidence import evidence_of
-from worker.calibration.see.segmentation import reachable_regions, whole_frame
-from worker.calibration.see.view import look_at
-from worker.calibration.settle import CAPTURE_RAD
+from worker.calibration.solve import CAPTURE_RAD
 
 SAMPLE_M = 0.1
 AROUND_M = 0.5

@@ -17,11 +17,11 @@ from tests.benchmarks.fields.engine import Engine, camera_row
 from tests.benchmarks.fields.judging import reasons, share
 from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
 from tests.benchmarks.truth import apart
-from worker.calibration.judge.quality import Gate
-from worker.calibration.scene.camera import Camera, Frame, Pose, inside
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.rotation import rotation_vectors
-from worker.calibration.see.view import UsualView, look_at
+from worker.calibration.detection.view_condition import UsualView, look_at
+from worker.calibration.gate.quality import Gate
+from worker.calibration.geometry.camera import Camera, Frame, Pose, inside
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.rotation import rotation_vectors
 
 OTHER = "another field's frame"
 MIRRORED = "mirrored"

@@ -8,7 +8,7 @@ from tests.benchmarks.learned.net import loaded
 from tests.benchmarks.learned.nets import NETS
 from tests.benchmarks.learned.pose import Displacement
 from tests.benchmarks.learned.window import Picture
-from worker.calibration.scene.camera import Array
+from worker.calibration.geometry.camera import Array
 
 
 def displacement_by(name: str) -> Displacement:

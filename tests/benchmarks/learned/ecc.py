@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from tests.benchmarks.learned.window import QUAD, Picture
-from worker.calibration.scene.camera import Array
+from worker.calibration.geometry.camera import Array
 
 LEVELS = (
     (8.0, cv2.MOTION_TRANSLATION),

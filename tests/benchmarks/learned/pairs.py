@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from tests.benchmarks.learned.window import FINER, QUAD, SIZE, Picture, Window, placed, shown, strokes
 from tests.benchmarks.scenes import SIZE as FRAME
 from tests.benchmarks.scenes import started
-from worker.calibration.scene.camera import Array, Camera, Pose, inside
-from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.geometry.camera import Array, Camera, Pose, inside
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.lens import Intrinsics
 
 LARGEST_START = 1.5
 """Of the paper's Start error, up to which wrong poses go."""

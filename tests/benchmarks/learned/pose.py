@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.benchmarks.learned.window import QUAD, Picture, Window
-from worker.calibration.scene.camera import Array, Camera, Pose
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry.field import Field
 
 Displacement = Callable[[Picture, Picture], Array]
 """From a mask of the window and the template to how far the points of `QUAD` have to move, (4, 2) pixels."""

@@ -18,9 +18,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.see.sampling import bilinear
+from worker.calibration.detection.sampling import bilinear
+from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry.field import Field
 
 SIZE = (160, 128)
 HEIGHTS_PER_PIXEL = 0.03

@@ -9,9 +9,9 @@ import numpy as np
 
 from tests.benchmarks.nights.simulated import Painted
 from tests.demo.render import outdated
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.motion import moved
-from worker.calibration.scene.parameters import with_focal_length
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.derivatives import moved
+from worker.calibration.geometry.parameters import with_focal_length
 
 HEAT, JOBS_A_DAY = 3e-4, 6
 """Half of what a day does to a focal length, part of it, and into how many jobs that day is divided."""

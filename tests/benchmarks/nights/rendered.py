@@ -26,8 +26,8 @@ from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
 from tests.e2e.running import Service, wait_for
 from tests.homes import Embedded
-from worker.calibration.scene.camera import Camera, Frame, Pose
-from worker.calibration.scene.parameters import with_focal_length
+from worker.calibration.geometry.camera import Camera, Frame, Pose
+from worker.calibration.geometry.parameters import with_focal_length
 
 FOCAL_LENGTHS = {"box": 5000.0, "circle": 6000.0, "half": 4000.0, "corner": 2200.0}
 """The views, and the focal length (px) that each is seen with."""

@@ -12,22 +12,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from worker.calibration.finish.refinement import refine
-from worker.calibration.finish.uncertainty import Finished
-from worker.calibration.judge.overlap import Overlap
-from worker.calibration.judge.quality import CameraResult, Gate, Movement, alone_rejection
-from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory, fitting
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field, LinePoints
-from worker.calibration.scene.ground import Ground
-from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.evidence import Evidence
-from worker.calibration.see.line_measurement import Measurements
-from worker.calibration.see.view import ViewCondition, ViewFigures
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
+from worker.calibration.diagnostics.overlap import Overlap
+from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field, LinePoints
+from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory, memories_of_field
+from worker.calibration.refinement.refine import refine
+from worker.calibration.refinement.uncertainty import RefinedPoses
 
 NOISE_PX, SHARED_PX = 0.2, 0.06
 """Error of a measurement, and the part of it that is the same every night."""
-SWELL_M, ROUGH_M, PAINT_M = 0.012, 0.004, 0.005
+SWELL, ROUGH, PAINT_M = 12 / 15, 4 / 15, 0.005
+"""Of the ground, parts of how uneven it usually is in that sport, and of the paint."""
 CHANCE = 0.04
 FOUND_PX = 3.0
 USABLE = ViewCondition(True, None, None, "", ViewFigures(*[1.0] * len(ViewFigures.__dataclass_fields__)))
@@ -46,15 +47,17 @@ class Painted:
         """On a ground that swells, by a painter who is half a centimetre off."""
         lines = pitch.line_points()
         ground = Ground.under(lines)
-        swell = SWELL_M * np.linalg.cholesky(np.linalg.inv(ground.precision)) @ rng.normal(size=len(ground))
-        up = ground.under_points(swell, np.arange(len(lines))) + ROUGH_M * rng.normal(size=len(lines))
+        swell = (
+            SWELL * lines.uneven_m * np.linalg.cholesky(np.linalg.inv(ground.precision)) @ rng.normal(size=len(ground))
+        )
+        up = ground.under_points(swell, np.arange(len(lines))) + ROUGH * lines.uneven_m * rng.normal(size=len(lines))
         beside = PAINT_M * rng.normal(size=len(lines))
         there = lines.position + beside[:, None] * lines.normal + up[:, None] * [0.0, 0.0, 1.0]
         return cls(pitch, lines, there)
 
     def longest_seen(self, camera: Camera) -> str:
         """The marking of which a camera sees most."""
-        seen = SeenLines.from_camera(self.lines, camera)
+        seen = VisibleLines.from_camera(self.lines, camera)
         return self.pitch.markings()[int(np.argmax(np.bincount(seen.points.marking)))].name
 
     def painted_anew(self, name: str, aside_m: float) -> Painted:
@@ -93,7 +96,7 @@ class SimulatedSight:
         return [self._measured(lines, number, camera, search_px) for number, camera in enumerate(cameras)]
 
     def _measured(self, lines: LinePoints, number: int, camera: Camera, search_px: float) -> Measurements:
-        seen = SeenLines.from_camera(lines, camera)
+        seen = VisibleLines.from_camera(lines, camera)
         there = self.real[number].project(self.painted.there[seen.index])
         shift = np.sum((there - seen.pixel) * seen.normal, axis=1) + self.noise[number, seen.index]
         near = np.abs(shift) <= search_px * camera.intrinsics.relative_size
@@ -107,7 +110,7 @@ class SimulatedSight:
         return [self._evidence(lines, number, camera) for number, camera in enumerate(cameras)]
 
     def _evidence(self, lines: LinePoints, number: int, camera: Camera) -> Evidence:
-        seen = SeenLines.from_camera(lines, camera)
+        seen = VisibleLines.from_camera(lines, camera)
         near = self._measured(lines, number, camera, FOUND_PX).index
         weight = seen.length_px * np.minimum(seen.width_px, 1.0)
         found = np.isin(seen.index, near)
@@ -136,16 +139,22 @@ class Installation:
             lines = self.pitch.line_points()
             frames = str(sight.noise[number].sum())
             job = AcceptedJob(
-                result.camera, result.measured, lines, None, result.painted_anew, frames, zoomed=result.lens_changed
+                result.camera,
+                result.measured,
+                lines,
+                None,
+                result.repainted_markings,
+                frames,
+                zoomed=result.lens_changed,
             )
-            (memory,) = fitting([self.memories[number]], lines)
+            (memory,) = memories_of_field([self.memories[number]], lines)
             self.memories[number] = (
-                CameraMemory.begun(self.stored[number], job) if memory is None else memory.after(job)
+                CameraMemory.from_first_job(self.stored[number], job) if memory is None else memory.after(job)
             )
             self.stored[number] = result.camera
         return results
 
-    def _judged(self, finished: Finished, sight: SimulatedSight) -> list[CameraResult]:
+    def _judged(self, finished: RefinedPoses, sight: SimulatedSight) -> list[CameraResult]:
         before = sight.evidence(self.pitch, self.pitch.line_points(), self.stored)
         results = [
             CameraResult(

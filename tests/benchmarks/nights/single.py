@@ -14,8 +14,8 @@ from tests.benchmarks.nights.simulated import SHARED_PX, Installation, Painted, 
 from tests.benchmarks.scenes import as_built
 from tests.benchmarks.truth import apart
 from tests.demo.render import outdated
-from worker.calibration.judge.quality import CameraResult
-from worker.calibration.scene.camera import Camera
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Camera
 
 LEAST_WRONG_M = 0.005
 COSTS_M = 0.10

@@ -12,8 +12,8 @@ from tests.benchmarks.nights.simulated import SHARED_PX, Installation, Painted, 
 from tests.benchmarks.scenes import LAYOUTS, Scene, as_built, placed_cameras
 from tests.benchmarks.truth import apart, errors
 from tests.demo.render import outdated
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
 
 NIGHTS = (1, 10, 30, 100)
 VENUES = ("pair", "low pair", "apart", "three", "four")

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from service.schemas.health import Alarms as Rules
+from service.schemas.results import CameraResult, Result
 from service.store.refined import NoRefinedPose
-from service.wire.health import Alarms as Rules
-from service.wire.results import CameraResult, Result
 from tests.benchmarks.lenses import SIGMAS
 from tests.benchmarks.nights.changes import HEAT
 from tests.benchmarks.nights.single import LEAST_WRONG_M
@@ -26,9 +26,9 @@ from tests.demo.render import outdated
 from tests.worker.calibration.synthetic import CROWNED
 from tests.worker.duties.year import VENUE, Year, cameras, fast_motion, frames_of, longer, stored
 from tests.worker.stock import Stock, anyway
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field, Marking
-from worker.calibration.scene.rotation import rotation_matrices, rotation_vectors
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field, Marking
+from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
 
 WIND_M, WIND_DEG = 0.005, 0.02
 SIGMA = {"fx": 0.12, "cx": 0.2, "cy": 0.2, "k1": 5e-4, "k2": 5e-4}

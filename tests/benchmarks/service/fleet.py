@@ -19,23 +19,24 @@ from pathlib import Path
 import numpy as np
 import sqlalchemy as sa
 
-from service.home import Home
+from service.application_state import ApplicationState
 from service.intake.submit import frame_paths
-from service.observe import logs
+from service.observability import logs
+from service.schemas.options import Options
+from service.schemas.venue import VenueIn
 from service.settings import Settings
 from service.store import tables
-from service.store.expiry import Expiry
+from service.store.expiry import ExpiryRepository
 from service.store.ids import new_id
 from service.store.jobs.files import OF_CAMERA, STITCHED, picture_folder
+from service.store.jobs.queries import JobPage
 from service.store.jobs.submission import Submission
-from service.wire.options import Options
-from service.wire.venue import VenueIn
 from tests.benchmarks.service.stage import homes, resident_mb
 from tests.e2e.running import venue
-from tests.homes import Home as Place
+from tests.homes import ApplicationState as Place
 from tests.homes import files
 from tests.worker.stock import anyway, result
-from worker.duties.retention import BREATH_S, FOLDERS_OF_A_JOB, Retention
+from worker.duties.retention import BETWEEN_ROUNDS_S, FOLDERS_OF_A_JOB, Retention
 
 VENUES, CAMERAS = 100, ("left", "right")
 # Of 10 000 venues every 15 minutes: 11.1 jobs a second, and four folders of each.
@@ -67,14 +68,14 @@ class Day:
     objects: int
 
 
-class Counted(Expiry):
+class Counted(ExpiryRepository):
     """Counts the folders that are gone."""
 
     gone = 0
 
-    def swept(self, folders: Collection[str]) -> None:
+    def forget_leftovers(self, folders: Collection[str]) -> None:
         """These."""
-        super().swept(folders)
+        super().forget_leftovers(folders)
         self.gone += len(folders)
 
 
@@ -118,11 +119,11 @@ def _month(place: Place, days: int, jobs: int) -> list[Day]:
         folder = Path(name)
         settings = Settings(data=folder, keep_jobs_days=KEEP_JOBS_DAYS, log_level="warning", **place.settings(folder))
         logs.configure(settings)
-        home = Home(settings)
+        home = ApplicationState(settings)
         counted = Counted(home.engine)
         retention = Retention(settings, counted, home.blobs, home.workers, home.queue.forget)
         for number in range(VENUES):
-            stored = VenueIn.model_validate(venue(f"v{number}", cameras=CAMERAS)).stored()
+            stored = VenueIn.model_validate(venue(f"v{number}", cameras=CAMERAS)).to_venue()
             home.venues.put(stored, anyway)
         begun = home.expiry.now()
         measured = []
@@ -134,7 +135,7 @@ def _month(place: Place, days: int, jobs: int) -> list[Day]:
         return measured
 
 
-def _live(home: Home, evening: datetime, jobs: int) -> None:
+def _live(home: ApplicationState, evening: datetime, jobs: int) -> None:
     """A day with so many jobs."""
     since = home.expiry.now()
     ids = [_calibrated(home, f"v{number % VENUES}") for number in range(jobs)]
@@ -146,23 +147,23 @@ def _live(home: Home, evening: datetime, jobs: int) -> None:
         connection.execute(sa.update(tables.events).where(*just_now).values(at=evening))
 
 
-def _seen(home: Home, folders: int, seconds: float) -> Day:
+def _seen(home: ApplicationState, folders: int, seconds: float) -> Day:
     with home.engine.connect() as connection:
         kept = connection.execute(sa.select(sa.func.count()).select_from(tables.jobs)).scalar_one()
     return Day(
         jobs=kept,
         folders=folders,
         folders_per_s=folders / seconds if folders else None,
-        jobs_ms=_ms(lambda: home.jobs.page(None, None, None, PAGE)),
-        venue_ms=_ms(lambda: home.jobs.page("v7", "succeeded", None, PAGE)),
-        venues_ms=_ms(lambda: home.glances.of([f"v{number}" for number in range(50)])),
+        jobs_ms=_ms(lambda: home.jobs.page(JobPage(PAGE))),
+        venue_ms=_ms(lambda: home.jobs.page(JobPage(PAGE, venue="v7", status="succeeded"))),
+        venues_ms=_ms(lambda: home.venue_summaries.of([f"v{number}" for number in range(50)])),
         resident_mb=resident_mb(os.getpid()),
         kept_kb_per_job=_database_kb(home) / kept,
         objects=len(files(home.settings.home_blob_url)),
     )
 
 
-def _calibrated(home: Home, venue_id: str) -> str:
+def _calibrated(home: ApplicationState, venue_id: str) -> str:
     """A job from its submission to its end."""
     stored, job_id = home.venues.get(venue_id), new_id()
     assert stored is not None
@@ -193,7 +194,7 @@ def _tidied(retention: Retention, counted: Counted, now: datetime) -> tuple[int,
     while more:
         begun = time.monotonic()
         more = retention.round(now)
-        seconds += time.monotonic() - begun + (BREATH_S if more else 0)
+        seconds += time.monotonic() - begun + (BETWEEN_ROUNDS_S if more else 0)
     return counted.gone - before, seconds
 
 
@@ -208,7 +209,7 @@ def _ms(look: Callable[[], object]) -> float:
     return float(np.median([once() for _ in range(LOOKS)]))
 
 
-def _database_kb(home: Home) -> float:
+def _database_kb(home: ApplicationState) -> float:
     """Of ours and of the queue's, with what was deleted and is not yet used again."""
     if home.engine.dialect.name == "sqlite":
         return sum(path.stat().st_size for path in home.settings.data.glob("esc.sqlite*")) / 1e3

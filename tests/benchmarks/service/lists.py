@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import sqlalchemy as sa
 
+from service.schemas.options import Options
+from service.schemas.venue import VenueIn
 from service.store import tables
-from service.store.stores import Stores
-from service.wire.options import Options
-from service.wire.venue import VenueIn
+from service.store.jobs.queries import JobPage
+from service.store.repositories import Repositories
 from tests.benchmarks.service.stage import homes, spread
 from tests.e2e.running import venue
 from tests.worker.stock import result
@@ -45,7 +46,7 @@ def table(options: argparse.Namespace) -> list[str]:
     rows = [f"{options.listed_jobs} jobs of {VENUES} venues; pages of {PAGE - 1}; ms, median (least to most)", ""]
     with homes() as both, tempfile.TemporaryDirectory(prefix="esc-lists-") as name:
         folder = Path(name)
-        stores = {called: Stores(home.database_url(folder)) for called, home in both.items()}
+        stores = {called: Repositories(home.database_url(folder)) for called, home in both.items()}
         for store in stores.values():
             _fill(store, options.listed_jobs)
         rows += ["| list | " + " | ".join(stores) + " |", "|---|" + "---|" * len(stores)]
@@ -59,17 +60,19 @@ def table(options: argparse.Namespace) -> list[str]:
     return rows
 
 
-def _times(store: Stores, wanted: dict[str, str | None], before: str | None) -> list[float]:
+def _times(store: Repositories, wanted: dict[str, str | None], before: str | None) -> list[float]:
     def page() -> float:
         begun = time.perf_counter()
-        store.jobs.page(wanted["venue"], wanted["status"], before, PAGE, wanted["kind"])
+        store.jobs.page(
+            JobPage(PAGE, before=before, venue=wanted["venue"], status=wanted["status"], kind=wanted["kind"])
+        )
         return 1e3 * (time.perf_counter() - begun)
 
     page()
     return [page() for _ in range(ROUNDS)]
 
 
-def _fill(store: Stores, jobs: int) -> None:
+def _fill(store: Repositories, jobs: int) -> None:
     """All jobs; whole ones where pages are read, and of the others what lists are sorted and chosen by.
 
     With their documents ten million would need 90 GB. No list reads those of jobs that it does not show.
@@ -110,7 +113,7 @@ def _lean(first: int, end: int, but: Sequence[range]) -> sa.Insert:
 
 
 def _rows(first: int, end: int) -> Iterator[dict[str, Any]]:
-    stands = VenueIn.model_validate(venue("v")).stored()
+    stands = VenueIn.model_validate(venue("v")).to_venue()
     document, found = stands.model_dump(mode="json"), result(stands, accepted=True).model_dump(mode="json")
     asked = Options(seed=1).model_dump(mode="json")
     venues = np.random.default_rng(1).integers(0, VENUES, end - first)

@@ -20,15 +20,15 @@ from pathlib import Path
 import numpy as np
 
 from service.client import Client
+from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
-from service.wire.venue import VenueIn
 from tests.benchmarks.service.poller import POLLERS
 from tests.benchmarks.service.stage import service, spread
 from tests.e2e.running import Service, wait_for
 from tests.homes import Embedded
 
 DEMO = Path(__file__).parents[2] / "demo"
-ENGINE = [sys.executable, "-P", "-m", "worker.jobs.job"]
+ENGINE = [sys.executable, "-P", "-m", "worker.jobs.program"]
 PER_S = 510
 POLLERS_CORE = max(os.sched_getaffinity(0))
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")

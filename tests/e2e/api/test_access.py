@@ -12,7 +12,7 @@ from fastapi.routing import iter_route_contexts
 
 from service.api.auth import GUESSES
 from service.app import create_app
-from service.pages.shown import SIGN_IN, Page
+from service.pages.page_rendering import SIGN_IN, Page
 from service.routes.contract.guarded import Guarded
 from service.settings import Settings
 from tests.e2e.commands import esc_here, esc_process
@@ -30,12 +30,14 @@ OPEN = {
     "/docs/LICENSE.txt",
 }
 # The way to sign in, and what it is drawn with.
-OPEN |= {"/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
+OPEN |= {"/ui/documents/{name}", "/favicon.ico", "/ui/static/{of_edition}/{path:path}", "/ui/sign-in", "/ui/sign-out"}
 NEEDED = {"GET": "read", "POST": "calibrate", "PUT": "admin", "PATCH": "admin", "DELETE": "admin"}
 # Pages that show nothing but how to change something, and a question that takes a body.
 OTHERWISE = {
     "/ui/venues/{venue_id}/calibrate": "calibrate",
     "/ui/venues/{venue_id}/ignore": "admin",
+    "/ui/venues/{venue_id}/settings": "admin",
+    "/ui/venues/{venue_id}/first-pose": "admin",
     "/ui/new-venue": "admin",
     "/ui/new-venue/plan": "read",
 }
@@ -80,6 +82,14 @@ def esc(folder, *arguments, **environment):
     return esc_here(folder, *arguments, **os.environ | {"ESC_DATA": str(folder)} | environment)
 
 
+def test_keys_are_said_to_be_of_this_machine_where_other_commands_go_to_a_service_elsewhere(tmp_path):
+    made = esc_process(
+        tmp_path, "key", "add", "cron", "--scope", "read", ESC_DATA=str(tmp_path), ESC_URL="https://esc.example.com"
+    )
+    assert made.returncode == 0
+    assert "the service at ESC_URL (https://esc.example.com) is not asked" in made.stderr
+
+
 def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
     for route in routes:
         if not isinstance(route.original_route, Guarded):
@@ -96,6 +106,7 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             reason="lines",
             of_edition="0",
             path="page.css",
+            name="refused",
         )
         for caller in (None, *SCOPES):
             answer = guarded.http.request(method, path, headers=bearer(key[caller]) if caller else {})
@@ -118,6 +129,25 @@ def test_the_document_says_which_scope_a_route_needs(guarded):
     assert document["paths"]["/venues/{venue_id}"]["put"]["security"] == [{"key": ["admin"]}]
     assert {"401", "403", "429"} <= document["paths"]["/venues/{venue_id}"]["put"]["responses"].keys()
     assert document["paths"]["/livez"]["get"]["security"] == []
+
+
+def test_the_document_defines_the_world_and_tells_what_each_route_does(guarded):
+    document = guarded.http.get("/openapi.json").json()
+    world = document["info"]["description"]
+    for told in ("centre of the field", "`length_m`", "z up", "metres", "world to camera", "PUT /venues/{venue_id}"):
+        assert told in world
+    used = {tag for path in document["paths"].values() for operation in path.values() for tag in operation["tags"]}
+    assert used == {tag["name"] for tag in document["tags"] if tag["description"]}
+    for path in document["paths"].values():
+        for operation in path.values():
+            assert operation["description"].startswith(operation["summary"].split("`")[0][:20])
+            assert len(operation["summary"].split()) > 2, operation["summary"]
+    layer = document["paths"]["/jobs/{job_id}/stored/{camera}.png"]["get"]
+    assert layer["summary"] == "Draw the field by the pose that was stored, to lay over a frame"
+
+
+def test_a_browser_finds_an_icon_beside_what_names_none(guarded):
+    assert guarded.http.get("/favicon.ico").headers["content-type"] == "image/svg+xml"
 
 
 def test_refusals_are_problems_that_name_the_way_in(guarded, key):
@@ -177,8 +207,8 @@ def test_keys_are_made_listed_and_removed_on_the_machine_of_the_service(start):
     assert service.http.get("/jobs", headers=bearer(key)).status_code == 200
     assert service.stop() == 0
 
-    name, scope, made_at, used_at, until = esc(service.data, "key", "list").stdout.strip().split("\t")
-    assert (name, scope) == ("cron", "calibrate")
+    name, scope, made_at, used_at, until, venues = esc(service.data, "key", "list").stdout.strip().split("\t")
+    assert (name, scope, venues) == ("cron", "calibrate", "all")
     assert made_at <= used_at < until
     again = esc(service.data, "key", "add", "cron", "--scope", "read")
     assert (again.returncode, "There is a key cron already" in again.stderr) == (2, True)

@@ -27,7 +27,6 @@ REACHED = {
     ("PATCH", "/venues/*", 422),
     ("DELETE", "/venues/*", 204),
     ("POST", "/venues/*/calibrate", 202),
-    ("POST", "/venues/*/cameras/left/locate", 202),
     ("GET", "/jobs/*", 200),
     ("GET", "/jobs/*/events", 200),
     ("GET", "/jobs/*/frames/0", 200),
@@ -75,7 +74,15 @@ def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_p
 
     seed = random.randrange(2**32) if EXAMPLES else 1
     command = ["run", f"{guarded.url}/openapi.json", "--checks", "all", "--seed", seed]
-    command += ["--max-examples", EXAMPLES or 8, "--header", f"Authorization: {guarded.http.headers['Authorization']}"]
+    # A map of a lens keeps a core busy for seconds, and the machine may have other work.
+    command += [
+        "--request-timeout",
+        60,
+        "--max-examples",
+        EXAMPLES or 8,
+        "--header",
+        f"Authorization: {guarded.http.headers['Authorization']}",
+    ]
     told = subprocess.run(
         [Path(sys.executable).parent / "schemathesis", *map(str, command)],
         cwd=tmp_path,
@@ -91,4 +98,6 @@ def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_p
         (one["method"], re.sub("/(venues|jobs)/[^/]+", r"/\1/*", one["path"]), one["status"]) for one in requests
     }
     assert REACHED - reached == set()
+    # 200 for whoever waits and sees the job's end.
+    assert {("POST", "/venues/*/cameras/left/locate", status) for status in (200, 202)} & reached
     assert [one for one in requests if one["status"] >= 500] == []

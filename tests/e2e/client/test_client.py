@@ -13,11 +13,11 @@ import httpx
 import pytest
 
 from service import client as client_module
-from service import refused as refused_module
+from service import client_errors as refused_module
 from service.client import AsyncClient, Client, Refused
-from service.wire.health import AlarmEvent, VenueAlarm
-from service.wire.told.events import VenueChange, VenueEvent
-from service.wire.venue import VenueIn
+from service.schemas.events.venue_event import VenueChange, VenueEvent
+from service.schemas.health import AlarmEvent, VenueAlarm
+from service.schemas.venue import VenueIn
 from tests.e2e.running import DEADLINE_S, png, venue, wait_for
 
 
@@ -68,7 +68,7 @@ def test_the_same_without_blocking(service, frames, name):
 def test_both_clients_have_the_same_methods_with_the_same_signatures():
     clients = Client("http://127.0.0.1:9"), AsyncClient("http://127.0.0.1:9")
     names = [name for name in dir(Client) if not name.startswith("_") and name != "url_of"]
-    assert len(names) == 27
+    assert len(names) == 28
     for name in names:
         blocking, awaited = (getattr(client, name) for client in clients)
         assert inspect.signature(blocking) == inspect.signature(awaited)

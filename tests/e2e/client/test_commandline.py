@@ -1,20 +1,21 @@
 import json
 import os
+import pty
 import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from importlib.metadata import version
 from pathlib import Path
 
 import httpx
 import pytest
 from typer.main import get_command
 
+from service import build
 from service.cli.main import app_of
-from service.store.engine import SCHEMA_TABLE, connect, migrate, writing
+from service.store.database import SCHEMA_TABLE, connect, migrate, writing
 from tests.e2e.commands import esc_here, esc_process
-from tests.e2e.running import FRAMES, png, venue, wait_for
+from tests.e2e.running import FRAMES, keys_in, png, venue, wait_for
 
 # An editor in which somebody changes the name, while somebody else may put another one.
 MEDDLING = """
@@ -37,6 +38,39 @@ def test_a_venue_is_put_read_listed_and_deleted(esc, name, tmp_path):
     gone = esc("venue", "get", name)
     assert gone.returncode == 1
     assert "There is no such venue" in gone.stderr
+
+
+@pytest.mark.parametrize(("said", "options", "code"), [("n\n", [], 1), ("y\n", [], 0), ("", ["--yes"], 0)])
+def test_a_venue_is_deleted_at_a_terminal_only_after_a_yes(service, tmp_path, name, said, options, code):
+    service.venue(name)
+    terminal, its_end = pty.openpty()
+    os.write(terminal, said.encode())
+    command = [sys.executable, "-m", "service.cli", "venue", "delete", name, *options]
+    answer = subprocess.run(
+        command,
+        cwd=tmp_path,
+        env=os.environ | {"ESC_URL": service.url},
+        stdin=its_end,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    os.close(terminal)
+    os.close(its_end)
+    assert answer.returncode == code, answer.stderr
+    assert service.http.get(f"/venues/{name}").status_code == (404 if code == 0 else 200)
+    assert ("Nothing was deleted." in answer.stderr) == (code == 1)
+    assert ("its jobs stay" in answer.stderr) == (code == 0)
+    assert ("cannot be undone" in answer.stderr) == (not options)
+
+
+def test_the_names_of_a_sports_points_are_listed(esc):
+    listed = esc("pose", "--points", "tennis")
+    assert listed.returncode == 0
+    assert "left near corner\t-11.88\t-5.49" in listed.stdout.splitlines()
+    assert "far doubles sideline, {distance} m from the left baseline" in listed.stdout.splitlines()
+    unknown = esc("pose", "--points", "soccer")
+    assert (unknown.returncode, "football" in unknown.stderr) == (2, True)
 
 
 def test_a_wrong_venue_file_is_a_usage_error(esc, tmp_path):
@@ -301,8 +335,26 @@ def test_the_service_and_its_key_may_be_named_in_a_file(service, name, tmp_path)
     assert esc_here(tmp_path, "venue", "get", name, "--url", "http://127.0.0.1:9", **without).returncode == 75
 
 
+def test_the_key_may_stand_in_a_file_of_its_own(start, tmp_path):
+    service = start("serve")
+    key = keys_in(service.data).add("cron", "read")
+    (tmp_path / "key").write_text(f"{key}\n")
+    variables = {"ESC_URL": service.url, "ESC_API_KEY_FILE": "key"}
+    assert esc_here(tmp_path, "venue", "list", ESC_URL=service.url).returncode == 1
+    assert esc_here(tmp_path, "venue", "list", **variables).returncode == 0
+    twice = esc_here(tmp_path, "venue", "list", **variables | {"ESC_API_KEY": key})
+    assert (twice.returncode, "ESC_API_KEY_FILE are" in twice.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["ESC_DATABASE_URL_FILE", "AWS_SECRET_ACCESS_KEY_FILE"])
+def test_a_secret_whose_file_is_missing_is_a_usage_error(tmp_path, name):
+    started = esc_process(tmp_path, "serve", **{name: "/nowhere/secret"})
+    assert (started.returncode, f"{name}: /nowhere/secret cannot be read" in started.stderr) == (2, True)
+    assert "Traceback" not in started.stderr
+
+
 def test_the_version_is_told(esc):
-    assert esc("--version").stdout == f"esc {version('esc-calibration')}\n"
+    assert esc("--version").stdout == f"esc {build.description()}\n"
 
 
 def test_a_shell_is_taught_the_commands():
@@ -365,6 +417,13 @@ def test_a_wrong_setting_is_told(tmp_path):
     answer = esc_here(tmp_path, "serve", ESC_QUEUE_LIMIT="many")
     assert answer.returncode == 2
     assert "ESC_QUEUE_LIMIT" in answer.stderr
+    assert esc_here(tmp_path, "serve", ESC_DATABASE_URL="mysql://x").stderr.startswith("ESC_DATABASE_URL: expected is ")
+
+
+def test_a_list_among_the_settings_that_is_no_json_is_told_in_a_line(tmp_path):
+    answer = esc_here(tmp_path, "serve", ESC_SOURCES="127.0.0.1")
+    assert (answer.returncode, answer.stdout) == (2, "")
+    assert answer.stderr == 'ESC_SOURCES: expected a list in JSON, for instance ["127.0.0.1"]\n'
 
 
 @pytest.mark.parametrize("command", [("serve", "--port", "0"), ("worker",)])
@@ -417,7 +476,7 @@ def test_a_worker_alone_serves_an_api_alone(start):
     assert service.end(job)["status"] == "succeeded"
     worker.send_signal(signal.SIGTERM)
     assert worker.wait(30) == 0
-    wait_for(lambda: service.http.get("/readyz").status_code == 503)
+    wait_for(lambda: "worker" in service.http.get("/readyz").json()["warnings"])
 
 
 def test_refined_poses_are_exported_and_stored_by_name(service, esc, name):
@@ -433,6 +492,25 @@ def test_refined_poses_are_exported_and_stored_by_name(service, esc, name):
     assert history[2:4] == ["adopted", job["id"]]
     none = esc("venue", "adopt", name, "middle")
     assert (none.returncode, "left, right" in none.stderr) == (1, True)
+
+
+def test_a_number_of_the_field_that_a_job_offers_is_stored_by_name(service, esc, name):
+    job = service.calibrated(service.venue(name, "contradict"))["id"]
+    stored = json.loads(esc("venue", "adopt", name, "--field", "ridge_height_m", "--job", job).stdout)
+    assert stored["field"]["ridge"] == [[-18.5, 0.0, 0.332], [18.5, 0.0, 0.332]]
+    history = esc("venue", "history", name, "--limit", "1").stdout.split()
+    assert history[2:4] == ["adopted", job]
+    beyond = esc("venue", "adopt", name, "--field", "length_m", "--job", job)
+    assert (beyond.returncode, "60 to 130 m" in beyond.stderr) == (1, True)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [(), ("left", "--field", "length_m"), ("--field", "length_m"), ("left", "--job", "0" * 26), ("--job", "7")],
+)
+def test_either_a_lens_is_stored_or_a_number_of_the_field(esc, arguments):
+    refused = esc("venue", "adopt", "main", *arguments)
+    assert (refused.returncode, refused.stdout) == (2, "")
 
 
 def test_a_lens_without_a_sigma_is_told_beside_the_venue(service, esc, name, tmp_path):

@@ -35,15 +35,17 @@ def test_help_and_completion_load_neither_models_nor_what_travels():
     for packages in (loaded("job", "list", "--help"), loaded("job", "get", "none"), loaded(**asked)):
         assert "typer" in packages
         assert not packages & {"httpx", "httpcore", "sqlalchemy", "numpy"}
-    models = "import sys, service.cli.main; print([name for name in sys.modules if name.startswith('service.wire.')])"
+    models = (
+        "import sys, service.cli.main; print([name for name in sys.modules if name.startswith('service.schemas.')])"
+    )
     told = subprocess.run([sys.executable, "-c", models], capture_output=True, text=True, check=True)
-    assert told.stdout == "['service.wire.names']\n"
+    assert told.stdout == "['service.schemas.names']\n"
 
 
 def test_a_command_that_asks_for_venues_loads_neither_results_nor_another_command_line(service):
     modules = loaded("venue", "list", "--url", service.url)
-    assert {"httpx", "service.client", "service.wire.venue"} <= modules
-    assert not modules & {"asyncio", "httpx._main", "rich", "click", "service.wire.job", "service.wire.results"}
+    assert {"httpx", "service.client", "service.schemas.venue"} <= modules
+    assert not modules & {"asyncio", "httpx._main", "rich", "click", "service.schemas.job", "service.schemas.results"}
 
 
 def test_commands_of_the_client_load_neither_the_server_nor_the_engine():

@@ -5,7 +5,7 @@ import json
 import av
 import pytest
 
-from service.wire.venue import VenueIn
+from service.schemas.venue import VenueIn
 from tests.worker.calibration.synthetic import pair
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
 from tests.worker.video.shaking import COUNT, film_shaking

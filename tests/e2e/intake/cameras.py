@@ -14,7 +14,7 @@ REALM = 'realm="camera", nonce="abc", qop="auth"'
 
 class NetworkCamera:
     """Answers at `/ok`, `/basic`, `/digest` (user:pass word), `/gone`, `/elsewhere`, `/hang`, `/drip`, `/endless`,
-    `/stream`, `/text`, `/small`; `asked` counts what came."""
+    `/mjpeg` and its kind, `/text`, `/small`; `asked` counts what came."""
 
     def __init__(self) -> None:
         self.asked: list[str] = []
@@ -52,6 +52,8 @@ class NetworkCamera:
                 right = given.startswith("Digest ") and _digest(given) in given
                 headers = {} if right else {"WWW-Authenticate": f"Digest {REALM}"}
                 self._send(request, 200 if right else 401, png() if right else b"", **headers)
+            case "/snap?usr=admin&pwd=hunter2":
+                self._send(request, 200, png())
             case "/elsewhere":
                 self._send(request, 302, b"", Location="/ok")
             case "/hang":
@@ -66,7 +68,13 @@ class NetworkCamera:
                 request.end_headers()
                 while True:
                     request.wfile.write(bytes(65536))
-            case "/stream":
+            case "/mjpeg":
+                self._endless(request, b"--x\r\nContent-Type: image/png\r\n\r\n" + png() + b"\r\n")
+            case "/mjpeg-never-whole":
+                self._endless(request, b"--x\r\nContent-Length: 99999999\r\n\r\n" + bytes(65536), bytes(65536))
+            case "/mjpeg-silent":
+                self._endless(request, b"--x\r\nContent-Length: 9\r\n\r\n", b"")
+            case "/mjpeg-short":
                 self._send(request, 200, b"--x", **{"Content-Type": "multipart/x-mixed-replace; boundary=x"})
             case "/text":
                 self._send(request, 200, b"<html>")
@@ -81,6 +89,15 @@ class NetworkCamera:
             request.send_header(name, value)
         request.end_headers()
         request.wfile.write(body)
+
+    def _endless(self, request: BaseHTTPRequestHandler, first: bytes, then: bytes | None = None) -> None:
+        request.send_response(200)
+        request.send_header("Content-Type", "multipart/x-mixed-replace; boundary=x")
+        request.end_headers()
+        request.wfile.write(first)
+        while True:
+            request.wfile.write(first if then is None else then)
+            time.sleep(0.01)
 
     def close(self) -> None:
         self._server.shutdown()

@@ -8,7 +8,9 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import sqlalchemy as sa
 
-from service.intake.snapshots import STARTING_S
+from service.intake.snapshots import STARTING_S, Snapshots
+from service.schemas.venue import VenueIn
+from service.settings import Settings
 from service.store import tables
 from tests.e2e.intake.cameras import NetworkCamera
 from tests.e2e.running import png, upload, venue, wait_for
@@ -60,6 +62,33 @@ def test_the_same_request_is_the_same_job_and_fetches_nothing_again(service, cam
     assert (again.status_code, again.json()["id"], len(camera.asked)) == (200, first.json()["id"], asked)
 
 
+def test_of_motion_jpeg_the_first_picture_is_the_frame(service, camera, name):
+    put(service, name, left=camera.url("/mjpeg"), right=camera.url("/ok"))
+    picture = service.http.get(f"/venues/{name}/cameras/left/snapshot")
+    assert (picture.status_code, picture.content) == (200, png())
+
+
+def test_several_frames_of_each_camera_are_taken_as_far_apart_as_asked(camera, tmp_path):
+    stored = VenueIn.model_validate(with_sources("v", left=camera.url("/ok"), right=camera.url("/mjpeg"))).to_venue()
+    snapshots = Snapshots(Settings(data=tmp_path, sources=["127.0.0.1"], source_timeout_s=30), lambda _: None)
+    asked, begun = len(camera.asked), time.monotonic()
+    taken = snapshots.take_of_all(stored.cameras, {}, frames=3, spacing_s=0.5)
+    assert time.monotonic() - begun >= 1
+    assert taken == {"left": [png()] * 3, "right": [png()] * 3}
+    assert sorted(camera.asked[asked:]) == ["/mjpeg"] * 3 + ["/ok"] * 3
+
+
+def test_a_schedule_that_wants_more_frames_than_an_upload_may_have_is_refused(unusual, camera, name):
+    document = with_sources(name, left=camera.url("/ok"), right=camera.url("/ok"))
+    schedule = {"cron": "0 4 * * *", "frames": 3}
+    refused = unusual.http.put(f"/venues/{name}", json=document | {"schedule": schedule})
+    assert (refused.status_code, refused.json()["type"], refused.json()["expected"]) == (
+        422,
+        "/problems/too-many-frames",
+        2,
+    )
+
+
 @pytest.mark.parametrize("way", ["basic", "digest"])
 def test_user_and_password_reach_the_camera_and_nobody_else(service, camera, name, way):
     shown = put(service, name, left=camera.url(f"/{way}", "user:pass%20word@"), right=camera.url("/ok"))
@@ -73,6 +102,42 @@ def test_user_and_password_reach_the_camera_and_nobody_else(service, camera, nam
     told = json.dumps([job, service.http.get(f"/venues/{name}").json(), service.http.get("/venues").json()])
     seen = told + (service.data / "log").read_text()
     assert not [secret for secret in ("pass%20word", "pass word") if secret in seen]
+
+
+def test_a_password_among_the_parameters_is_shown_to_nobody_and_still_reaches_the_camera(service, camera, name):
+    shown = put(service, name, left=camera.url("/snap?usr=admin&pwd=hunter2"), right=camera.url("/gone?pwd=s3cret"))
+    assert shown["cameras"][0]["source"] == camera.url("/snap?usr=***&pwd=***")
+    got = service.http.get(f"/venues/{name}")
+    assert service.http.put(f"/venues/{name}", json=got.json()).status_code == 200
+    assert service.http.get(f"/venues/{name}").content == got.content
+    assert service.http.get(f"/venues/{name}/cameras/left/snapshot").content == png()
+    failed = service.http.post(f"/venues/{name}/calibrate")
+    assert (failed.status_code, failed.json()["source"]) == (502, camera.url("/gone?pwd=***"))
+    assert "/gone?pwd=s3cret" in camera.asked
+    seen = shown | {"problem": failed.text, "list": service.http.get("/venues").text}
+    assert not [secret for secret in ("hunter2", "s3cret") if secret in json.dumps(seen)]
+    assert not [secret for secret in ("hunter2", "s3cret") if secret in (service.data / "log").read_text()]
+
+
+def test_a_password_in_a_venue_of_an_older_release_is_hidden_and_kept(service, camera, name):
+    put(service, name, left=camera.url("/snap?x=1"), right=camera.url("/ok"))
+    v = tables.venues.c
+    with service.database() as connection:
+        document = connection.scalar(sa.select(v.document).where(v.id == name))
+        document["cameras"][0]["source"] = camera.url("/snap?usr=admin&pwd=hunter2")
+        connection.execute(sa.update(tables.venues).where(v.id == name).values(document=document))
+    got = service.http.get(f"/venues/{name}")
+    assert got.json()["cameras"][0]["source"] == camera.url("/snap?usr=***&pwd=***")
+    for _ in range(2):
+        assert service.http.get(f"/venues/{name}/cameras/left/snapshot").content == png()
+        assert service.http.put(f"/venues/{name}", json=got.json()).status_code == 200
+
+
+def test_a_parameter_that_nobody_knows_is_refused_by_its_name(service, camera, name):
+    document = with_sources(name, left=camera.url("/snap?token=***"))
+    refused = service.http.put(f"/venues/{name}", json=document)
+    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/source-refused")
+    assert "`token`" in refused.json()["detail"]
 
 
 def sent_again(shown: dict) -> dict:
@@ -95,7 +160,8 @@ def test_a_password_does_not_follow_a_source_to_another_host(service, camera, na
         ("/basic", "source-failed", "check user and password"),
         ("/elsewhere", "source-failed", "leads elsewhere"),
         ("/endless", "source-failed", "ESC_MAX_FRAME_MB"),
-        ("/stream", "source-failed", "a single picture"),
+        ("/mjpeg-short", "source-failed", "ended before the first was whole"),
+        ("/mjpeg-never-whole", "source-failed", "ESC_MAX_FRAME_MB"),
         ("/text", "not-an-image", "as JPEG or PNG"),
         ("/small", "frame-size", "64x48"),
     ],
@@ -108,7 +174,7 @@ def test_a_source_that_gives_no_frame_is_named_with_what_came(service, camera, n
     assert service.http.get("/jobs", params={"venue": name}).json()["jobs"] == []
 
 
-@pytest.mark.parametrize("path", ["/hang", "/drip", "rtsp"])
+@pytest.mark.parametrize("path", ["/hang", "/drip", "/mjpeg-silent", "rtsp"])
 def test_a_source_that_is_too_slow_is_given_up(unusual, camera, name, path):
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = "rtsp://user:pass@{}:{}/live".format(*silent.getsockname()) if path == "rtsp" else camera.url(path)

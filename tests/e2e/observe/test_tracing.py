@@ -17,8 +17,8 @@ PARENT = "00f067aa0ba902b7"
 # Nothing of what sends spans.
 LIGHT = """
 import sys
-import service.app, service.serving, worker.process
-from service.observe import tracing
+import service.app, service.serving, worker.supervisor
+from service.observability import tracing
 tracing.configure("esc", "here")
 tracing.flush()
 loaded = [name for name in sys.modules if name.startswith(("opentelemetry.sdk", "opentelemetry.exporter"))]

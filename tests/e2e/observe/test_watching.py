@@ -97,5 +97,6 @@ def test_the_worker_calls_a_job_what_its_request_was_called(service, name):
         )
     )
     assert {(line["request"], line["trace"]) for line in lines} == {("night-run-7", trace)}
+    assert [line["verdict"] for line in lines if line["event"] == "job ends"] == ["accepted"]
     (asked,) = [line for line in log(service) if line.get("path") == f"/venues/{name}/calibrate"]
     assert (asked["request"], asked["trace"], asked["status"]) == ("night-run-7", trace, 202)

@@ -11,8 +11,8 @@ import pytest
 
 from tests.e2e.commands import esc_here
 from tests.e2e.running import png
-from tests.worker.calibration.first.test_first_pose import CAMERA, LENS, SIZE, clicks
-from tests.worker.calibration.first.test_lens_calibration import BOARD, PINHOLE, corners_seen, photograph, places
+from tests.worker.calibration.onboarding.test_first_pose import CAMERA, LENS, SIZE, clicks
+from tests.worker.calibration.onboarding.test_lens_calibration import BOARD, PINHOLE, corners_seen, photograph, places
 
 WAIT = {"wait": 60}
 
@@ -219,3 +219,27 @@ def test_esc_says_which_cameras_had_their_points_exchanged(tmp_path):
     assert posed.returncode == 3, posed.stderr
     assert posed.stderr.count("the points of the two cameras are exchanged, or else their lenses") == 2
     assert not (tmp_path / "v.json").exists()
+
+
+def test_esc_hints_at_points_of_one_camera_that_were_given_for_two(tmp_path):
+    """With the lens fitted to them, the points of another camera fit; the focal length is the other one's."""
+    longer = replace(LENS, matrix=LENS.matrix * [[1.08, 1, 1], [1, 1.08, 1], [1, 1, 1]])
+    for name, lens in (("left", LENS), ("right", longer)):
+        described = {"matrix": lens.matrix.tolist(), "distortion": lens.distortion.tolist()}
+        (tmp_path / f"{name}.json").write_text(json.dumps({"image_size": list(SIZE), "intrinsics": described}))
+    (tmp_path / "site.json").write_text(json.dumps({key: venue("v")[key] for key in ("id", "field")}))
+    of_right = points(clicks(camera=CAMERA.with_lens(longer)))
+    (tmp_path / "clicks.json").write_text(json.dumps({"left": of_right, "right": of_right}))
+    posed = esc_here(tmp_path, "pose", "site.json", "clicks.json", "left=left.json", "right=right.json", "-o", "v.json")
+    assert posed.returncode == 0, posed.stderr
+    assert posed.stderr.count("which is nearer to the lens of right (1350 px) than to that of left (1250 px)") == 1
+
+
+def test_a_file_that_is_no_lens_is_answered_with_one(tmp_path):
+    (tmp_path / "site.json").write_text(json.dumps({key: venue("v")[key] for key in ("id", "field")}))
+    (tmp_path / "clicks.json").write_text(json.dumps({"left": points()}))
+    (tmp_path / "left.json").write_text(json.dumps({"matrix": []}))
+    posed = esc_here(tmp_path, "pose", "site.json", "clicks.json", "left=left.json", "-o", "v.json")
+    assert posed.returncode == 2
+    assert "image_size is missing" in posed.stderr
+    assert 'Expected is {"image_size": [3840, 2160], "intrinsics": {"matrix": ' in posed.stderr

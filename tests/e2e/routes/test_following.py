@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,9 +12,11 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service import lifeline
+from service import child_process
+from service.store.database import connect
+from service.store.venues import VenueRepository
 from tests.e2e.running import DEADLINE_S, Service, venue, wait_for
-from tests.e2e.worker.test_callbacks import LOCAL
+from tests.e2e.worker.test_callbacks import LOCAL, SECRET
 from tests.homes import in_both_homes
 from tests.worker.receiver import Receiver
 
@@ -130,14 +133,19 @@ def test_who_asks_for_the_head_of_a_stream_alone_gets_it_and_takes_nobodys_place
     job = service.submitted("v")
     for _ in range(3):
         for stream in ("/venues/v/events", f"/jobs/{job}/events"):
-            head = service.http.head(stream, timeout=5)
-            assert (head.status_code, head.headers["content-type"]) == (200, "text/event-stream; charset=utf-8")
+            # The place of the head before is given back a moment after its answer.
+            wait_for(lambda stream=stream: _head(service, stream) == (200, "text/event-stream; charset=utf-8"))
     wait_for(lambda: _status(service) == 200)
 
 
 def _status(service) -> int:
     with service.http.stream("GET", "/venues/v/events") as answer:
         return answer.status_code
+
+
+def _head(service, stream) -> tuple[int, str]:
+    head = service.http.head(stream, timeout=5)
+    return head.status_code, head.headers["content-type"]
 
 
 def _threads(service) -> int:
@@ -179,6 +187,42 @@ def test_a_webhook_that_could_not_be_told_is_refused(service, name):
     assert service.http.put(f"/venues/{name}", json=venue(name) | {"webhooks": [unknown]}).status_code == 422
 
 
+SLACK = "https://hooks.slack.example/services/T0/B0/s3cret"
+
+
+def test_addresses_that_are_told_are_shown_by_their_host_and_come_back_whole(start):
+    service = start("serve", ESC_WEBHOOK_SECRET=SECRET)
+    told = {
+        "webhooks": [{"url": SLACK}, {"url": f"{SLACK}2"}, {"url": "https://plain.example"}],
+        "alarms": {"rejected_in_a_row": 2, "callback_url": f"{SLACK}?alarm"},
+    }
+    put = service.http.put("/venues/v", json=venue("v") | told)
+    got = service.http.get("/venues/v")
+    first, second, plain = (webhook["url"] for webhook in got.json()["webhooks"])
+    assert re.fullmatch(r"https://hooks\.slack\.example/\*\*\*-[0-9a-f]{8}", first)
+    assert (first != second, plain) == (True, "https://plain.example/")
+    seen = [put.text, got.text, service.http.get("/venues").text, (service.data / "log").read_text()]
+    assert not [text for text in seen if "s3cret" in text]
+    # As it was read, it is put again, and a patch may have what was shown in another order.
+    again = service.http.put("/venues/v", json=got.json(), headers={"If-Match": got.headers["ETag"]})
+    assert (again.status_code, service.http.get("/venues/v").content) == (200, got.content)
+    patch = {"webhooks": [{"url": second}, {"url": first}, {"url": "https://new.example/told"}]}
+    patched = service.http.patch("/venues/v", json=patch, headers={"Content-Type": "application/merge-patch+json"})
+    assert [webhook["url"] for webhook in patched.json()["webhooks"]][:2] == [second, first]
+    kept = VenueRepository(connect(service.database_url)).get("v")
+    assert [webhook.url for webhook in kept.webhooks] == [f"{SLACK}2", SLACK, "https://new.example/told"]
+    assert kept.alarms.callback_url == f"{SLACK}?alarm"
+
+
+def test_an_address_that_is_shown_of_another_venue_is_refused(start):
+    service = start("serve", ESC_WEBHOOK_SECRET=SECRET)
+    service.http.put("/venues/v", json=venue("v") | {"webhooks": [{"url": SLACK}]}).raise_for_status()
+    webhooks = service.http.get("/venues/v").json()["webhooks"]
+    refused = service.http.put("/venues/w", json=venue("w") | {"webhooks": webhooks})
+    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/callback-refused")
+    assert "send the address itself" in refused.json()["detail"]
+
+
 def test_the_renderer_of_the_documents_has_the_poses_also_after_a_restart_of_the_service(start, tmp_path):
     service = start("up").ready()
     service.venue("v")
@@ -186,7 +230,7 @@ def test_the_renderer_of_the_documents_has_the_poses_also_after_a_restart_of_the
     # With the standard library alone: whoever draws has copied the file.
     command = [sys.executable, "-I", "-S", RENDERER, service.url, "v", file]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env=os.environ | lifeline.for_child()
+        command, stdout=subprocess.PIPE, text=True, env=os.environ | child_process.for_child()
     ) as renderer:
         try:
             assert renderer.stdout.readline() == "revision 1 (put)\n"

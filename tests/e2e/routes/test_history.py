@@ -90,7 +90,10 @@ def test_the_command_line_goes_back_too(service, esc, name):
     assert f'"id": "{job}"' in esc("job", "accept", job).stdout
     newest, oldest = (line.split("\t") for line in esc("venue", "history", name).stdout.splitlines())
     assert (newest[0], newest[2:4]) == ("2", ["accepted", job])
-    assert (oldest[0], oldest[2:]) == ("1", ["put", "-", "left:-/0.0 right:-/0.0"])
+    assert (oldest[0], oldest[2:]) == (
+        "1",
+        ["put", "-", "left:-/0.0 right:-/0.0", "anyone from 127.0.0.1"],
+    )
     assert f'"id": "{name}"' in esc("venue", "restore", name, "1").stdout
     assert positions(service, name) == [-1.0, -1.0]
     assert len(esc("venue", "history", name, "--limit", "2").stdout.splitlines()) == 2

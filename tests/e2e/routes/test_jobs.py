@@ -1,4 +1,5 @@
 import json
+import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
@@ -10,6 +11,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from service.store.blobs import Blobs
+from tests.e2e.observe.figures import figures
 from tests.e2e.running import DEADLINE_S, SIZE, alive, png, upload, venue, wait_for
 from tests.homes import in_both_homes
 
@@ -353,13 +355,25 @@ def test_a_full_queue_says_so_and_when_to_come_again(unusual):
     assert [answer.status_code for answer in answers] == [202, 202, 429]
     assert (answers[2].json()["type"], answers[2].headers["retry-after"]) == ("/problems/queue-full", "30")
     assert len(unusual.files("frames")) == 2 * len(("left", "right"))
+    # Before the body is there.
+    url = httpx.URL(unusual.url)
+    with socket.create_connection((url.host, url.port), timeout=10) as connection:
+        form = "Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 5000\r\n"
+        connection.sendall(f"POST /venues/venue-2/calibrate HTTP/1.1\r\nHost: 127.0.0.1\r\n{form}\r\n".encode())
+        assert connection.recv(1000).startswith(b"HTTP/1.1 429 ")
+    with unusual.database() as database:
+        assert database.scalar(sa.select(sa.func.count()).select_from(tables.leftovers)) == 0
     for answer in answers[:2]:
         unusual.http.post(f"/jobs/{answer.json()['id']}/cancel").raise_for_status()
 
 
-def test_nothing_is_ready_without_a_worker(unusual):
+def test_without_a_worker_a_service_goes_on_answering_and_says_what_is_missing(unusual):
     answer = unusual.http.get("/readyz")
-    assert (answer.status_code, answer.json()["parts"]["worker"]) == (503, "none gave a sign of life")
+    assert (answer.status_code, answer.json()["status"]) == (200, "ok")
+    assert answer.json()["parts"]["worker"] == "none gave a sign of life"
+    assert answer.json()["warnings"].keys() == {"worker", "model"}
+    assert figures(unusual)["esc_part_up", ("part", "worker")] == 0
+    assert figures(unusual)["esc_part_up", ("part", "database")] == 1
 
 
 @in_both_homes
@@ -396,3 +410,10 @@ def test_a_job_whose_frames_are_past_their_time_names_none(service, name):
         410,
         "/problems/frames-deleted",
     )
+
+
+@pytest.mark.parametrize("nonsense", ["XYZ", "01kaj3q6wz5t3y8r0n4m2c7b1d", "%00", "a" * 300])
+def test_an_id_that_no_job_can_have_is_answered_as_that_of_a_job_that_is_gone(service, nonsense):
+    for path in ("", "/preview.jpg"):
+        answer = service.http.get(f"/jobs/{nonsense}{path}")
+        assert (answer.status_code, answer.json()["type"]) == (404, "/problems/job-not-found")

@@ -55,6 +55,19 @@ def test_a_lens_of_which_nobody_says_how_well_it_is_known_is_said_to_be_taken_fo
     assert "warnings" not in service.http.get(f"/venues/{name}").json()
 
 
+def test_a_pose_in_another_convention_is_named_by_put_and_by_patch(service, name):
+    document = venue(name, cameras=("left",))
+    document["cameras"][0]["intrinsics"]["sigma"] = {"fx": 0.5}
+    assert service.http.put(f"/venues/{name}", json=document).json()["warnings"] == []
+    pose = document["cameras"][0]["pose"]
+    pose["rotation"] = [-component for component in pose["rotation"]]
+    put = service.http.put(f"/venues/{name}", json=document)
+    (warning,) = put.json()["warnings"]
+    assert (put.status_code, warning.startswith("camera left: its pose sees 0 m of markings")) == (200, True)
+    assert "its rotation goes from camera to world" in warning
+    assert patched(service, name, {"name": "other"}).json()["warnings"] == [warning]
+
+
 def test_a_conditional_put_of_an_outdated_venue_is_refused(service, name):
     old, new = (service.http.put(f"/venues/{name}", json=venue(name, b)).headers["etag"] for b in ("accept", "other"))
     answer = service.http.put(f"/venues/{name}", json=venue(name), headers={"If-Match": old})

@@ -15,7 +15,7 @@ from service.store import tables
 from tests.e2e.commands import esc_here
 from tests.e2e.running import wait_for
 from tests.worker.receiver import Receiver
-from worker.duties import webhook
+from worker.duties import webhook_request
 
 SECRET = "whsec_" + b64encode(bytes(32)).decode()
 LOCAL = {"ESC_WEBHOOK_SECRET": SECRET, "ESC_CALLBACK_ALLOW_HTTP": "true", "ESC_CALLBACK_ALLOW_PRIVATE": "true"}
@@ -52,11 +52,11 @@ def test_the_worker_that_is_killed_over_a_callback_sends_it_again_when_it_is_bac
     wait_for(lambda: len(receiver.received) == 2)
     first, second = receiver.received
     assert (first.body, first.headers["webhook-id"]) == (second.body, job)
-    told = {"type": "job.succeeded", "timestamp": ended["finished_at"], "data": ended | {"callback": None}}
+    told = {"type": "job.succeeded", "timestamp": ended["finished_at"], "data": ended | {"callback": None}, "by": None}
     assert json.loads(second.body) == told
     keys = Settings(webhook_secret=SECRET).webhook_keys
     at = datetime.fromtimestamp(int(second.headers["webhook-timestamp"]), UTC)
-    assert second.headers.items() >= webhook.headers(job, at, second.body, keys).items()
+    assert second.headers.items() >= webhook_request.headers(job, at, second.body, keys).items()
     wait_for(lambda: 'esc_callbacks_total{outcome="delivered"} 1.0' in service.http.get("/metrics").text)
 
 

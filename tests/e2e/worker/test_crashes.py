@@ -109,7 +109,7 @@ def test_two_workers_of_one_name_do_not_run_on_one_machine(service):
 
 
 def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):
-    service = start().ready()
+    service = start(cold=True).ready()
     job = service.submitted(service.venue("v", "accept 2"))
     service.running(job)
     worker = service.worker()
@@ -132,7 +132,7 @@ def test_a_job_whose_202_arrived_survives_the_kill_of_everything(start):
 
 
 def test_a_service_that_is_asked_to_stop_does_so_whoever_still_waits(start):
-    service = start().ready()
+    service = start("up", ESC_DRAIN_S="1").ready()
     job = service.submitted(service.venue("v", "hang"))
     service.running(job)
     worker = service.worker()
@@ -240,7 +240,11 @@ def test_a_disk_without_a_byte_left_stops_nobody_for_longer_than_that(small_disk
         wait_for(lambda: service.http.get("/readyz").json()["parts"]["worker"] != "ok")
         answer = service.submit("w")
         assert (answer.status_code, answer.json()["type"]) == (503, "/problems/unavailable")
-    assert service.end(job)["error"]["type"] == "/problems/job-crashed"
+    ended = service.end(job)
+    # Its poses were found, its pictures found no room.
+    assert ended["status"] == "succeeded"
+    assert "pictures cannot be stored" in ended["result"]["warnings"][0]
+    assert poses(service, "v") == [-0.875, -0.875]
     service.ready()
     assert service.calibrated("w")["status"] == "succeeded"
     assert service.worker() == worker

@@ -9,10 +9,10 @@ import pytest
 
 from models.training.pitches.render import Conditions, render_frame
 from tests.e2e.running import Service
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
-from worker.calibration.scene.rotation import rotation_angles_deg
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
+from worker.calibration.geometry.rotation import rotation_angles_deg
 
 SIZE = (1280, 720)
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
@@ -104,11 +104,14 @@ def test_a_black_frame_is_rejected_by_the_name_of_its_camera_and_the_stored_pose
     assert stored_position(service, name, 1) == venue(name)["cameras"][1]["pose"]["position"]
 
 
-def test_a_stored_pose_that_looks_at_the_sky_fails_by_the_name_of_its_camera(service, name):
+def test_a_stored_pose_that_looks_at_the_sky_is_refused_by_the_name_of_its_camera_and_the_other_is_calibrated(
+    service, name
+):
     job = calibrated(service, venue(name, right_turn=np.array([1.2, 0.0, 0.0])), frames())
-    assert job["status"] == "failed"
-    assert job["error"]["camera"] == "right"
-    assert "first pose" in job["error"]["detail"]
+    left, right = job["result"]["cameras"]
+    assert (left["accepted"], right["accepted"]) == (True, False)
+    assert right["refusal"] == "/refusals/no-markings-in-view"
+    assert "first pose" in right["rejected_because"]
     assert service.http.get("/readyz").status_code == 200
 
 

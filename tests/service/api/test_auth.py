@@ -9,27 +9,27 @@ from fastapi import APIRouter
 from starlette.requests import HTTPConnection
 from structlog.testing import capture_logs
 
-from service.api.auth import BELIEVED_FOR_S, COOKIE, GUESS_EVERY_S, GUESSES, Gate, page_token
+from service.api.auth import COOKIE, GUESS_EVERY_S, GUESSES, KEY_CACHED_FOR_S, Authenticator, page_token
 from service.routes.contract.guarded import Guarded
+from service.schemas.problems import Problem
 from service.settings import Settings
-from service.store.keys import Keys, hash_of
-from service.store.sessions import Sessions
-from service.wire.problems import Problem
+from service.store.keys import KeyRepository, hash_of
+from service.store.sessions import SessionRepository
 from tests.service.api.test_rate_limit import Clock
 
-JUST_BEFORE, JUST_AFTER = BELIEVED_FOR_S - 0.1, BELIEVED_FOR_S + 0.1
+JUST_BEFORE, JUST_AFTER = KEY_CACHED_FOR_S - 0.1, KEY_CACHED_FOR_S + 0.1
 # `esc calibrate --wait` asks so often for a job.
 FOLLOWS_PER_S = 2
 
 
 @pytest.fixture
 def keys(engine):
-    return Keys(engine)
+    return KeyRepository(engine)
 
 
 @pytest.fixture
 def sessions(engine):
-    return Sessions(engine)
+    return SessionRepository(engine)
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def clock():
 @pytest.fixture
 def gate(keys, sessions, clock):
     """Of a service that listens on loopback."""
-    return Gate(keys, sessions, Settings(), clock)
+    return Authenticator(keys, sessions, Settings(), clock)
 
 
 def caller(key=None, address="192.0.2.1", scheme="Bearer", method="GET", **others):
@@ -81,12 +81,12 @@ def test_a_service_that_asked_for_keys_goes_on_asking_when_the_last_one_is_remov
 
 
 def test_beyond_this_machine_a_key_is_needed_even_if_there_is_none(keys, sessions):
-    assert kind(Gate(keys, sessions, Settings(host="0.0.0.0"))) == "key-missing"
+    assert kind(Authenticator(keys, sessions, Settings(host="0.0.0.0"))) == "key-missing"
 
 
 def test_switched_off_it_asks_for_nothing(keys, sessions):
     keys.add("ops", "admin")
-    assert kind(Gate(keys, sessions, Settings(host="0.0.0.0", auth="off")), needed="admin") == "passed"
+    assert kind(Authenticator(keys, sessions, Settings(host="0.0.0.0", auth="off")), needed="admin") == "passed"
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_uses_are_remembered_while_the_database_is_away(gate, keys, monkeypatch)
 
 
 def test_a_key_that_asks_too_often_is_told_when_to_come_back(keys, sessions, clock):
-    gate = Gate(keys, sessions, Settings(rate_per_s=0.5, rate_burst=3), clock)
+    gate = Authenticator(keys, sessions, Settings(rate_per_s=0.5, rate_burst=3), clock)
     hasty, other = keys.add("hasty", "read"), keys.add("other", "read")
     assert [kind(gate, hasty) for _ in range(3)] == ["passed"] * 3
     problem = answer(gate, hasty)
@@ -298,3 +298,34 @@ def test_what_is_stored_of_a_session_does_not_open_the_door(gate, engine, signed
     with engine.connect() as connection:
         (stored,) = connection.scalars(sa.text("SELECT hash FROM sessions"))
     assert with_cookie(gate, stored) == "session-over"
+
+
+def test_sessions_cannot_be_guessed_quickly(gate, keys, sessions, monkeypatch):
+    keys.add("ops", "admin")
+    looked_up, key_of = [], sessions.key_of
+    monkeypatch.setattr(sessions, "key_of", lambda hash_: looked_up.append(hash_) or key_of(hash_))
+    with capture_logs() as logs:
+        answers = [with_cookie(gate, f"guess-{number}") for number in range(30 * GUESSES)]
+    assert answers == ["session-over"] * GUESSES + ["too-many-unknown-keys"] * 29 * GUESSES
+    assert len(looked_up) == GUESSES
+    guess = {"event": "unknown key", "address": "192.0.2.1", "sent_as": "cookie", "log_level": "warning"}
+    assert logs == [guess] * GUESSES
+    # Keys are guessed from the same address.
+    assert kind(gate, "esc_x") == "too-many-unknown-keys"
+    assert kind(gate, "esc_x", address="192.0.2.2") == "key-unknown"
+
+
+def test_a_page_that_goes_on_asking_after_its_session_guesses_nothing(gate, keys, sessions, signed_in, clock):
+    key = keys.add("other", "read")
+    sessions.end(hash_of(signed_in))
+    assert {with_cookie(gate, signed_in) for _ in range(10 * GUESSES)} == {"session-over"}
+    # Whoever sits there can sign in again at once.
+    assert asyncio.run(gate.sign_in(caller(), key))
+
+
+def test_who_is_signed_in_is_not_held_up_by_guesses_from_the_same_address(gate, signed_in, clock):
+    assert with_cookie(gate, signed_in) == "passed"
+    for number in range(2 * GUESSES):
+        with_cookie(gate, f"guess-{number}")
+    clock.now += JUST_AFTER
+    assert with_cookie(gate, signed_in) == "passed"

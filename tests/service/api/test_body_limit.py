@@ -21,7 +21,7 @@ LARGEST = {
 def post():
     app = FastAPI()
     app.add_middleware(BodyLimit, largest_form=LARGEST_FORM)
-    problems.install(app)
+    problems.install_handlers(app)
 
     @app.post("/")
     async def size(request: Request) -> int:

@@ -8,9 +8,9 @@ import pytest
 
 from service.api.programs import drawings
 from service.api.programs.drawings import Drawings
+from service.schemas.problems import Problem
 from service.settings import Settings
 from service.store.jobs.files import source_file
-from service.wire.problems import Problem
 from tests.e2e.running import wait_for
 from tests.homes import in_both_homes
 from tests.worker.stock import result

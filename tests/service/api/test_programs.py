@@ -11,9 +11,9 @@ from anyio.to_thread import current_default_thread_limiter
 from service.api.programs import clicked_pose
 from service.api.programs.clicked_pose import ClickedPoses
 from service.api.programs.running import OneAtATime
+from service.schemas.problems import Problem
+from service.schemas.programs.clicked_pose import ClickedPoseRequest
 from service.settings import Settings
-from service.wire.problems import Problem
-from service.wire.programs.clicked_pose import ClickedCamera
 from tests.e2e.running import venue
 
 SLOW = [sys.executable, "-c", "import sys, time; time.sleep(0.5); sys.stdout.write(sys.stdin.read())"]
@@ -43,7 +43,9 @@ def clicked():
     camera = venue("v")["cameras"][0]
     points = [{"world": [x, y], "pixel": [x, y]} for x in (1.0, 20.0) for y in (1.0, 30.0)]
     known = {"field": venue("v")["field"], "points": points}
-    return ClickedCamera.model_validate(known | {name: camera[name] for name in ("id", "image_size", "intrinsics")})
+    return ClickedPoseRequest.model_validate(
+        known | {name: camera[name] for name in ("id", "image_size", "intrinsics")}
+    )
 
 
 def answering(after_s):

@@ -2,17 +2,17 @@
 
 import asyncio
 import sys
-from concurrent.futures import ThreadPoolExecutor
+import time
 
 import pytest
 
 from service.api.programs import drawings
 from service.api.programs.stitches import Stitches
+from service.schemas.problems import Problem
+from service.schemas.venue import VenueIn
+from service.schemas.view import ViewChoice
 from service.settings import Settings
-from service.wire.problems import Problem
-from service.wire.venue import VenueIn
-from service.wire.view import ViewChoice
-from tests.e2e.running import venue, wait_for
+from tests.e2e.running import venue
 
 # Says that it has begun, waits, and answers with what it was asked.
 SLOW = """
@@ -34,26 +34,32 @@ def stitches(program):
 
 
 def question(made_by, wanted, **view):
-    stored = VenueIn.model_validate(venue("v")).stored()
+    stored = VenueIn.model_validate(venue("v")).to_venue()
     return made_by.asked(stored, 1, view=ViewChoice(**{"width_px": 320, **view}), wanted=wanted, tag="")
 
 
-def test_one_package_is_made_at_a_time(tmp_path):
-    slow = stitches(SLOW.format(begun=str(tmp_path / "begun"), pause=1))
+def test_a_key_has_one_package_made_at_a_time_and_other_keys_have_theirs_after_it(tmp_path):
+    slow = stitches(SLOW.format(begun=str(tmp_path / "begun"), pause=0.5))
     asked = question(slow, "ffmpeg")
-    with ThreadPoolExecutor(1) as aside:
-        first = aside.submit(slow.package, asked)
-        wait_for((tmp_path / "begun").exists)
-        with pytest.raises(Problem) as busy:
-            slow.package(asked)
-        assert first.result() == asked.model_dump_json().encode() + b"\n"
-    assert (busy.value.kind, busy.value.headers) == ("unavailable", {"Retry-After": "5"})
+
+    async def three():
+        begun = time.monotonic()
+        made = [slow.package(asked, owner) for owner in ("greedy", "greedy", "other")]
+        return await asyncio.gather(*made, return_exceptions=True), time.monotonic() - begun
+
+    (first, refused, other), seconds = asyncio.run(three())
+    assert first == other == asked.model_dump_json().encode() + b"\n"
+    assert (refused.kind, refused.headers) == ("unavailable", {"Retry-After": "5"})
+    # One after the other.
+    assert seconds > 1
+    # And again, once it is done.
+    assert asyncio.run(slow.package(asked, "greedy")) == first
 
 
 def test_st_maps_need_openexr_and_say_what_to_install():
     made_by = stitches(WITHOUT_OPENEXR)
     with pytest.raises(Problem, match=r"pip install 'esc-calibration\[exr\]'") as told:
-        made_by.package(question(made_by, "st-map"))
+        asyncio.run(made_by.package(question(made_by, "st-map"), ""))
     assert told.value.kind == "extra-missing"
 
 

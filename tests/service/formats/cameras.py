@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 
-from service.formats.lens import Shot
-from service.wire.geometry import Intrinsics, Pose
-from service.wire.venue import Camera
+from service.formats.lens import NumberedCamera
+from service.schemas.geometry import Intrinsics, Pose
+from service.schemas.venue import Camera
 
 SIZE = (3072, 1728)
 RADIAL = [-0.3402, 0.1042, 0.0, 0.0, -0.012]
@@ -22,9 +22,9 @@ def shot(distortion=(), *, rotation=(1.67922206, 0.40966611, -0.47792389), numbe
         intrinsics=Intrinsics(
             matrix=[[focal[0], skew, 1634.8], [0, focal[1], 877.7], [0, 0, 1]], distortion=list(distortion)
         ),
-        pose=Pose.at(list(rotation), [-1.611377, -49.405109, 7.886158]),
+        pose=Pose.from_position(list(rotation), [-1.611377, -49.405109, 7.886158]),
     )
-    return Shot(camera, number)
+    return NumberedCamera(camera, number)
 
 
 def seen_points(shot, count=1000):

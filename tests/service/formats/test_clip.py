@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from service.formats import opentrackio
-from service.formats.clip import ClipPoses, FollowedShot
-from service.wire.geometry import Pose
-from service.wire.problems import Problem
+from service.formats.clip import ClipPoses, TrackedCamera
+from service.schemas.geometry import Pose
+from service.schemas.problems import Problem
 from tests.service.formats.cameras import ALL_OF_OPENCV_8, farthest, seen_points, shot
 from tests.service.formats.test_formats import AS_PUBLISHED_PX, SCHEMA, project_by_opentrackio, read_freed
 
@@ -24,7 +24,7 @@ def turning(number, frame):
     """A camera that turns a little with every frame."""
     still = shot(ALL_OF_OPENCV_8, number=number)
     rotation = (np.array(still.camera.pose.rotation) + [0.0, 1e-4 * frame, 0.0]).tolist()
-    pose = Pose.at(rotation, still.camera.pose.position)
+    pose = Pose.from_position(rotation, still.camera.pose.position)
     return replace(still, camera=still.camera.model_copy(update={"pose": pose}))
 
 
@@ -33,7 +33,7 @@ def written(tmp_path):
     with ClipPoses(tmp_path / "final.cut", [shot(), shot(number=2)], AXES) as poses:
         for frame in range(FRAMES):
             status = "coasted" if frame == 7 else "measured"
-            cameras = [FollowedShot(turning(n, frame), status, (0.02, 0.03), (0.002, 0.004)) for n in (1, 2)]
+            cameras = [TrackedCamera(turning(n, frame), status, (0.02, 0.03), (0.002, 0.004)) for n in (1, 2)]
             poses.add(cameras, Fraction(30000, 1001))
     return tmp_path
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from service.formats import colmap, freed, opencv, opentrackio, plain, soccernet
-from service.formats.lens import Shot
-from service.wire.problems import Problem
-from service.wire.venue import Camera
+from service.formats.lens import NumberedCamera
+from service.schemas.problems import Problem
+from service.schemas.venue import Camera
 from tests.service.formats.cameras import (
     ALL_OF_OPENCV_8,
     RADIAL,
@@ -302,7 +302,7 @@ def test_coefficients_that_are_zero_need_no_place():
 def test_a_fisheye_is_refused_by_formats_that_know_no_such_lens(write):
     glass = shot([-0.02, 0.004, 0.0, 0.0])
     lens = glass.camera.intrinsics.model_copy(update={"model": "fisheye"})
-    fisheye = Shot(glass.camera.model_copy(update={"intrinsics": lens}), 1)
+    fisheye = NumberedCamera(glass.camera.model_copy(update={"intrinsics": lens}), 1)
     assert write(glass)
     with pytest.raises(Problem, match="json and st-map hold every lens") as refused:
         write(fisheye)

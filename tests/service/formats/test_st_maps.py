@@ -9,12 +9,12 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from service.formats.lens import Shot
-from service.formats.table import formats
+from service.formats.lens import NumberedCamera
+from service.formats.table import export_formats
+from service.schemas.geometry import Intrinsics
+from service.schemas.problems import Problem
+from service.schemas.venue import Camera
 from service.settings import Settings
-from service.wire.geometry import Intrinsics
-from service.wire.problems import Problem
-from service.wire.venue import Camera
 from tests.service.formats.cameras import ALL_OF_OPENCV_8, RADIAL, WITH_TILT, shot
 
 SIZE = (192, 108)
@@ -26,12 +26,12 @@ def small(distortion):
     camera = shot(distortion).camera
     matrix = [[132.6, 0, 101.6], [0, 132.6, 54.3], [0, 0, 1]]
     intrinsics = Intrinsics(matrix=matrix, distortion=distortion)
-    return Shot(Camera(id="left", image_size=list(SIZE), intrinsics=intrinsics, pose=camera.pose), 1)
+    return NumberedCamera(Camera(id="left", image_size=list(SIZE), intrinsics=intrinsics, pose=camera.pose), 1)
 
 
 def read_maps(shot, form, tmp_path):
     """Pixel positions to sample, (height, width, 2), top left, of each direction."""
-    document = formats(SETTINGS)[form].document([shot])
+    document = export_formats(SETTINGS)[form].document([shot])
     maps = {}
     with zipfile.ZipFile(io.BytesIO(document.content)) as files:
         for name in files.namelist():
@@ -49,7 +49,7 @@ def test_without_openexr_it_is_told_what_to_install():
     program = "import sys; sys.modules['OpenEXR'] = None; from worker.programs.stmap import main; main(sys.argv[1])"
     settings = Settings(map_program=[sys.executable, "-P", "-c", program])
     with pytest.raises(Problem, match=r"pip install 'esc-calibration\[exr\]'") as told:
-        formats(settings)["st-map"].document([small([])])
+        export_formats(settings)["st-map"].document([small([])])
     assert told.value.kind == "extra-missing"
 
 
@@ -122,7 +122,7 @@ def test_pixels_that_nothing_is_behind_point_outside(tmp_path):
 
 
 def test_maps_of_several_cameras_are_asked_for_one_by_one():
-    shots = [Shot(small(RADIAL).camera.model_copy(update={"id": each}), 1) for each in ("left", "right")]
+    shots = [NumberedCamera(small(RADIAL).camera.model_copy(update={"id": each}), 1) for each in ("left", "right")]
     with pytest.raises(Problem) as refused:
-        formats(SETTINGS)["st-map"].document(shots)
+        export_formats(SETTINGS)["st-map"].document(shots)
     assert refused.value.members()["expected"] == ["left", "right"]

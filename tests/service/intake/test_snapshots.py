@@ -6,9 +6,9 @@ import sys
 import pytest
 
 from service.intake.snapshots import Snapshots
+from service.schemas.problems import Problem
+from service.schemas.venue import VenueIn
 from service.settings import Settings
-from service.wire.problems import Problem
-from service.wire.venue import VenueIn
 from tests.e2e.running import venue
 
 
@@ -19,9 +19,9 @@ def test_the_program_that_fetches_frames_sees_no_secret_of_the_service(monkeypat
     settings = Settings(source_program=[sys.executable, "-c", writing])
     for name in secrets:
         monkeypatch.setenv(name, "x")
-    (camera, _) = VenueIn.model_validate(venue("v")).stored().cameras
+    (camera, _) = VenueIn.model_validate(venue("v")).to_venue().cameras
     with pytest.raises(Problem, match="No frame of camera left"):
-        Snapshots(settings).take([camera.model_copy(update={"source": "http://127.0.0.1/x"})], {})
+        Snapshots(settings, lambda _: None).take(camera.model_copy(update={"source": "http://127.0.0.1/x"}), {})
     inherited = json.loads(seen.read_text())
     assert {"PATH", "OMP_NUM_THREADS"} <= inherited.keys()
     assert not inherited.keys() & set(secrets)

@@ -1,8 +1,8 @@
 import pytest
 
-from service.intake.sources import permitted
+from service.schemas.hosts import is_permitted
+from service.schemas.source_urls import SourceSecrets, UnknownSecret, hide_secrets, secrets_of, with_parameters
 from service.settings import Settings
-from service.wire.addresses import without_credentials
 
 LAN = ["*.cams.lan", "10.1.0.0/16", "fd00::/8"]
 
@@ -25,11 +25,11 @@ LAN = ["*.cams.lan", "10.1.0.0/16", "fd00::/8"]
     ],
 )
 def test_a_host_is_asked_if_its_name_or_all_its_addresses_are_named(host, addresses, allowed):
-    assert permitted(host, addresses, LAN) == allowed
+    assert is_permitted(host, addresses, LAN) == allowed
 
 
 def test_a_wildcard_names_no_address():
-    assert not permitted("10.9.9.9", ["10.9.9.9"], ["*"])
+    assert not is_permitted("10.9.9.9", ["10.9.9.9"], ["*"])
 
 
 @pytest.mark.parametrize("pattern", ["10.1.0.0/33", "10.1.0.7/16", "http://cams.lan", "", "1.2.3"])
@@ -50,9 +50,35 @@ def test_a_pattern_of_names_may_have_figures(pattern):
     assert Settings(sources=[pattern]).sources == [pattern]
 
 
-def test_user_and_password_are_told_apart_from_the_rest():
-    assert without_credentials("rtsp://u:p%40ss@10.1.0.7:554/live?x=1") == (
-        "rtsp://***@10.1.0.7:554/live?x=1",
-        "u:p%40ss",
-    )
-    assert without_credentials("http://10.1.0.7/a@b") == ("http://10.1.0.7/a@b", None)
+SECRET = [
+    ("rtsp://u:p%40ss@10.1.0.7:554/live?x=1", "rtsp://***@10.1.0.7:554/live?x=1", "u:p%40ss"),
+    ("http://10.1.0.7/a@b", "http://10.1.0.7/a@b", ""),
+    ("http://h/cgi?cmd=snap&usr=admin&pwd=hunter2", "http://h/cgi?cmd=snap&usr=***&pwd=***", "?usr=admin&pwd=hunter2"),
+    ("http://h/snap?auth=YWRtaW46/eA==&x=1", "http://h/snap?auth=***&x=1", "?auth=YWRtaW46/eA=="),
+    ("rtsp://h/user=admin&password=x/stream?token=t", "rtsp://h/user=***&password=***/stream?token=***", None),
+    ("http://u:p@h?PASSWORD=Two", "http://***@h?PASSWORD=***", "u:p?PASSWORD=Two"),
+    ("http://h/?pwd=one&pwd=two&pwd=", "http://h/?pwd=***&pwd=***&pwd=", "?pwd=one&pwd=two"),
+    ("http://h/bypass=1?author=me&keyboard=x", "http://h/bypass=1?author=me&keyboard=x", ""),
+]
+
+
+@pytest.mark.parametrize(("url", "is_shown", "encoded"), SECRET)
+def test_what_is_secret_in_a_source_is_told_apart_from_the_rest_and_comes_back(url, is_shown, encoded):
+    secrets = secrets_of(url)
+    assert (hide_secrets(url), hide_secrets(is_shown)) == (is_shown, is_shown)
+    assert encoded is None or secrets.encoded() == encoded
+    again = SourceSecrets.decoded(secrets.encoded())
+    assert again == secrets
+    plain = with_parameters(is_shown, again)
+    before = "" if secrets.userinfo is None else f"{secrets.userinfo}@"
+    assert plain.replace("://", f"://{before}", 1) == url
+
+
+def test_what_stands_for_a_secret_is_kept_by_its_name_and_anything_else_is_new():
+    known = secrets_of("http://u:p@h/?usr=admin&pwd=one&pwd=two")
+    sent = secrets_of("http://***@h/?pwd=***&pwd=***&usr=root")
+    assert sent.fill_hidden(known) == secrets_of("http://u:p@h/?pwd=one&pwd=two&usr=root")
+    with pytest.raises(UnknownSecret, match="token"):
+        secrets_of("http://h/?token=***").fill_hidden(known)
+    with pytest.raises(UnknownSecret, match="user and password"):
+        secrets_of("http://***@h/").fill_hidden(SourceSecrets())

@@ -1,11 +1,11 @@
 """Alarms of venues: each begins once and is over once, in both homes."""
 
-from service.store.counts.figures import look
-from service.wire.health import Alarms as Rules
-from service.wire.job import JobError
+from service.schemas.health import Alarms as Rules
+from service.schemas.job import JobError
+from service.store.statistics.snapshot import read_statistics
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway
-from worker.duties.alarms import Alarms
+from worker.duties.alarms import AlarmTimer
 
 URL = "https://example.com/alarms"
 ERROR = JobError(type="/problems/no-markings-in-view", title="", detail="")
@@ -97,18 +97,44 @@ def test_drift_adds_up_until_it_rings_and_restoring_ends_it(stock):
 @in_both_homes
 def test_what_was_not_calibrated_for_long_rings_without_anything_happening(stock):
     watched(stock, not_calibrated_for_h=24)
-    duty = Alarms(stock.venues)
-    duty.look()
+    duty = AlarmTimer(stock.venues)
+    duty.poll()
     assert rings(stock) == []
     stock.time_passes(hours=25)
     for _ in range(2):
-        assert duty.look() > 0
+        assert duty.poll() > 0
     assert (rings(stock), told(stock)) == ([("not-calibrated", None)], [("not-calibrated", "began")])
     stock.calibrated("v")
     assert told(stock)[1:] == [("not-calibrated", "ended")]
     stock.time_passes(hours=25)
-    duty.look()
+    duty.poll()
     assert told(stock)[2:] == [("not-calibrated", "began")]
+
+
+@in_both_homes
+def test_the_alarm_of_a_camera_goes_on_while_the_venues_rings_and_the_camera_is_no_better(stock):
+    watched(stock, rejected_in_a_row=2)
+    for _ in range(2):
+        stock.calibrated("v", accepted=("right",))
+    assert rings(stock) == [("rejected-in-a-row", "left")]
+    for _ in range(2):
+        stock.calibrated("v", accepted=False)
+    assert sorted(rings(stock), key=str) == [("rejected-in-a-row", "left"), ("rejected-in-a-row", None)]
+    assert told(stock) == [("rejected-in-a-row", "began")] * 2
+    stock.calibrated("v", accepted=("right",))
+    assert rings(stock) == [("rejected-in-a-row", "left")]
+    stock.calibrated("v")
+    assert rings(stock) == []
+    assert told(stock)[2:] == [("rejected-in-a-row", "ended")] * 2
+
+
+@in_both_homes
+def test_an_alarm_names_the_setting_that_it_goes_by(stock):
+    watched(stock, rejected_in_a_row=1)
+    stock.calibrated("v", accepted=False)
+    (alarm,) = stock.venues.health("v").alarms
+    assert (alarm.setting, getattr(Rules(rejected_in_a_row=1), alarm.setting)) == ("rejected_in_a_row", 1)
+    assert stock.alarms_told()[0].data.setting == "rejected_in_a_row"
 
 
 @in_both_homes
@@ -133,11 +159,11 @@ def test_what_rings_is_told_to_whoever_watches_and_only_so_much_of_it(stock):
     watched(stock, rejected_in_a_row=1, moved_since_last_px=0.001)
     stock.calibrated("v")
     stock.calibrated("v", accepted=False)
-    seen = look(stock.engine, 10)
+    seen = read_statistics(stock.engine, 10)
     assert seen.alarms == {"moved-since-last": 2, "rejected-in-a-row": 1}
     assert [(ringing.venue, ringing.rule) for ringing in seen.ringing] == [
         ("v", "moved-since-last"),
         ("v", "rejected-in-a-row"),
     ]
     assert seen.venues[0].drift_px == stock.venues.health("v").cameras[0].drift.pixels
-    assert len(look(stock.engine, 1).ringing) == 1
+    assert len(read_statistics(stock.engine, 1).ringing) == 1

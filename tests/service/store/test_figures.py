@@ -5,15 +5,15 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import sqlalchemy as sa
 
-from service.store.counts.endings import ENDED, ERRORS, STAGES, Ending
-from service.store.counts.figures import look
-from service.store.counts.tallies import STAGE, Buckets, add, read
-from service.wire.job import JobError
+from service.schemas.job import JobError
+from service.store.statistics.counters import STAGE, HistogramBuckets, add, read
+from service.store.statistics.job_outcome import ENDED, ERRORS, STAGES, JobOutcome
+from service.store.statistics.snapshot import read_statistics
 from tests.homes import in_both_homes
 from tests.worker.stock import result
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
-TIMES = Buckets("t", (1, 5))
+TIMES = HistogramBuckets("t", (1, 5))
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def test_observations_fall_into_the_buckets_that_prometheus_means(counted):
 
 @in_both_homes
 def test_what_an_older_release_counted_under_other_bounds_is_not_lost(counted):
-    found = counted(Buckets("t", (2, 50)).of(1.5), Buckets("t", (2, 50)).of(40), TIMES.of(0.5))
+    found = counted(HistogramBuckets("t", (2, 50)).of(1.5), HistogramBuckets("t", (2, 50)).of(40), TIMES.of(0.5))
     assert TIMES.read(found)[0] == [("1", 1), ("5", 2), ("+Inf", 3)]
 
 
@@ -53,7 +53,7 @@ def end(**values):
         "finished_at": NOON + timedelta(seconds=10),
         "attempts": 1,
     }
-    return Ending(**(shown | values)).tallies()
+    return JobOutcome(**(shown | values)).tallies()
 
 
 def test_an_error_that_nobody_knows_makes_no_new_series():
@@ -88,7 +88,7 @@ def test_a_look_reads_no_table_from_end_to_end_that_grows_with_jobs_or_venues(st
     def _(connection, cursor, statement, parameters, context, many):
         asked.append((statement, parameters))
 
-    seen = look(stock.engine, 10)
+    seen = read_statistics(stock.engine, 10)
     assert (seen.callbacks_waiting, [waiting.jobs for waiting in seen.queue.values()], seen.running) == (1, [1], 0)
     selects = [(statement, values) for statement, values in asked if statement.startswith("SELECT")]
     with stock.engine.connect() as connection:

@@ -6,15 +6,16 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import sqlalchemy as sa
 
+from service.schemas.events.webhooks import Webhook
+from service.schemas.job import JobError
 from service.store import tables
-from service.wire.job import JobError
-from service.wire.told.webhooks import Webhook
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock, anyway
 
 
 @pytest.fixture
 def stock(home, tmp_path):
+    home.make_database(tmp_path)
     stock = Stock(tmp_path, **home.settings(tmp_path))
     yield stock
     stock.engine.dispose()
@@ -22,7 +23,7 @@ def stock(home, tmp_path):
 
 def told(stock, venue="v", seen=0, kinds=()):
     """The types of the events after one."""
-    return [one.event.type for one in stock.following.since(venue, seen, kinds, 100).events]
+    return [one.event.type for one in stock.events.since(venue, seen, kinds, 100).events]
 
 
 @in_both_homes
@@ -33,7 +34,7 @@ def test_everything_that_happens_to_a_venue_is_an_event_in_its_order(stock):
     stock.attempts.fail(stock.attempts.begin(failed), JobError(type="/problems/job-crashed", title="", detail=""))
     stock.decisions.cancel(stock.submitted("v"))
     stock.venues.delete("v", lambda *_: None)
-    page = stock.following.since("v", 0, [], 100)
+    page = stock.events.since("v", 0, [], 100)
     assert [one.event.type for one in page.events] == [
         "venue.created",
         "poses.changed",
@@ -58,7 +59,7 @@ def test_everything_that_happens_to_a_venue_is_an_event_in_its_order(stock):
 @in_both_homes
 def test_new_poses_come_with_everything_that_draws_on_a_picture(stock):
     stock.calibrated("v", accepted=["right"])
-    (event,) = (one.event for one in stock.following.since("v", 0, ["poses.changed"], 100).events[1:])
+    (event,) = (one.event for one in stock.events.since("v", 0, ["poses.changed"], 100).events[1:])
     assert event.data.changed == ["right"]
     assert event.data.cameras == [camera.posed for camera in stock.venue("v").cameras]
     assert event.data.revision == stock.venues.health("v").revision
@@ -67,30 +68,30 @@ def test_new_poses_come_with_everything_that_draws_on_a_picture(stock):
 @in_both_homes
 def test_who_has_seen_nothing_begins_with_the_poses_that_hold_and_misses_nothing_after_them(stock):
     stock.calibrated("v")
-    beginning = stock.following.beginning("v", None)
+    beginning = stock.events.beginning("v", None)
     assert beginning.event.type == "poses.current"
     assert beginning.event.data.revision == 2
     assert told(stock, seen=beginning.number) == []
     stock.moved_by_hand("v", 3.0)
     assert told(stock, seen=beginning.number) == ["venue.changed", "poses.changed"]
-    assert stock.following.beginning("v", beginning.number) is None
+    assert stock.events.beginning("v", beginning.number) is None
 
 
 @in_both_homes
 def test_what_is_past_its_time_goes_and_who_may_have_missed_it_begins_anew(stock):
     stock.calibrated("v")
-    newest = stock.following.newest(["v"])["v"]
+    newest = stock.events.newest(["v"])["v"]
     now = datetime.now(UTC) + timedelta(minutes=1)
     assert stock.expiry.expire_events(now - timedelta(hours=1), 100) == 0
     assert stock.expiry.expire_events(now, 2) == 2
-    assert stock.following.beginning("v", 2) is None
-    assert stock.following.beginning("v", 1).event.type == "poses.current"
+    assert stock.events.beginning("v", 2) is None
+    assert stock.events.beginning("v", 1).event.type == "poses.current"
     # The newest stays, and tells that nothing was missed.
     assert stock.expiry.expire_events(now, 100) == newest - 3
-    assert stock.following.beginning("v", newest) is None
-    assert stock.following.beginning("v", newest - 2).number == newest
+    assert stock.events.beginning("v", newest) is None
+    assert stock.events.beginning("v", newest - 2).number == newest
     # A number of another database.
-    assert stock.following.beginning("v", newest + 1).number == newest
+    assert stock.events.beginning("v", newest + 1).number == newest
 
 
 def test_no_number_is_given_twice_on_sqlite(tmp_path):
@@ -100,8 +101,19 @@ def test_no_number_is_given_twice_on_sqlite(tmp_path):
         last = connection.scalar(sa.select(sa.func.max(tables.events.c.id)))
         connection.execute(sa.delete(tables.events))
     stock.moved_by_hand("v", 3.0)
-    assert min(one.number for one in stock.following.since("v", 0, [], 10).events) > last
+    assert min(one.number for one in stock.events.since("v", 0, [], 10).events) > last
     stock.engine.dispose()
+
+
+@in_both_homes
+def test_that_a_job_was_submitted_is_told_as_it_was_submitted_whatever_became_of_it(stock):
+    job = stock.calibrated("v")
+    (queued,) = stock.events.since("v", 0, ["job.queued"], 100).events
+    (ended,) = stock.events.since("v", 0, ["job.succeeded"], 100).events
+    assert (queued.event.data.id, queued.event.data.status, queued.event.data.queue_position) == (job, "queued", 1)
+    assert queued.event.data.result is None
+    assert queued.event.timestamp == queued.event.data.created_at
+    assert (ended.event.data.id, ended.event.data.status) == (job, "succeeded")
 
 
 @in_both_homes
@@ -114,7 +126,7 @@ def test_the_event_of_a_job_that_was_deleted_is_passed_over(stock):
 @in_both_homes
 def test_who_follows_misses_no_event_of_transactions_that_run_at_once(stock):
     stock.venue("v")
-    seen, found, over = stock.following.newest(["v"])["v"], [], threading.Event()
+    seen, found, over = stock.events.newest(["v"])["v"], [], threading.Event()
     # Between giving a number and being seen there is time for others.
     sa.event.listen(stock.engine, "after_cursor_execute", lambda *_: time.sleep(0.002))
 
@@ -122,7 +134,7 @@ def test_who_follows_misses_no_event_of_transactions_that_run_at_once(stock):
         number, ending = seen, False
         while not ending:
             ending = over.is_set()
-            page = stock.following.since("v", number, ["venue.*"], 100)
+            page = stock.events.since("v", number, ["venue.*"], 100)
             number = page.up_to
             found.extend(one.number for one in page.events)
 
@@ -146,7 +158,7 @@ def test_webhooks_are_told_what_they_want(stock):
     d = tables.deliveries.c
     with stock.engine.connect() as connection:
         rows = connection.execute(sa.select(d.url, d.event).order_by(d.event)).all()
-    assert [(row.url, stock.following.get(row.event).type) for row in rows] == [
+    assert [(row.url, stock.events.get(row.event).type) for row in rows] == [
         ("https://b.example/", "job.queued"),
         ("https://a.example/", "poses.changed"),
         ("https://b.example/", "job.succeeded"),

@@ -4,15 +4,15 @@ from datetime import UTC, datetime
 
 import sqlalchemy as sa
 
-from service.pages.venues import rows_of
-from service.store.counts.glances import IN_CURVE
-from service.wire.health import Alarms
+from service.pages.venues import venue_rows
+from service.schemas.health import Alarms
+from service.store.statistics.venue_summary import IN_CURVE
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway
 
 
 def glance(stock, venue="v"):
-    return stock.glances.of([venue]).get(venue)
+    return stock.venue_summaries.of([venue]).get(venue)
 
 
 @in_both_homes
@@ -55,9 +55,9 @@ def test_the_list_asks_as_often_for_many_venues_as_for_one(stock):
     venues = stock.venues.page(None, 10)
     asked = []
     sa.event.listen(stock.engine, "before_cursor_execute", lambda *arguments: asked.append(arguments[2]))
-    one = rows_of(stock, venues[1:2])
+    one = venue_rows(stock, venues[1:2])
     of_one = len(asked)
-    rows = rows_of(stock, venues)
+    rows = venue_rows(stock, venues)
     assert len(asked) == 2 * of_one
     assert rows[1] == one[0]
     assert [[alarm.rule for alarm in row.alarms] for row in rows] == [["rejected-in-a-row"], [], ["rejected-in-a-row"]]

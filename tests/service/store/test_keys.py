@@ -3,7 +3,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.store.keys import KeyExists, Keys, hash_of
+from service.store.keys import KeyExists, KeyRepository, hash_of
 from tests.homes import in_both_homes
 
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
@@ -11,7 +11,7 @@ NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 
 @pytest.fixture
 def keys(engine):
-    return Keys(engine)
+    return KeyRepository(engine)
 
 
 def test_a_key_is_256_random_bits_behind_a_prefix(keys):

@@ -7,6 +7,7 @@ import pytest
 import sqlalchemy as sa
 
 from service.store import tables
+from service.store.jobs.queries import JobPage
 from tests.homes import in_both_homes
 
 # So many that reading all of them, or all of the commonest kind, takes longer than a list may.
@@ -59,7 +60,7 @@ def many(stock):
 def test_a_list_goes_through_no_more_jobs_than_it_shows(many):
     for filters in LISTS:
         with work_of(many.engine) as work:
-            many.jobs.page(**filters, before=None, limit=PAGE)
+            many.jobs.page(JobPage(PAGE, **filters))
         assert max(work) <= MOST_ENTRIES, filters
 
 
@@ -83,7 +84,7 @@ def test_a_list_asks_no_question_for_each_of_its_jobs(stock):
         stock.calibrated(name, callback_url="https://example.com/")
         stock.submitted(name)
     with work_of(stock.engine) as work:
-        jobs = stock.jobs.page(None, None, None, 10)
+        jobs = stock.jobs.page(JobPage(10))
     assert len(work) == 4
     alone = [stock.jobs.get(job.id) for job in jobs]
     assert jobs == alone

@@ -4,10 +4,10 @@ import pytest
 import sqlalchemy as sa
 import structlog
 
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Intrinsics
 from service.store import tables
 from service.store.memories import KEPT, LARGEST_BYTES, newest_memories
-from service.wire.field import FieldOfPlay
-from service.wire.geometry import Intrinsics
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway, result
 

@@ -10,21 +10,22 @@ from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
+from service.schemas.options import Board, IntrinsicsOptions, LocateOptions, Options
+from service.schemas.results import Result
+from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.store import tables
-from service.store.counts.endings import ENDED
-from service.store.counts.figures import VenueQuality, look
-from service.store.engine import MIGRATIONS, SCHEMA_TABLE, UnsupportedDatabase, connect, migrate, writing
+from service.store.database import MIGRATIONS, SCHEMA_TABLE, UnsupportedDatabase, connect, migrate, writing
 from service.store.ids import new_id
 from service.store.jobs.submission import Submission
-from service.store.stores import Stores
-from service.wire.options import Board, IntrinsicsOptions, LocateOptions, Options
-from service.wire.results import Result
-from service.wire.venue import VENUE_EXAMPLE, VenueIn
+from service.store.repositories import Repositories
+from service.store.statistics.job_outcome import ENDED
+from service.store.statistics.snapshot import VenueGauges, read_statistics
 from tests.homes import in_both_homes
 
 REVISIONS = [script.revision for script in ScriptDirectory(str(MIGRATIONS)).walk_revisions()]
+NEWEST = max(REVISIONS)
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
-VENUE = VenueIn.model_validate(VENUE_EXAMPLE).stored()
+VENUE = VenueIn.model_validate(VENUE_EXAMPLE).to_venue()
 DONE, WAITING = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "01KAJ3Q6WZ5T3Y8R0N4M2C7B1E"
 RECEIVER = "https://example.com/"
 FIRST_POSE = VENUE.cameras[0].pose.model_copy(update={"position": [-1.5, -49.5, 7.9]})
@@ -154,7 +155,7 @@ def upgraded(home, tmp_path):
             for name in then.tables.keys() & ROWS.keys():
                 insert_what_it_has_columns_for(connection, then.tables[name], ROWS[name])
         engine.dispose()
-        stores.append(Stores(url))
+        stores.append(Repositories(url))
         return stores[-1]
 
     stores = []
@@ -193,15 +194,15 @@ def test_what_an_older_release_stored_is_there_after_the_upgrade(upgraded, revis
     assert (key.name, key.scope, key.last_used_at) == ("cron", "calibrate", NOON)
     assert stores.sessions.key_of("1" * 64) == key
     assert stores.expiry.leftovers(NOON, 10) == ["frames/lost"]
-    (due,) = stores.deliveries.attempt(NOON, NOON, 10)
+    (due,) = stores.outbox.claim_due(NOON, NOON, 10)
     assert (due.id, due.attempt, jobs.get(DONE).callback.last_error) == (DONE, 2, "timed out")
     health = venues.health(VENUE.id)
     assert [alarm.why for alarm in health.alarms] == ["No poses."]
     assert (health.revision, health.rejected_in_a_row, health.schedule.last_job) == (2, 0, DONE)
     assert venues.with_credentials(VENUE.id)[1] == {"left": "user:secret"}
-    seen = look(stores.engine, 10)
-    assert seen.tallies == {(ENDED, ("succeeded", "accepted", "")): 3}
-    assert seen.venues == [VenueQuality(VENUE.id, 0.2, 2.0, NOON)]
+    seen = read_statistics(stores.engine, 10)
+    assert seen.counters == {(ENDED, ("succeeded", "accepted", "")): 3}
+    assert seen.venues == [VenueGauges(VENUE.id, 0.2, 2.0, NOON)]
 
 
 @in_both_homes
@@ -284,7 +285,7 @@ def test_a_database_from_before_the_first_release_is_told_and_left_alone(home, t
             "INSERT INTO alembic_version VALUES ('0001')",
         ):
             connection.exec_driver_sql(statement)
-    with pytest.raises(UnsupportedDatabase, match=r"development version .* begins with schema 0003 .* new place"):
+    with pytest.raises(UnsupportedDatabase, match=rf"development version .* begins with schema {NEWEST} .* new place"):
         migrate(engine)
     assert sorted(sa.inspect(engine).get_table_names()) == ["alembic_version", "jobs"]
     engine.dispose()
@@ -294,5 +295,7 @@ def test_a_database_from_before_the_first_release_is_told_and_left_alone(home, t
 def test_a_database_that_a_newer_version_has_upgraded_is_told(engine):
     with writing(engine) as connection:
         connection.exec_driver_sql(f"UPDATE {SCHEMA_TABLE} SET version_num = '0999'")
-    with pytest.raises(UnsupportedDatabase, match=r"has schema 0999, .* knows none after 0003: .* restore the backup"):
+    with pytest.raises(
+        UnsupportedDatabase, match=rf"has schema 0999, .* knows none after {NEWEST}: .* restore the backup"
+    ):
         migrate(engine)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Intrinsics, Pose, PosedCamera
 from service.store import movement
-from service.wire.field import FieldOfPlay
-from service.wire.geometry import Intrinsics, Pose, PosedCamera
-from worker.calibration.judge.quality import Movement
-from worker.jobs.reading import camera_of, pitch_of
+from worker.calibration.gate.quality import Movement
+from worker.jobs.from_schemas import camera_of, pitch_of
 
 FIELD = FieldOfPlay(length_m=105, width_m=68)
 LENSES = {
@@ -31,7 +31,7 @@ def camera(lens="barrel", turned=(0, 0, 0), by=(0, 0, 0), skew=0.0) -> PosedCame
             matrix=[[2122.4, skew, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
             distortion=LENSES[lens],
         ),
-        pose=Pose.at(rotation.tolist(), position.tolist()),
+        pose=Pose.from_position(rotation.tolist(), position.tolist()),
     )
 
 
@@ -41,7 +41,7 @@ def test_points_of_the_pitch_are_where_the_engine_has_them(lens, skew):
     shot = camera(lens, skew=skew)
     points = np.array([[x, y] for x in (-30.0, -10, 0) for y in (-20, 0, 30)])
     expected = camera_of(shot).project(np.column_stack([points, np.zeros(len(points))]))
-    np.testing.assert_allclose(movement._pixels(shot, points), expected, atol=1e-6)
+    np.testing.assert_allclose(movement.pixels(shot, points), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("lens", ["none", "barrel", "fisheye"])
@@ -71,6 +71,6 @@ def test_a_point_that_a_lens_formula_folds_back_into_the_picture_is_not_in_view(
     shot = camera().model_copy(
         update={"intrinsics": Intrinsics(matrix=camera().intrinsics.matrix, distortion=[-0.34, 0, 0, 0])}
     )
-    beside, before = movement._pixels(shot, np.array([[40.0, -49.0], [-20.0, 0.0]]))
+    beside, before = movement.pixels(shot, np.array([[40.0, -49.0], [-20.0, 0.0]]))
     assert np.isnan(beside).all()
     assert np.isfinite(before).all()

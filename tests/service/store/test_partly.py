@@ -2,10 +2,10 @@
 
 import pytest
 
-from service.store.counts.figures import look
-from service.store.jobs.decisions import MovedOn
-from service.wire.geometry import Light
-from service.wire.results import View
+from service.schemas.geometry import Light
+from service.schemas.results import View
+from service.store.jobs.decisions import VenueHasChanged
+from service.store.statistics.snapshot import read_statistics
 from tests.homes import in_both_homes
 from tests.service.store.test_alarms import failed, rings, told, watched
 from tests.worker.stock import anyway, result
@@ -105,7 +105,7 @@ def test_the_rest_is_not_taken_once_something_else_has_come(stock):
     stock.venue("v")
     job = partly(stock)
     stock.moved_by_hand("v", -3.0)
-    with pytest.raises(MovedOn):
+    with pytest.raises(VenueHasChanged):
         stock.decisions.accept(job)
     stock.venues.restore("v", 2, anyway)
     assert standing(stock) == LEFT_MOVED
@@ -148,7 +148,7 @@ def test_a_camera_whose_pose_is_old_rings_by_itself_until_it_is_accepted(stock):
     partly(stock)
     assert rings(stock) == []
     stock.time_passes(hours=2)
-    stock.venues.settle_alarms("v")
+    stock.venues.update_alarms("v")
     assert rings(stock) == [("not-calibrated", "right")]
     assert stock.venues.health("v").alarms[0].why.startswith("No pose of camera right was accepted since ")
     stock.calibrated("v")
@@ -161,7 +161,7 @@ def test_it_is_a_verdict_of_its_own_where_jobs_are_counted_and_listed(stock):
     partly(stock)
     (end,) = stock.past_calibrations.of("v", 1)
     assert (end.verdict, end.accepted, end.rejected_because) == ("partly", False, "the lines do not fit")
-    assert look(stock.engine, 10).tallies["jobs_ended", ("succeeded", "partly", "")] == 1
+    assert read_statistics(stock.engine, 10).counters["jobs_ended", ("succeeded", "partly", "")] == 1
 
 
 @in_both_homes

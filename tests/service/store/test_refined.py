@@ -3,12 +3,12 @@
 import pytest
 import sqlalchemy as sa
 
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Intrinsics, Pose
+from service.schemas.results import Refined
 from service.store import tables
 from service.store.memories import newest_memories
 from service.store.refined import NoRefinedPose
-from service.wire.field import FieldOfPlay
-from service.wire.geometry import Intrinsics, Pose
-from service.wire.results import Refined
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway, result
 
@@ -27,7 +27,7 @@ def night(stock, accepted=True, **options):
 
 def refined(pose):
     x, y, z = pose.position
-    there = Pose.at(pose.rotation, [x, y, z + 0.01])
+    there = Pose.from_position(pose.rotation, [x, y, z + 0.01])
     return Refined(pose=there, intrinsics=LENS, covariance=None, sigma=None, longer=0.001, differs_m=0.03)
 
 

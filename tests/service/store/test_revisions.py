@@ -2,10 +2,10 @@
 
 import pytest
 
-from service.store.jobs.decisions import MovedOn, NoPoses
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Intrinsics
+from service.store.jobs.decisions import NoPoses, VenueHasChanged
 from service.store.revisions import NoSuchRevision, RevisionUnfit
-from service.wire.field import FieldOfPlay
-from service.wire.geometry import Intrinsics
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway, result
 
@@ -193,12 +193,12 @@ def test_what_was_taken_can_be_given_back_and_taken_again(stock):
 def test_nothing_by_hand_undoes_what_came_later(stock):
     stock.venue("v")
     refused, taken = stock.calibrated("v", accepted=False), stock.calibrated("v")
-    with pytest.raises(MovedOn) as moved:
+    with pytest.raises(VenueHasChanged) as moved:
         stock.decisions.accept(refused)
     assert moved.value.newest.revision == 2
     stock.moved_by_hand("v", -3.0)
     for decide in (stock.decisions.accept, stock.decisions.reject):
-        with pytest.raises(MovedOn):
+        with pytest.raises(VenueHasChanged):
             decide(taken)
     assert standing(stock) == -3.0
 
@@ -224,7 +224,7 @@ def test_poses_that_were_found_for_another_venue_are_not_taken(stock):
     venue = stock.venue("v")
     job = stock.calibrated("v", accepted=False)
     stock.venues.put(venue.model_copy(update={"field": FieldOfPlay(length_m=104, width_m=68)}), anyway)
-    with pytest.raises(MovedOn):
+    with pytest.raises(VenueHasChanged):
         stock.decisions.accept(job)
 
 

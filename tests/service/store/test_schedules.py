@@ -5,8 +5,8 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.store.schedules import Schedules
-from service.wire.schedule import NoSchedule, Schedule, next_time, place_of
+from service.schemas.schedule import InvalidSchedule, Schedule, next_time, phase_of
+from service.store.schedules import ScheduleRepository
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway
 
@@ -35,11 +35,11 @@ def test_a_schedule_fires_by_the_clock_on_the_wall(cron, zone, after, expected):
 
 
 def test_venues_with_the_same_schedule_fire_one_after_the_other_within_a_quarter_of_an_hour():
-    times = [next_time("*/15 * * * *", "UTC", NOON, place_of(f"venue-{n}")) for n in range(1000)]
+    times = [next_time("*/15 * * * *", "UTC", NOON, phase_of(f"venue-{n}")) for n in range(1000)]
     assert NOON < min(times) < max(times) <= NOON + timedelta(minutes=15)
     # 1000 in 900 s.
     assert max(Counter(times).values()) < 10
-    assert times == [next_time("*/15 * * * *", "UTC", NOON, place_of(f"venue-{n}")) for n in range(1000)]
+    assert times == [next_time("*/15 * * * *", "UTC", NOON, phase_of(f"venue-{n}")) for n in range(1000)]
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_a_schedule_that_must_be_exact_is(stock, schedules):
     exact = put(stock, exact=True).next_at
     assert (exact.minute % 15, exact.second) == (0, 0)
     assert spread != exact
-    (firing,) = schedules.fire(exact, exact + LEASE, 10)
+    (firing,) = schedules.claim_due(exact, exact + LEASE, 10)
     schedules.done(firing, exact, None, None)
     state = stock.venues.health("v").schedule
     assert (state.last_at, state.next_at) == (exact, exact + timedelta(minutes=15))
@@ -78,13 +78,13 @@ def test_a_schedule_that_must_be_exact_is(stock, schedules):
     ],
 )
 def test_what_never_fires_is_no_schedule(cron, zone):
-    with pytest.raises(NoSchedule):
+    with pytest.raises(InvalidSchedule):
         next_time(cron, zone, NOON)
 
 
 @pytest.fixture
 def schedules(stock):
-    return Schedules(stock.engine)
+    return ScheduleRepository(stock.engine)
 
 
 def put(stock, cron="*/15 * * * *", exact=False):
@@ -96,43 +96,43 @@ def put(stock, cron="*/15 * * * *", exact=False):
 @in_both_homes
 def test_a_time_that_came_fires_once(stock, schedules):
     due = put(stock).next_at
-    assert schedules.fire(due - timedelta(seconds=1), due, 10) == []
-    (firing,) = schedules.fire(due, due + LEASE, 10)
+    assert schedules.claim_due(due - timedelta(seconds=1), due, 10) == []
+    (firing,) = schedules.claim_due(due, due + LEASE, 10)
     assert (firing.venue_id, firing.due_at) == ("v", due)
     # Another worker.
-    assert schedules.fire(due, due + LEASE, 10) == []
+    assert schedules.claim_due(due, due + LEASE, 10) == []
     schedules.done(firing, due, None, "the camera is away")
     state = stock.venues.health("v").schedule
     assert (state.next_at, state.last_error) == (due + timedelta(minutes=15), "the camera is away")
-    assert schedules.fire(due, due + LEASE, 10) == []
+    assert schedules.claim_due(due, due + LEASE, 10) == []
 
 
 @in_both_homes
 def test_times_that_were_missed_fire_once(stock, schedules):
     due = put(stock).next_at
     late = due + timedelta(hours=5, minutes=1)
-    (firing,) = schedules.fire(late, late + LEASE, 10)
+    (firing,) = schedules.claim_due(late, late + LEASE, 10)
     schedules.done(firing, late, None, None)
-    assert schedules.fire(late, late + LEASE, 10) == []
+    assert schedules.claim_due(late, late + LEASE, 10) == []
     assert stock.venues.health("v").schedule.next_at == due + timedelta(hours=5, minutes=15)
 
 
 @in_both_homes
 def test_what_a_worker_died_over_is_fired_again_for_the_same_time(stock, schedules):
     due = put(stock).next_at
-    (first,) = schedules.fire(due, due + LEASE, 10)
-    (again,) = schedules.fire(due + LEASE, due + 2 * LEASE, 10)
+    (first,) = schedules.claim_due(due, due + LEASE, 10)
+    (again,) = schedules.claim_due(due + LEASE, due + 2 * LEASE, 10)
     assert again == first
 
 
 @in_both_homes
 def test_a_schedule_that_is_changed_or_taken_away_fires_no_more(stock, schedules):
     due = put(stock).next_at
-    (firing,) = schedules.fire(due, due + LEASE, 10)
+    (firing,) = schedules.claim_due(due, due + LEASE, 10)
     changed = put(stock, "0 3 * * *")
     schedules.done(firing, due, None, "too late")
     assert stock.venues.health("v").schedule == changed
     # Put again as it is, it goes on where it was.
     assert put(stock, "0 3 * * *") == changed
     assert put(stock, None) is None
-    assert schedules.fire(due + timedelta(days=9), due + timedelta(days=9), 10) == []
+    assert schedules.claim_due(due + timedelta(days=9), due + timedelta(days=9), 10) == []

@@ -1,31 +1,36 @@
+import os
 import socket
 import time
+from datetime import timedelta
 
 import obstore
 import pytest
+import sqlalchemy as sa
 from obstore.exceptions import BaseError
 from obstore.store import from_url
 
+from service.schemas.geometry import Intrinsics
+from service.schemas.health import Alarms as Rules
+from service.schemas.results import View
+from service.schemas.venue import VENUE_EXAMPLE, VenueIn
+from service.store import tables
 from service.store.blobs import Blobs
 from service.store.ids import new_id
-from service.store.venues import Venues
-from service.store.workers import Workers
-from service.wire.geometry import Intrinsics
-from service.wire.results import View
-from service.wire.venue import VENUE_EXAMPLE, VenueIn
+from service.store.venues import VenueRepository
+from service.store.workers import WorkerRepository
 from tests.homes import in_both_homes, on_servers
-from tests.worker.stock import result
+from tests.worker.stock import anyway, result
 
 
 @in_both_homes
 def test_a_refused_put_changes_nothing(engine):
-    venues = Venues(engine)
+    venues = VenueRepository(engine)
 
     def refuse(_):
         raise PermissionError
 
     with pytest.raises(PermissionError):
-        venues.put(VenueIn.model_validate(VENUE_EXAMPLE).stored(), refuse)
+        venues.put(VenueIn.model_validate(VENUE_EXAMPLE).to_venue(), refuse)
     assert venues.get("tsukuba") is None
 
 
@@ -45,14 +50,30 @@ def test_jobs_that_are_not_there_are_none(stock):
 
 @in_both_homes
 def test_a_silent_worker_is_noticed_and_may_come_back(engine):
-    workers = Workers(engine)
-    workers.enter("w", None)
+    workers = WorkerRepository(engine)
+    workers.register("w", None)
     assert [worker.name for worker in workers.alive(5)] == ["w"]
     assert workers.silent(0) == ["w"]
-    workers.leave("w", 5)
+    workers.forget("w", 5)
     assert workers.beat("w")
-    workers.leave("w", 0)
+    workers.forget("w", 0)
     assert not workers.beat("w")
+
+
+@in_both_homes
+def test_a_worker_that_died_before_its_clock_was_put_right_is_noticed_as_soon_as_any(engine):
+    workers = WorkerRepository(engine)
+    for name in ("dead", "alive"):
+        workers.register(name, None)
+    with engine.begin() as connection:
+        ahead = workers.now() + timedelta(hours=6)
+        connection.execute(sa.update(tables.workers).where(tables.workers.c.name == "dead").values(seen_at=ahead))
+    # Nobody knows: it may only not have given a sign of life since.
+    assert [worker.name for worker in workers.alive(10)] == ["alive"]
+    assert workers.silent(10) == []
+    workers.beat("alive")
+    time.sleep(0.1)
+    assert workers.silent(0.05) == ["alive", "dead"]
 
 
 @in_both_homes
@@ -82,6 +103,18 @@ def test_a_large_blob_goes_to_a_bucket_in_one_piece(home, tmp_path):
     url = home.blob_url(tmp_path)
     Blobs(url).put("frames/a/left/0", bytes(20_000_000))
     assert "-" not in obstore.head(from_url(url), "frames/a/left/0")["e_tag"]
+
+
+@on_servers
+def test_the_credentials_of_a_bucket_may_stand_in_files(home, tmp_path, monkeypatch):
+    url = home.blob_url(tmp_path)
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        (tmp_path / name).write_text(f"{os.environ[name]}\n")
+        monkeypatch.setenv(f"{name}_FILE", str(tmp_path / name))
+        monkeypatch.delenv(name)
+    blobs = Blobs(url, patience_s=5)
+    blobs.put("frames/a/left/0", b"1")
+    assert blobs.get("frames/a/left/0") == b"1"
 
 
 def test_a_blob_reaches_the_disk_with_every_folder_on_the_way_to_it(tmp_path, monkeypatch):
@@ -143,3 +176,24 @@ def test_a_job_is_handed_out_with_what_the_frames_of_the_last_accepted_one_were_
     second = after(first, clear, accepted=True)
     assert second.last_views == {camera.id: clear for camera in first.venue.cameras}
     assert after(second, fog, accepted=False).last_views == second.last_views
+
+
+@in_both_homes
+def test_the_end_of_a_job_reads_and_writes_what_is_known_of_its_venue_once(stock):
+    venue = stock.venue("v")
+    stock.venues.put(venue.model_copy(update={"alarms": Rules(moved_since_last_px=0.001)}), anyway)
+    stock.calibrated("v")
+    task, statements = stock.attempts.begin(stock.submitted("v")), []
+
+    @sa.event.listens_for(stock.engine, "before_cursor_execute")
+    def note(_, __, statement, *___):
+        statements.append(statement)
+
+    stock.attempts.finish(task, result(task.venue, True), [])
+    of_venue = [statement.split()[0] for statement in statements if "venue_quality" in statement]
+    assert of_venue == ["SELECT", "UPDATE"]
+    for table in ("venues", "camera_anchors"):
+        assert len([statement for statement in statements if f"FROM {table} " in statement.replace("\n", " ")]) == 1
+    assert len([statement for statement in statements if "ORDER BY revisions.number" in statement]) == 1
+    # 36 and, with what PostgreSQL is asked for the time and for locks, 42 when each part of the end read for itself.
+    assert len(statements) <= 24

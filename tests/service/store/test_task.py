@@ -2,11 +2,11 @@
 
 import pytest
 
+from service.schemas.options import Board, FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.store.jobs.task import Origin, Task, seeded
-from service.wire.options import Board, FieldOptions, IntrinsicsOptions, LocateOptions, Options
-from service.wire.venue import VENUE_EXAMPLE, VenueIn
 
-VENUE = VenueIn.model_validate(VENUE_EXAMPLE).stored()
+VENUE = VenueIn.model_validate(VENUE_EXAMPLE).to_venue()
 POINTS = [{"world": [x, y], "pixel": [10.5 * x, y]} for x in (0, 1) for y in (0, 1)]
 ORIGIN = Origin("van-3", "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01")
 

@@ -5,8 +5,8 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import sqlalchemy as sa
 
+from service.schemas.health import Alarms
 from service.store import tables, trends
-from service.wire.health import Alarms
 from tests.homes import in_both_homes
 from tests.trending import SIGMA_M, displacement, night, nights, noisy
 from tests.worker.stock import anyway

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.scene.camera import Array, Camera, Pose
-from worker.calibration.scene.field import Field, Marking
-from worker.calibration.scene.lens import Intrinsics
+from worker.calibration.geometry.camera import Array, Camera, Pose
+from worker.calibration.geometry.field import Field, Marking
+from worker.calibration.geometry.lens import Intrinsics
 
 GRASS = np.array([60, 130, 70], np.float32)
 PAINTS = {

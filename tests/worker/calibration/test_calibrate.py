@@ -8,10 +8,10 @@ import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.calibrate import calibrate
-from worker.calibration.judge.quality import Gate, ridge_rejection
+from worker.calibration.gate.quality import Gate, ridge_rejection
+from worker.calibration.geometry.parameters import free_focal_lengths
+from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import CalibrationError, Options, Stopped
-from worker.calibration.scene.parameters import free_focal_lengths
-from worker.calibration.scene.rotation import rotation_angles_deg
 
 TURN = (0.006, -0.005, 0.004)
 SHIFT = (0.05, -0.06, 0.04)
@@ -22,7 +22,8 @@ def frames():
 
 
 def white_on_green(frame, regions):
-    assert regions
+    if not regions:
+        return np.zeros(frame.shape[:2], dtype=np.uint8)
     is_sky = (frame[..., 0] > 200) & (frame[..., 2] < 200)
     whiteness = np.clip((frame.min(axis=-1) - 70.0) * 2, 0, 255)
     return np.where(is_sky, 0, whiteness).astype(np.uint8)
@@ -91,11 +92,27 @@ def test_black_frames_are_rejected_and_the_camera_is_named():
     assert "camera left" not in found.rejected_because
 
 
-def test_a_stored_pose_that_looks_at_the_sky_is_an_error_that_names_the_camera():
+def test_a_stored_pose_that_looks_at_the_sky_is_refused_and_the_other_camera_is_calibrated():
     left, right = outdated()
-    with pytest.raises(CalibrationError, match="camera right sees") as caught:
-        run(cameras=[left, moved(right, (1.2, 0, 0))])
-    assert caught.value.camera == "right"
+    found = run(cameras=[left, moved(right, (1.2, 0, 0))])
+    assert [camera.accepted for camera in found.cameras] == [True, False]
+    assert found.cameras[1].refusal.reason == "no-markings-in-view"
+    assert "camera right sees 0 m" in found.rejected_because
+    assert found.verdict == "partly"
+
+
+def test_stored_poses_that_all_look_at_the_sky_are_an_error_that_names_each_camera():
+    with pytest.raises(CalibrationError, match="camera left sees") as caught:
+        run(cameras=[moved(camera, (1.2, 0, 0)) for camera in outdated()])
+    assert caught.value.camera == "left"
+    assert "the stored pose of camera right sees" in str(caught.value)
+
+
+def test_reasons_that_end_with_a_full_stop_are_joined_without_it():
+    dark = {name: (np.zeros_like(several[0]),) for name, several in frames().items()}
+    reasons = run(pictures=dark).rejected_because
+    assert "; camera right: Dark" in reasons
+    assert ".;" not in reasons
 
 
 def test_what_walks_through_one_of_three_frames_does_not_matter():
@@ -153,6 +170,20 @@ def test_a_lens_that_is_not_the_one_that_was_given_is_suspected_with_its_numbers
     assert "camera left fit best with a first radial coefficient" in told["left", "k1"].detail
     assert found.cameras[0].camera.intrinsics is other
     assert result().suspicions == []
+
+
+def test_a_flat_pitch_that_is_crowned_is_told_with_how_far_the_true_ridge_moves_the_cameras():
+    flat = calibrate(CROWNED.flat(), outdated(), frames(), white_on_green, Options(seed=3))
+    (ridge,) = [one for one in flat.suspicions if one.camera is None]
+    assert ridge.quantity == "ridge_height_m"
+    assert ridge.deviation == pytest.approx(0.35, abs=3 * ridge.sigma)
+    raised = CROWNED.flat().raised(ridge.deviation)
+    there = [one.camera for one in flat.cameras]
+    again = calibrate(raised, there, frames(), white_on_green, Options(seed=3))
+    assert again.suspicions == []
+    for before, after in zip(flat.cameras, again.cameras, strict=True):
+        assert after.residual_px < before.residual_px / 3
+        assert after.moved.position_m == pytest.approx(ridge.moves_m[before.camera.id], rel=0.1)
 
 
 def test_a_ridge_below_the_ground_is_rejected():

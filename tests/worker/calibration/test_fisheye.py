@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 from tests.worker.calibration.synthetic import CROWNED, PITCH, moved, paint_frame
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.calibrate import calibrate
-from worker.calibration.draw.mosaic import birdseye, stitched
-from worker.calibration.draw.overlays import overlay
+from worker.calibration.detection.segmentation import reachable_regions
+from worker.calibration.geometry.camera import Camera, Pose, inside, project, project_planes
+from worker.calibration.geometry.lens import FISHEYE_DISTORTION_LENGTHS, WIDEST_FISHEYE_RAD, Fisheye
+from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.records import Options
-from worker.calibration.scene.camera import Camera, Pose, inside, project, project_planes
-from worker.calibration.scene.lens import FISHEYE_DISTORTION_LENGTHS, WIDEST_FISHEYE_RAD, Fisheye
-from worker.calibration.scene.rotation import rotation_angles_deg
-from worker.calibration.scene.visibility import SeenLines
-from worker.calibration.see.segmentation import reachable_regions
-from worker.calibration.stitch.views import ViewChoice, chosen_view
+from worker.calibration.rendering.overlays import overlay
+from worker.calibration.rendering.stitched_pictures import birdseye, stitched
+from worker.calibration.stitching.views import ViewChoice, chosen_view
 
 SIZE = (1920, 1080)
 # Of wide action and dome cameras, and a lens of the opposite sign.
@@ -121,7 +121,7 @@ def test_a_smaller_copy_of_a_picture_keeps_every_point_in_its_place_and_its_lens
 
 
 def test_it_sees_the_lines_that_a_pinhole_of_the_same_focal_length_cannot():
-    seen = SeenLines.from_camera(PITCH.line_points(), camera())
+    seen = VisibleLines.from_camera(PITCH.line_points(), camera())
     assert np.isfinite(seen.width_px).all()
     assert len(seen) > 0.95 * len(PITCH.line_points())
     # The directions across lines are those that small steps on the ground have in the picture.

@@ -9,11 +9,11 @@ from fields.template import Template, load
 from tests.worker.calibration.synthetic import camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
 from worker.calibration.calibrate import calibrate
-from worker.calibration.draw.mosaic import birdseye
-from worker.calibration.draw.overlays import overlay
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Options
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.rotation import rotation_angles_deg
+from worker.calibration.rendering.overlays import overlay
+from worker.calibration.rendering.stitched_pictures import birdseye
 
 # A tennis court, as a venue would give it: half of it, named as its owner likes.
 TENNIS = Template(

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fields.template import load
-from tests.worker.calibration.see.spoiling import fogged
+from tests.worker.calibration.detection.spoiling import fogged
 from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
 from tests.worker.calibration.test_sports import field
 from worker.calibration import calibrate as engine
+from worker.calibration import solve
 from worker.calibration.calibrate import calibrate
-from worker.calibration.judge.pairs import Pair
+from worker.calibration.gate.pairs import Pair
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
-from worker.calibration.settle import Situation
 
 Pictures = dict[str, NDArray[np.uint8]]
 
@@ -120,13 +120,13 @@ def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeyp
         agree, disagree = Pair("west", "middle", 0.1, True, True), Pair("middle", "east", 4.0, True, False)
         return [pair for pair in (agree, disagree) if {*pair.cameras} <= {one.camera.id for one in cameras}]
 
-    def finishing(here, begun):
+    def finishing(problem, begun, progress):
         finished.append([camera.id for camera in begun])
-        return finish(here, begun)
+        return finish(problem, begun, progress)
 
-    finish = Situation.finished
-    monkeypatch.setattr(Situation, "finished", finishing)
-    monkeypatch.setattr(engine, "compared", contradicted)
+    finish = solve.refine_poses
+    monkeypatch.setattr(solve, "refine_poses", finishing)
+    monkeypatch.setattr(engine, "compare_pairs", contradicted)
     found = run(mast)
     assert verdicts(found) == {"west": True, "middle": True, "east": False}
     assert finished == [["west", "middle", "east"], ["west", "middle"]]

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from service.wire.health import Alarms as Rules
+from service.schemas.health import Alarms as Rules
 from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame
 from tests.worker.duties.year import VENUE, Frames, Year, cameras, fast_motion, frames_of, longer
 from tests.worker.stock import anyway
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
 
 OTHER_PITCH = Field(92.0, 50.0)
 # Of 640: what of 4K would be 9 px. The lines themselves are 1 to 3 px wide here.

@@ -6,11 +6,14 @@ from threading import Barrier
 import pytest
 import sqlalchemy as sa
 
+from service.schemas.events.webhooks import Webhook
 from service.store import tables
-from service.store.blobs import FolderAway
+from service.store.blobs import BlobFolderUnavailable
 from service.store.jobs.files import source_file
+from service.store.jobs.queries import JobPage
+from service.store.statistics import counters
 from tests.homes import in_both_homes
-from tests.worker.stock import Stock
+from tests.worker.stock import Stock, anyway
 from worker.duties.retention import AT_ONCE, FOLDERS_OF_A_JOB, TRY_AGAIN_AFTER, Retention
 
 pytestmark = in_both_homes
@@ -38,7 +41,7 @@ def test_frames_go_after_two_days_and_pictures_after_two_weeks(stock, retention)
     young = stock.ended("a", ago(days=1))
     retention.round(NOW)
     assert stock.files() == {f"pictures/{old}", f"pictures/{young}", f"frames/{young}"}
-    assert {job.id for job in stock.jobs.page("a", None, None, 10)} == {failed, old, older, young}
+    assert {job.id for job in stock.jobs.page(JobPage(10, venue="a"))} == {failed, old, older, young}
 
 
 def test_frames_of_pictures_that_nobody_has_looked_at_stay_as_long_as_pictures(stock, retention):
@@ -59,7 +62,7 @@ def test_frames_that_cannot_be_kept_for_pictures_do_not_go(stock, retention, mon
     unseen, later = (stock.ended("a", ago(days=days), accepted=False, drawn=False) for days in (4, 3))
 
     def away(*_):
-        raise FolderAway("away")
+        raise BlobFolderUnavailable("away")
 
     with monkeypatch.context() as outage:
         outage.setattr(stock.blobs, "move", away)
@@ -78,7 +81,7 @@ def test_frames_that_cannot_be_kept_for_pictures_hold_up_no_others(stock, retent
 
     def refuse(path, to):
         if stuck in path:
-            raise FolderAway(path)
+            raise BlobFolderUnavailable(path)
         return move(path, to)
 
     monkeypatch.setattr(stock.blobs, "move", refuse)
@@ -118,7 +121,7 @@ def test_nothing_of_a_deleted_venue_is_kept_for_ever(stock, retention):
     stock.ended("a", ago(days=500))
     stock.venues.delete("a", lambda *_: None)
     retention.round(NOW)
-    assert (stock.jobs.page("a", None, None, 10), stock.files()) == ([], set())
+    assert (stock.jobs.page(JobPage(10, venue="a")), stock.files()) == ([], set())
 
 
 def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
@@ -132,7 +135,7 @@ def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
 
 def test_frames_of_an_upload_that_became_no_job_go_after_their_grace(stock, retention):
     grace = timedelta(hours=1)
-    stock.expiry.expect_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", grace)
+    stock.expiry.register_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", grace)
     stock.blobs.put("frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/left/0", b"frame")
     retention.round(stock.expiry.now())
     assert stock.files() == {"frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"}
@@ -222,12 +225,12 @@ def test_a_round_deletes_all_that_as_many_jobs_leave_and_many_at_once(stock, ret
 
 def test_of_several_workers_one_tidies(stock, retention):
     job = stock.ended("a", ago(days=3), accepted=None)
-    stock.workers.enter("another", None)
-    stock.workers.enter("w", None)
-    retention.look()
+    stock.workers.register("another", None)
+    stock.workers.register("w", None)
+    retention.poll()
     assert stock.files() == {f"frames/{job}"}
-    stock.workers.leave("another", 0)
-    retention.look()
+    stock.workers.forget("another", 0)
+    retention.poll()
     assert stock.files() == set()
 
 
@@ -247,7 +250,7 @@ def test_two_rounds_at_once_do_no_harm(stock, retention):
     # What one could not delete because the other just did is looked at again.
     retention.round(NOW + TRY_AGAIN_AFTER)
     assert len(stock.files()) == 1
-    assert len(stock.jobs.page("a", None, None, 10)) == 2
+    assert len(stock.jobs.page(JobPage(10, venue="a"))) == 2
     assert stock.expiry.leftovers(NOW + timedelta(days=1), 10) == []
 
 
@@ -263,10 +266,10 @@ def test_a_full_disk_does_not_wait_for_the_next_round(home, tmp_path, forgotten)
     here = home.settings(tmp_path) | {"blob_url": (tmp_path / "blobs").as_uri()}
     stock = Stock(tmp_path, min_free_mb=1e12, tidy_every_s=3600, **here)
     retention = Retention(stock.settings, stock.expiry, stock.blobs, stock.workers, forgotten.extend)
-    stock.workers.enter("w", None)
-    retention.look()
+    stock.workers.register("w", None)
+    retention.poll()
     stock.ended("a", datetime.now(UTC) - timedelta(minutes=1), accepted=None)
-    retention.look()
+    retention.poll()
     assert stock.files() == set()
     stock.engine.dispose()
 
@@ -298,3 +301,34 @@ def in_years(stock, years):
 
 def numbers(stock, venue):
     return [revision.revision for revision in stock.venues.history(venue, None, 100)]
+
+
+def test_callbacks_that_were_not_delivered_expire_by_their_age_however_seldom_they_were_tried(stock, retention):
+    url = "https://hangs.example/"
+    old, tried, young = (stock.ended("v", ago(days=days), accepted=False, callback_url=url) for days in (2.1, 2.1, 1.9))
+    with stock.engine.begin() as connection:
+        d = tables.deliveries.c
+        last = {"attempts": 3, "last_error": "no answer within 10 s", "due_at": NOW + timedelta(hours=9)}
+        connection.execute(sa.update(tables.deliveries).where(d.id == tried).values(last))
+    retention.round(NOW)
+    told = {job: stock.jobs.get(job).callback for job in (old, tried, young)}
+    assert [(told[job].state, told[job].next_attempt_at) for job in (old, tried)] == [("given-up", None)] * 2
+    assert told[old].last_error == "its turn did not come in time"
+    assert (told[tried].last_error, told[young].state) == ("no answer within 10 s", "waiting")
+    with stock.engine.connect() as connection:
+        assert counters.read(connection)["callbacks", ("expired",)] == 2
+
+
+def test_deliveries_of_events_expire_in_batches_and_leave_no_row(stock, retention, monkeypatch):
+    monkeypatch.setattr("worker.duties.retention.EVENTS", 3)
+    hook = Webhook(url="https://hangs.example/told", events=["poses.changed"])
+    stock.venues.put(stock.venue("v").model_copy(update={"webhooks": [hook]}), anyway)
+    for _ in range(4):
+        stock.calibrated("v")
+    assert stock.callbacks() == {"waiting": 4}
+    with stock.engine.begin() as connection:
+        connection.execute(sa.update(tables.events).values(at=ago(days=2.5)))
+    assert retention.round(NOW)
+    assert stock.callbacks() == {"waiting": 1}
+    assert not retention.round(NOW)
+    assert stock.callbacks() == {}

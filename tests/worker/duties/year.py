@@ -10,20 +10,20 @@ from unittest import mock
 import cv2
 import numpy as np
 
-from service.store import engine as database
+from service.schemas.health import AlarmEvent
+from service.schemas.health import Alarms as Rules
+from service.schemas.results import Result
+from service.schemas.venue import Venue, VenueIn
+from service.store import database as database
 from service.store import movement
-from service.wire.health import AlarmEvent
-from service.wire.health import Alarms as Rules
-from service.wire.results import Result
-from service.wire.venue import Venue, VenueIn
 from tests.worker.calibration.synthetic import CROWNED, camera, paint_frame
 from tests.worker.stock import Stock, anyway
-from worker.calibration.scene.camera import Camera
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.parameters import with_focal_length
-from worker.duties.alarms import Alarms
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.parameters import with_focal_length
+from worker.duties.alarms import AlarmTimer
 from worker.jobs import calibration
-from worker.message import Means
+from worker.protocol import ComputeResources
 
 VENUE = "v"
 SIZE, FOCAL, LENS = (640, 360), 400.0, (-0.12, 0.02, 0.0, 0.0, 0.0)
@@ -67,7 +67,7 @@ def stored(of: Sequence[Camera], rules: Rules, sigma: Sigma | None = None) -> Ve
             ],
             "alarms": rules.model_dump(),
         }
-    ).stored()
+    ).to_venue()
 
 
 class Clock:
@@ -101,7 +101,7 @@ class Year:
         self.home = home
         self.clock = clock
         self.rules = rules
-        self.duty = Alarms(home.venues)
+        self.duty = AlarmTimer(home.venues)
         home.venues.put(stored(cameras(), rules, sigma), anyway)
 
     @property
@@ -114,15 +114,15 @@ class Year:
     def pass_(self, days: float) -> None:
         """Time passes, and the worker looks after the alarms."""
         self.clock.go_on(days)
-        self.duty.look()
+        self.duty.poll()
 
     def calibrate(self, frames: Frames) -> Result:
         """A job of these frames, from its beginning to its end."""
         files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
         task = self.home.attempts.begin(self.home.submitted(VENUE, generations=40, parents=32, offspring=64))
         assert task is not None
-        nights = calibration.Nights(task.last_views, task.memories, task.anchors, task.taken_at)
-        means = Means.of(self.home.settings)
+        nights = calibration.NightHistory(task.last_views, task.memories, task.anchors, task.taken_at)
+        means = ComputeResources.of(self.home.settings)
         found = calibration.solve(task.venue, files, task.options, means, lambda _: None, nights)
         self.home.attempts.finish(task, found.result, [], found.memories)
         self.job = task.job_id

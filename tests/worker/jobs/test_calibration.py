@@ -7,30 +7,30 @@ import cv2
 import numpy as np
 import pytest
 
+from service.schemas import geometry
+from service.schemas.field import OtherField
+from service.schemas.options import Options
+from service.schemas.programs.drawing import FLAT, DrawingRequest, DrawnPictures, decode_files, encode_message
+from service.schemas.results import AdoptableNumber, View
+from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store.jobs.files import drawn_together, picture_file
-from service.wire import geometry
-from service.wire.field import OtherField
-from service.wire.options import Options
-from service.wire.programs.drawing import FLAT, Drawing, Drawn, packed, unpacked
-from service.wire.results import View
-from service.wire.venue import VenueIn
 from worker.calibration import records as engine
-from worker.calibration.finish.diagnosis import Suspicion
-from worker.calibration.finish.uncertainty import Sigma
-from worker.calibration.judge.markings import MarkingSeen
-from worker.calibration.judge.overlap import Overlap
-from worker.calibration.judge.quality import CameraResult, Movement, Refusal
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.view_condition import UsualView, ViewCondition, ViewFigures
+from worker.calibration.diagnostics.markings import MarkingReport
+from worker.calibration.diagnostics.overlap import Overlap
+from worker.calibration.gate.quality import CameraResult, Movement, Refusal
+from worker.calibration.geometry.camera import Pose
 from worker.calibration.memory.camera_memory import CameraMemory, fingerprint
 from worker.calibration.memory.epoch import Epoch
-from worker.calibration.scene.camera import Pose
-from worker.calibration.see.evidence import Evidence
-from worker.calibration.see.view import UsualView, ViewCondition, ViewFigures
-from worker.calibration.settle import METHODS
-from worker.calibration.stitch.light import Light
-from worker.jobs import calibration, pictures, reading, wire
-from worker.jobs.calibration import Nights
-from worker.message import Means, Message
+from worker.calibration.refinement.diagnosis import Suspicion
+from worker.calibration.refinement.uncertainty import Sigma
+from worker.calibration.solve import METHODS
+from worker.calibration.stitching.photometry import Light
+from worker.jobs import calibration, from_schemas, pictures, to_schemas
+from worker.jobs.calibration import NightHistory
+from worker.protocol import ComputeResources, Message
 
 SIZE = (320, 180)
 FIGURES = ViewFigures(120.0, 1.5, 60.0, 0.8, 0.7, 0.0, 0.0, 0.0, 0.0, 0.1)
@@ -50,7 +50,7 @@ def venue():
         for camera, side in (("left", 1), ("right", -1))
     ]
     field = {"length_m": 105, "width_m": 68, "ridge": [[-18, 0, 0.2], [18, 0, 0.2]]}
-    return VenueIn.model_validate({"id": "v", "field": field, "cameras": cameras}).stored()
+    return VenueIn.model_validate({"id": "v", "field": field, "cameras": cameras}).to_venue()
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def asked(monkeypatch):
     """
     asked = {"against": {}}
 
-    def calibrate(pitch, cameras, frames, segment, options, report, usual, memories, taken_at):
+    def calibrate(pitch, cameras, frames, segment, options, report, usual, memories, taken_at, recorder):
         asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options, usual=usual)
         asked.update(memories=memories, taken_at=taken_at)
         for several in frames.values():
@@ -84,7 +84,7 @@ def asked(monkeypatch):
                 covariance=np.diag([np.inf] * 3 + [0.1] * 3),
                 repeatability=Sigma(0.01, 0.02),
                 zoom=None,
-                likelier=None,
+                with_fitted_zoom=None,
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
                 overlap=Overlap(0.9, 0.95, 0.05),
                 evidence_before=seen,
@@ -94,14 +94,17 @@ def asked(monkeypatch):
             )
             for camera in cameras
         ]
-        spent = engine.Spent()
-        with spent.measuring("evolution"):
+        spent = engine.StageTimings()
+        with spent.timed("evolution"):
             sum(range(10_000))
-        doubt = Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ...")
+        doubts = [
+            Suspicion("left", "k1", 0.01, 0.001, "the lines of camera left fit best with ..."),
+            *asked.get("of_field", []),
+        ]
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
         found = pitch.flat() if options.flat else pitch.raised(asked.get("raised", 0.0))
         lights, after = asked.get("lights", {}), asked.get("after", {})
-        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, [doubt], "near", lights, after)
+        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, doubts, "near", lights, after)
 
     class Segmenter:
         sha256 = "f" * 64
@@ -118,7 +121,7 @@ def asked(monkeypatch):
             asked["released"] = True
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
-    monkeypatch.setattr(wire, "Segmenter", Segmenter)
+    monkeypatch.setattr(to_schemas, "Segmenter", Segmenter)
     return asked
 
 
@@ -126,12 +129,12 @@ def asked(monkeypatch):
 def means(tmp_path):
     model = tmp_path / "unet.onnx"
     model.touch()
-    return Means(model=model, threads=1)
+    return ComputeResources(model=model, threads=1)
 
 
 def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, means):
     last = {"left": View(usable=True, detail="", lines_found=0.9, blur_px=None)}
-    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, Nights(last))
+    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, NightHistory(last))
     assert asked["usual"] == {"left": UsualView(0.9, None)}
     assert outcome.result.cameras[0].view.lines_found == 0.8
 
@@ -171,10 +174,12 @@ def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_len
 
 
 def test_what_is_hardly_told_of_a_lens_fits_what_a_venue_takes():
-    lens = reading.lens_of(
+    lens = from_schemas.lens_of(
         geometry.Intrinsics(matrix=[[220, 0, 160], [0, 220, 90], [0, 0, 1]], distortion=[]), list(SIZE)
     )
-    said = wire.wire_lens(replace(lens, sigma={"fx": 0.0, "k2": 1e12, "k3": float("inf"), "k1": float("nan")})).sigma
+    said = to_schemas.lens_to_schema(
+        replace(lens, sigma={"fx": 0.0, "k2": 1e12, "k3": float("inf"), "k1": float("nan")})
+    ).sigma
     assert said == {"fx": geometry.LEAST_SIGMA, "k2": geometry.LARGEST_SIGMA, "k3": geometry.LARGEST_SIGMA}
 
 
@@ -215,8 +220,8 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     partly = left.model_copy(update={"ignore": [[[0, 100], [319, 100], [319, 179], [0, 179]]]})
     venue = venue.model_copy(update={"cameras": [partly, right]})
     asked["markings"] = [
-        MarkingSeen("halfway line", 31.5, 0.21),
-        MarkingSeen("left goal line", 40.2, 0.9, -0.08, 0.01, "outside"),
+        MarkingReport("halfway line", 31.5, 0.21),
+        MarkingReport("left goal line", 40.2, 0.9, -0.08, 0.01, "outside"),
     ]
     asked["raised"] = 0.1 if options.fit_ridge else 0.0
     at_once = options.model_copy(update={"pictures": True})
@@ -224,14 +229,14 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     first = {camera: several[0] for camera, several in files.items()}
     for name in ("preview", "birdseye", "frame_left", "frame_right"):
         needed = {camera: file for camera, file in first.items() if not name.startswith("frame") or camera in name}
-        given = Drawing.of(venue, outcome.result, [name], 1, needed)
+        given = DrawingRequest.of(venue, outcome.result, [name], 1, needed)
         run = subprocess.run(
             [sys.executable, "-m", "worker.programs.draw"],
-            input=packed(given, needed),
+            input=encode_message(given, needed),
             stdout=subprocess.PIPE,
             check=True,
         )
-        drawn = unpacked(Drawn.model_validate_json(run.stdout.splitlines()[0]).sizes, run.stdout)
+        drawn = decode_files(DrawnPictures.model_validate_json(run.stdout.splitlines()[0]).sizes, run.stdout)
         assert set(drawn) == set(drawn_together(name))
         assert all(picture == outcome.pictures[each] for each, picture in drawn.items())
 
@@ -302,12 +307,23 @@ def test_what_the_lines_contradict_is_told(venue, files, asked, means):
     assert (doubt.camera, doubt.quantity, doubt.deviation, doubt.sigma) == ("left", "k1", 0.01, 0.001)
 
 
+def test_numbers_of_the_field_are_offered_in_millimetres_with_how_far_they_move_accepted_cameras(
+    venue, files, asked, means
+):
+    moves = {"left": 0.0812, "right": 0.0794}
+    asked["of_field"] = [Suspicion(None, "ridge_height_m", 0.1321, 0.016, "the lines fit ...", moves_m=moves)]
+    asked["against"] = {"right": "it is dark"}
+    (ridge,) = calibration.solve(venue, files, Options(), means, lambda _: None).result.adoptable
+    assert ridge == AdoptableNumber(name="ridge_height_m", given=0.2, value=0.332, sigma=0.016, moves_m={"left": 0.081})
+    assert calibration.solve(venue, files, Options(flat=True), means, lambda _: None).result.adoptable == []
+
+
 def test_what_json_cannot_say_is_null(venue, files, asked, means):
     steps = []
     camera = calibration.solve(venue, files, Options(seed=7), means, steps.append).result.cameras[0]
     assert (camera.sigma, camera.moved.pixels, camera.residual_px) == (None, None, None)
     assert camera.repeatability.position_m == 0.02
-    assert (steps[0].loss, steps[0].fraction) == (None, wire.PREVIEW_FRACTION)
+    assert (steps[0].loss, steps[0].fraction) == (None, to_schemas.PREVIEW_FRACTION)
 
 
 def test_what_a_program_says_is_what_its_worker_understands(venue, files, asked, means):
@@ -326,14 +342,14 @@ def test_the_orientation_a_camera_writes_into_its_files_is_not_obeyed(venue, fil
 
 def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, files, asked, means):
     files["right"] = [b"\xff\xd8\xff\xda\0\x02\xff\xd9"]
-    with pytest.raises(reading.Failure) as failure:
+    with pytest.raises(from_schemas.JobFailedError) as failure:
         calibration.solve(venue, files, Options(), means, lambda _: None)
     assert (failure.value.error.type, failure.value.error.camera) == ("/problems/broken-image", "right")
 
 
 def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, means):
     files["right"] = [cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()]
-    with pytest.raises(reading.Failure, match=r"right decodes to 64x48 pixels; .* 320x180"):
+    with pytest.raises(from_schemas.JobFailedError, match=r"right decodes to 64x48 pixels; .* 320x180"):
         calibration.solve(venue, files, Options(), means, lambda _: None)
 
 
@@ -342,7 +358,7 @@ def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, ask
         raise engine.CalibrationError("left", "no-markings-in-view", "store another pose")
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
-    with pytest.raises(reading.Failure) as failure:
+    with pytest.raises(from_schemas.JobFailedError) as failure:
         calibration.solve(venue, files, Options(), means, lambda _: None)
     error = failure.value.error
     assert (error.type, error.camera, error.detail) == ("/problems/no-markings-in-view", "left", "store another pose")
@@ -350,14 +366,20 @@ def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, ask
 
 def test_a_missing_network_fails_and_says_where_it_should_be(venue, files, means):
     gone = means.model_copy(update={"model": means.model / "nowhere"})
-    with pytest.raises(reading.Failure, match="nowhere"):
+    with pytest.raises(from_schemas.JobFailedError, match="nowhere"):
         calibration.solve(venue, files, Options(), gone, lambda _: None)
 
 
 def test_a_provider_that_is_not_installed_fails_and_says_what_to_set(venue, files):
-    with pytest.raises(reading.Failure, match=r"no CUDAExecutionProvider, only .* ESC_PROVIDER=cpu") as failure:
+    with pytest.raises(
+        from_schemas.JobFailedError, match=r"no CUDAExecutionProvider, only .* ESC_PROVIDER=cpu"
+    ) as failure:
         calibration.solve(
-            venue, files, Options(), Means(model=MODEL_BESIDE_THE_CODE, threads=1, provider="cuda"), lambda _: None
+            venue,
+            files,
+            Options(),
+            ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1, provider="cuda"),
+            lambda _: None,
         )
     assert failure.value.error.type == "/problems/provider-missing"
 
@@ -366,7 +388,7 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, mea
     def stitched(*_):
         raise ValueError
 
-    monkeypatch.setattr(pictures.mosaic, "stitched", stitched)
+    monkeypatch.setattr(pictures.stitched_pictures, "stitched", stitched)
     outcome = calibration.solve(venue, files, Options(seed=1, pictures=True), means, lambda _: None)
     assert {"birdseye", "overlay_left", "overlay_right"} <= set(outcome.pictures)
     assert not {"preview", "preview_before"} & set(outcome.pictures)
@@ -375,8 +397,8 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, mea
 def memory_of(camera):
     """A memory of one job, in which the camera was found where it is stored and measured nothing."""
     nothing = np.zeros(0)
-    epoch = Epoch(reading.camera_of(camera), nothing.astype(int), nothing, nothing, 1, None, None)
-    return CameraMemory(reading.camera_of(camera), epoch, None, (), (), "another field")
+    epoch = Epoch(from_schemas.camera_of(camera), nothing.astype(int), nothing, nothing, 1, None, None)
+    return CameraMemory(from_schemas.camera_of(camera), epoch, None, (), (), "another field")
 
 
 def test_memories_reach_the_engine_and_those_that_it_leaves_come_back(venue, files, asked, means):
@@ -385,7 +407,7 @@ def test_memories_reach_the_engine_and_those_that_it_leaves_come_back(venue, fil
     before = {"left": memory_of(left).to_json(), "right": {"format": 0}}
     at = datetime(2026, 11, 23, 2, tzinfo=UTC)
     outcome = calibration.solve(
-        venue, files, Options(seed=7), means, lambda _: None, Nights(memories=before, taken_at=at)
+        venue, files, Options(seed=7), means, lambda _: None, NightHistory(memories=before, taken_at=at)
     )
     assert (asked["taken_at"], list(asked["memories"])) == (at, ["left"])
     assert asked["memories"]["left"].to_json() == before["left"]
@@ -395,7 +417,7 @@ def test_memories_reach_the_engine_and_those_that_it_leaves_come_back(venue, fil
 
 
 def test_the_nights_of_a_camera_are_counted(venue, files, asked, means):
-    fits = fingerprint(reading.pitch_of(venue.field).line_points())
+    fits = fingerprint(from_schemas.pitch_of(venue.field).line_points())
     asked["after"] = {"left": replace(memory_of(venue.cameras[0]), lines=fits)}
     outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None)
     assert [camera.nights for camera in outcome.result.cameras] == [1, 0]

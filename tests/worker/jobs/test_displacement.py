@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.wire.geometry import PosedCamera
-from service.wire.trend import Anchor
-from tests.worker.calibration.judge.test_quality import good
+from service.schemas.geometry import PosedCamera
+from service.schemas.trend import Anchor
+from tests.worker.calibration.gate.test_quality import good
 from tests.worker.calibration.synthetic import PITCH, camera
-from worker.calibration.finish.uncertainty import Deviation
-from worker.calibration.scene.camera import Pose
-from worker.jobs.wire import wire_displacement, wire_lens, wire_pose
+from worker.calibration.geometry.camera import Pose
+from worker.calibration.refinement.uncertainty import Deviation
+from worker.jobs.to_schemas import displacement_to_schema, lens_to_schema, pose_to_schema
 
 CAMERA = camera("left", (0.0, -44.0, 10.0), (0.0, 10.0), focal=900.0)
 ANCHOR = Anchor(
     revision=3,
     posed=PosedCamera(
-        id="left", image_size=[960, 540], intrinsics=wire_lens(CAMERA.intrinsics), pose=wire_pose(CAMERA.pose)
+        id="left", image_size=[960, 540], intrinsics=lens_to_schema(CAMERA.intrinsics), pose=pose_to_schema(CAMERA.pose)
     ),
 )
 
@@ -28,14 +28,14 @@ def found(by=(0.0, 0.0, 0.0), **known):
 
 
 def test_a_camera_is_compared_with_its_anchor():
-    told = wire_displacement(PITCH, found(by=(0.03, 0.04, 0.0)), ANCHOR)
+    told = displacement_to_schema(PITCH, found(by=(0.03, 0.04, 0.0)), ANCHOR)
     assert (told.anchor, told.rotation_deg, told.position_m) == (3, 0.0, pytest.approx(0.05))
     assert np.hypot(told.across_m, told.away_m) == pytest.approx(0.05)
     assert told.sigma_across_m >= told.repeatability_across_m > 0
 
 
 def test_a_camera_without_an_anchor_is_its_own():
-    told = wire_displacement(PITCH, found(by=(0.03, 0.04, 0.0)), None)
+    told = displacement_to_schema(PITCH, found(by=(0.03, 0.04, 0.0)), None)
     assert (told.anchor, told.rotation_deg, told.position_m) == (None, 0.0, 0.0)
     assert (told.across_m, told.away_m) == pytest.approx((0.0, 0.0), abs=1e-9)
     assert told.sigma_away_m > 0
@@ -43,12 +43,12 @@ def test_a_camera_without_an_anchor_is_its_own():
 
 def test_the_focal_length_is_told_where_the_lines_were_asked_for_it():
     zoom = Deviation("left", "focal_length_px", -0.9, 0.45, 0.3)
-    told = wire_displacement(PITCH, found(zoom=zoom), ANCHOR)
+    told = displacement_to_schema(PITCH, found(zoom=zoom), ANCHOR)
     assert (told.focal_length, told.sigma_focal_length) == pytest.approx((-0.001, 0.0005))
     assert told.focal_length_m > 0
-    assert wire_displacement(PITCH, found(), ANCHOR).focal_length is None
+    assert displacement_to_schema(PITCH, found(), ANCHOR).focal_length is None
 
 
 @pytest.mark.parametrize("covariance", [None, np.diag([np.inf] * 3 + [0.1] * 3)])
 def test_a_pose_that_nobody_knows_the_sigma_of_is_not_compared(covariance):
-    assert wire_displacement(PITCH, found(covariance=covariance), ANCHOR) is None
+    assert displacement_to_schema(PITCH, found(covariance=covariance), ANCHOR) is None

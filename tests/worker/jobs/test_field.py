@@ -2,11 +2,11 @@
 
 import pytest
 
-from service.wire.options import FieldOptions
-from service.wire.venue import VenueIn
+from service.schemas.options import FieldOptions
+from service.schemas.venue import VenueIn
 from worker.jobs.field import solve
-from worker.jobs.reading import Failure
-from worker.message import Means
+from worker.jobs.from_schemas import JobFailedError
+from worker.protocol import ComputeResources
 
 
 def refusal(tmp_path, template, length_m, width_m):
@@ -18,9 +18,15 @@ def refusal(tmp_path, template, length_m, width_m):
         "pose": {"rotation": [1.675, 0.372, -0.462], "position": [-1, -49, 8]},
     }
     field = {"template": template, "length_m": length_m, "width_m": width_m}
-    venue = VenueIn.model_validate({"id": "v", "field": field, "cameras": [camera]}).stored()
-    with pytest.raises(Failure) as refused:
-        solve(venue, {"left": []}, FieldOptions(), Means(model=tmp_path / "none.onnx", threads=1), lambda _: None)
+    venue = VenueIn.model_validate({"id": "v", "field": field, "cameras": [camera]}).to_venue()
+    with pytest.raises(JobFailedError) as refused:
+        solve(
+            venue,
+            {"left": []},
+            FieldOptions(),
+            ComputeResources(model=tmp_path / "none.onnx", threads=1),
+            lambda _: None,
+        )
     return refused.value.error
 
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from fields.landmarks import UnknownLandmark
-from service.wire import geometry
-from service.wire.field import FieldOfPlay
-from service.wire.options import ClickedPoint
-from tests.worker.calibration.first.test_first_pose import NAMED
-from worker.calibration.scene.camera import Camera, Pose, inside
-from worker.calibration.scene.lens import Intrinsics
-from worker.jobs.reading import Failure
-from worker.jobs.together import locate_all
-from worker.jobs.wire import wire_pose
+from service.schemas import geometry
+from service.schemas.field import FieldOfPlay
+from service.schemas.options import ClickedPoint
+from tests.worker.calibration.onboarding.test_first_pose import NAMED
+from worker.calibration.geometry.camera import Camera, Pose, inside
+from worker.calibration.geometry.lens import Intrinsics
+from worker.jobs.from_schemas import JobFailedError
+from worker.jobs.locate_all import locate_all
+from worker.jobs.to_schemas import pose_to_schema
 
 FIELD = FieldOfPlay(length_m=105, width_m=68, ridge=[[-18.5, 0, 0.3], [18.5, 0, 0.3]])
 LEFT = Pose.looking_at([-3.0, -50.0, 11.0], [-16.0, -6.0, 0.0], roll_deg=1.0)
@@ -41,7 +41,7 @@ def clicked(lens, pose, seed):
 
 def located(lenses, points, stored=None):
     ended = locate_all(FIELD, lenses, points, {}, stored or {})
-    return {name: end if isinstance(end, Failure) else end.result for name, end in ended.items()}
+    return {name: end if isinstance(end, JobFailedError) else end.result for name, end in ended.items()}
 
 
 ONE, OTHERS = lens(1250), {"another focal length": lens(1310), "twice the size": lens(2500, (3840, 2160))}
@@ -51,10 +51,10 @@ ONE, OTHERS = lens(1250), {"another focal length": lens(1310), "twice the size":
 def test_points_exchanged_between_cameras_of_other_lenses_are_refused_as_such(other):
     found = located({"left": ONE, "right": other}, {"left": clicked(other, RIGHT, 1), "right": clicked(ONE, LEFT, 2)})
     for end in found.values():
-        why = end.error.detail if isinstance(end, Failure) else end.rejected_because
+        why = end.error.detail if isinstance(end, JobFailedError) else end.rejected_because
         assert "points of left fit the lens of right (" in why
         assert "the points of the two cameras are exchanged, or else their lenses" in why
-        assert isinstance(end, Failure) or not end.accepted
+        assert isinstance(end, JobFailedError) or not end.accepted
 
 
 def test_of_three_cameras_the_two_that_were_exchanged_are_named():
@@ -83,7 +83,7 @@ def test_two_lenses_that_were_measured_badly_are_no_exchange():
 
 
 def stored():
-    return {name: wire_pose(pose) for name, pose in (("left", LEFT), ("right", RIGHT))}
+    return {name: pose_to_schema(pose) for name, pose in (("left", LEFT), ("right", RIGHT))}
 
 
 def test_points_of_a_camera_with_the_same_lens_are_told_by_the_stored_poses():
@@ -97,8 +97,8 @@ def test_points_of_a_camera_with_the_same_lens_are_told_by_the_stored_poses():
 
 
 def test_a_camera_that_stands_as_it_is_stored_or_as_none_is_warned_of_nothing():
-    moved = geometry.Pose.at(stored()["left"].rotation, [-20.0, -55.0, 14.0])
-    for known in (stored(), stored() | {"left": moved, "right": moved}, {"right": wire_pose(LEFT)}):
+    moved = geometry.Pose.from_position(stored()["left"].rotation, [-20.0, -55.0, 14.0])
+    for known in (stored(), stored() | {"left": moved, "right": moved}, {"right": pose_to_schema(LEFT)}):
         (result,) = located({"left": ONE}, {"left": clicked(ONE, LEFT, 1)}, known).values()
         assert result.accepted
         assert not any("is stored" in warning for warning in result.warnings)

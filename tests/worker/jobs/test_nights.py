@@ -6,17 +6,17 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from service.wire.venue import BOARD_FOCAL_PERCENT
-from worker.calibration.finish.uncertainty import LensChange, Refined
-from worker.calibration.judge.overlap import Overlap
-from worker.calibration.judge.quality import CameraResult, Movement
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
-from worker.calibration.scene.parameters import BOARD_FOCAL, with_lens_changed
-from worker.calibration.see.evidence import Evidence
-from worker.calibration.see.view import ViewCondition, ViewFigures
-from worker.jobs.nights import lens_change_in_words, memories_of, wire_lens_change, wire_refined
+from service.schemas.venue import BOARD_FOCAL_PERCENT
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
+from worker.calibration.diagnostics.overlap import Overlap
+from worker.calibration.gate.quality import CameraResult, Movement
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
+from worker.calibration.geometry.parameters import BOARD_FOCAL, with_lens_changed
+from worker.calibration.refinement.uncertainty import LensChange, PoseAndLens
+from worker.jobs.nights import lens_change_in_words, lens_change_to_schema, read_memories, refined_to_schema
 
 PITCH = Field(105.0, 68.0)
 LENS = Intrinsics(np.array([[2000.0, 0, 1920], [0, 2000, 1080], [0, 0, 1]]), np.zeros(4), (3840, 2160), {"fx": 5.0})
@@ -47,7 +47,7 @@ def found():
 def test_a_refined_camera_is_told_with_its_covariance_and_with_what_differs(found):
     there = with_lens_changed(CAMERA, np.array([2.0, 0.5, 0.0, 0.0, 1e-3, 0.0]))
     covariance = np.diag([1e-8] * 3 + [1e-4] * 3 + [4.0, 1.0, 1.0, 1e-8, 1e-6, 1e-6])
-    told = wire_refined(PITCH, replace(found, refined=Refined(there, covariance)))
+    told = refined_to_schema(PITCH, replace(found, refined=PoseAndLens(there, covariance)))
     assert told.longer == pytest.approx(0.001)
     assert told.intrinsics.matrix[0] == pytest.approx([2002.0, 0.0, 1920.5])
     assert told.intrinsics.distortion == [1e-3, 0, 0, 0]
@@ -60,18 +60,18 @@ def test_a_refined_camera_is_told_with_its_covariance_and_with_what_differs(foun
 
 
 def test_a_covariance_that_is_not_determined_is_none(found):
-    told = wire_refined(PITCH, replace(found, refined=Refined(CAMERA, np.diag([np.inf] * 12))))
+    told = refined_to_schema(PITCH, replace(found, refined=PoseAndLens(CAMERA, np.diag([np.inf] * 12))))
     assert (told.covariance, told.sigma, told.intrinsics.sigma) == (None, None, None)
 
 
 @pytest.mark.parametrize("change", [[-3000.0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 2000.0, 0], [np.nan, 0, 0, 0, 0, 0]])
 def test_lines_that_end_outside_of_all_lenses_have_found_no_camera(found, change):
     there = with_lens_changed(CAMERA, np.array(change))
-    assert wire_refined(PITCH, replace(found, refined=Refined(there, np.eye(12)))) is None
+    assert refined_to_schema(PITCH, replace(found, refined=PoseAndLens(there, np.eye(12)))) is None
 
 
 def test_a_camera_without_a_refined_pose_or_a_memory_has_nothing_to_tell(found):
-    assert (wire_refined(PITCH, found), wire_lens_change(found, TONIGHT)) == (None, None)
+    assert (refined_to_schema(PITCH, found), lens_change_to_schema(found, TONIGHT)) == (None, None)
 
 
 @pytest.mark.parametrize(
@@ -98,12 +98,12 @@ def test_a_change_of_the_lens_is_put_into_words_once_it_is_no_chance(change, wor
 
 
 def test_a_change_of_the_lens_is_told_in_numbers_whatever_it_is(found):
-    told = wire_lens_change(replace(found, lens_change=LensChange(NOVEMBER, 0.0029, 0.001)), TONIGHT)
+    told = lens_change_to_schema(replace(found, lens_change=LensChange(NOVEMBER, 0.0029, 0.001)), TONIGHT)
     assert (told.longer, told.sigma, told.since, told.words) == (0.0029, 0.001, NOVEMBER, None)
 
 
 def test_a_memory_that_another_release_wrote_is_left_out():
-    assert memories_of({"left": {"format": 0}, "right": {}}) == {}
+    assert read_memories({"left": {"format": 0}, "right": {}}) == {}
 
 
 def test_the_service_says_what_the_engine_takes_a_lens_without_a_sigma_to_be_known_to():

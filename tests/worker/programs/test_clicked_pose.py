@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from service.wire.options import ClickedPoint
-from service.wire.programs.clicked_pose import ClickedCamera
+from service.schemas.options import ClickedPoint
+from service.schemas.programs.clicked_pose import ClickedPoseRequest
 from tests.pages.newcomer import VENUE, points_to_click, true_camera
 from worker.programs.clicked_pose import answer
 
 
 def clicked(points):
     camera = VENUE.cameras[0]
-    return ClickedCamera(
+    return ClickedPoseRequest(
         field=VENUE.field,
         id=camera.id,
         image_size=camera.image_size,

@@ -1,122 +1,158 @@
-"""A frame of an RTSP stream, from a camera that speaks it over a real socket."""
+"""A frame of an RTSP stream, from cameras that speak it over real sockets."""
 
 import socket
-import struct
 import threading
-from base64 import b64encode
-from contextlib import suppress
+import time
 
 import cv2
+import httpx
 import numpy as np
 import pytest
 
 from service.intake.snapshots import Snapshots
+from service.schemas.problems import Problem
+from service.schemas.venue import VenueIn
 from service.settings import Settings
-from service.wire.problems import Problem
-from service.wire.venue import VenueIn
 from tests.e2e.running import venue
+from tests.worker.certificates import certificate
+from tests.worker.sources.streaming_camera import ASKS, SIZE, StreamingCamera
+from worker.sources.rtsp_relay import Relay
 
-SIZE = (64, 48)
-SDP = "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=c\r\nt=0 0\r\nm=video 0 RTP/AVP 26\r\na=control:track1\r\n"
-
-
-class StreamingCamera:
-    """Motion JPEG by RTSP (RFC 2326) in RTP (RFC 2435), interleaved in one TCP connection, for user:pass."""
-
-    def __init__(self, shade: int) -> None:
-        frame = np.full((SIZE[1], SIZE[0], 3), shade, np.uint8)
-        self._payload = _rtp_payload(cv2.imencode(".jpg", frame)[1].tobytes())
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.host = "{}:{}".format(*self._listener.getsockname())
-        threading.Thread(target=self._accept, daemon=True).start()
-
-    def close(self) -> None:
-        self._listener.close()
-
-    def _accept(self) -> None:
-        with suppress(OSError):
-            while True:
-                connection, _ = self._listener.accept()
-                threading.Thread(target=self._converse, args=(connection,), daemon=True).start()
-
-    def _converse(self, connection: socket.socket) -> None:
-        stop = threading.Event()
-        with connection, suppress(OSError), connection.makefile("rb") as lines:
-            while request := lines.readline():
-                if request.startswith(b"$"):
-                    continue
-                headers = {}
-                while line := lines.readline().strip():
-                    name, _, value = line.decode().partition(":")
-                    headers[name.lower()] = value.strip()
-                self._answer(connection, request.split()[0].decode(), headers, stop)
-        stop.set()
-
-    def _answer(self, connection, method, headers, stop) -> None:
-        more, body, status = {}, "", "200 OK"
-        match method:
-            case "OPTIONS":
-                more["Public"] = "OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN"
-            case "DESCRIBE" if headers.get("authorization") != f"Basic {b64encode(b'user:pass').decode()}":
-                status, more = "401 Unauthorized", {"WWW-Authenticate": 'Basic realm="camera"'}
-            case "DESCRIBE":
-                body, more = SDP, {"Content-Type": "application/sdp"}
-            case "SETUP":
-                more = {"Transport": "RTP/AVP/TCP;unicast;interleaved=0-1", "Session": "1"}
-            case "PLAY":
-                more["Session"] = "1"
-        head = {"CSeq": headers["cseq"], "Content-Length": str(len(body)), **more}
-        lines = "".join(f"{name}: {value}\r\n" for name, value in head.items())
-        connection.sendall(f"RTSP/1.0 {status}\r\n{lines}\r\n{body}".encode())
-        if method == "PLAY":
-            threading.Thread(target=self._play, args=(connection, stop), daemon=True).start()
-
-    def _play(self, connection, stop) -> None:
-        number = 0
-        with suppress(OSError):
-            while not stop.wait(0.04):
-                packet = struct.pack(">BBHII", 0x80, 0x80 | 26, number & 0xFFFF, number * 3600, 7) + self._payload
-                connection.sendall(b"$\0" + struct.pack(">H", len(packet)) + packet)
-                number += 1
-
-
-def _rtp_payload(jpeg: bytes) -> bytes:
-    """The scan of a JPEG of standard Huffman tables, behind its quantisation tables."""
-    tables, position = b"", 2
-    while jpeg[position + 1] != 0xDA:
-        length = struct.unpack_from(">H", jpeg, position + 2)[0]
-        if jpeg[position + 1] == 0xDB:
-            segment = jpeg[position + 4 : position + 2 + length]
-            tables += b"".join(segment[at + 1 : at + 65] for at in range(0, len(segment), 65))
-        position += 2 + length
-    scan = jpeg[position + 2 + struct.unpack_from(">H", jpeg, position + 2)[0] : -2]
-    head = struct.pack(">IBBBB", 0, 1, 255, SIZE[0] // 8, SIZE[1] // 8)
-    return head + struct.pack(">BBH", 0, 0, len(tables)) + tables + scan
+RIGHT = "user:pass%20word"
 
 
 @pytest.fixture
 def camera():
-    camera = StreamingCamera(shade=120)
+    """Starts cameras."""
+    cameras = []
+
+    def camera(**what) -> StreamingCamera:
+        cameras.append(StreamingCamera(**what))
+        return cameras[-1]
+
     yield camera
-    camera.close()
+    for one in cameras:
+        one.close()
+
+
+class Stranger:
+    """A host that a camera leads to: keeps what is said to it."""
+
+    def __init__(self) -> None:
+        self.heard: list[bytes] = []
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.host = "{}:{}".format(*self._listener.getsockname())
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        while True:
+            try:
+                connection, _ = self._listener.accept()
+            except OSError:
+                return
+            self.heard.append(b"a connection")
+            with connection:
+                connection.sendall(b'RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\nWWW-Authenticate: Basic realm="x"\r\n\r\n')
+                connection.settimeout(5)
+                while data := connection.recv(4096):
+                    self.heard.append(data)
+
+    def close(self) -> None:
+        self._listener.close()
+
+
+@pytest.fixture
+def stranger():
+    stranger = Stranger()
+    yield stranger
+    stranger.close()
 
 
 def taken(tmp_path, url, userinfo):
     document = venue("v", cameras=("left",))
     document["cameras"][0]["source"] = url
-    stored = VenueIn.model_validate(document).stored()
+    stored = VenueIn.model_validate(document).to_venue()
     settings = Settings(data=tmp_path, sources=["127.0.0.1"], source_timeout_s=60)
-    return Snapshots(settings).take(stored.cameras, {"left": userinfo})["left"]
+    known = {} if userinfo is None else {"left": userinfo}
+    return Snapshots(settings, lambda _: None).take(stored.cameras[0], known)
 
 
-def test_a_frame_of_a_stream_is_what_the_camera_sees(camera, tmp_path):
-    frame = taken(tmp_path, f"rtsp://***@{camera.host}/live", "user:pass")
+def refused(tmp_path, url, userinfo) -> str:
+    with pytest.raises(Problem) as problem:
+        taken(tmp_path, url, userinfo)
+    assert problem.value.kind == "source-failed"
+    return problem.value.detail
+
+
+@pytest.mark.parametrize("way", ASKS)
+def test_a_frame_of_a_stream_is_what_the_camera_sees(camera, tmp_path, way):
+    seen = camera(shade=120, way=way)
+    frame = taken(tmp_path, f"rtsp://***@{seen.host}/live?channel=1", RIGHT)
     picture = cv2.imdecode(np.frombuffer(frame, np.uint8), cv2.IMREAD_COLOR)
     assert picture.shape == (SIZE[1], SIZE[0], 3)
     assert abs(float(picture.mean()) - 120) < 3
+    if way != "basic":
+        assert not [given for _, given in seen.asked if given.startswith("Basic")]
+
+
+def test_an_encrypted_stream_is_taken_from_a_camera_that_signed_its_own_certificate(camera, tmp_path):
+    seen = camera(certificate=certificate(tmp_path, "camera.example"))
+    assert taken(tmp_path, f"rtsps://***@{seen.host}/live", RIGHT)
 
 
 def test_a_stream_that_is_refused_says_what_to_look_at(camera, tmp_path):
-    with pytest.raises(Problem, match="check address, user and password") as refused:
-        taken(tmp_path, f"rtsp://***@{camera.host}/live", "user:wrong")
-    assert "wrong" not in refused.value.detail
+    said = refused(tmp_path, f"rtsp://***@{camera().host}/live", "user:wrong")
+    assert "it answered 401 to DESCRIBE; check address, user and password" in said
+    assert "wrong" not in said
+
+
+def test_a_user_and_password_that_are_wrong_are_tried_once(camera, tmp_path):
+    seen = camera(way="digest")
+    refused(tmp_path, f"rtsp://***@{seen.host}/live", "user:wrong")
+    assert len([given for method, given in seen.asked if method == "DESCRIBE" and given]) == 1
+
+
+@pytest.mark.parametrize("way", ["basic", "digest"])
+@pytest.mark.parametrize("method", ["OPTIONS", "DESCRIBE", "SETUP", "PLAY"])
+def test_a_camera_that_leads_elsewhere_is_not_followed_and_its_password_stays_with_it(
+    camera, stranger, tmp_path, method, way
+):
+    seen = camera(way=way, leads={method: f"rtsp://{stranger.host}/live?token=s3cret"})
+    said = refused(tmp_path, f"rtsp://***@{seen.host}/live", RIGHT)
+    assert f"it answered 302 to {method} and leads to rtsp://{stranger.host}, which is not followed" in said
+    assert "s3cret" not in said
+    assert stranger.heard == []
+
+
+def test_nobody_else_on_the_machine_speaks_to_the_camera_through_the_relay(camera):
+    seen = camera()
+    target = httpx.URL(f"rtsp://{seen.host}/live")
+    with Relay(target, ["127.0.0.1"], target.port, RIGHT) as relay:
+        there = httpx.URL(relay.url)
+        with socket.create_connection((there.host, there.port)) as guess:
+            guess.sendall(f"OPTIONS rtsp://127.0.0.1:{there.port}/live RTSP/1.0\r\nCSeq: 1\r\n\r\n".encode())
+            assert guess.recv(1) == b""
+        with socket.create_connection((there.host, there.port)) as player:
+            player.sendall(f"OPTIONS {relay.url} RTSP/1.0\r\nCSeq: 7\r\n\r\n".encode())
+            answer = player.recv(4096).decode()
+    assert answer.startswith("RTSP/1.0 200 OK")
+    assert "CSeq: 7" in answer
+    assert [method for method, _ in seen.asked] == ["OPTIONS"]
+
+
+@pytest.mark.parametrize(
+    "says", [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"RTSP/1.0 x\r\nCSeq: 1\r\n\r\n", b"A" * 200_000]
+)
+def test_what_does_not_speak_rtsp_is_called_so(tmp_path, says):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def answer():
+            connection, _ = listener.accept()
+            with connection:
+                connection.recv(4096)
+                connection.sendall(says)
+                time.sleep(1)
+
+        threading.Thread(target=answer, daemon=True).start()
+        said = refused(tmp_path, "rtsp://{}:{}/live".format(*listener.getsockname()), None)
+    assert "what it says is not RTSP" in said

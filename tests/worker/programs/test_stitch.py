@@ -15,17 +15,17 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from service.wire.field import FieldOfPlay
-from service.wire.geometry import Light, Pose
-from service.wire.programs.stitching import Stitching
-from service.wire.venue import VenueIn
-from service.wire.view import ViewChoice
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Light, Pose
+from service.schemas.programs.stitching import StitchRequest
+from service.schemas.venue import VenueIn
+from service.schemas.view import ViewChoice
 from tests import demo
 from tests.worker.calibration.synthetic import PITCH, camera, paint_frame
-from worker.calibration.scene.lens import Fisheye
-from worker.calibration.stitch.panorama import BACKDROP
-from worker.jobs.reading import camera_of
-from worker.jobs.wire import wire_lens, wire_pose
+from worker.calibration.geometry.lens import Fisheye
+from worker.calibration.stitching.panorama import BACKDROP
+from worker.jobs.from_schemas import camera_of
+from worker.jobs.to_schemas import lens_to_schema, pose_to_schema
 from worker.programs.stitch.__main__ import stitched
 from worker.programs.stitch.package import package
 
@@ -46,12 +46,12 @@ def asked(cameras, wanted, lights, field=FIELD, **view):
     """What the program is asked of cameras of the wire."""
     choice = ViewChoice(**{"width_px": 640, **view})
     about = {"venue": "v", "revision": 7, "tag": '"t"', "threads": 1}
-    return Stitching(field=field, cameras=cameras, lights=lights, view=choice, wanted=wanted, **about)
+    return StitchRequest(field=field, cameras=cameras, lights=lights, view=choice, wanted=wanted, **about)
 
 
 def told(one):
     """A camera of the engine as the wire has it."""
-    pose, lens = wire_pose(one.pose), wire_lens(one.intrinsics)
+    pose, lens = pose_to_schema(one.pose), lens_to_schema(one.intrinsics)
     return {
         "id": one.id,
         "image_size": [*one.intrinsics.size],
@@ -62,10 +62,10 @@ def told(one):
 
 def demo_pair():
     """Cameras as they stand, their field and their files."""
-    venue = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).stored()
+    venue = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).to_venue()
     truth = json.loads((DEMO / "truth.json").read_text())["poses"]
-    venue = venue.with_poses({name: Pose.at(**pose) for name, pose in truth.items()})
-    return venue.standing, venue.field, {one.id: DEMO / f"{one.id}.jpg" for one in venue.cameras}
+    venue = venue.with_poses({name: Pose.from_position(**pose) for name, pose in truth.items()})
+    return venue.poses_and_lenses, venue.field, {one.id: DEMO / f"{one.id}.jpg" for one in venue.cameras}
 
 
 def fisheye():
@@ -156,6 +156,8 @@ def test_ffmpeg_shows_the_demo_as_the_service_does(ffmpeg, tmp_path):
     assert done.returncode == 0, done.stderr
     shown, expected = cv2.imread(str(tmp_path / "view.png")), made.picture(read(files))
     agrees(shown, expected, at_most=6)
+    # Neither ffmpeg's whole log nor warnings that the script is to blame for.
+    assert not re.search("option is deprecated|Input #|Stream #", done.stderr)
     assert np.abs(apart_px(shown, expected)).max() < 0.1
 
 

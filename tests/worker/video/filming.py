@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.worker.calibration.synthetic import CROWNED, camera, paint_frame
-from worker.calibration.scene.camera import Camera
+from worker.calibration.geometry.camera import Camera
 
 SIZE = (384, 216)
 PITCH = CROWNED

@@ -9,8 +9,8 @@ import av
 import numpy as np
 
 from tests.worker.calibration.synthetic import pair, pair_frames
-from worker.calibration.scene.camera import Array
-from worker.calibration.see.steady import Sway
+from worker.calibration.detection.frame_fusion import Sway
+from worker.calibration.geometry.camera import Array
 
 RATE = 25
 COUNT = 24

@@ -16,15 +16,15 @@ import pytest
 
 from tests.disks import filled, may_mount, small_disk
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film, frame_at, frames_of
-from worker.calibration.stitch.light import NEUTRAL
-from worker.calibration.stitch.panorama import BACKDROP, panorama
-from worker.calibration.stitch.views import ViewChoice, chosen_view
-from worker.video.faults import VideoFault
-from worker.video.stitch import Offset, Plan, Scene, Standing, stitch
-from worker.video.write import Encoding
+from worker.calibration.stitching.panorama import BACKDROP, panorama
+from worker.calibration.stitching.photometry import NEUTRAL
+from worker.calibration.stitching.views import ViewChoice, chosen_view
+from worker.video.encoding import Encoding
+from worker.video.errors import VideoError
+from worker.video.stitch import Offset, Plan, StaticGeometry, StitchScene, stitch
 
 CHOICE = ViewChoice(width=480)
-SCENE = Scene(PITCH, cameras, CHOICE, {one.id: NEUTRAL for one in cameras})
+SCENE = StitchScene(PITCH, cameras, CHOICE, {one.id: NEUTRAL for one in cameras})
 VIEW = chosen_view(PITCH, cameras, CHOICE)
 TOGETHER = {"right": Offset(0)}
 FINE = Encoding(crf=10, preset="ultrafast")
@@ -110,7 +110,8 @@ def test_an_offset_that_cannot_be_found_is_not_made_up(tmp_path):
         "right": str(film(tmp_path / "r.mp4", RIGHT, 3.0, moving=False)),
     }
     with pytest.raises(
-        VideoFault, match=r"not found within 2 s: nothing moves .*--offset right=0 if they began together"
+        VideoError,
+        match=r"not found within 2 s: nothing moves .*Nothing was made: .*--offset right=0 if they began together$",
     ):
         stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4")), told)
     assert stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told).frames == 75
@@ -169,7 +170,7 @@ def test_the_light_of_cameras_is_estimated_where_the_venue_has_none(tmp_path):
         )
 
     assert step(SCENE, "raw.mp4") > 0.1
-    assert step(Scene(PITCH, cameras, CHOICE), "evened.mp4") < 0.05
+    assert step(StitchScene(PITCH, cameras, CHOICE), "evened.mp4") < 0.05
 
 
 def test_half_size_clips_are_of_the_same_lens(tmp_path, pair):
@@ -181,7 +182,7 @@ def test_half_size_clips_are_of_the_same_lens(tmp_path, pair):
 def test_clips_of_another_shape_are_refused(tmp_path, pair):
     clips = pair | {"right": str(film(tmp_path / "r.mp4", RIGHT, 0.4, size=(320, 240)))}
     with pytest.raises(
-        VideoFault, match=r"camera right: its clip has 320x240 pixels, its lens was measured for 384x216"
+        VideoError, match=r"camera right: its clip has 320x240 pixels, its lens was measured for 384x216"
     ):
         stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told)
     assert not (tmp_path / "pano.mp4").exists()
@@ -192,7 +193,7 @@ def test_clips_that_are_to_be_turned_are_refused(tmp_path, pair):
     subprocess.run(
         ["ffmpeg", "-v", "error", "-i", pair["right"], "-c", "copy", "-metadata:s:v", "rotate=180", turned], check=True
     )
-    with pytest.raises(VideoFault, match=r"camera right: the clip says that players are to turn it by -?180 degrees"):
+    with pytest.raises(VideoError, match=r"camera right: the clip says that players are to turn it by -?180 degrees"):
         stitch(SCENE, pair | {"right": str(turned)}, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told)
 
 
@@ -212,7 +213,7 @@ def test_clips_that_end_within_a_frame_of_each_other_have_not_ended_early(tmp_pa
 
 def test_a_camera_without_a_clip_is_missed_unless_one_goes_on_without_it(tmp_path, pair):
     alone = {"left": pair["left"]}
-    with pytest.raises(VideoFault, match=r"No clip of camera right\. --allow-missing"):
+    with pytest.raises(VideoError, match=r"No clip of camera right\. --allow-missing"):
         stitch(SCENE, alone, Plan(str(tmp_path / "pano.mp4")), told)
     made = stitch(SCENE, alone, Plan(str(tmp_path / "pano.mp4"), allow_missing=True, encoding=FINE), told)
     assert made.size == VIEW.size
@@ -248,7 +249,7 @@ def test_broken_frames_are_bridged_and_counted(tmp_path):
 def test_more_than_a_second_of_broken_frames_is_an_error(tmp_path):
     clips = {one.id: str(film(tmp_path / f"{one.id}.mkv", one, codec="mjpeg")) for one in cameras}
     clips["right"] = broken(clips["right"], tmp_path / "broken.mkv", 10, 40)
-    with pytest.raises(VideoFault, match=r"camera right: 30 frames from 0\.36 s on cannot be decoded"):
+    with pytest.raises(VideoError, match=r"camera right: 30 frames from 0\.36 s on cannot be decoded"):
         stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told)
     assert not list(tmp_path.glob("pano*"))
 
@@ -266,14 +267,14 @@ def test_what_is_no_video_is_named(tmp_path, pair, content):
     path = tmp_path / "r.mp4"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(VideoFault, match=r"camera right: (there is no file .*r\.mp4|.*r\.mp4 is no clip)"):
+    with pytest.raises(VideoError, match=r"camera right: (there is no file .*r\.mp4|.*r\.mp4 is no clip)"):
         stitch(SCENE, pair | {"right": str(path)}, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told)
 
 
 def test_sound_alone_is_no_video(tmp_path, pair):
     path = tmp_path / "r.wav"
     subprocess.run(["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "sine=d=1", path], check=True)
-    with pytest.raises(VideoFault, match="there is no video in"):
+    with pytest.raises(VideoError, match="there is no video in"):
         stitch(SCENE, pair | {"right": str(path)}, Plan(str(tmp_path / "pano.mp4"), TOGETHER), told)
 
 
@@ -321,7 +322,7 @@ def test_the_sound_of_a_camera_stays_with_its_pictures(tmp_path, sound, suffix, 
     assert beeps(tmp_path / "pano.mp4") == pytest.approx([0.3, 1.3, 2.3], abs=0.03)
     stitch(SCENE, clips, Plan(str(tmp_path / "silent.mp4"), {"right": Offset(0.4)}, sound="none"), told)
     assert list(probed(tmp_path / "silent.mp4")) == ["video"]
-    with pytest.raises(VideoFault, match="--audio: the clip of camera left has no sound"):
+    with pytest.raises(VideoError, match="--audio: the clip of camera left has no sound"):
         stitch(SCENE, clips, Plan(str(tmp_path / "x.mp4"), TOGETHER, sound="left"), told)
 
 
@@ -329,7 +330,7 @@ def test_the_sound_of_a_camera_stays_with_its_pictures(tmp_path, sound, suffix, 
 def test_a_full_disk_is_told_and_leaves_nothing(tmp_path, pair):
     with small_disk(tmp_path / "disk", 1) as disk, filled(disk, leave_bytes=30_000):
         with pytest.raises(
-            VideoFault, match=r"pano\.mp4 cannot be written: No space left on device; nothing is left of it"
+            VideoError, match=r"pano\.mp4 cannot be written: No space left on device; nothing is left of it"
         ):
             stitch(SCENE, pair, Plan(str(disk / "pano.mp4"), TOGETHER, encoding=Encoding(crf=0)), told)
         assert [path.name for path in disk.iterdir()] == ["filling"]
@@ -338,7 +339,7 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path, pair):
 def test_an_error_leaves_what_was_there_before(tmp_path, pair):
     (tmp_path / "pano.mp4").write_bytes(b"yesterday's")
 
-    class Failing(Standing):
+    class Failing(StaticGeometry):
         def at(self, number, pictures):
             if number == 20:
                 raise KeyboardInterrupt
@@ -362,7 +363,7 @@ def test_an_error_leaves_what_was_there_before(tmp_path, pair):
 )
 def test_where_nothing_can_be_written_is_said(tmp_path, pair, output, encoding, words):
     target = output if "://" in output else str(tmp_path / output)
-    with pytest.raises(VideoFault, match=words):
+    with pytest.raises(VideoError, match=words):
         stitch(SCENE, pair, Plan(target, TOGETHER, encoding=encoding), told)
     assert list(tmp_path.iterdir()) == []
 
@@ -427,7 +428,7 @@ def test_a_live_stream_needs_an_offset_and_is_read_as_it_comes(tmp_path, pair):
         ]
     )
     try:
-        with pytest.raises(VideoFault, match=r"camera right is a live stream.*--offset right=0 takes pictures as they"):
+        with pytest.raises(VideoError, match=r"camera right is a live stream.*--offset right=0 takes pictures as they"):
             stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4")), told)
         alone = {"right": clips["right"]}
         plan = Plan(str(tmp_path / "pano.mp4"), allow_missing=True, encoding=FINE)

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from tests.benchmarks.nights.simulated import SHARED_PX, Installation, Painted, SimulatedSight
-from worker.calibration.judge.quality import CameraResult
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import Intrinsics
+from worker.calibration.geometry.parameters import with_focal_length
 from worker.calibration.memory.camera_memory import AcceptedJob
-from worker.calibration.scene.camera import Camera, Pose
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.lens import Intrinsics
-from worker.calibration.scene.parameters import with_focal_length
-from worker.calibration.see.line_measurement import Measurements
 
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
 LINES = PITCH.line_points()

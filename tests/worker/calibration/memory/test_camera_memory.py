@@ -7,24 +7,24 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.memory.nights import LINES, PITCH, box_camera, job, measured, painted
+from worker.calibration.geometry.derivatives import moved
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.parameters import with_focal_length
 from worker.calibration.memory.camera_memory import (
     ANCHOR_JOBS,
     AcceptedJob,
     CameraMemory,
     fingerprint_of_frames,
-    fitting,
+    memories_of_field,
 )
 from worker.calibration.memory.epoch import MOST_JOBS, Epoch
-from worker.calibration.scene.field import Field
-from worker.calibration.scene.motion import moved
-from worker.calibration.scene.parameters import with_focal_length
 
 CAMERA = box_camera()
 FIELD = painted()
 
 
 def remembered(count: int, **other) -> CameraMemory:
-    memory = CameraMemory.begun(CAMERA, job(CAMERA, measured(CAMERA, FIELD, 0), 0))
+    memory = CameraMemory.from_first_job(CAMERA, job(CAMERA, measured(CAMERA, FIELD, 0), 0))
     for number in range(1, count):
         memory = memory.after(job(CAMERA, measured(CAMERA, FIELD, number), number, **other))
     return memory
@@ -84,12 +84,12 @@ def test_another_lens_is_another_epoch():
 def test_a_marking_that_was_painted_anew_is_forgotten_and_stays_so():
     goal_line = [marking.name for marking in PITCH.markings()].index(FIELD.longest_seen(CAMERA))
     memory = remembered(3)
-    memory = memory.after(job(CAMERA, measured(CAMERA, FIELD, 7), 7, painted_anew=(goal_line,)))
+    memory = memory.after(job(CAMERA, measured(CAMERA, FIELD, 7), 7, repainted_markings=(goal_line,)))
     memory = memory.after(job(CAMERA, measured(CAMERA, FIELD, 8), 8))
-    assert memory.aside == (goal_line,)
+    assert memory.repainted_markings == (goal_line,)
     assert all(goal_line not in LINES.marking[epoch.index] for epoch in memory.epochs)
-    begun = CameraMemory.begun(CAMERA, job(CAMERA, measured(CAMERA, FIELD), painted_anew=(goal_line,)))
-    assert begun.aside == (goal_line,)
+    begun = CameraMemory.from_first_job(CAMERA, job(CAMERA, measured(CAMERA, FIELD), repainted_markings=(goal_line,)))
+    assert begun.repainted_markings == (goal_line,)
     assert goal_line not in LINES.marking[begun.anchor.index]
 
 
@@ -106,7 +106,7 @@ def test_what_stands_on_a_line_for_a_night_is_not_taken_for_paint():
 
 
 def test_an_epoch_forgets_so_that_paint_may_wear():
-    epoch = Epoch.begun(CAMERA, measured(CAMERA, FIELD), LINES, None)
+    epoch = Epoch.from_job(CAMERA, measured(CAMERA, FIELD), LINES, None)
     for number in range(MOST_JOBS + 3):
         epoch = epoch.joined(CAMERA, measured(CAMERA, FIELD, number), LINES, None)
     assert epoch.count.max() == MOST_JOBS
@@ -114,18 +114,18 @@ def test_an_epoch_forgets_so_that_paint_may_wear():
 
 def test_a_memory_comes_back_from_json_as_it_was():
     at = datetime(2026, 11, 3, 2, tzinfo=UTC)
-    memory = CameraMemory.begun(CAMERA, AcceptedJob(CAMERA, measured(CAMERA, FIELD), LINES, at, frames="a"))
+    memory = CameraMemory.from_first_job(CAMERA, AcceptedJob(CAMERA, measured(CAMERA, FIELD), LINES, at, frames="a"))
     for number in range(1, ANCHOR_JOBS + 3):
         night = at + timedelta(days=number)
         memory = memory.after(AcceptedJob(CAMERA, measured(CAMERA, FIELD, number), LINES, night, frames=str(number)))
     text = json.dumps(memory.to_json())
     back = CameraMemory.from_json(json.loads(text))
     assert len(text) < 60_000
-    assert (back.jobs, back.since, back.lines, back.aside, back.frames) == (
+    assert (back.jobs, back.since, back.lines, back.repainted_markings, back.frames) == (
         memory.jobs,
         at + timedelta(days=(ANCHOR_JOBS - 1) / 2),
         memory.lines,
-        memory.aside,
+        memory.repainted_markings,
         memory.frames,
     )
     for ours, theirs in zip(memory.epochs, back.epochs, strict=True):
@@ -141,9 +141,9 @@ def test_what_another_release_wrote_is_no_memory():
 
 def test_a_memory_of_another_field_says_nothing_here():
     memory = remembered(1)
-    assert fitting([memory, None], LINES) == [memory, None]
+    assert memories_of_field([memory, None], LINES) == [memory, None]
     wider = Field(105.0, 68.5, 0.12, PITCH.ridge)
-    assert fitting([memory], wider.line_points()) == [None]
+    assert memories_of_field([memory], wider.line_points()) == [None]
 
 
 @pytest.mark.parametrize("count", [1, ANCHOR_JOBS, ANCHOR_JOBS + 4])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import pair
-from worker.calibration.scene.camera import Pose
+from worker.calibration.geometry.camera import Pose
 from worker.calibration.search.genome import from_swinging, genome_of, looked_at, swinging, with_genome
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair, pair_markings
+from worker.calibration.detection.line_profile import blurred_line
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.ground_objective import BROAD, NARROW, GroundObjective
 from worker.calibration.search.objective import BlurredResponse, Objective
-from worker.calibration.see.line_profile import blurred_line
 
 
 def scene():

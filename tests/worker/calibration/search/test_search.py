@@ -4,7 +4,7 @@ import numpy as np
 
 from tests.demo.render import outdated
 from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
-from worker.calibration.scene.rotation import rotation_angles_deg
+from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.search import ON_THE_GROUND, Level, Strategy, search
 

@@ -1,0 +1,117 @@
+"""Jobs that a newer version submitted, with something in them that the workers of this one do not know."""
+
+import time
+
+import pytest
+import sqlalchemy as sa
+
+from service.store import tables
+from tests.e2e.observe.figures import families
+from tests.e2e.running import wait_for
+from tests.homes import in_both_homes
+
+j = tables.jobs.c
+TAKEOVER_S = 3
+
+
+def changed(service, job_id, **values):
+    with service.database() as connection:
+        connection.execute(sa.update(tables.jobs).where(j.id == job_id).values(**values))
+
+
+def options_of(service, job_id):
+    with service.database() as connection:
+        return connection.execute(sa.select(j.options).where(j.id == job_id)).scalar_one()
+
+
+def log_of(service):
+    return (service.data / "log").read_text()
+
+
+def unreadable(service):
+    return sum(sample.value for sample in families(service)["esc_worker_unreadable_jobs"].samples)
+
+
+@pytest.fixture
+def begin(tmp_path):
+    """Start workers beside a service."""
+    begun = []
+
+    def begin(service, name):
+        begun.append(service.worker_beside(tmp_path / name, name))
+        return begun[-1]
+
+    yield begin
+    for worker in begun:
+        worker.kill()
+        worker.wait()
+
+
+@in_both_homes
+def test_a_job_with_options_of_a_newer_version_waits_for_a_worker_of_that_version(start, begin):
+    service = start("serve")
+    newer, plain = (service.submitted(service.venue(name)) for name in ("newer", "plain"))
+    asked = options_of(service, newer)
+    changed(service, newer, options=asked | {"zoom": "fit"})
+    worker = begin(service, "first")
+    # The others go on.
+    assert service.end(plain)["status"] == "succeeded"
+    wait_for(lambda: unreadable(service) == 1)
+    time.sleep(3 * TAKEOVER_S)
+    assert (service.job(newer)["status"], service.job(newer)["attempt"]) == ("queued", 0)
+    # It is told of once, however often it is met.
+    assert log_of(service).count("job left to a worker of a newer version") == 1
+    assert "zoom" in log_of(service)
+    assert worker.poll() is None
+    # A worker that can read it, which is what another one is once the option is gone, takes it.
+    changed(service, newer, options=asked)
+    begin(service, "second")
+    end = service.end(newer)
+    assert (end["status"], end["attempt"]) == ("succeeded", 1)
+    assert service.calibrated("newer", shade=1)["status"] == "succeeded"
+    wait_for(lambda: unreadable(service) == 0)
+
+
+def test_a_job_that_no_worker_can_read_can_be_cancelled(start):
+    service = start("serve")
+    job = service.submitted(service.venue("newer"))
+    changed(service, job, options=options_of(service, job) | {"zoom": "fit"}, kind="zooming")
+    assert service.job(job)["kind"] == "zooming"
+    assert service.http.post(f"/jobs/{job}/cancel").json()["status"] == "cancelled"
+
+
+def test_the_frames_of_a_job_of_a_newer_version_are_not_submitted_again_otherwise(start):
+    service = start("serve")
+    job = service.submitted(service.venue("newer"))
+    service.http.post(f"/jobs/{job}/cancel").raise_for_status()
+    changed(service, job, options=options_of(service, job) | {"zoom": "fit"})
+    answer = service.http.post(f"/jobs/{job}/again")
+    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/job-of-newer-version")
+    assert "zoom" in answer.json()["detail"]
+
+
+def test_a_job_that_a_worker_broke_off_before_it_began_is_put_back(start, begin):
+    """As one of 0.1.0 does with a job that it cannot read."""
+    service = start("serve")
+    broken = service.submitted(service.venue("broken"))
+    with service.database() as connection:
+        connection.exec_driver_sql("UPDATE workflow_status SET status = 'ERROR'")
+    begin(service, "worker")
+    end = service.end(broken)
+    assert (end["status"], end["attempt"]) == ("succeeded", 1)
+
+
+@pytest.mark.parametrize("given_up", ["MAX_RECOVERY_ATTEMPTS_EXCEEDED", "CANCELLED"])
+def test_one_job_whose_rows_are_broken_does_not_keep_another_from_its_end(start, begin, given_up):
+    service = start("serve")
+    first, second = (service.submitted(service.venue(name)) for name in ("first", "second"))
+    with service.database() as connection:
+        connection.execute(
+            sa.update(tables.venues).where(tables.venues.c.id == "first").values(document={"no": "venue"})
+        )
+        connection.exec_driver_sql(f"UPDATE workflow_status SET status = '{given_up}'")
+    begin(service, "worker")
+    assert service.end(second)["error"]["type"] == "/problems/job-abandoned"
+    assert service.job(first)["status"] == "queued"
+    time.sleep(2 * TAKEOVER_S)
+    assert log_of(service).count("cannot end or begin a job that the queue has given up") == 1

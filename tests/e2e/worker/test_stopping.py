@@ -1,0 +1,133 @@
+"""A worker that is asked to stop, and two that have one name."""
+
+import socket
+import subprocess
+import sys
+import time
+
+from service.store.database import connect
+from service.store.workers import WorkerRepository
+from tests.e2e.observe.figures import figures
+from tests.e2e.running import alive, wait_for
+from tests.e2e.worker.test_crashes import poses
+from tests.homes import in_both_homes
+
+# Far below ESC_DRAIN_S as it is unless set, far above what a process needs to end.
+AT_ONCE_S = 15
+
+
+@in_both_homes
+def test_a_worker_that_is_stopped_lets_its_job_end_and_takes_no_other(start, tmp_path):
+    service = start("serve")
+    worker = service.worker_beside(tmp_path / "machine", "w")
+    running = service.submitted(service.venue("v", "accept 2"))
+    service.running(running)
+    waiting = service.submitted(service.venue("w"))
+    worker.terminate()
+    assert worker.wait(60) == 0
+    ended = service.job(running)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
+    assert service.job(waiting)["status"] == "queued"
+
+
+@in_both_homes
+def test_stops_in_the_middle_of_a_job_do_not_count_as_its_attempts(start, tmp_path):
+    service = start("serve", ESC_DRAIN_S="0")
+    job = service.submitted(service.venue("v", "accept 3"))
+    # More often than the queue begins a job whose worker has died.
+    for _ in range(4):
+        worker = service.worker_beside(tmp_path / "machine", "w")
+        service.running(job)
+        (computing,) = [process for process in service.begun(job) if alive(process)]
+        worker.terminate()
+        assert worker.wait(60) == 0
+        state = service.job(job)
+        assert (state["status"], state["attempt"], state["started_at"]) == ("queued", 0, None)
+        wait_for(lambda process=computing: not alive(process))
+    worker = service.worker_beside(tmp_path / "machine", "w")
+    ended = service.end(job)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
+    assert poses(service, "v") == [-0.875, -0.875]
+    assert figures(service)["esc_job_restarts_total",] == 0
+    worker.kill()
+    worker.wait()
+
+
+def test_a_worker_that_is_asked_twice_to_stop_does_not_wait_for_its_job(start, tmp_path):
+    service = start("serve")
+    worker = service.worker_beside(tmp_path / "machine", "w")
+    job = service.submitted(service.venue("v", "hang"))
+    service.running(job)
+    worker.terminate()
+    time.sleep(1)
+    assert worker.poll() is None
+    begun = time.monotonic()
+    worker.terminate()
+    assert worker.wait(60) == 0
+    assert time.monotonic() - begun < AT_ONCE_S
+    assert service.job(job)["status"] == "queued"
+
+
+def test_poses_that_were_found_hold_though_their_pictures_cannot_be_stored(start):
+    service = start().ready()
+    (service.data / "blobs" / "pictures").write_bytes(b"no folder")
+    job = service.calibrated(service.venue("v"))
+    assert (job["status"], job["venue_revision"]) == ("succeeded", 2)
+    assert job["result"]["warnings"][0].startswith("Its pictures cannot be stored: ")
+    assert poses(service, "v") == [-0.875, -0.875]
+    assert service.http.get(f"/jobs/{job['id']}/preview.jpg").status_code == 404
+
+
+@in_both_homes
+def test_two_workers_of_one_name_do_not_run_on_two_machines(start, tmp_path):
+    service = start("serve", ESC_TAKEOVER_AFTER_S="6")
+    first = service.worker_beside(tmp_path / "one", "truck")
+    job = service.submitted(service.venue("v", "accept 5"))
+    service.running(job)
+    second = service.worker_beside(tmp_path / "two", "truck")
+    assert second.wait(60) == 2
+    assert "A worker called truck already runs elsewhere" in (service.data / "log").read_text()
+    ended = service.end(job)
+    assert (ended["status"], ended["attempt"]) == ("succeeded", 1)
+    # Once the first one is gone, whatever it died of, the name is free.
+    first.kill()
+    first.wait()
+    third = service.worker_beside(tmp_path / "two", "truck")
+    assert service.calibrated("v", 1)["status"] == "succeeded"
+    third.kill()
+    third.wait()
+
+
+def test_a_worker_whose_name_was_taken_while_it_was_away_ends(start, tmp_path):
+    service = start("serve")
+    worker = service.worker_beside(tmp_path / "one", "truck")
+    service.ready()
+    engine = connect(service.database_url)
+    WorkerRepository(engine).register("truck", None, "another", "elsewhere")
+    engine.dispose()
+    assert worker.wait(60) == 2
+    assert "another worker of this name has started" in (service.data / "log").read_text()
+
+
+def test_a_second_service_on_one_folder_is_told_so_and_ends(start):
+    service = start().ready()
+    worker = service.worker()
+    command = [sys.executable, "-m", "service.cli", "up", "--port", "0"]
+    second = subprocess.run(command, env=service.environment, capture_output=True, timeout=60)
+    assert second.returncode == 2
+    assert f"A worker called {socket.gethostname()} already runs on" in second.stderr.decode()
+    assert b"listens" not in second.stdout
+    assert service.worker() == worker
+
+
+def test_a_service_whose_worker_has_the_name_of_another_machines_ends(start, tmp_path):
+    service = start("serve", ESC_WORKER_NAME="truck")
+    first = service.worker_beside(tmp_path / "one", "truck")
+    service.ready()
+    home = {"ESC_DATA": str(tmp_path / "two"), "ESC_DATABASE_URL": service.database_url}
+    command = [sys.executable, "-m", "service.cli", "up", "--port", "0"]
+    second = subprocess.run(command, env=service.environment | home, capture_output=True, timeout=60)
+    assert second.returncode == 2
+    assert "A worker called truck already runs elsewhere" in second.stderr.decode()
+    first.kill()
+    first.wait()

@@ -1,0 +1,124 @@
+"""What pages offer can be done, and what cannot be done any more is said in words."""
+
+import pytest
+import sqlalchemy as sa
+from playwright.sync_api import expect
+
+from service.store import tables
+from tests.e2e.running import venue
+
+
+def moved_by_hand(stub, name):
+    """Somebody stores another pose of the left camera."""
+    pose = {"rotation": [1.6, 0.1, -0.2], "position": [-1.5, -50.0, 8.0]}
+    stub.http.patch(f"/venues/{name}", json={"cameras": {"left": {"pose": pose}}}).raise_for_status()
+
+
+@pytest.mark.parametrize("behaviour", ["accept", "reject", "partly"])
+@pytest.mark.parametrize("path", ["/ui/venues/{venue}", "/ui/jobs/{job}"])
+def test_poses_of_a_venue_that_was_changed_since_are_not_offered_and_the_way_out_is_said(stub, visit, behaviour, path):
+    name = stub.venue(f"changed-{behaviour}", behaviour)
+    job = stub.calibrated(name)["id"]
+    moved_by_hand(stub, name)
+    page = visit(stub.url, path.format(venue=name, job=job))
+    expect(page.get_by_text("cannot be accepted any more")).to_be_visible()
+    expect(page.get_by_role("button", name="Accept")).to_have_count(0)
+    expect(page.get_by_role("button", name="Reject")).to_have_count(0)
+    way_out = "Calibrate" if behaviour == "reject" else "Revisions"
+    expect(page.get_by_text("cannot be accepted any more").get_by_role("link", name=way_out)).to_be_visible()
+
+
+def test_what_was_restored_away_can_be_had_back_as_the_page_says(stub, visit):
+    name = stub.venue("had-back")
+    stub.calibrated(name)
+    page = visit(stub.url, f"/ui/venues/{name}")
+    page.get_by_role("button", name="Restore revision 1").click()
+    expect(page.get_by_text("These poses no longer hold")).to_be_visible()
+    # The poses are those that the calibration began with: it can be accepted after all.
+    page.get_by_role("button", name="Accept", exact=True).click()
+    expect(page.get_by_text("These poses hold now")).to_be_visible()
+
+
+def test_a_ridge_that_the_lines_have_is_stored_after_a_question_that_says_what_changes(stub, visit):
+    name = stub.venue("crowned", "contradict")
+    job = stub.calibrated(name)["id"]
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    contradicted = page.get_by_role("region", name="What the lines contradict")
+    asked = []
+    page.on("dialog", lambda dialog: asked.append(dialog.message))
+    contradicted.get_by_role("button", name="Store a ridge 0.332 m high").click()
+    expect(contradicted.get_by_role("button")).to_have_count(0)
+    assert stub.http.get(f"/venues/{name}").json()["field"]["ridge"][0] == [-18.5, 0.0, 0.332]
+    assert asked == [
+        "Store a ridge 0.332 m high instead of 0.000 m? The lines are sure of it to ± 5.10 cm. The next calibration "
+        "will move left by about 8.10 cm and right by about 7.90 cm. What the cameras remember of "
+        "earlier nights ends. Restoring a revision takes it back."
+    ]
+    page.goto(f"{stub.url}/ui/venues/{name}")
+    expect(page.get_by_text("ridge 0.000 → 0.332 m")).to_be_visible()
+    page.get_by_role("button", name="Restore revision 2").click()
+    expect(page.get_by_text("restored from 2")).to_be_visible()
+    assert stub.http.get(f"/venues/{name}").json()["field"]["ridge"] is None
+
+
+def test_a_camera_that_was_accepted_by_hand_is_not_offered_again(stub, visit):
+    name = stub.venue("once", "partly")
+    job = stub.calibrated(name)["id"]
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    page.get_by_role("button", name="Accept right anyway").click()
+    expect(page.get_by_text("as revision 3")).to_be_visible()
+    expect(page.get_by_role("button", name="anyway")).to_have_count(0)
+
+
+def test_a_revision_of_other_cameras_is_not_offered(stub, visit):
+    name = stub.venue("grown")
+    stub.http.put(f"/venues/{name}", json=venue(name, cameras=("left", "middle", "right"))).raise_for_status()
+    page = visit(stub.url, f"/ui/venues/{name}")
+    expect(page.get_by_text("of other cameras or another pitch")).to_be_visible()
+    expect(page.get_by_role("button", name="Restore revision 1")).to_have_count(0)
+
+
+def test_a_job_whose_frames_do_not_fit_any_more_is_not_offered_again(stub, visit):
+    name = stub.venue("refitted")
+    job = stub.calibrated(name)["id"]
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    expect(page.get_by_role("button", name="Again")).to_be_visible()
+    stub.http.patch(f"/venues/{name}", json={"field": {"length_m": 100}}).raise_for_status()
+    page.reload()
+    expect(page.get_by_role("heading", level=1)).to_be_visible()
+    expect(page.get_by_role("button", name="Again")).to_have_count(0)
+
+
+def test_what_was_changed_a_moment_ago_is_said_without_a_word_of_requests(stub, visit):
+    name = stub.venue("raced")
+    job = stub.calibrated(name)["id"]
+    page = visit(stub.url, f"/ui/jobs/{job}", forgiven=("409",))
+    moved_by_hand(stub, name)
+    page.get_by_role("button", name="Reject").click()
+    said = page.get_by_role("status").filter(has_text="changed since")
+    expect(said).to_have_text("The venue has been changed since this job. Load the page again to see how it is now.")
+
+
+def test_a_job_that_was_deleted_is_not_linked_to(stub, visit):
+    name = stub.venue("pruned")
+    job = stub.calibrated(name)["id"]
+    stub.http.delete(f"/jobs/{job}").raise_for_status()
+    page = visit(stub.url, f"/ui/venues/{name}", forgiven=("404",))
+    expect(page.get_by_text("(job deleted)")).to_be_visible()
+    assert page.locator(f"a[href*='{job}']").count() == 0
+    page.goto(f"/ui/jobs/{job}")
+    expect(page.get_by_text("It was deleted: by somebody, or since it ended more than")).to_be_visible()
+
+
+@pytest.mark.parametrize("path", ["/ui/venues/alone", "/ui/jobs/{job}"])
+def test_a_stitch_error_that_nobody_could_measure_has_no_length(stub, visit, path):
+    stub.venue("alone")
+    job = stub.calibrated("alone")["id"]
+    with stub.database() as connection:
+        of_job = tables.jobs.c.id == job
+        result = connection.scalar(sa.select(tables.jobs.c.result).where(of_job))
+        unmeasured = result | {"stitch_error_px": None, "stitch_error_before_px": None}
+        connection.execute(sa.update(tables.jobs).where(of_job).values(result=unmeasured))
+    page = visit(stub.url, path.format(job=job))
+    expect(page.locator(".keys").get_by_text("not measured")).to_have_count(2)
+    expect(page.locator(".keys").get_by_text("–on the pitch")).to_have_count(0)

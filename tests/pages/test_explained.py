@@ -1,0 +1,118 @@
+"""What refusals and problems mean: a page for people, JSON for programs; and the ways between all pages."""
+
+import re
+
+import httpx
+import pytest
+from playwright.sync_api import expect
+
+from service.pages import documents
+from service.pages.problem_pages import DOCUMENT_NAME, wants_page
+from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS
+from tests.e2e.running import Service, keys_in
+from tests.pages.browsing import grave
+
+CHROME = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,image/webp,*/*;q=0.8"
+
+
+@pytest.mark.parametrize(
+    ("accept", "page"),
+    [
+        (CHROME, True),
+        ("text/html", True),
+        ("", False),
+        ("*/*", False),
+        ("application/json", False),
+        ("application/json, text/html;q=0.9", False),
+        ("text/html, application/problem+json", False),
+        ("text/html;q=0", False),
+        ("text/html;q=nonsense", False),
+    ],
+)
+def test_who_likes_a_page_better_than_json_gets_one(accept, page):
+    assert wants_page(accept) is page
+
+
+@pytest.mark.parametrize("path", ["/refusals/residual", "/problems/no-markings-in-view"])
+def test_programs_get_json_and_browsers_a_page_at_the_same_address(stub, path):
+    json = stub.http.get(path)
+    assert json.headers["content-type"] == "application/json"
+    assert json.json()["title"]
+    page = stub.http.get(path, headers={"Accept": CHROME})
+    assert page.headers["content-type"].startswith("text/html")
+    assert json.json()["title"] in page.text
+    assert json.headers["vary"] == page.headers["vary"] == "Accept"
+
+
+def test_the_reason_beside_a_camera_leads_to_what_the_document_says_of_it(stub, visit):
+    page = visit(stub.url, "/refusals/residual")
+    expect(page.get_by_role("heading", level=1)).to_have_text("Lines are beside where the pose puts them")
+    expect(page.get_by_text("The blue drawing crosses the lines.")).to_be_visible()
+    expect(page.get_by_text("Limit: 2.5 px")).to_be_visible()
+    # What the same part of the document says of other reasons stays there.
+    expect(page.get_by_text("few-lines")).to_have_count(0)
+    page.get_by_role("link", name="Refused, and what now: the whole document").click()
+    expect(page).to_have_url(re.compile("/ui/documents/refused#the-lines$"))
+    expect(page.locator("#the-lines")).to_be_in_viewport()
+    page.get_by_role("link", name="first pose", exact=True).first.click()
+    expect(page.get_by_role("heading", level=1)).to_have_text(documents.title("first-calibration"))
+
+
+@pytest.mark.parametrize("reason", REFUSAL_REASONS)
+def test_every_reason_has_a_part_of_the_document(reason):
+    assert f"<code>{reason}</code>" in documents.reason(DOCUMENT_NAME, REFUSAL_REASONS[reason].anchor, reason)
+
+
+@pytest.mark.parametrize("kind", ["no-markings-in-view", "job-crashed", "frame-size"])
+def test_what_a_job_failed_with_is_explained_with_what_to_do(stub, visit, kind):
+    page = visit(stub.url, f"/problems/{kind}")
+    expect(page.get_by_role("heading", level=1)).to_have_text(PROBLEM_TYPES[kind].title)
+    expect(page.get_by_role("row").filter(has=page.get_by_text(kind, exact=True))).to_be_visible()
+
+
+def test_a_problem_of_requests_says_so(stub, visit):
+    page = visit(stub.url, "/problems/not-json")
+    expect(page.get_by_text("A request was answered so, with the status 415.")).to_be_visible()
+
+
+@pytest.mark.parametrize("name", documents.NAMES)
+def test_every_link_of_a_document_leads_to_a_heading_that_is_there(name):
+    targets = re.findall(r'href="([^"]*)"', documents.whole(name))
+    for target in targets:
+        of, _, anchor = target.removeprefix("/ui/documents/").partition("#")
+        assert of in documents.NAMES, target
+        assert not anchor or f'id="{anchor}"' in documents.whole(of) or anchor == "refused-and-what-now", target
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_document_can_be_read_by_everybody_on_a_phone_too(stub, visit, scheme):
+    page = visit(stub.url, "/ui/documents/refused", scheme=scheme, size=(390, 800))
+    assert grave(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_what_is_not_explained_is_said_on_a_page(stub, visit):
+    page = visit(stub.url, "/refusals/whim", forgiven=("404",))
+    expect(page.get_by_role("link", name="To the venues")).to_be_visible()
+
+
+def test_the_interface_has_a_way_back_and_speaks_of_no_key_where_none_is_asked_for(stub, visit):
+    page = visit(stub.url, "/docs")
+    expect(page.get_by_text("venues", exact=True).first).to_be_visible()
+    expect(page.get_by_text("No API key applied")).to_have_count(0)
+    page.get_by_role("link", name="Venues").click()
+    expect(page).to_have_url(f"{stub.url}/")
+
+
+def test_the_interface_takes_a_key_where_one_is_asked_for(tmp_path, visit):
+    keys_in(tmp_path).add("reader", "read")
+    service = Service(tmp_path, "serve")
+    page = visit(service.url, "/docs", forgiven=("401",))
+    expect(page.get_by_text("No API key applied")).to_be_visible()
+    page.close()
+    service.kill()
+
+
+def test_a_browser_finds_a_sign_for_addresses_that_name_none(stub):
+    sign = httpx.get(f"{stub.url}/favicon.ico")
+    assert (sign.status_code, sign.headers["content-type"]) == (200, "image/svg+xml")

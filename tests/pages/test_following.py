@@ -1,0 +1,152 @@
+"""Pages that stay right by themselves: a venue by its events, lists by asking again."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.e2e.running import Service, venue
+from tests.pages.browsing import wait_until
+
+# While a service is away, a browser says so at each try.
+AWAY = ("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_EMPTY_RESPONSE", "ERR_CONNECTION_RESET")
+HIDE = """hidden => {
+    Object.defineProperty(document, "hidden", {configurable: true, get: () => hidden});
+    document.dispatchEvent(new Event("visibilitychange"));
+}"""
+
+
+@pytest.fixture
+def open_venue(stub, visit):
+    """Opens the page of a venue; in the end it must be the page that was opened, never loaded again."""
+    opened = []
+
+    def open_venue(name, behaviour="accept", **parts):
+        stub.http.put(f"/venues/{name}", json=venue(name, behaviour) | parts).raise_for_status()
+        page = visit(stub.url, f"/ui/venues/{name}")
+        page.evaluate("window.opened = true")
+        opened.append(page)
+        return page
+
+    yield open_venue
+    assert all(page.evaluate("window.opened") for page in opened)
+
+
+def test_the_page_of_a_venue_shows_a_new_job_its_end_and_its_revision(stub, open_venue):
+    page = open_venue("watched", "accept 2")
+    expect(page.get_by_role("heading", name="Not calibrated yet")).to_be_visible()
+    job = stub.submitted("watched")
+    going_on = page.get_by_role("region", name="The job that is going on")
+    expect(going_on.locator(".badge")).to_have_text("Running")
+    expect(going_on).to_contain_text("evolution")
+    expect(page.get_by_role("link", name="Calibrate", exact=True)).to_have_count(0)
+    stub.end(job)
+    expect(page.locator(".verdict-big")).to_have_text(re.compile("Accepted"))
+    expect(going_on).to_have_count(0)
+    expect(page.get_by_role("region", name="The last calibrations").get_by_role("link", name=job)).to_be_visible()
+    expect(page.get_by_role("button", name="Restore revision 1")).to_be_visible()
+    expect(page.locator("#chart canvas")).to_be_visible()
+
+
+def test_the_page_of_a_venue_shows_alarms_and_what_others_change(stub, open_venue):
+    page = open_venue("ringing", "reject", alarms={"rejected_in_a_row": 1})
+    stub.end(stub.submitted("ringing"))
+    expect(page.locator(".problem", has_text="rejected")).to_be_visible()
+    stub.http.patch("/venues/ringing", json={"name": "North pitch"}).raise_for_status()
+    expect(page.get_by_role("heading", level=1)).to_have_text("North pitch")
+
+
+def test_a_form_that_somebody_fills_in_is_left_alone_and_cannot_undo_what_others_changed(stub, open_venue):
+    page = open_venue("edited")
+    page.get_by_label("Pan to the right, °", exact=True).fill("7")
+    stub.http.patch("/venues/edited", json={"name": "Changed", "view": {"pan_deg": 3}}).raise_for_status()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Changed")
+    expect(page.get_by_label("Pan to the right, °", exact=True)).to_have_value("7")
+    assert (
+        page.evaluate("document.querySelector('[data-tag]').dataset.tag")
+        != stub.http.get("/venues/edited").headers["etag"]
+    )
+
+
+def test_a_switch_and_the_focus_stay_where_they_are_when_a_part_is_shown_anew(stub, open_venue):
+    page = open_venue("focused")
+    stub.calibrated("focused")
+    page.get_by_label("Logarithmic").check()
+    page.get_by_role("link", name="All jobs of this venue").focus()
+    stub.calibrated("focused", shade=9)
+    expect(page.get_by_role("region", name="The last calibrations").locator("tbody tr")).to_have_count(2)
+    expect(page.get_by_label("Logarithmic")).to_be_checked()
+    wait_until(page, "document.activeElement.tagName === 'A'")
+
+
+def test_a_page_says_that_the_service_is_away_and_goes_on_when_it_is_back(tmp_path, visit):
+    service = Service(tmp_path / "coming-back").ready()
+    service.venue("patient")
+    page = visit(service.url, "/ui/venues/patient", forgiven=AWAY)
+    hint = page.get_by_text("The service does not answer.")
+    expect(hint).to_be_hidden()
+    assert service.stop() == 0
+    expect(hint).to_be_visible()
+    service.start(int(service.url.rpartition(":")[2]))
+    service.ready()
+    service.calibrated("patient")
+    expect(page.locator(".verdict-big")).to_have_text(re.compile("Accepted"))
+    expect(hint).to_be_hidden()
+    service.kill()
+
+
+def test_a_hidden_page_holds_no_connection_and_a_page_in_sight_catches_up(tmp_path, visit):
+    service = Service(tmp_path / "one-place", "serve", ESC_FOLLOWERS="1")
+    service.venue("shared")
+    first = visit(service.url, "/ui/venues/shared")
+    first.evaluate(HIDE, True)
+    # The one place there is was given back: or this page would not hear of the change.
+    second = visit(service.url, "/ui/venues/shared")
+    service.http.patch("/venues/shared", json={"name": "Seen by one"}).raise_for_status()
+    expect(second.get_by_role("heading", level=1)).to_have_text("Seen by one")
+    second.close()
+    assert first.get_by_role("heading", level=1).inner_text() == "accept"
+    first.evaluate(HIDE, False)
+    expect(first.get_by_role("heading", level=1)).to_have_text("Seen by one")
+    first.close()
+    service.kill()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_what_waits_and_what_runs_are_pills_like_other_states_and_named_alike_all_over_a_page(stub, visit, scheme):
+    stub.calibrated(stub.venue("pill"))
+    job = stub.submitted(stub.venue("pills", "accept 60"))
+    stub.running(job)
+    list_of_jobs = visit(stub.url, "/ui/jobs", scheme=scheme)
+    heights = {
+        state: list_of_jobs.locator("tbody .badge", has_text=state).first.bounding_box()["height"]
+        for state in ("Running", "Accepted")
+    }
+    assert heights["Running"] == heights["Accepted"]
+    page = visit(stub.url, f"/ui/jobs/{job}", scheme=scheme)
+    badges = page.locator(".badge")
+    expect(badges).to_have_text(["Running", "Running"])
+    assert {box["height"] for box in (badges.nth(number).bounding_box() for number in (0, 1))} == {heights["Accepted"]}
+    stub.http.post(f"/jobs/{job}/cancel")
+
+
+def test_the_head_of_a_job_that_begins_says_so_as_the_panel_below_does(stub, visit):
+    before = stub.submitted(stub.venue("ahead", "accept 60"))
+    stub.running(before)
+    job = stub.submitted(stub.venue("behind", "accept 60"))
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    expect(page.locator(".badge")).to_have_text(["Queued", "Queued"])
+    stub.http.post(f"/jobs/{before}/cancel")
+    expect(page.locator(".badge")).to_have_text(["Running", "Running"])
+    stub.http.post(f"/jobs/{job}/cancel")
+
+
+def test_the_list_of_venues_goes_on_while_a_link_of_it_has_the_focus(stub, visit):
+    stub.venue("chosen")
+    page = visit(stub.url)
+    page.locator("a[href='/ui/venues/chosen']").focus()
+    stub.calibrated("chosen")
+    expect(page.locator(".venue-row", has=page.locator("a[href='/ui/venues/chosen']")).locator(".badge")).to_have_text(
+        "Accepted"
+    )
+    expect(page.locator("a[href='/ui/venues/chosen']")).to_be_focused()

@@ -1,0 +1,95 @@
+"""Markings in paint of any colour, beside lines of other colours."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fields.shapes import COLOURS
+from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
+from worker.calibration.detection.contrast import BLUE, GREEN, RED, Channels, possible_signs
+from worker.calibration.detection.evidence import evidence_of
+from worker.calibration.detection.frame_fusion import Sway
+from worker.calibration.detection.line_measurement import measure_lines
+
+WOOD, TURF, ICE = (60, 110, 170), (40, 120, 70), (235, 230, 225)
+PAINTS = {
+    "white": (235, 235, 235),
+    "blue": (180, 90, 30),
+    "yellow": (40, 200, 225),
+    "black": (20, 20, 20),
+    "red": (40, 40, 150),
+}
+BESIDE_PX = 9
+
+
+def scene():
+    return pair(())[0], pair_markings(())[0]
+
+
+def lines(colour):
+    """All markings of the pitch, as if they were painted in one colour."""
+    white = CROWNED.line_points()
+    return replace(white, colour=np.full(len(white), colour))
+
+
+def painted(ground, *layers):
+    """Grain, and lines of several colours: (colour, how many columns aside)."""
+    _, share = scene()
+    picture = np.random.default_rng(1).normal(ground, 3, (*share.shape, 3))
+    for colour, aside in layers:
+        there = np.roll(share, aside, axis=1)[..., None]
+        picture += there * (np.array(PAINTS[colour]) - picture)
+    return Channels([np.clip(picture, 0, 255).astype(np.uint8)])
+
+
+def agreement(colour, channels):
+    one, share = scene()
+    return evidence_of(lines(colour), one, channels, np.zeros_like(share)).agreement
+
+
+@pytest.mark.parametrize("colour", PAINTS)
+@pytest.mark.parametrize("ground", [WOOD, TURF], ids=["wood", "turf"])
+def test_markings_are_seen_in_the_colour_that_they_are_said_to_have(colour, ground):
+    assert agreement(colour, painted(ground, (colour, 0))) > 0.8
+
+
+@pytest.mark.parametrize("colour", ["blue", "red"])
+def test_the_coloured_lines_of_a_rink_are_darker_than_ice_in_every_channel_and_seen(colour):
+    assert agreement(colour, painted(ICE, (colour, 0))) > 0.8
+
+
+@pytest.mark.parametrize("colour", ["blue", "yellow"])
+def test_markings_of_any_colour_are_seen_where_nobody_has_said_which(colour):
+    assert agreement("white", painted(WOOD, (colour, 0))) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("said", "there"), [("blue", "white"), ("yellow", "white"), ("black", "white"), ("yellow", "blue")]
+)
+def test_lines_of_another_colour_are_not_the_marking(said, there):
+    assert agreement(said, painted(WOOD, (there, 0))) < 0.2
+
+
+def test_a_white_line_beside_a_blue_one_does_not_pull_it():
+    one, share = scene()
+    both = painted(WOOD, ("blue", 0), ("white", BESIDE_PX))
+    found = measure_lines(lines("blue"), one, both, np.zeros_like(share), 14.0)
+    # Along the rows the two lie on each other.
+    across = found[np.abs(found.normal[:, 0]) > 0.8]
+    off = np.sum((across.pixel - one.project(across.points.position)) * across.normal, axis=1)
+    assert len(across) > 20
+    assert np.average(np.abs(off) < 1.0, weights=across.trust) > 0.75
+
+
+def test_white_says_nothing_and_every_other_colour_something():
+    for colour in (*COLOURS, "#102040"):
+        free = all(possible_signs(colour, channel) == (1, -1) for channel in (BLUE, GREEN, RED))
+        assert free == (colour == "white")
+
+
+def test_of_several_frames_each_channel_is_the_median():
+    frames = [np.full((4, 5, 3), (value, 2 * value, 0), dtype=np.uint8) for value in (10, 12, 90)]
+    channels = Channels(frames, [Sway(None)] * 3)
+    assert (channels[BLUE] == 12).all()
+    assert (channels[GREEN] == 24).all()

@@ -1,0 +1,55 @@
+"""Lines of another sport on the same ground: of no use, and no harm."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fields.template import load
+from tests.worker.calibration.synthetic import PITCH, camera, paint_markings
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.evidence import evidence_of
+from worker.calibration.detection.exclusions import left_out
+from worker.calibration.diagnostics.overlap import overlap_of
+from worker.calibration.geometry.field import Field
+
+GRIDIRON = load("american-football")
+ONE = camera("one", (-1.0, -48.0, 14.0), (-20.0, -5.0), focal=700.0)
+LISTED = replace(PITCH, others=GRIDIRON.markings({}))
+
+
+@cache
+def both_painted():
+    field = Field(109.728, 48.768, 0.1016, template=GRIDIRON)
+    return np.maximum(paint_markings(PITCH, ONE), paint_markings(field, ONE))
+
+
+def seen(pitch):
+    frame = np.repeat((70 + 160 * both_painted()).astype(np.uint8)[..., None], 3, axis=2)
+    lines = pitch.line_points()
+    return evidence_of(lines, ONE, Channels([frame]), both_painted(), left_out(pitch, ONE))
+
+
+def test_lines_of_another_sport_are_unexpected_until_they_are_listed():
+    unlisted, listed = (overlap_of(pitch, ONE, both_painted()) for pitch in (PITCH, LISTED))
+    assert unlisted.unexpected > 0.4
+    assert listed.unexpected < 0.1
+    assert listed.found == unlisted.found
+    assert listed.iou > unlisted.iou + 0.2
+
+
+def test_lines_of_another_sport_are_no_chance_hits_once_they_are_listed():
+    unlisted, listed = seen(PITCH), seen(LISTED)
+    assert listed.by_chance < 0.5 * unlisted.by_chance
+    np.testing.assert_array_equal(listed.found, unlisted.found)
+
+
+def test_a_listed_line_where_the_venue_has_its_own_hides_nothing():
+    same = replace(PITCH, others=PITCH.template.markings({"length": 105.0, "width": 68.0, "line": 0.12}))
+    paint = paint_markings(PITCH, ONE)
+    assert overlap_of(same, ONE, paint).found == pytest.approx(overlap_of(PITCH, ONE, paint).found)
+
+
+def test_where_nothing_else_is_painted_all_of_a_frame_counts():
+    assert left_out(PITCH, ONE) is None

@@ -1,0 +1,59 @@
+"""What the segmentation finds of the expected markings, and beside them."""
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
+from worker.calibration.diagnostics.overlap import overlap_of
+
+
+def scene():
+    return pair(())[0], pair_markings(())[0]
+
+
+def test_the_true_pose_explains_the_markings():
+    one, response = scene()
+    assert overlap_of(CROWNED, one, response).iou > 0.7
+
+
+def test_a_moved_pose_explains_fewer():
+    one, response = scene()
+    assert overlap_of(CROWNED, moved(one, (0.02, 0, 0)), response).iou < 0.4
+
+
+def test_markings_beside_the_expected_ones_count_against_a_pose():
+    one, response = scene()
+    cluttered = response.copy()
+    cluttered[300:330:4, 200:700] = 1
+    assert overlap_of(CROWNED, one, cluttered).iou < overlap_of(CROWNED, one, response).iou
+
+
+def test_what_is_off_the_pitch_does_not_count():
+    one, response = scene()
+    lettering = response.copy()
+    lettering[:60] = 1  # sky
+    assert overlap_of(CROWNED, one, lettering).iou == pytest.approx(overlap_of(CROWNED, one, response).iou)
+
+
+def test_a_black_segmentation_explains_nothing():
+    one, response = scene()
+    assert overlap_of(CROWNED, one, np.zeros_like(response)).iou == 0
+
+
+def test_a_pose_that_sees_no_pitch_explains_nothing():
+    one, response = scene()
+    assert overlap_of(CROWNED, moved(one, (2.0, 0, 0)), response).iou == 0
+
+
+def test_the_two_sides_of_the_overlap_tell_missing_lines_from_other_lines():
+    one, response = scene()
+    clean = overlap_of(CROWNED, one, response)
+    assert clean.found > 0.9
+    assert clean.unexpected < 0.1
+    cluttered, hidden = response.copy(), response.copy()
+    cluttered[300:330:4, 200:700] = 1
+    hidden[:, 480:] = 0
+    assert overlap_of(CROWNED, one, cluttered).found == pytest.approx(clean.found, abs=0.05)
+    assert overlap_of(CROWNED, one, cluttered).unexpected > 0.3
+    assert overlap_of(CROWNED, one, hidden).found < clean.found - 0.2
+    assert overlap_of(CROWNED, one, hidden).unexpected < 0.1

@@ -1,0 +1,52 @@
+"""How far apart two cameras put the same paint, all along what both see."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames, pair_markings
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.diagnostics.seam import measure_seam
+from worker.calibration.refinement.refine import Observations, evaluate_poses
+
+
+@cache
+def seam(by=(0.0, 0.0, 0.0)):
+    """Of the pair, the right camera believed to stand beside where it does."""
+    left, right = pair()
+    sight = Observations([Channels([frame]) for frame in pair_frames()], pair_markings())
+    return measure_seam(CROWNED, *evaluate_poses(CROWNED, [left, moved(right, by=by)], sight, 0.5).each)
+
+
+def test_cameras_in_their_places_agree_all_along_the_seam():
+    places = seam().places
+    assert 6 <= len(places) <= 24
+    assert all(place.error_m < 0.02 + 3 * place.sigma_m for place in places)
+    assert np.median([place.error_m for place in places]) < 0.01
+
+
+def test_a_camera_that_stands_beside_its_place_shows_it_across_the_lines_and_not_along_them():
+    halfway = [place for place in seam((0.15, 0.0, 0.0)).places if abs(place.across[0]) > 0.99]
+    level = [place for place in seam((0.15, 0.0, 0.0)).places if abs(place.across[1]) > 0.99]
+    assert len(halfway) >= 3
+    for place in halfway:
+        # It believes that what it sees is as far to the right as itself.
+        assert place.error_m * place.across[0] == pytest.approx(0.15, abs=0.02 + 3 * place.sigma_m)
+    assert all(place.error_m < 0.02 + 3 * place.sigma_m for place in level)
+
+
+def test_the_places_are_in_order_from_end_to_end_and_the_worst_is_named():
+    turned = seam((0.0, 0.0, 0.1))
+    along = [place.at[1] for place in turned.places]
+    assert np.corrcoef(along, np.arange(len(along)))[0, 1] > 0.9
+    assert turned.worst.error_m > np.median([place.error_m for place in turned.places])
+
+
+def test_cameras_that_have_measured_nothing_in_common_have_no_seam():
+    left, right = pair()
+    sight = Observations([Channels([frame]) for frame in pair_frames()], pair_markings())
+    first, second = evaluate_poses(CROWNED, [left, right], sight, 0.5).each
+    assert measure_seam(CROWNED, first, replace(second, measured=None)).places == []
+    assert measure_seam(CROWNED, first, replace(second, measured=None)).worst is None

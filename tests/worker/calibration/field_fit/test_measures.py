@@ -1,0 +1,124 @@
+"""Measures of a pitch from its lines: found where they can be, and declared unknowable where not."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fields.template import Template, load
+from tests.worker.calibration.synthetic import (
+    BARREL,
+    CROWNED,
+    PITCH,
+    camera,
+    moved,
+    paint_frame,
+    paint_markings,
+    pair,
+    pair_frames,
+)
+from tests.worker.calibration.test_calibrate import white_on_green
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.field_fit.measures import fit_field, fit_measures
+from worker.calibration.geometry.field import Field
+from worker.calibration.refinement.refine import Observations
+
+pytestmark = pytest.mark.timeout(600)
+
+
+def fitted(truth, cameras, given):
+    """The pitch that the lines of `truth` make of a `given` one, by cameras a little off, and its measures by name."""
+    sight = Observations(
+        [Channels([paint_frame(truth, c)]) for c in cameras],
+        [paint_markings(truth, c) for c in cameras],
+    )
+    start = [moved(c, (0.0008, -0.0006, 0.0005), (0.02, -0.03, 0.02)) for c in cameras]
+    refined, measures = fit_measures(given, start, sight, 0.5)
+    return refined, {measure.name: measure for measure in measures}
+
+
+@cache
+def whole_pitch():
+    return fitted(CROWNED, pair(), Field(103.5, 67.0))
+
+
+@cache
+def centre_only():
+    one = camera("centre", (0.0, -30.0, 8.0), (0.0, 0.0), focal=900.0, distortion=BARREL)
+    return fitted(PITCH, [one], Field(104.0, 67.5))
+
+
+def test_a_pitch_that_is_shorter_narrower_and_flatter_than_said_is_found():
+    refined, measures = whole_pitch()
+    truth = {"length_m": 105.0, "width_m": 68.0, "ridge_height_m": 0.35, "ridge_length_m": 37.0}
+    for name, measure in measures.items():
+        assert measure.known, name
+        assert abs(measure.value - truth[name]) < 3 * measure.sigma, name
+    found = refined.pitch
+    assert (found.length, found.width) == (measures["length_m"].value, measures["width_m"].value)
+    assert found.ridge_height == pytest.approx(0.35, abs=0.03)
+    for before, after in zip(pair(), refined.cameras, strict=True):
+        assert np.linalg.norm(before.pose.position - after.pose.position) < 0.1
+
+
+def test_the_sigmas_of_what_is_found_are_worth_having():
+    _, measures = whole_pitch()
+    assert measures["length_m"].sigma < 0.2
+    assert measures["width_m"].sigma < 0.4
+    assert measures["ridge_height_m"].sigma < 0.1
+    assert measures["ridge_length_m"].sigma < 8
+
+
+@pytest.mark.parametrize(("name", "given"), [("length_m", 104.0), ("width_m", 67.5)])
+def test_what_no_line_in_view_depends_on_is_unknowable_and_stays(name, given):
+    refined, measures = centre_only()
+    assert not measures[name].known
+    assert "in view" in measures[name].detail
+    assert measures[name].given == given
+    assert (refined.pitch.length, refined.pitch.width) == (104.0, 67.5)
+
+
+def test_markings_of_ones_own_are_where_their_coordinates_say_and_it_is_said_so():
+    lines = {"north": [[-20, 10], [20, 10]], "south": [[-20, -10], [20, -10]], "across": [[-20, -10], [-20, 10]]}
+    own = Template(marking=[{"name": name, "line": line} for name, line in lines.items()])
+    court = Field(40.0, 20.0, 0.12, template=own)
+    opposite = camera("whole", (-5.0, -25.0, 12.0), (-5.0, 0.0), focal=500.0)
+    refined, measures = fitted(court, [opposite], court)
+    for name in ("length_m", "width_m"):
+        assert not measures[name].known
+        assert measures[name].detail == "markings of your own lie where their coordinates say, whatever the measure"
+    assert (refined.pitch.length, refined.pitch.width) == (40.0, 20.0)
+
+
+def test_a_flat_pitch_has_no_ridge_worth_mentioning_and_none_whose_length_could_be_told():
+    refined, measures = centre_only()
+    height, length = measures["ridge_height_m"], measures["ridge_length_m"]
+    assert abs(height.value) < 2 * height.sigma
+    assert refined.pitch.ridge_height == pytest.approx(0.0, abs=0.03)
+    assert not length.known
+    assert "from 0 to 100 m" in length.detail
+
+
+def test_where_one_camera_sees_nothing_no_measure_is_known_and_it_alone_is_named():
+    left, right = pair_frames()
+    frames = {"left": [left], "right": [np.zeros_like(right)]}
+    found = fit_field(CROWNED, pair(), frames, white_on_green, 1)
+    assert found.rejected_because.startswith("camera right: Dark")
+    assert "camera left" not in found.rejected_because
+    assert found.cameras[1].moved.position_m == 0.0
+    assert (found.pitch.length, found.pitch.width) == (105.0, 68.0)
+    assert [measure.known for measure in found.measures] == [False] * 4
+    assert found.measures[3].value == found.measures[3].given == 37.0
+
+
+def test_a_handball_court_that_is_narrower_than_said_is_found_though_it_has_fewer_dashes():
+    truth = Field(39.8, 19.6, 0.05, template=load("handball"))
+    given = Field(40.0, 20.0, 0.05, template=load("handball"))
+    assert len(truth.markings()) < len(given.markings())
+    opposite = [
+        camera(name, (x, y, 7.0), (0.5 * x, 0.0), focal=600.0) for name, x, y in (("a", -9.0, -15.0), ("b", 9.0, 15.0))
+    ]
+    refined, measures = fitted(truth, opposite, given)
+    assert refined.pitch.length == pytest.approx(39.8, abs=0.03)
+    assert refined.pitch.width == pytest.approx(19.6, abs=0.03)
+    assert measures["width_m"].known

@@ -1,0 +1,105 @@
+"""Quality without ground truth, and the gate."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import PITCH, moved, pair
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
+from worker.calibration.diagnostics.overlap import Overlap
+from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection
+from worker.calibration.geometry.camera import Pose
+from worker.calibration.refinement.uncertainty import Deviation, Sigma
+
+LEFT = pair(())[0]
+
+
+def seen(share: float, by_chance: float = 0.2) -> Evidence:
+    """That much of a hundred pieces of one line."""
+    pieces = np.arange(100)
+    found = pieces < 100 * share
+    return Evidence(pieces, np.zeros(100, int), np.ones(100), found, np.full(100, by_chance))
+
+
+FIGURES = ViewFigures(*[0.5] * len(fields(ViewFigures)))
+IN_VIEW = ViewCondition(True, None, None, "The field can be seen.", FIGURES)
+ZOOMED = Deviation("left", "focal_length_px", 0.02 * LEFT.intrinsics.matrix[0, 0], 0.002 * 600.0, 3e-4 * 600.0)
+FOGGED = ViewCondition(False, "fogged", "far half", "Fogged (far half): most likely fog.", FIGURES)
+
+
+def good():
+    return CameraResult(
+        camera=LEFT,
+        evidence=seen(0.95),
+        residual_px=0.2,
+        covariance=np.diag([0.005**2] * 3 + [0.05**2] * 3),
+        repeatability=Sigma(0.01, 0.01),
+        zoom=None,
+        with_fitted_zoom=None,
+        view=IN_VIEW,
+        overlap=Overlap(0.9, 0.95, 0.05),
+        evidence_before=seen(0.3),
+        moved=Movement(0.5, 0.1, 12.0),
+    )
+
+
+def test_a_good_result_passes_the_gate():
+    assert alone_rejection(good(), Gate()) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (
+            {"evidence": seen(0.4)},
+            "40% of their length is where it ought to be, at least 68% are needed (20% is seen anywhere)",
+        ),
+        ({"view": FOGGED, "evidence": seen(0.1)}, "Fogged (far half)"),
+        ({"residual_px": None}, "fewer than 30 points"),
+        ({"covariance": None}, "fewer than 30 points"),
+        ({"residual_px": 9.0}, "px from where the pose puts them"),
+        ({"covariance": np.diag([0.02**2] * 3 + [0.01**2] * 3)}, "sigma 1.98 degrees (at most 1.5 allowed)"),
+        ({"covariance": np.diag([1e-4**2] * 3 + [1.0**2] * 3)}, "1.73 m (at most 0.5)"),
+        (
+            {"zoom": ZOOMED, "with_fitted_zoom": moved(LEFT, by=(0.5, 0.0, 0.0))},
+            "a focal length 2.00% ± 0.20% longer than the venue says",
+        ),
+        ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
+        ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
+        ({"evidence": seen(0.8), "evidence_before": seen(0.95)}, "stored pose fits the frame better"),
+    ],
+)
+def test_the_gate_names_the_cause(change, cause):
+    assert cause in alone_rejection(replace(good(), **change), Gate()).words
+
+
+def test_a_rejection_amid_lines_of_something_else_offers_to_list_them():
+    spoiled = replace(good(), evidence=seen(0.4), overlap=Overlap(0.4, 0.9, 0.56))
+    assert "56% of what it takes for lines on the pitch lies beside" in alone_rejection(spoiled, Gate()).words
+    assert "other_markings" in alone_rejection(spoiled, Gate()).words
+    assert "other_markings" not in alone_rejection(replace(spoiled, overlap=Overlap(0.4, 0.4, 0.1)), Gate()).words
+
+
+def test_a_doubt_of_the_focal_length_that_moves_no_camera_rejects_none():
+    assert (
+        alone_rejection(replace(good(), zoom=ZOOMED, with_fitted_zoom=moved(LEFT, by=(0.05, 0.0, 0.0))), Gate()) is None
+    )
+
+
+def test_movement_is_told_in_degrees_metres_and_pixels():
+    turned = Movement.between(PITCH, LEFT, moved(LEFT, by=(0.3, 0, 0.4)))
+    assert turned.rotation_deg == pytest.approx(0)
+    assert turned.position_m == pytest.approx(0.5)
+    assert turned.pixels > 1
+    assert Movement.between(PITCH, LEFT, LEFT) == Movement(0.0, 0.0, 0.0)
+
+
+def test_a_pose_from_which_no_field_is_filmed_is_doubted_before_the_sport_is():
+    hanging = LEFT.with_pose(Pose.looking_at(LEFT.pose.position, (0.0, 0.0, 0.0), roll_deg=180.0))
+    lost = replace(good(), evidence=seen(0.3), overlap=Overlap(0.1, 0.1, 0.9))
+    assert "list it in the field's other_markings" in alone_rejection(lost, Gate()).words
+    words = alone_rejection(replace(lost, camera=hanging), Gate()).words
+    assert "was it written in another convention" in words
+    assert "other_markings" not in words

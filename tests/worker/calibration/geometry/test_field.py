@@ -1,0 +1,157 @@
+"""The pitch: markings by the Laws of the Game, and the roof."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fields.template import Template, load
+from tests.worker.calibration.synthetic import CROWNED, PITCH
+from worker.calibration.geometry.field import Field, resample
+
+lengths, widths = st.floats(90, 120), st.floats(45, 90)
+
+
+def by_name(pitch, name):
+    return next(marking for marking in pitch.markings() if marking.name == name)
+
+
+@given(lengths, widths)
+def test_the_outer_edges_of_the_boundary_enclose_the_nominal_pitch(length, width):
+    pitch = Field(length, width, line_width=0.1)
+    lines = [m.centre for m in pitch.markings() if "touchline" in m.name or "goal line" in m.name]
+    everything = np.concatenate(lines)
+    np.testing.assert_allclose(everything.max(axis=0) + 0.05, [length / 2, width / 2])
+    np.testing.assert_allclose(everything.min(axis=0) - 0.05, [-length / 2, -width / 2])
+
+
+def test_the_penalty_area_ends_sixteen_and_a_half_metres_from_the_goal_line():
+    front = by_name(PITCH, "left penalty area, front")
+    np.testing.assert_allclose(front.centre[:, 0] + 0.06, -52.5 + 16.5)
+    np.testing.assert_allclose(np.abs(front.centre[:, 1]) + 0.06, 20.16)
+
+
+def test_the_penalty_arc_begins_on_the_front_of_the_area_and_bulges_towards_the_centre():
+    for side, name in ((-1, "left"), (1, "right")):
+        arc = by_name(PITCH, f"{name} penalty arc").centre
+        front = by_name(PITCH, f"{name} penalty area, front").centre[0, 0]
+        assert arc[0, 0] == pytest.approx(front, abs=1e-9)
+        assert arc[-1, 0] == pytest.approx(front, abs=1e-9)
+        mark = side * (52.5 - 11)
+        assert np.abs(arc[:, 0]).min() == pytest.approx(abs(mark) - 9.15 + 0.06, abs=1e-3)
+
+
+def test_corner_arcs_lie_inside_the_pitch():
+    for name in ("left near", "left far", "right near", "right far"):
+        arc = by_name(PITCH, f"{name} corner arc").centre
+        assert (np.abs(arc) <= [52.5 + 1e-9, 34 + 1e-9]).all()
+        np.testing.assert_allclose(np.linalg.norm(np.abs(arc) - [52.5, 34], axis=1), 0.94)
+
+
+def test_both_halves_are_mirror_images():
+    points = PITCH.line_points().position[:, :2]
+    mirrored = points * [-1, 1]
+    distance = np.linalg.norm(points[:, None] - mirrored[None], axis=2).min(axis=1)
+    assert distance.max() < 0.13
+
+
+def test_the_roof_is_flat_at_the_boundary_and_highest_along_the_ridge():
+    edge = np.array([[-52.5, 10], [52.5, -34], [0, 34], [20, -34], [60, 0], [0, 40]])
+    np.testing.assert_allclose(CROWNED.height(edge), 0, atol=1e-12)
+    np.testing.assert_allclose(CROWNED.height(np.array([[-18.5, 0], [0, 0], [18.5, 0]])), 0.35)
+    assert CROWNED.height(np.array([0.0, 17.0])) == pytest.approx(0.175)
+    assert CROWNED.height(np.array([-35.5, 0.0])) == pytest.approx(0.175)
+
+
+def test_the_ends_of_the_ridge_may_come_in_either_order():
+    swapped = Field(105, 68, ridge=CROWNED.ridge[::-1])
+    somewhere = np.random.default_rng(0).uniform([-52, -34], [52, 34], size=(50, 2))
+    np.testing.assert_array_equal(swapped.height(somewhere), CROWNED.height(somewhere))
+
+
+def test_a_ridge_beside_the_middle_still_meets_the_corners_at_zero():
+    pitch = Field(105, 68, ridge=np.array([[-10.0, 5.0, 0.3], [20.0, 5.0, 0.3]]))
+    corners = np.array([[x, y] for x in (-52.5, 52.5) for y in (-34, 34)])
+    np.testing.assert_allclose(pitch.height(corners), 0, atol=1e-12)
+    assert pitch.height(np.array([0.0, 5.0])) == pytest.approx(0.3)
+
+
+def test_line_points_follow_the_surface():
+    lines = CROWNED.line_points()
+    np.testing.assert_allclose(lines.position[:, 2], CROWNED.height(lines.position[:, :2]))
+    np.testing.assert_allclose(np.linalg.norm(lines.tangent, axis=1), 1)
+    np.testing.assert_allclose(np.sum(lines.tangent[:, :2] * lines.normal[:, :2], axis=1), 0, atol=1e-4)
+
+
+@given(st.floats(0.1, 3), st.integers(2, 6))
+def test_resampled_points_are_evenly_spaced(spacing, corners):
+    line = np.stack([np.arange(corners) * 10.0, np.zeros(corners)], axis=1)
+    points, tangents = resample(line, spacing)
+    steps = np.diff(points[:, 0])
+    assert np.allclose(steps, steps[0]) if len(steps) else True
+    assert points[0, 0] == pytest.approx((corners - 1) * 10 - points[-1, 0])
+    np.testing.assert_allclose(tangents, [[1, 0]] * len(points))
+
+
+def test_points_stay_the_same_points_on_a_pitch_of_other_measures():
+    longer = Field(109.3, 64.0, 0.12, CROWNED.ridge)
+    lines = CROWNED.line_points()
+    same = longer.same_line_points(lines)
+    assert (same.marking == lines.marking).all()
+    assert len(longer.line_points()) != len(lines)
+    touchline = lines.marking == 0
+    along = lines.position[touchline, 0] / (CROWNED.length - 0.12)
+    assert same.position[touchline, 0] / (longer.length - 0.12) == pytest.approx(along)
+
+
+def test_a_ridge_gets_another_length_around_its_middle_as_far_as_there_is_room():
+    ridge = np.array([[-10.0, 2.0, 0.3], [20.0, 2.0, 0.3]])
+    pitch = Field(105.0, 68.0, ridge=ridge)
+    assert (pitch.ridge_length, pitch.ridge_height) == (30.0, 0.3)
+    assert pitch.with_ridge_length(10.0).ridge == pytest.approx(np.array([[0.0, 2.0, 0.3], [10.0, 2.0, 0.3]]))
+    widest = pitch.with_ridge_length(500.0)
+    assert widest.ridge[:, 0] == pytest.approx([5.0 - 47.0, 5.0 + 47.0])
+    assert PITCH.with_ridge_length(8.0).height(np.array([3.0, 5.0])) == 0.0
+
+
+def test_markings_have_the_colour_of_their_paint():
+    circle = {"name": "b", "circle": {"centre": [0, 0], "radius": 1}, "colour": "blue"}
+    spot = {"name": "c", "spot": {"centre": [0, 0], "diameter": 0.3}, "colour": "#ffcc00"}
+    plan = Template(marking=[{"name": "a", "line": [[0, 0], [1, 0]]}, circle, spot])
+    assert [marking.colour for marking in Field(10, 5, 0.05, template=plan).markings()] == ["white", "blue", "#ffcc00"]
+
+
+@pytest.mark.parametrize(
+    ("sport", "usual"), [("handball", (40, 20)), ("handball", (38, 18.4)), ("rugby-union", (120, 68))]
+)
+@settings(max_examples=30)
+@given(by=st.floats(-1.5, 1.5))
+def test_a_resized_field_has_the_same_dashes_where_its_broken_lines_are_now(sport, usual, by):
+    template = load(sport)
+    size = {name: extent.default for name, extent in template.size.items()}
+    nominal = Field(*usual, size["line"], template=template)
+    wider = nominal.resized(width=usual[1] + by).resized(length=usual[0] + by)
+    assert [marking.name for marking in wider.markings()] == [marking.name for marking in nominal.markings()]
+    lines = nominal.line_points(0.1)
+    assert (wider.same_line_points(lines).marking == lines.marking).all()
+    if sport == "handball":
+        dashes = [marking for marking in wider.markings() if "left free-throw line, far" in marking.name]
+        ends = np.concatenate([dash.centre for dash in dashes])
+        post = np.array([-wider.length / 2, 1.5])
+        np.testing.assert_allclose(np.linalg.norm(ends - post, axis=1), 9 - 0.025)
+        assert ends[:, 1].max() < wider.width / 2
+
+
+def test_a_field_dashed_anew_has_whole_dashes_again():
+    wider = Field(40, 20, 0.05, template=load("handball")).resized(width=19.2)
+    anew = Field(40, 19.2, 0.05, template=load("handball"))
+    assert len(wider.markings()) > len(anew.markings())
+    assert len(wider.dashed_anew().markings()) == len(anew.markings())
+
+
+def test_the_points_of_broken_lines_move_smoothly_with_the_width():
+    nominal = Field(40, 20, 0.05, template=load("handball"))
+    before = nominal.line_points()
+    steps = [nominal.resized(width=20 + by).same_line_points(before).position for by in (0.0, 0.01, 0.02)]
+    np.testing.assert_allclose(steps[1] - steps[0], steps[2] - steps[1], atol=2e-4)
+    assert np.abs(steps[1] - steps[0]).max() < 0.03

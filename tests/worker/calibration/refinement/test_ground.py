@@ -1,0 +1,60 @@
+"""Floors of halls are taken to be as even as they are, and turf as uneven as it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fields.template import TURF_M, load
+from tests.benchmarks.nights.simulated import Painted, SimulatedSight
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.lens import Intrinsics
+from worker.calibration.refinement.refine import refine
+
+NIGHTS = 12
+HALL = Field(40.0, 20.0, 0.05, None, load("handball"))
+SIZE = (1920, 1080)
+
+
+def hall_camera():
+    """On a gallery beside the court, over one half of it."""
+    matrix = np.array([[1400.0, 0, 959.5], [0, 1400.0, 539.5], [0, 0, 1]])
+    pose = Pose.looking_at(np.array([-4.0, -19.0, 6.0]), np.array([-8.0, 0.0, 0.0]), roll_deg=0.0)
+    return Camera("hall", Intrinsics(matrix, np.zeros(5), SIZE, {}), pose)
+
+
+def finished(court, painted, rng):
+    camera = hall_camera()
+    sight = SimulatedSight(painted, [camera], 0.2 * rng.normal(size=(1, len(painted.lines))))
+    return refine(court, [camera], sight, 0.5).each[0]
+
+
+def off_m(found):
+    return float(np.linalg.norm(found.camera.pose.position - hall_camera().pose.position))
+
+
+def test_in_a_hall_errors_are_as_large_as_the_sigmas_say():
+    rng = np.random.default_rng(2)
+    ends = [finished(HALL, Painted.drawn(HALL, rng), rng) for _ in range(NIGHTS)]
+    assert 0.4 < np.sqrt(np.mean([(off_m(end) / end.sigma.position_m) ** 2 for end in ends])) < 1.5
+
+
+def test_a_floor_leaves_less_doubt_than_turf_would():
+    as_turf = replace(HALL, template=replace(HALL.template, uneven=TURF_M))
+    rng = np.random.default_rng(3)
+    painted = Painted.drawn(HALL, rng)
+    floor, turf = (finished(court, painted, np.random.default_rng(4)) for court in (HALL, as_turf))
+    assert floor.sigma.position_m < 0.8 * turf.sigma.position_m
+
+
+@pytest.mark.parametrize("sport", ["handball", "ice-hockey", "tennis"])
+def test_hard_floors_are_thought_more_even_than_turf(sport):
+    size = {name: extent.default for name, extent in load(sport).size.items()}
+    court = Field(size["length"], size["width"], size["line"], None, load(sport))
+    assert Ground.under(court.line_points()).usual_m < TURF_M / 1.5
+
+
+def test_sand_is_less_even_than_turf():
+    assert load("beach-volleyball").uneven > TURF_M

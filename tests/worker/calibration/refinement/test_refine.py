@@ -1,0 +1,337 @@
+"""The finish: line centres to a fraction of a pixel, and poses to millimetres on a perfect picture."""
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import (
+    BARREL,
+    CROWNED,
+    camera,
+    ground_behind,
+    moved,
+    paint_frame,
+    paint_markings,
+    pair,
+    pair_frames,
+    pair_markings,
+)
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.line_matching import expected_profiles, sliding_correlation
+from worker.calibration.detection.line_measurement import measure_lines
+from worker.calibration.diagnostics.registration import register_pair
+from worker.calibration.gate.quality import Gate
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.parameters import free_focal_lengths, free_ridge, lens_parameters
+from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
+from worker.calibration.robust import huber_weights, tukey_weights
+
+SMALL_TURN = (0.0008, -0.0006, 0.0005)
+SMALL_SHIFT = (0.02, -0.03, 0.02)
+
+
+@cache
+def scene():
+    return pair(), [Channels([frame]) for frame in pair_frames()], list(pair_markings())
+
+
+def a_little_off():
+    return [moved(c, SMALL_TURN, SMALL_SHIFT) for c in pair()]
+
+
+@cache
+def brought_back():
+    _, channels, responses = scene()
+    return refine(CROWNED, a_little_off(), Observations(channels, responses), 0.5)
+
+
+@cache
+def from_the_truth():
+    cameras, channels, responses = scene()
+    return refine(CROWNED, cameras, Observations(channels, responses), 0.5)
+
+
+@cache
+def through_a_wrong_lens():
+    """The left camera's lens is not the one that was given."""
+    cameras, channels, responses = scene()
+    bent = next(p for p in lens_parameters(cameras) if p.name == "k1")
+    wrong, _ = bent.applied(cameras, CROWNED, 0.01)
+    return refine(CROWNED, wrong, Observations(channels, responses), 0.5)
+
+
+def off_by(cameras, refined):
+    return [
+        (
+            np.linalg.norm(after.pose.position - before.pose.position),
+            rotation_angles_deg(after.pose.rotation, before.pose.rotation),
+        )
+        for before, after in zip(cameras, refined, strict=True)
+    ]
+
+
+def test_lines_are_found_where_they_are():
+    cameras, channels, responses = scene()
+    wrong = moved(cameras[0], SMALL_TURN)
+    found = measure_lines(CROWNED.line_points(), wrong, channels[0], responses[0], 6.0)
+    truth = cameras[0].project(found.points.position)
+    off = np.sum((found.pixel - truth) * found.normal, axis=1)
+    assert len(found) > 300
+    assert np.abs(np.median(off)) < 0.02
+    assert np.percentile(np.abs(off), 75) < 0.1
+
+
+def test_lines_that_the_network_misses_are_measured_by_their_ridges():
+    cameras, channels, responses = scene()
+    found = measure_lines(CROWNED.line_points(), cameras[0], channels[0], np.zeros_like(responses[0]), 6.0)
+    truth = cameras[0].project(found.points.position)
+    assert len(found) > 300
+    assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
+
+
+def test_ridges_that_do_not_go_on_along_a_line_are_not_measured():
+    cameras, channels, responses = scene()
+    noise = np.random.default_rng(3).normal(100, 20, (*responses[0].shape, 3)).astype(np.uint8)
+    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([noise]), np.zeros_like(responses[0]), 6.0)
+    seen = measure_lines(CROWNED.line_points(), cameras[0], channels[0], responses[0], 6.0)
+    assert len(found) < 0.2 * len(seen)
+
+
+def test_lines_darker_than_their_ground_are_measured_where_they_are():
+    cameras, _, responses = scene()
+    negative = 255 - pair_frames()[0]
+    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([negative]), np.zeros_like(responses[0]), 6.0)
+    truth = cameras[0].project(found.points.position)
+    assert len(found) > 300
+    assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
+
+
+@pytest.mark.parametrize("shift", [-3.25, 0.0, 1.5])
+@pytest.mark.parametrize("width", [1.0, 4.0, 9.0])
+def test_the_filter_fits_best_at_the_centre_of_its_line(width, shift):
+    offsets = np.arange(-30, 30.5, 0.5)
+    line = expected_profiles(np.array([width]), offsets - shift)
+    filters = expected_profiles(np.array([width]), np.arange(-15, 15.5, 0.5))
+    correlation = sliding_correlation(100 * line + 50, filters)
+    best = np.argmax(correlation[0])
+    assert (best - correlation.shape[1] // 2) * 0.5 == pytest.approx(shift, abs=0.26)
+    assert correlation[0, best] > 0.95
+
+
+def test_slightly_moved_cameras_come_back_to_where_they_were():
+    for shift, turn in off_by(pair(), brought_back().cameras):
+        assert shift < 0.02
+        assert turn < 0.02
+    assert all(one.residual_px < 0.3 for one in brought_back().each)
+
+
+def test_where_it_ends_does_not_depend_on_where_it_began():
+    cameras, channels, responses = scene()
+    start = [moved(c, (-0.0005, 0.0008, 0)) for c in cameras]
+    other = refine(CROWNED, start, Observations(channels, responses), 0.5)
+    for shift, turn in off_by(brought_back().cameras, other.cameras):
+        assert shift < 0.002
+        assert turn < 0.001
+
+
+def test_the_error_is_of_the_size_of_its_sigma():
+    cameras, _, responses = scene()
+    rng = np.random.default_rng(0)
+    noisy = [np.clip(f + rng.normal(scale=12, size=f.shape), 0, 255).astype(np.uint8) for f in pair_frames()]
+    refined = refine(CROWNED, cameras, Observations([Channels([f]) for f in noisy], responses), 0.5)
+    for before, after in zip(cameras, refined.each, strict=True):
+        error = after.camera.pose.position - before.pose.position
+        assert (np.abs(error) < 4 * np.sqrt(np.diag(after.covariance)[3:])).all()
+        assert np.sqrt(np.diag(after.covariance)[3:]).max() < 0.1
+
+
+def test_the_stitch_term_holds_together_what_a_wrong_lens_pulls_apart():
+    cameras, channels, responses = scene()
+    longer, _ = free_focal_lengths(cameras)[0].applied(cameras, CROWNED, 2.0)
+    alone, together = (
+        register_pair(CROWNED, *refine(CROWNED, longer, Observations(channels, responses), weight).cameras, *responses)
+        for weight in (0.0, 0.9)
+    )
+    assert together.error_px < 0.6 * alone.error_px
+
+
+def test_cameras_that_need_not_agree_end_as_each_does_by_itself():
+    cameras, channels, responses = scene()
+    stored, begun, sight = (
+        [moved(c, by=(0.3, 0.0, 0.0)) for c in cameras],
+        a_little_off(),
+        Observations(channels, responses),
+    )
+    together = refine(CROWNED, begun, sight, 0.0, stored=stored)
+    for n, end in enumerate(together.each):
+        alone = refine(CROWNED, [begun[n]], sight.of([n]), 0.0, stored=[stored[n]])
+        np.testing.assert_array_equal(end.camera.pose.position, alone.each[0].camera.pose.position)
+        of_its_lens = [d for d in alone.deviations if d.camera is not None]
+        assert [d for d in together.deviations if d.camera == end.camera.id] == of_its_lens
+
+
+def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
+    cameras, channels, responses = scene()
+    black = Channels([np.zeros((*responses[1].shape, 3), dtype=np.uint8)])
+    blind = Observations([channels[0], black], [responses[0], np.zeros_like(responses[1])])
+    refined = refine(CROWNED, cameras, blind, 0.5)
+    np.testing.assert_array_equal(refined.cameras[1].pose.position, cameras[1].pose.position)
+    seeing, unseeing = refined.each
+    assert (unseeing.sigma, unseeing.repeatability, unseeing.residual_px) == (None, None, None)
+    assert seeing.sigma is not None
+
+
+def test_assessing_moves_nothing():
+    cameras, channels, responses = scene()
+    start = [moved(c, SMALL_TURN) for c in cameras]
+    assessed = evaluate_poses(CROWNED, start, Observations(channels, responses), 0.5)
+    assert assessed.cameras == start
+    assert all(one.residual_px > 0.3 for one in assessed.each)
+
+
+def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
+    weights = tukey_weights(np.array([0.0, 0.5, -0.5, 0.2, 100.0]))
+    assert weights[-1] == 0
+    assert weights[0] == 1
+    assert (weights[:4] > 0.9).all()
+
+
+@pytest.mark.parametrize("distortion", [(), BARREL])
+def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(distortion):
+    one = camera("left", (-30.0, -48.0, 10.0), (-30.0, -34.0), focal=900, distortion=distortion, size=(960, 240))
+    sight = Observations([Channels([paint_frame(CROWNED, one)])], [paint_markings(CROWNED, one)])
+    refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], sight, 0.5)
+    assert refined.each[0].residual_px is not None
+    assert np.linalg.norm(refined.cameras[0].pose.position - one.pose.position) < 1.5
+    assert refined.each[0].sigma.position_m > Gate().largest_sigma_m
+
+
+@pytest.mark.parametrize("colour", [0, 2])
+def test_blue_and_red_that_the_lens_puts_elsewhere_move_no_line(colour):
+    one, frame = pair()[0], pair_frames()[0]
+    fringed = frame.copy()
+    fringed[:, 4:, colour] = frame[:, :-4, colour]
+    lines, response = CROWNED.line_points(), pair_markings()[0]
+    here, there = (measure_lines(lines, one, Channels([f]), response, 6.0) for f in (frame, fringed))
+    np.testing.assert_array_equal(here.pixel, there.pixel)
+
+
+def test_the_end_is_the_same_from_both_sides_where_the_model_is_wrong():
+    cameras, channels, responses = scene()
+    wrong = Field(CROWNED.length, CROWNED.width, CROWNED.line_width, CROWNED.ridge + [0.0, 0.0, 0.3])
+    ends = [
+        refine(wrong, [moved(c, turn, shift) for c in cameras], Observations(channels, responses), 0.5).cameras
+        for turn, shift in ((SMALL_TURN, SMALL_SHIFT), (tuple(-np.array(SMALL_TURN)), tuple(-np.array(SMALL_SHIFT))))
+    ]
+    for shift, turn in off_by(*ends):
+        assert shift < 0.004
+        assert turn < 0.004
+
+
+def test_huber_believes_what_is_near_and_doubts_the_rest_the_more_the_farther():
+    weights = huber_weights(np.array([0.0, 0.5, -0.5, 0.2, 10.0, 100.0]))
+    assert weights[0] == weights[1] == 1
+    assert weights[4] == pytest.approx(10 * weights[5])
+
+
+def test_a_focal_length_that_is_left_free_is_found_with_the_pose():
+    cameras, channels, responses = scene()
+    longer, _ = free_focal_lengths(cameras)[0].applied(cameras, CROWNED, 1.5)
+    start = [moved(c, SMALL_TURN, SMALL_SHIFT) for c in longer]
+    found = refine(CROWNED, start, Observations(channels, responses), 0.5, free_focal_lengths(start))
+    for true, after in zip(cameras, found.cameras, strict=True):
+        assert after.intrinsics.matrix[0, 0] == pytest.approx(true.intrinsics.matrix[0, 0], abs=0.2)
+        assert np.linalg.norm(after.pose.position - true.pose.position) < 0.02
+    assert found.pitch is CROWNED
+
+
+@pytest.mark.parametrize("start", [0.1, 0.5])
+def test_a_ridge_that_is_left_free_is_found_with_the_poses(start):
+    cameras, channels, responses = scene()
+    wrong = CROWNED.raised(start - 0.35)
+    found = refine(wrong, cameras, Observations(channels, responses), 0.5, free_ridge(wrong))
+    assert found.pitch.ridge[:, 2] == pytest.approx([0.35, 0.35], abs=0.03)
+
+
+def test_a_ground_that_swells_is_found_and_does_not_move_the_cameras():
+    cameras = pair()
+    uneven = CROWNED.raised(0.0)
+    bumps = np.array([0.03, -0.03])
+
+    def swelling(xy, height=CROWNED.height):
+        return height(xy) + bumps[0] * np.sin(xy[..., 0] / 6) * np.cos(xy[..., 1] / 6)
+
+    object.__setattr__(uneven, "height", swelling)
+    sight = Observations(
+        [Channels([paint_frame(uneven, c)]) for c in cameras],
+        [paint_markings(uneven, c) for c in cameras],
+    )
+    refined = refine(CROWNED, cameras, sight, 0.5)
+    for (shift, turn), one in zip(off_by(cameras, refined.cameras), refined.each, strict=True):
+        assert shift < 0.05
+        assert turn < 0.05
+        assert shift < 3 * one.sigma.position_m
+
+
+def deviation(refined, camera, name):
+    return next(d for d in refined.deviations if (d.camera, d.name) == (camera, name))
+
+
+def test_lines_tell_which_number_of_which_lens_is_wrong():
+    found = deviation(through_a_wrong_lens(), "left", "k1")
+    assert found.value == pytest.approx(-0.01, abs=3 * found.sigma)
+    # The second coefficient bends lines much alike, and may have a part of it.
+    assert abs(found.value) > 2 * found.sigma
+    assert abs(deviation(through_a_wrong_lens(), "right", "k1").value) < 0.002
+
+
+def test_a_lens_and_a_field_that_are_right_are_not_suspected():
+    found = from_the_truth().deviations
+    assert all(abs(d.value) < max(3 * d.sigma, 0.1 * d.expected) for d in found)
+
+
+def test_lines_tell_that_the_pitch_is_crowned_though_it_is_said_to_be_flat():
+    cameras, channels, responses = scene()
+    refined = refine(CROWNED.flat(), cameras, Observations(channels, responses), 0.5)
+    found = deviation(refined, None, "ridge_height_m")
+    assert found.value == pytest.approx(0.35, abs=max(3 * found.sigma, 0.1))
+    assert found.value > 3 * found.sigma
+
+
+def test_a_camera_with_a_wrong_lens_is_less_sure_of_its_pose():
+    right, unsure = from_the_truth().each[0], through_a_wrong_lens().each[0]
+    assert unsure.sigma.position_m > 2 * right.sigma.position_m
+
+
+def test_the_same_wrong_lens_makes_the_next_pose_no_less_like_this_one():
+    left = through_a_wrong_lens().each[0]
+    assert left.repeatability.position_m < left.sigma.position_m / 2
+
+
+def offsets(found, one):
+    """How far (M,) measured lines are from where they are."""
+    return np.sum((found.pixel - one.project(found.points.position)) * found.normal, axis=1)
+
+
+def test_bent_lines_are_found_where_they_are():
+    cameras, channels, responses = scene()
+    found = measure_lines(CROWNED.line_points(), cameras[0], channels[0], responses[0], 3.0)
+    names = np.array([marking.name for marking in CROWNED.markings()])[found.points.marking]
+    for name in ("centre circle", "left penalty arc"):
+        # Along a straight tangent the arc would be 0.3 px off.
+        assert abs(np.median(offsets(found, cameras[0])[names == name])) < 0.08
+
+
+def test_ground_that_is_brighter_on_one_side_does_not_pull_a_line():
+    cameras, _, responses = scene()
+    with np.errstate(invalid="ignore"):
+        outside = ground_behind(CROWNED, cameras[0])[..., 1] < -CROWNED.width / 2
+    lit = cv2.add(pair_frames()[0], 40 * np.dstack([outside] * 3).astype(np.uint8))
+    found = measure_lines(CROWNED.line_points(), cameras[0], Channels([lit]), responses[0], 3.0)
+    names = np.array([marking.name for marking in CROWNED.markings()])[found.points.marking]
+    beside = offsets(found, cameras[0])[names == "near touchline"]
+    assert len(beside) > 30
+    assert abs(np.median(beside)) < 0.05

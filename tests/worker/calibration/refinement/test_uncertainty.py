@@ -1,0 +1,97 @@
+"""How sure the finish is: its sigmas are as large as its errors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fields.template import load
+from tests.worker.calibration.synthetic import camera, moved
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.geometry import parameters
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ground import Ground
+from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.refinement.estimate import Estimate, gauss_newton_step
+from worker.calibration.refinement.uncertainty import estimate_uncertainty
+from worker.calibration.refinement.unknowns import Unknowns
+from worker.calibration.robust import tukey_weights
+
+MISFIT_PX = 2.0
+EVEN_M = 1e-4
+TRIALS = 100
+NO_EVIDENCE = Evidence(np.empty(0, int), np.empty(0, int), np.empty(0), np.empty(0, bool), np.empty(0))
+
+
+def measured(lines, one):
+    """Each visible piece of line where it is, expected to be off by some pixels."""
+    seen = VisibleLines.from_camera(lines, one)
+    across = (seen.normal, seen.px_per_metre, seen.px_per_metre_up)
+    return Measurements(seen.index, seen.points, seen.pixel, *across, seen.length_px, np.ones(len(seen)), MISFIT_PX)
+
+
+def test_errors_as_large_as_expected_spread_poses_as_far_as_is_said():
+    court = Field(40.0, 20.0, 0.05, template=load("handball"))
+    one, rng = camera("left", (-9.0, -15.0, 7.0), (-6.0, 0.0), focal=500.0), np.random.default_rng(0)
+    lines = court.line_points()
+    exact, unknowns = measured(lines, one), Unknowns(1, [], Ground.under(lines))
+    errors, said = [], []
+    for trial in range(TRIALS):
+        off = rng.normal(scale=exact.sigma_px)[:, None] * exact.normal
+        found = [replace(exact, pixel=exact.pixel + off)]
+        here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
+        for _ in range(4):
+            here = gauss_newton_step(here, [one], found, unknowns, tukey_weights).to
+        errors.append(here.cameras[0].pose.position - one.pose.position)
+        if trial % 10 == 0:
+            said.append(
+                estimate_uncertainty(here, [one], [None], found, [NO_EVIDENCE], unknowns)
+                .each[0]
+                .repeatability.position_m
+            )
+    spread = np.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
+    assert np.mean(said) == pytest.approx(spread, rel=0.15)
+
+
+def said_of_a_corner(**sigma):
+    """How sure (m) a long camera is that moved and now sees one corner of a court, its lens known so well."""
+    court = Field(40.0, 20.0, 0.05, template=load("handball"))
+    one = camera("left", (-9.0, -35.0, 9.0), (-20.0, 10.0), focal=3000.0)
+    one = one.with_lens(replace(one.intrinsics, sigma=sigma))
+    lines = court.line_points()
+    unknowns = Unknowns(1, [], Ground.under(lines))
+    here = replace(Estimate.at(court, [one], unknowns), uneven_m=EVEN_M)
+    before = [moved(one, by=(0.0, -2.0, 1.0))]
+    (said,) = estimate_uncertainty(here, before, [None], [measured(lines, one)], [NO_EVIDENCE], unknowns).each
+    return said.sigma.position_m
+
+
+@pytest.fixture
+def without_heat(monkeypatch):
+    """Focal lengths that stay as they were on the day of the photos."""
+    monkeypatch.setattr(parameters, "HEAT_FOCAL", 0.0)
+
+
+def test_however_well_a_focal_length_was_measured_heat_may_have_moved_it(monkeypatch):
+    warm = said_of_a_corner(fx=0.1)
+    assert said_of_a_corner(fx=0.01) == pytest.approx(warm, rel=0.01)
+    heat = parameters.HEAT_FOCAL
+    monkeypatch.setattr(parameters, "HEAT_FOCAL", 0.0)
+    cold = said_of_a_corner(fx=0.1)
+    # The corner is 47 m away, and a camera with a longer lens seems to stand farther by as large a part of that.
+    assert np.sqrt(warm**2 - cold**2) == pytest.approx(47 * heat, rel=0.4)
+
+
+@pytest.mark.usefixtures("without_heat")
+def test_the_worse_the_focal_length_is_known_the_less_sure_is_where_a_camera_stands_that_sees_little():
+    well, badly, hardly = (said_of_a_corner(fx=fx) for fx in (0.1, 30.0, 150.0))
+    assert well < said_of_a_corner() < badly < hardly
+    assert badly > 3 * well
+    assert said_of_a_corner(fy=150.0) == hardly
+
+
+@pytest.mark.usefixtures("without_heat")
+@pytest.mark.parametrize("sigma", [{"aspect": 0.01}, {"cx": 30.0, "cy": 30.0}, {"k1": 0.1}])
+def test_what_else_of_a_lens_is_known_badly_makes_a_camera_less_sure_too(sigma):
+    assert said_of_a_corner(fx=0.1, **sigma) > 1.1 * said_of_a_corner(fx=0.1)

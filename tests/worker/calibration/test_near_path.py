@@ -1,0 +1,96 @@
+"""Cameras that stand almost where they stood are found without a search, and as a search finds them."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame, pair, pair_frames
+from tests.worker.calibration.test_calibrate import white_on_green
+from worker.calibration import solve as settling
+from worker.calibration.calibrate import calibrate
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.records import Calibration, Options
+
+# What the wind does in a quarter of an hour: a pixel of these small frames.
+WIND = ((0.0012, -0.0008, 0.0005), (0.01, 0.005, -0.01))
+STORM = ((0.012, -0.018, 0.006), (0.12, -0.08, 0.1))
+
+
+def calibrated(by=WIND, frames=None, **options) -> Calibration:
+    frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)} if frames is None else frames
+    stored = [moved(one, *by) for one in pair() if one.id in frames]
+    return calibrate(CROWNED, stored, frames, white_on_green, Options(seed=5, **options))
+
+
+@cache
+def nearby() -> Calibration:
+    return calibrated()
+
+
+def off_m(found: Calibration) -> float:
+    pairs = zip(found.cameras, pair(), strict=True)
+    return max(float(np.linalg.norm(one.camera.pose.position - true.pose.position)) for one, true in pairs)
+
+
+def test_cameras_that_hardly_moved_are_found_without_a_search():
+    assert (nearby().path, nearby().generations, nearby().verdict) == ("near", 0, "accepted")
+    assert nearby().timings.seconds["evolution"] == 0.0
+    assert off_m(nearby()) < 0.02
+
+
+def test_they_are_found_where_a_search_finds_them():
+    searched = calibrated(search="wide")
+    assert (searched.path, searched.verdict) == ("wide", "accepted")
+    for short, long in zip(nearby().cameras, searched.cameras, strict=True):
+        assert np.linalg.norm(short.camera.pose.position - long.camera.pose.position) < 2e-4
+        assert rotation_angles_deg(short.camera.pose.rotation, long.camera.pose.rotation) < 5e-4
+        assert short.sigma.position_m == pytest.approx(long.sigma.position_m, rel=0.05)
+
+
+def test_cameras_that_moved_far_are_searched_for():
+    found = calibrated(by=STORM)
+    assert (found.path, found.verdict) == ("wide", "accepted")
+    assert off_m(found) < 0.02
+
+
+def test_what_a_search_would_refuse_is_not_accepted_nearby():
+    found = calibrated(frames={"left": [paint_frame(Field(92.0, 50.0), pair()[0])]}, generations=20)
+    assert (found.path, found.verdict) == ("wide", "rejected")
+
+
+def test_a_camera_whose_frame_is_of_no_use_does_not_have_the_other_one_searched_for():
+    frames = {"left": [pair_frames()[0]], "right": [np.zeros_like(pair_frames()[1])]}
+    found = calibrated(frames=frames)
+    assert (found.path, found.verdict) == ("near", "partly")
+    left, right = found.cameras
+    assert left.accepted
+    assert right.refusal.reason == "view"
+    assert np.linalg.norm(left.camera.pose.position - pair()[0].pose.position) < 0.02
+
+
+def test_only_the_camera_that_was_turned_is_searched_for():
+    frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
+    left, right = pair()
+    searched: list[str] = []
+    real = settling.search
+
+    def watched(pitch, cameras, *others):
+        searched.extend(camera.id for camera in cameras)
+        return real(pitch, cameras, *others)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settling, "search", watched)
+        found = calibrate(CROWNED, [moved(left, *WIND), moved(right, *STORM)], frames, white_on_green, Options(seed=5))
+    assert searched == ["right"]
+    assert (found.path, found.verdict) == ("wide", "accepted")
+    assert off_m(found) < 0.02
+
+
+def test_nobody_is_told_of_looking_nearby_in_vain():
+    steps = []
+    started = [moved(one, *STORM) for one in pair()]
+    frames = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
+    calibrate(CROWNED, started, frames, white_on_green, Options(seed=5, generations=10), steps.append)
+    assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]

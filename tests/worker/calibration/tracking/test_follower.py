@@ -1,0 +1,153 @@
+"""A camera that shakes is followed by its lines; what is not seen is said, and it is found again afterwards."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
+from worker.calibration.detection.frame_fusion import Sway
+from worker.calibration.geometry import derivatives
+from worker.calibration.geometry.camera import inside
+from worker.calibration.records import CalibrationError
+from worker.calibration.tracking.follower import CameraTracker, Moment
+
+FRAMES_PER_SECOND = 25.0
+COUNT = 40
+LEFT = pair()[0]
+PICTURE = pair_frames()[0]
+STORED = moved(LEFT, (0.0012, -0.0008, 0.0005), (0.01, 0.005, -0.01))
+
+
+def turn(number: int) -> np.ndarray:
+    """0.3 degrees at 0.5 Hz about each axis, from where the stored pose was found on."""
+    phase = np.pi * number / FRAMES_PER_SECOND + np.array([0.0, 1.0, 2.0])
+    return np.radians(0.3) * (np.sin(phase) - np.sin([0.0, 1.0, 2.0]))
+
+
+@cache
+def frame(number: int) -> np.ndarray:
+    """What the camera shows when it has turned: all of its picture turns alike."""
+    shaken = Sway.from_turn(-turn(number), LEFT.intrinsics).rows(PICTURE, 0, len(PICTURE))
+    noise = np.random.default_rng(number).normal(0, 2, shaken.shape)
+    return np.clip(shaken + noise, 0, 255).astype(np.uint8)
+
+
+def true(number: int):
+    return derivatives.moved(LEFT, np.append(turn(number), np.zeros(3)))
+
+
+def followed(
+    frames: Mapping[int, np.ndarray | None] | None = None, every: int = 1, look_ahead: int = 0
+) -> list[Moment]:
+    """The clip, with some of its frames replaced; None is none."""
+    follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND, every, look_ahead)
+    told: list[Moment] = []
+    for number in range(1, COUNT):
+        replaced = frames or {}
+        picture = replaced[number] if number in replaced else frame(number)
+        now = follower.see({} if picture is None else {"left": picture})
+        assert now.number == number
+        told += follower.settled()
+    return told + follower.rest()
+
+
+def residual_px(moments: list[Moment]) -> float:
+    """How far lines are from where the cameras that are told expect them, about the mean of each, rms."""
+    points = CROWNED.line_points(2.0).position
+    points = points[inside(LEFT.project(points), LEFT.intrinsics.size, 20)]
+    off = np.array([true(m.number).project(points) - m.cameras[0].camera.project(points) for m in moments])
+    return float(np.sqrt(np.mean(np.sum((off - off.mean(axis=0)) ** 2, axis=-1))))
+
+
+def how(moments: list[Moment]) -> list[str]:
+    return [moment.cameras[0].how for moment in moments]
+
+
+def sigma_deg(moment: Moment) -> float:
+    return moment.cameras[0].motion_sigma.rotation_deg
+
+
+@pytest.mark.parametrize(("every", "look_ahead"), [(1, 0), (1, 10), (2, 10)])
+def test_a_shaking_camera_is_followed_to_a_fraction_of_a_pixel_and_every_frame_is_told_once(every, look_ahead):
+    moments = followed(every=every, look_ahead=look_ahead)
+    assert [moment.number for moment in moments] == list(range(COUNT))
+    assert how(moments) == [("measured" if number % every == 0 else "coasted") for number in range(COUNT)]
+    assert residual_px(moments) < 0.1
+    away = [m.cameras[0].camera.pose.position - LEFT.pose.position for m in moments]
+    assert np.max(np.abs(away)) < 0.03
+
+
+def test_what_is_said_at_once_is_what_settles_without_looking_ahead():
+    follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND)
+    at_once = [follower.see({"left": frame(number)}) for number in range(1, 4)]
+    for now, settled in zip(at_once, followed(look_ahead=0)[1:4], strict=True):
+        np.testing.assert_array_equal(now.cameras[0].camera.pose.rotation, settled.cameras[0].camera.pose.rotation)
+
+
+def test_its_motion_is_known_as_well_as_it_says():
+    ratios = []
+    for moment in followed():
+        told = moment.cameras[0]
+        error = derivatives.change_between(true(moment.number), told.camera)
+        ratios.append((error, told.motion_covariance))
+    about_mean = np.array([error for error, _ in ratios]) - np.mean([error for error, _ in ratios], axis=0)
+    squared = [e @ np.linalg.solve(cov, e) / 6 for e, (_, cov) in zip(about_mean, ratios, strict=True)]
+    assert 0.1 < np.mean(squared) < 2.0
+
+
+def test_without_frames_it_coasts_with_a_sigma_that_grows_and_is_found_again():
+    gap = range(12, 24)
+    moments = followed(dict.fromkeys(gap))
+    assert [number for number, one in enumerate(how(moments)) if one == "coasted"] == list(gap)
+    growing = [sigma_deg(moments[number]) for number in gap]
+    assert growing == sorted(growing)
+    assert growing[-1] > 20 * sigma_deg(moments[11])
+    assert residual_px(moments[:12] + moments[24:]) < 0.1
+
+
+def test_who_looks_ahead_bridges_a_short_gap():
+    gap = dict.fromkeys(range(12, 16))
+    blind, ahead = followed(gap), followed(gap, look_ahead=8)
+    assert residual_px(ahead) < 0.5 * residual_px(blind)
+    assert sigma_deg(ahead[14]) < 0.5 * sigma_deg(blind[14])
+
+
+def test_a_frame_that_shows_no_lines_is_coasted_over():
+    moments = followed({15: np.full_like(PICTURE, 90)})
+    assert how(moments)[14:17] == ["measured", "coasted", "measured"]
+
+
+def test_a_frame_of_something_else_is_coasted_over():
+    moments = followed({15: np.roll(frame(15), 40, axis=0)})
+    assert how(moments)[14:17] == ["measured", "coasted", "measured"]
+    assert residual_px(moments) < 0.15
+
+
+def test_a_frame_that_cannot_be_is_refused():
+    elsewhere = np.roll(frame(15), (1, 2), axis=(0, 1))
+    moments = followed({15: elsewhere})
+    assert how(moments)[14:17] == ["measured", "refused", "measured"]
+    assert residual_px(moments) < 0.15
+
+
+def test_a_pose_does_not_jump_when_lines_are_hidden_that_a_wrong_lens_puts_beside_their_places():
+    lens = LEFT.intrinsics
+    wrong = LEFT.with_lens(replace(lens, distortion=lens.distortion + [0.01, 0, 0, 0, 0]))
+    still = [np.clip(PICTURE + np.random.default_rng(n).normal(0, 2, PICTURE.shape), 0, 255) for n in range(16)]
+    frames = [each.astype(np.uint8) for each in still]
+    for hidden in frames[8:]:
+        hidden[:, :400] = (60, 130, 70)
+    follower = CameraTracker(CROWNED, [wrong], {"left": frames[0]}, FRAMES_PER_SECOND, look_ahead=0)
+    told = [follower.see({"left": each}).cameras[0] for each in frames[1:]]
+    assert {one.how for one in told} == {"measured"}
+    before, after = (np.mean([one.camera.pose.rotation for one in part], axis=0) for part in (told[2:7], told[8:]))
+    assert np.degrees(np.linalg.norm(after - before)) < 0.01
+
+
+def test_a_first_frame_without_lines_is_said():
+    with pytest.raises(CalibrationError, match="first frame of camera left does not show its lines") as refused:
+        CameraTracker(CROWNED, [STORED], {"left": np.full_like(PICTURE, 90)}, FRAMES_PER_SECOND)
+    assert refused.value.kind == "lines-not-seen"

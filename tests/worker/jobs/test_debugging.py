@@ -1,0 +1,83 @@
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from service.schemas.options import Options
+from service.schemas.venue import VenueIn
+from service.settings import MODEL_BESIDE_THE_CODE
+from tests.architecture import ROOT
+from worker.jobs import calibration
+from worker.jobs.debugging import DebugRecorder
+from worker.protocol import ComputeResources
+
+DEMO = ROOT / "tests/demo"
+SHRUNK = 4
+OF_CAMERA = ("view.json", "response.png", "lines.json", "lines.jpg", "residuals.jpg", "ground.jpg")
+
+
+def smaller_demo():
+    """The demo at a quarter of its size: files by camera, and the venue with lenses of that size."""
+    venue = json.loads((DEMO / "venue.json").read_text())
+    files = {}
+    for camera in venue["cameras"]:
+        lens = camera["intrinsics"]
+        lens["matrix"] = (np.diag([1 / SHRUNK, 1 / SHRUNK, 1]) @ np.array(lens["matrix"])).tolist()
+        camera["image_size"] = [side // SHRUNK for side in camera["image_size"]]
+        frame = cv2.imread(str(DEMO / f"{camera['id']}.jpg"))
+        small = cv2.resize(frame, tuple(camera["image_size"]), interpolation=cv2.INTER_AREA)
+        files[camera["id"]] = [cv2.imencode(".png", small)[1].tobytes()]
+    return VenueIn.model_validate(venue).to_venue(), files
+
+
+@pytest.fixture(scope="module")
+def runs():
+    venue, files = smaller_demo()
+    resources, options = ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1), Options(seed=1, search="wide")
+    recorder = DebugRecorder()
+    plain, recorded = (
+        calibration.solve(venue, files, options, resources, lambda _: None, **recording).result
+        for recording in ({}, {"recorder": recorder})
+    )
+    return plain, recorded, recorder.files
+
+
+def test_the_result_is_the_same_with_a_recorder(runs):
+    plain, recorded, _ = runs
+    assert recorded.cameras == plain.cameras
+    assert recorded.loss == plain.loss
+
+
+def test_each_stage_left_its_files_and_the_index_says_what_they_are(runs):
+    files = runs[2]
+    expected = {f"{camera}.{kind}" for camera in ("left", "right") for kind in OF_CAMERA} | {"search.json"}
+    assert set(files) == expected | {"index.json"}
+    index = json.loads(files["index.json"])["files"]
+    assert {entry["file"] for entry in index} == expected
+    for entry in index:
+        assert entry["what"]
+        assert entry["units"]
+        page, _, section = entry["see"].partition("#")
+        headings = [line.lower() for line in (ROOT / page).read_text().splitlines() if line.startswith("#")]
+        assert not section or any(section.split("-")[1] in heading for heading in headings)
+    for name, data in files.items():
+        if not name.endswith(".json"):
+            assert cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) is not None
+
+
+@pytest.mark.parametrize("camera", ["left", "right"])
+def test_lines_lie_on_the_paint_and_their_residuals_shrink(runs, camera):
+    lines = json.loads(runs[2][f"{camera}.lines.json"])
+    assert lines["rms_px"] < 0.2 * lines["rms_before_px"]
+    response = cv2.imdecode(np.frombuffer(runs[2][f"{camera}.response.png"], np.uint8), cv2.IMREAD_GRAYSCALE)
+    column, row = np.rint(np.array(lines["pixel"])).astype(int).T
+    sure = np.array(lines["weight"]) > 0.5
+    assert np.median(response[row[sure], column[sure]]) > 100
+    assert np.max(np.abs(lines["ground_height_m"])) < 0.2
+
+
+def test_each_level_of_the_search_left_its_candidates(runs):
+    levels = json.loads(runs[2]["search.json"])["levels"]
+    assert [level["level"] for level in levels[:3]] == [0, 1, 2]
+    assert all(len(camera["candidates"][0]) == len(camera["best"]) == 6 for camera in levels[0]["cameras"])

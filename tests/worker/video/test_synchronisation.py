@@ -1,0 +1,72 @@
+"""How much later a clip began, found by what moves."""
+
+import numpy as np
+import pytest
+
+from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
+from worker.video.clips import Clip
+from worker.video.synchronisation import CoarseView, chain_offsets, estimate_offset
+
+PLACES = CoarseView(PITCH, cameras)
+# Encoders refresh whole frames in rhythms of their own.
+COARSE = {"crf": "30"}
+
+
+def motion(camera, path):
+    with Clip.open(camera, str(path)) as clip:
+        return PLACES.motion(camera, clip.shots())
+
+
+@pytest.fixture(scope="module")
+def left(tmp_path_factory):
+    return motion("left", film(tmp_path_factory.mktemp("left") / "l.mp4", LEFT, 6.0, options=COARSE | {"g": "12"}))
+
+
+@pytest.mark.parametrize(("offset", "rate"), [(0.0, 25), (0.137, 25), (-0.5, 30), (1.3, 25)])
+def test_the_offset_is_found_to_a_part_of_a_frame(left, tmp_path, offset, rate):
+    path = film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=offset, rate=rate, options=COARSE | {"g": "10"})
+    found = estimate_offset(left, motion("right", path))
+    assert found.second_s == pytest.approx(offset, abs=0.01)
+    assert found.strength > 0.7
+
+
+def test_lamps_that_flicker_are_not_taken_for_motion(left, tmp_path):
+    path = film(
+        tmp_path / "r.mp4",
+        RIGHT,
+        6.0,
+        begun_s=0.2,
+        change=lambda picture, n: np.clip(picture * (1 + 0.05 * (n % 3)), 0, 255).astype(np.uint8),
+    )
+    assert estimate_offset(left, motion("right", path)).second_s == pytest.approx(0.2, abs=0.01)
+
+
+def test_an_empty_pitch_tells_nothing(left, tmp_path):
+    still = motion("right", film(tmp_path / "r.mp4", RIGHT, 4.0, moving=False))
+    found = estimate_offset(left, still)
+    assert found.second_s is None
+    assert "nothing moves" in found.why
+
+
+def test_clips_of_different_minutes_are_not_put_together(left, tmp_path):
+    other = motion("right", film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=40))
+    found = estimate_offset(left, other)
+    assert found.second_s is None
+    assert found.why
+
+
+def test_clips_too_far_apart_are_not_put_together(left, tmp_path):
+    assert estimate_offset(left, motion("right", film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=3))).second_s is None
+
+
+def test_an_instant_tells_nothing(left, tmp_path):
+    found = estimate_offset(left, motion("right", film(tmp_path / "r.mp4", RIGHT, 1.0)))
+    assert found.second_s is None
+    assert "shorter than 2 s" in found.why
+
+
+def test_a_camera_comes_in_time_by_one_that_is_in_time(left, tmp_path):
+    right = motion("right", film(tmp_path / "r.mp4", RIGHT, 6.0, begun_s=0.4))
+    offsets, found = chain_offsets(PLACES, {"left": left, "right": right}, {"left": 0.25})
+    assert offsets == {"left": 0.25, "right": pytest.approx(0.65, abs=0.01)}
+    assert list(found) == ["right"]
