@@ -33,7 +33,7 @@ from service.store.jobs.queries import JobPage
 from service.store.jobs.submission import Submission
 from tests.benchmarks.service.stage import homes, resident_mb
 from tests.e2e.running import venue
-from tests.homes import ApplicationState as Place
+from tests.homes import Home as Place
 from tests.homes import files
 from tests.worker.stock import anyway, result
 from worker.duties.retention import BETWEEN_ROUNDS_S, FOLDERS_OF_A_JOB, Retention

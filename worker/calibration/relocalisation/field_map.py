@@ -65,7 +65,7 @@ class FieldMap:
             half,
         )
 
-    def cells(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def cells(self, x: Array, y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Row and column of the cells of ground places; -1 for both where the map does not reach."""
         rows, columns = self.nearest.shape[:2]
         column = np.floor((x - self.origin[0]) / self.cell_m + 0.5)
@@ -76,7 +76,7 @@ class FieldMap:
     @cached_property
     def is_symmetric(self) -> bool:
         """Whether the field turned by half a turn looks the same, so that each view has a twin."""
-        turned = -self.points[:, :2]
+        turned = -self.points[:, :2].astype(float)
         row, column = self.cells(turned[:, 0], turned[:, 1])
         return bool(np.linalg.norm(self.nearest[row, column], axis=-1).max() < SAME_LINE_M)
 

@@ -73,7 +73,7 @@ def _lines(measures: Array, lengths: Array) -> tuple[Array, Array]:
     weight = np.bincount(line, lengths)
     mean = np.bincount(line, lengths * measures) / weight
     longest = np.argsort(-weight)[:MOST_LINES]
-    return mean[longest], weight[longest]
+    return mean[longest], weight[longest].astype(float)
 
 
 def _matched(

@@ -51,7 +51,9 @@ class LineView:
         width, height = lens.size
         scale = WIDTH_PX / width
         focal = lens.focal_length_px * scale
-        small = cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA)
+        small = np.asarray(
+            cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA), np.uint8
+        )
         border = _undistorted(_border(width, height), lens, focal)
         low = np.maximum(border.min(axis=0), -WIDEST * WIDTH_PX)
         high = np.minimum(border.max(axis=0), WIDEST * WIDTH_PX)

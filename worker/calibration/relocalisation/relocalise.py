@@ -35,8 +35,8 @@ DIFFERENT = 0.01
 RIVAL = 0.15
 """A different pose whose agreement is lower by less than this may be the true one."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
-"""How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 at half
-the width of the frame."""
+"""How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 at
+half the width of the frame."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "residual", "undetermined", "implausible", "not-unique"]
 
@@ -76,7 +76,7 @@ def relocalise(
     markings = FieldMap.of(field)
     lenses = unknown_lenses((width, height)) if lens is None else [lens]
     proposals = propose(markings, response, lenses, lens is not None, seed)
-    observations = Observations([Channels([frame])], [response.astype(np.float32) / 255])
+    observations = Observations([Channels([frame])], [np.divide(response, 255, dtype=np.float32)])
     candidates = list[Candidate]()
     for one in _distinct(field, camera_id, proposals):
         found = _refined(field, Camera(camera_id, one.lens, one.pose), observations, lens is None)
@@ -167,7 +167,7 @@ def _refusal(field: Field, candidates: Sequence[Candidate], gate: Gate) -> tuple
 
 
 def _differ(field: Field, one: Camera, other: Camera) -> bool:
-    """Whether two cameras put the markings that the first one sees elsewhere; a twin on a symmetric field is the same."""
+    """Whether two cameras put the markings that the first one sees elsewhere; twins on a symmetric field do not."""
     lines = field.line_points().position
     width = one.intrinsics.size[0]
     seen = one.project(lines)
