@@ -179,10 +179,15 @@ def test_the_wheel_has_the_client_and_nothing_that_it_does_not_reach(wheel):
         (licence,) = (archive.read(name) for name in archive.namelist() if name.endswith("/licenses/LICENSE"))
         text = b"".join(archive.read(name) for name in shipped if name.endswith(".py")).decode()
     assert licence == (ROOT / "LICENSE").read_bytes()
-    assert {name for name in shipped if not name.startswith(("esc_client/wire/", "esc_client/fields/"))} == {
-        f"esc_client/{name}" for name in ("__init__.py", "blocking.py", "client.py", "py.typed", "refused.py")
+    assert {name for name in shipped if not name.startswith(("esc_client/schemas/", "esc_client/fields/"))} == {
+        f"esc_client/{name}"
+        for name in ("__init__.py", "blocking_client.py", "client.py", "client_errors.py", "py.typed")
     }
-    assert {"esc_client/wire/told/events.py", "esc_client/wire/trend.py", "esc_client/fields/football.toml"} <= shipped
+    assert {
+        "esc_client/schemas/events/venue_event.py",
+        "esc_client/schemas/trend.py",
+        "esc_client/fields/football.toml",
+    } <= shipped
     assert not {name for name in shipped if re.search("programs|callback_urls|hosts|findings|landmarks", name)}
     assert not re.search(r"^\s*(from|import) (service|fields|fastapi|numpy|sqlalchemy)\b", text, re.MULTILINE)
 
@@ -249,7 +254,7 @@ def test_programs_that_use_it_are_type_checked(python, tmp_path):
     ("statement", "why"),
     [
         ("import service.schemas.names", "`import service.schemas.names` is not rewritten"),
-        ("from .wire import names", "a relative import is not rewritten"),
+        ("from .schemas import names", "a relative import is not rewritten"),
         ("from  service.schemas import names", "an import in an unusual form is not rewritten"),
         ("import importlib; importlib.import_module('service.schemas.names')", "computed is not rewritten"),
         ("def late():\n    import sqlalchemy", "sqlalchemy is no dependency of the client"),
@@ -257,7 +262,7 @@ def test_programs_that_use_it_are_type_checked(python, tmp_path):
 )
 def test_what_cannot_become_part_of_it_fails_the_build(tmp_path, statement, why):
     source = copied(tmp_path / "source")
-    with (source / "service" / "refused.py").open("a") as module:
+    with (source / "service" / "client_errors.py").open("a") as module:
         module.write(f"\n\n{statement}\n")
     command = [sys.executable, "setup.py", "--quiet", "build_py"]
     built = subprocess.run(command, cwd=source / "client", capture_output=True, text=True)
