@@ -163,16 +163,16 @@ def serve(requests: socket.socket, asking: int) -> None:
                 os.close(file)
             os.waitpid(between, 0)
             continue
-        child = os.fork()
-        if child:
-            requests.send(str(child).encode())
+        if os.fork():
             os._exit(0)
+        # Only now can whoever asked wait for this process: before, it is no child of theirs.
+        while os.getppid() != asking:
+            time.sleep(0.001)
+        requests.send(str(os.getpid()).encode())
         requests.close()
         for number, file in enumerate(files):
             os.dup2(file, number)
             os.close(file)
-        while os.getppid() != asking:
-            time.sleep(0.001)
         return become(*json.loads(request))
 
 
