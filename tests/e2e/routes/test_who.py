@@ -1,6 +1,7 @@
 """Who made each change, from where and by which request, as the history and the events tell it."""
 
 import json
+import time
 
 import pytest
 
@@ -112,6 +113,17 @@ def test_the_command_prints_who_and_from_where(asking, name, tmp_path):
 
 def test_the_log_line_of_a_request_has_the_address_of_its_client(asking, name):
     call(asking, "PUT", f"/venues/{name}", "logged-put", json=venue(name))
-    lines = [json.loads(line) for line in (asking.data / "log").read_text().splitlines() if "logged-put" in line]
-    (line,) = [line for line in lines if line["event"] == "request"]
+    line = request_line(asking, "logged-put")
     assert (line["address"], line["key"], line["status"]) == (TRUCK, "truck", 201)
+
+
+def request_line(service, request_id):
+    """That of a request in the log; it is written once the answer has been sent."""
+    for _ in range(100):
+        lines = [line for line in (service.data / "log").read_text().splitlines() if request_id in line]
+        found = [line for line in map(json.loads, lines) if line["event"] == "request"]
+        if found:
+            (line,) = found
+            return line
+        time.sleep(0.05)
+    raise AssertionError(f"no line of the request {request_id}")
