@@ -1,5 +1,6 @@
 """Disks that are full: real ones, small, in memory."""
 
+import errno
 import os
 import subprocess
 from collections.abc import Iterator
@@ -24,13 +25,26 @@ def small_disk(folder: Path, megabytes: int) -> Iterator[Path]:
         subprocess.run(["umount", "--lazy", folder], check=True)
 
 
+def _filled(disk: Path, file: int, leave_bytes: int) -> bool:
+    """Make a file so long that no more than so many bytes are left; False: others wrote meanwhile."""
+    found = os.statvfs(disk)
+    try:
+        os.posix_fallocate(file, 0, found.f_bavail * found.f_frsize - leave_bytes)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        os.ftruncate(file, 0)
+        return False
+    return True
+
+
 @contextmanager
 def filled(disk: Path, leave_bytes: int = 0) -> Iterator[None]:
     """No more than so many bytes can be written."""
     filling = disk / "filling"
-    found = os.statvfs(disk)
     with filling.open("wb") as file:
-        os.posix_fallocate(file.fileno(), 0, found.f_bavail * found.f_frsize - leave_bytes)
+        while not _filled(disk, file.fileno(), leave_bytes):
+            pass
     try:
         yield
     finally:
