@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check wheel bench bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
+.PHONY: setup demo test check wheel bench bench-find bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
 
 setup: $(VENV)/.installed
 
@@ -42,6 +42,10 @@ bench-real: setup
 # One BLAS thread, as the worker sets it.
 bench-fields: setup
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.fields
+
+# One BLAS thread, as the worker sets it.
+bench-find: setup
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.find
 
 bench-segmentation: $(VENV)/.train
 	$(BIN)/python -m tests.benchmarks.segmentation

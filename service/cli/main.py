@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from service import child_process
-from service.cli import calibrate, home, jobs, keys, onboarding, serve, stitch, venues
+from service.cli import calibrate, find, home, jobs, keys, onboarding, serve, stitch, venues
 from service.cli.printing import FAILED, fail
 
 COMMANDS = (
@@ -24,6 +24,7 @@ COMMANDS = (
     calibrate.run,
     onboarding.intrinsics,
     onboarding.pose,
+    find.find,
     stitch.stitch,
 )
 NOUNS = {"venue": venues.app, "field": onboarding.field_app, "job": jobs.app, "key": keys.app, "home": home.app}

@@ -432,4 +432,58 @@ class FieldResult(Schema):
     provenance: Provenance
 
 
-AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult
+class CandidateResult(Schema):
+    """A camera that may have taken the frame. `agreement`: how well the lines agree with it both ways, 0..1: is the
+    expected seen, and the seen expected? `lines_found`: the share of the expected that is seen; `residual_px`: rms of
+    the measured lines, null where too few were measured.
+    """
+
+    intrinsics: Intrinsics
+    pose: Pose
+    agreement: float
+    lines_found: float
+    residual_px: float | None
+    sigma: Sigma | None
+
+
+FindReason = Annotated[
+    Literal[
+        "no-lines",
+        "lines",
+        "few-lines",
+        "residual",
+        "undetermined",
+        "implausible",
+        "not-unique",
+        "not-confirmed",
+    ],
+    OPEN_WORD,
+]
+
+
+class FoundCameraResult(Schema):
+    """What was found for a camera: `candidates`, the best first; where it is accepted, its first one is the camera."""
+
+    id: Id
+    accepted: bool
+    reason: FindReason | None = Field(description="Why it is not accepted, in a word.")
+    rejected_because: str | None
+    remarks: list[str] = Field(description="What was assumed, such as the side of a field that looks the same twice.")
+    image_size: list[int]
+    candidates: list[CandidateResult]
+
+
+class FindResult(Schema):
+    """Cameras found from their frames alone. `accepted`: all of them were."""
+
+    accepted: bool
+    rejected_because: str | None
+    cameras: list[FoundCameraResult]
+    stitch_error_px: float | None
+    warnings: list[str] = Field([], description="Pictures that are missing.")
+    timings_s: dict[str, float]
+    cpu_s: dict[str, float] = CPU_S
+    provenance: Provenance
+
+
+AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult | FindResult

@@ -206,6 +206,12 @@ class ProgressReporter:
         self.fraction = max(self.fraction, begin + share * (end - begin))
         self.report(Progress(stage, self.fraction, generation, loss))
 
+    def at_fraction(self, stage: Stage, fraction: float) -> None:
+        """Report a `fraction` 0..1 of the whole, where stages have other shares; raise `Stopped` when asked to stop."""
+        if self.stop():
+            raise Stopped
+        self.report(Progress(stage, fraction))
+
     def evolution(self, total: int) -> Callable[[int, float], None]:
         """Return the callback that a search of at most `total` generations calls after each one."""
         return lambda number, loss: self.at("evolution", number / total, number, loss)

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
 
+HALF_TURN = np.diag([-1.0, -1.0, 1.0])
+"""Of the field about its centre."""
+
 
 @dataclass(frozen=True)
 class Hypotheses:
@@ -21,7 +24,7 @@ class Hypotheses:
     def __len__(self) -> int:
         return len(self.positions)
 
-    def __getitem__(self, chosen: NDArray[np.intp] | slice) -> Hypotheses:
+    def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Hypotheses:
         return Hypotheses(self.rotations[chosen], self.positions[chosen], self.focal_px[chosen])
 
     @classmethod

@@ -58,7 +58,7 @@ class LineView:
         low = np.maximum(border.min(axis=0), -WIDEST * WIDTH_PX)
         high = np.minimum(border.max(axis=0), WIDEST * WIDTH_PX)
         shape = tuple(np.floor(high - low).astype(int)[::-1] + 1)
-        cells = _cells(_undistorted(_middles_of_paint(small) / (2 * scale), lens, focal) - low, shape)
+        cells = _cells(_undistorted(middles_of_paint(small) / (2 * scale), lens, focal) - low, shape)
         free = np.ones(shape, np.uint8)
         free[cells[:, 1], cells[:, 0]] = 0
         covered = np.zeros(shape, np.uint8)
@@ -103,7 +103,7 @@ def _border(width: int, height: int) -> Array:
     return np.concatenate([top, right, bottom, left])
 
 
-def _middles_of_paint(small: NDArray[np.uint8]) -> Array:
+def middles_of_paint(small: NDArray[np.uint8]) -> Array:
     """Pixels (n, 2) of the shrunk response on the middles of what is painted."""
     depth = cv2.distanceTransform((small > PAINT).astype(np.uint8), cv2.DIST_L2, 5)
     middle = (depth > 0) & (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)) - 0.25)

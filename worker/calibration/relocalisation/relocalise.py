@@ -11,96 +11,112 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import Evidence
+from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.quality import Gate
-from worker.calibration.geometry.camera import Camera, Frame, inside
+from worker.calibration.geometry.camera import Camera, Pose, inside
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import LENS_NUMBERS, Lens
+from worker.calibration.geometry.lens import LENS_NUMBERS
 from worker.calibration.geometry.parameters import LensParameter
 from worker.calibration.geometry.plausible_pose import films_a_field
+from worker.calibration.geometry.rotation import rotation_vectors
 from worker.calibration.refinement.refine import Observations, refine
 from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.propose import Proposal, propose, unknown_lenses
+from worker.calibration.relocalisation.hypotheses import HALF_TURN
+from worker.calibration.relocalisation.paint import Paint
+from worker.calibration.relocalisation.propose import Proposal, propose
+from worker.calibration.relocalisation.sought import SoughtCamera
 
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
-REFINED, LEAST_OF_BEST = 4, 0.7
-"""So many proposals are refined, of those that agree at least so well as such a part of the best."""
-DIFFERENT = 0.01
-"""Poses are different that put the markings in view farther apart than this part of the width of the frame, on mean."""
+REFINED, MUCH_WORSE = 4, 0.12
+"""So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
+PROPOSED_APART, DIFFERENT = 0.04, 0.01
+"""Proposals, and refined poses, are different that put the markings in view farther apart than this part of the width
+of the frame, on mean."""
 RIVAL = 0.15
 """A different pose whose agreement is lower by less than this may be the true one."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 at
 half the width of the frame."""
 
-Reason = Literal["no-lines", "lines", "few-lines", "residual", "undetermined", "implausible", "not-unique"]
+Reason = Literal[
+    "no-lines", "lines", "few-lines", "residual", "undetermined", "implausible", "not-unique", "not-confirmed"
+]
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A camera that may have taken the frame, refined; `evidence`: how much of the lines is seen where it puts them.
+    """A camera that may have taken the frame, refined.
 
-    `residual_px`: rms of its lines; None where too few were measured, as `sigma`.
+    `agreement`: the harmonic mean of how much of the lines that it expects is seen beyond chance, as `evidence` has it,
+    and of how much of the paint in the frame lies on such a line, 0..1; `residual_px`: rms of its lines, None where too
+    few were measured, as `sigma`.
     """
 
     camera: Camera
+    agreement: float
     evidence: Evidence
     residual_px: float | None
     sigma: Sigma | None
 
 
 @dataclass(frozen=True)
+class Refusal:
+    """Why a camera that was found is not taken: the `reason` in a word, and in words with numbers and what to do."""
+
+    reason: Reason
+    words: str
+
+
+@dataclass(frozen=True)
 class Relocalisation:
-    """What was found for one camera: candidates, the best first; `refusal`: why the best one is not taken, with what
-    to do; None where it is. `has_twin`: the field looks the same turned by half a turn, and the best camera with it.
+    """What was found for one camera: candidates, the best first; `refusal`: why the best one is not taken, None where
+    it is; `remarks`: what was assumed.
     """
 
     candidates: Sequence[Candidate]
-    refusal: tuple[Reason, str] | None
-    has_twin: bool
+    refusal: Refusal | None
+    remarks: Sequence[str] = ()
 
 
 def relocalise(
-    field: Field, camera_id: str, frame: Frame, response: NDArray[np.uint8], lens: Lens | None, seed: int
+    field: Field, markings: FieldMap, sought: SoughtCamera, channels: Channels, response: Response, seed: int
 ) -> Relocalisation:
-    """Find the camera that took `frame` (height, width, 3), BGR; `response` (height, width), 0..255, of the network.
+    """Find the camera that took a frame; `response` (height, width) in 0..1 of the network; `markings`: of the field.
 
-    `lens` None: nothing is known of it; focal length, principal point and k1 are found with the pose.
+    Where its focal length is not known, principal point and k1 are found with it and the pose.
     """
-    height, width = frame.shape[:2]
-    markings = FieldMap.of(field)
-    lenses = unknown_lenses((width, height)) if lens is None else [lens]
-    proposals = propose(markings, response, lenses, lens is not None, seed)
-    observations = Observations([Channels([frame])], [np.divide(response, 255, dtype=np.float32)])
-    candidates = list[Candidate]()
-    for one in _distinct(field, camera_id, proposals):
-        found = _refined(field, Camera(camera_id, one.lens, one.pose), observations, lens is None)
-        candidates.append(found)
-    candidates.sort(key=lambda one: -one.evidence.agreement)
-    return Relocalisation(candidates, _refusal(field, candidates, Gate()), markings.is_symmetric)
+    small = np.rint(response * 255).astype(np.uint8)
+    proposals = propose(markings, small, sought, seed)
+    observations, paint = Observations([channels], [response]), Paint.of(small)
+    candidates = [
+        _candidate(field, _refined(field, camera, observations, not sought.lens_is_known), paint)
+        for camera in _distinct(field, markings, sought, proposals)
+    ]
+    candidates.sort(key=lambda one: -one.agreement)
+    return Relocalisation(candidates, _refusal(field, markings, candidates, Gate()))
 
 
-def _distinct(field: Field, camera_id: str, proposals: Sequence[Proposal]) -> list[Proposal]:
-    """The proposals to be refined: good beside the best, and different from each other."""
-    chosen = list[Proposal]()
+def _distinct(field: Field, markings: FieldMap, sought: SoughtCamera, proposals: Sequence[Proposal]) -> list[Camera]:
+    """The cameras to be refined: good beside the best, and different from each other."""
+    chosen = list[Camera]()
     for one in proposals:
-        if len(chosen) == REFINED or one.agreement < LEAST_OF_BEST * proposals[0].agreement:
+        if len(chosen) == REFINED or one.agreement < proposals[0].agreement - MUCH_WORSE:
             break
-        camera = Camera(camera_id, one.lens, one.pose)
-        if all(_differ(field, Camera(camera_id, other.lens, other.pose), camera) for other in chosen):
-            chosen.append(one)
+        camera = Camera(sought.id, one.lens, one.pose, ignored=sought.ignored)
+        if all(_differ(field, markings, other, camera, PROPOSED_APART) for other in chosen):
+            chosen.append(camera)
     return chosen
 
 
-def _refined(field: Field, camera: Camera, observations: Observations, frees_lens: bool) -> Candidate:
+def _refined(field: Field, camera: Camera, observations: Observations, frees_lens: bool) -> RefinedPose:
     """A proposed camera on the measured lines; with a free lens after its pose has caught them."""
     if not frees_lens:
-        return _candidate(refine(field, [camera], observations, 0.0, searches_px=SEARCH_PX).each[0])
+        return refine(field, [camera], observations, 0.0, searches_px=SEARCH_PX).each[0]
     width, focal = camera.intrinsics.size[0], camera.intrinsics.focal_length_px
     coarse = [
         LensParameter(0, "focal_length_px", FREE_FOCAL * focal),
@@ -109,12 +125,15 @@ def _refined(field: Field, camera: Camera, observations: Observations, frees_len
     centre = [LensParameter(0, f"principal_point_{axis}_px", FREE_CENTRE * width) for axis in ("x", "y")]
     caught = refine(field, [camera], observations, 0.0, coarse, SEARCH_PX).each[0].camera
     found = refine(field, [caught], observations, 0.0, [*coarse, *centre]).each[0]
-    return _candidate(replace(found, camera=_with_sigmas(found)))
+    return replace(found, camera=_with_sigmas(found))
 
 
-def _candidate(found: RefinedPose) -> Candidate:
+def _candidate(field: Field, found: RefinedPose, paint: Paint) -> Candidate:
+    explained = paint.explained_by(field, found.camera)
+    seen = max(found.evidence.agreement, 0.0)
+    both = 2 * seen * explained / max(seen + explained, 1e-9)
     sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
-    return Candidate(found.camera, found.evidence, found.residual_px, sigma)
+    return Candidate(found.camera, both, found.evidence, found.residual_px, sigma)
 
 
 def _with_sigmas(found: RefinedPose) -> Camera:
@@ -131,48 +150,66 @@ def _with_sigmas(found: RefinedPose) -> Camera:
     return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known))
 
 
-def _refusal(field: Field, candidates: Sequence[Candidate], gate: Gate) -> tuple[Reason, str] | None:
+def _refusal(field: Field, markings: FieldMap, candidates: Sequence[Candidate], gate: Gate) -> Refusal | None:
     """Why the best candidate is not taken."""
     if not candidates:
-        return "no-lines", "no lines of a field are seen in the frame; is the view free and lit?"
+        return Refusal("no-lines", "no lines of a field are seen in the frame; is the view free and lit?")
     best, *others = candidates
     seen = best.evidence
     if seen.agreement < gate.least_agreement:
-        return "lines", (
+        return Refusal(
+            "lines",
             f"no pose explains the lines: at the best one {seen.share:.0%} of the markings in view are seen, at least "
-            f"{gate.least_share(seen):.0%} are needed; are sport and measures of the field right, is the view free?"
+            f"{gate.least_share(seen):.0%} are needed; are sport and measures of the field right, is the view free?",
         )
     if best.residual_px is None or best.sigma is None:
-        return "few-lines", "too few points of lines could be measured; is the view free and lit?"
+        return Refusal("few-lines", "too few points of lines could be measured; is the view free and lit?")
     limit = max(gate.largest_residual_px * best.camera.intrinsics.relative_size, gate.residual_floor_px)
     if best.residual_px > limit:
-        return "residual", (
+        return Refusal(
+            "residual",
             f"lines are {best.residual_px:.2f} px from where the best pose puts them, at most {limit:.2f} allowed; "
-            "check the lens and the field's measures"
+            "check the lens and the field's measures",
         )
     if not films_a_field(best.camera.pose):
-        return "implausible", "the best pose is none from which a field is filmed: upside down, or far away"
+        return Refusal("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
     for other in others:
-        if other.evidence.agreement > seen.agreement - RIVAL and _differ(field, best.camera, other.camera):
-            return "not-unique", (
+        if other.agreement > best.agreement - RIVAL and _differ(field, markings, best.camera, other.camera, DIFFERENT):
+            return Refusal(
+                "not-unique",
                 f"two poses explain the lines: {seen.share:.0%} and {other.evidence.share:.0%} of the markings in view "
-                "are seen where they put them; say where the camera stands, or let it see more of the field"
+                "are seen where they put them; say where the camera stands, or let it see more of the field",
             )
     if best.sigma.rotation_deg > gate.largest_sigma_deg or best.sigma.position_m > gate.largest_sigma_m:
-        return "undetermined", (
+        return Refusal(
+            "undetermined",
             f"the visible lines do not determine the pose: sigma {best.sigma.rotation_deg:.2f} degrees (at most "
-            f"{gate.largest_sigma_deg} allowed), {best.sigma.position_m:.2f} m (at most {gate.largest_sigma_m})"
+            f"{gate.largest_sigma_deg} allowed), {best.sigma.position_m:.2f} m (at most {gate.largest_sigma_m})",
         )
     return None
 
 
-def _differ(field: Field, one: Camera, other: Camera) -> bool:
-    """Whether two cameras put the markings that the first one sees elsewhere; twins on a symmetric field do not."""
+def twin(camera: Camera) -> Camera:
+    """The camera that sees the same of a field which half a turn about its centre leaves as it is."""
+    pose = camera.pose
+    turned = Pose(rotation_vectors(pose.matrix @ HALF_TURN), HALF_TURN @ pose.position)
+    return replace(camera, pose=turned)
+
+
+def _differ(field: Field, markings: FieldMap, one: Camera, other: Camera, apart: float) -> bool:
+    """Whether two cameras put the markings that the first one sees elsewhere, by such a part of the frame's width.
+
+    On a symmetric field the one is compared with the twin of the other, too.
+    """
+    same = [other, twin(other)] if markings.is_symmetric else [other]
     lines = field.line_points().position
     width = one.intrinsics.size[0]
     seen = one.project(lines)
     lines, seen = lines[inside(seen, one.intrinsics.size)], seen[inside(seen, one.intrinsics.size)]
     if len(lines) == 0:
         return True
-    off = np.linalg.norm(other.project(lines) - seen, axis=1)
-    return not float(np.mean(np.nan_to_num(off, nan=width))) < DIFFERENT * width
+    off = min(
+        float(np.mean(np.nan_to_num(np.linalg.norm(camera.project(lines) - seen, axis=1), nan=width)))
+        for camera in same
+    )
+    return off >= apart * width

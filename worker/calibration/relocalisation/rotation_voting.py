@@ -13,7 +13,8 @@ import numpy as np
 
 from worker.calibration.geometry.camera import Array
 from worker.calibration.relocalisation.hypotheses import rotations_of
-from worker.calibration.relocalisation.line_view import WIDTH_PX, LineView
+from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.sought import SoughtLens
 
 STEP_DEG = 2.0
 STEEPEST_DEG, MOST_ROLL_DEG, ROLL_STEP_DEG = 78.0, 8.0, 2.0
@@ -24,8 +25,8 @@ USUAL_ROLL_DEG, ROLLED = 3.0, 0.02
 """What a roll of so many degrees takes from the votes."""
 ROUNDS, OFFSPRING, SPREAD_DEG, NARROWER = 7, 48, 1.4, 0.6
 FOCAL_SPREAD, FOCAL_OFFSPRING = 0.06, 5
-SHORTEST_FOCAL, LONGEST_FOCAL, FOCAL_LENGTHS = 0.4, 4.5, 15
-"""Of unknown lenses, in widths of the frame: views of 103° to 13°."""
+FOCAL_RATIO = 1.19
+"""Between two focal lengths that are tried one after the other."""
 QUARTER = np.pi / 2
 
 
@@ -44,11 +45,12 @@ class Direction:
         return bool(_turned(self.pan_tilt_roll, other.pan_tilt_roll) < np.radians(apart_deg))
 
 
-def focal_lengths(view: LineView, is_known: bool) -> Array:
+def focal_lengths(view: LineView, sought: SoughtLens) -> Array:
     """The focal lengths to be tried, view pixels."""
-    if is_known:
+    if sought.is_known:
         return np.array([view.focal_px])
-    return WIDTH_PX * np.geomspace(SHORTEST_FOCAL, LONGEST_FOCAL, FOCAL_LENGTHS)
+    count = max(3, round(np.log(sought.longest_px / sought.shortest_px) / np.log(FOCAL_RATIO)) + 1)
+    return np.geomspace(sought.shortest_px, sought.longest_px, count) / view.frame_px
 
 
 def vote(view: LineView, focal_px: Array, most: int, rng: np.random.Generator) -> list[Direction]:

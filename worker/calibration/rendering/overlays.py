@@ -54,6 +54,17 @@ def overlay(
     return picture
 
 
+def candidate_picture(pitch: Field, camera: Camera, frame: Frame, name: str) -> Frame:
+    """The frame with the markings framed as a camera that was found puts them, BGR like `frame`."""
+    picture = frame.copy()
+    thickness = max(1, round(frame.shape[1] / 1600))
+    for marking in pitch.markings():
+        for line in frame_of(pitch, camera, marking, EDGE_GAP * thickness):
+            draw_line(picture, line, NEW_COLOUR, thickness)
+    legend(picture, [(name, NEW_COLOUR)])
+    return picture
+
+
 def outline(marking: Marking) -> list[Array]:
     """A marking's centre line and its edges, (n, 2) each, densely enough for distortion and roof."""
     between, _ = resample(marking.centre, 0.25)

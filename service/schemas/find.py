@@ -1,0 +1,71 @@
+"""Cameras without poses, and what may be known of them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from service.schemas.addresses import SourceUrl
+from service.schemas.base import OPEN_WORD, Id, Name, Number, Schema
+from service.schemas.field import FieldOfPlay
+from service.schemas.geometry import Intrinsics, PoseIn, Position, Side
+from service.schemas.names import OPTIONS_PART
+from service.schemas.venue import Ignore
+
+FieldSide = Annotated[
+    Literal["near", "far", "left", "right"],
+    OPEN_WORD,
+    Field(description="Of the field that a camera stands on: near is y < 0, far y > 0, left x < 0, right x > 0."),
+]
+
+
+class SoughtCameraIn(Schema):
+    """A camera whose pose is sought; whatever is known of it makes that quicker and surer."""
+
+    id: Id
+    image_size: Annotated[list[Side], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="Width, height in pixels. Absent: that of its frame."
+    )
+    intrinsics: Intrinsics | None = Field(
+        None,
+        description="Its lens. With a `sigma` of `fx` above 2 % of it, the focal length is searched for. Absent: lens "
+        "and pose are found together.",
+    )
+    field_of_view_deg: Annotated[Number, Field(ge=5, le=150)] | None = Field(
+        None, description="Horizontal, roughly, where the lens is not known: focal lengths up to 30 % off are tried."
+    )
+    pose: PoseIn | None = Field(None, description="Of a camera that need not be found.")
+    position: Position | None = Field(None, description="Roughly where it stands, m: within `position_radius_m`.")
+    position_radius_m: Annotated[Number, Field(gt=0, le=1000)] = 10.0
+    side: FieldSide | None = None
+    ignore: Ignore = Field([])
+    source: SourceUrl | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.id == OPTIONS_PART:
+            raise ValueError("a camera cannot be called 'options': that is a part of the upload")
+        if self.intrinsics is not None and self.field_of_view_deg is not None:
+            raise ValueError(f"camera {self.id} has intrinsics and field_of_view_deg: leave one of them out")
+        if self.pose is not None and (self.intrinsics is None or self.image_size is None):
+            raise ValueError(f"camera {self.id} has a pose, so it needs its intrinsics and image_size, too")
+        if self.intrinsics is not None and self.image_size is None:
+            raise ValueError(f"camera {self.id} has intrinsics, which belong to an image_size: give that, too")
+        return self
+
+
+class SoughtSite(Schema):
+    """The file of a venue whose cameras may lack poses, and lenses."""
+
+    id: Id
+    name: Name = ""
+    field: FieldOfPlay
+    cameras: Annotated[list[SoughtCameraIn], Field(min_length=1, max_length=32)]
+
+    @model_validator(mode="after")
+    def _cameras_differ(self) -> Self:
+        ids = [camera.id for camera in self.cameras]
+        if len(set(ids)) < len(ids):
+            raise ValueError("two cameras have the same id")
+        return self

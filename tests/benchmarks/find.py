@@ -1,0 +1,183 @@
+"""`make bench-find`: cameras from nothing but a frame and the field.
+
+    python -m tests.benchmarks.find --only rendered --fields tennis padel --views 5
+    python -m tests.benchmarks.find --only real --folder FOLDER --knowing lens nothing
+
+Sections: `rendered` (every template on grounds and in colours of all kinds, from wide to medium lenses), `real` (frames
+with known cameras, where they are). What is known of each camera: its `lens`, its field of `view` to 30 %, or
+`nothing`. Every run is written to a file and not run again, so that long ones can be continued; after a change of the
+engine or of the renderer the file has to be removed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from fields.template import NAMES
+from models import MODEL_PATH
+from tests.benchmarks.fields import real
+from tests.benchmarks.fields.cases import Case, cases
+from tests.benchmarks.fields.engine import THREADS
+from tests.benchmarks.fields.judging import share
+from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
+from tests.benchmarks.rows import Rows
+from tests.benchmarks.scenes import FOLDER as RUNS
+from worker.calibration.detection.segmentation import Segmenter
+from worker.calibration.find_cameras import FoundCamera, find_cameras
+from worker.calibration.geometry.camera import Camera, Frame, inside
+from worker.calibration.geometry.field import Field
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.relocalise import twin
+from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens, lenses_of_view, unknown_lenses
+
+KNOWING = ("lens", "view", "nothing")
+VIEW_OFF = 0.3
+"""A given field of view makes the focal length at most this part longer or shorter than it is."""
+VIEW_UNCERTAIN = 0.15
+NEAR = 0.0026
+"""Found: the markings in view lie, on mean, within this part of the frame's width of where they are (5 px of 1920)."""
+
+
+def main() -> None:
+    """Run what is asked for and print it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    sections = {"rendered": _rendered, "real": _real}
+    parser.add_argument("--only", nargs="+", choices=sections, default=list(sections), help="sections")
+    parser.add_argument("--knowing", nargs="+", choices=KNOWING, default=list(KNOWING), help="what is known of cameras")
+    parser.add_argument("--folder", type=Path, default=real.FOLDER, help="of real frames, with cases.json")
+    parser.add_argument("--cases", nargs="+", help="real ones with one of these in their names")
+    parser.add_argument("--fields", nargs="+", choices=NAMES, default=list(NAMES), help="templates to render")
+    parser.add_argument("--views", type=int, default=20, help="rendered, of each template")
+    parser.add_argument("--rows", type=Path, default=RUNS / "find.jsonl", help="the file of what has been run")
+    options = parser.parse_args()
+    cv2.setNumThreads(THREADS)
+    segment, rows = Segmenter(MODEL_PATH, THREADS), Rows(options.rows)
+    for name in options.only:
+        print(f"\n## {name}\n", flush=True)
+        for line in sections[name](options, segment, rows):
+            print(line, flush=True)
+
+
+def _rendered(options: argparse.Namespace, segment: Segmenter, rows: Rows) -> Iterator[str]:
+    found = {
+        (name, knowing): [
+            rows.remembered(
+                {"find": name, "n": number, "knowing": knowing},
+                lambda name=name, number=number, knowing=knowing: _found_in_shot(name, number, knowing, segment),
+            )
+            for number in range(options.views)
+        ]
+        for knowing in options.knowing
+        for name in options.fields
+    }
+    clear = {key: [row for row in judged if row["shown"] >= LEAST_SHOWN] for key, judged in found.items()}
+    yield f"{options.views} views of each; of those that show at least {LEAST_SHOWN:.0%} of their lines:"
+    yield from _table(clear, options.knowing)
+    unclear = [row for judged in found.values() for row in judged if row["shown"] < LEAST_SHOWN]
+    wrong = sum(row["accepted"] and not row["near"] for row in unclear)
+    yield f"Of {len(unclear)} others {sum(row['accepted'] for row in unclear)} are accepted, {wrong} of them wrong."
+
+
+def _real(options: argparse.Namespace, segment: Segmenter, rows: Rows) -> Iterator[str]:
+    if not (options.folder / "cases.json").is_file():
+        yield f"The real frames are not there: put them into {options.folder}, with their cases.json."
+        return
+    found: dict[tuple[str, str], list[dict]] = {}
+    for knowing in options.knowing:
+        for case in cases(options.folder, options.cases):
+            row = rows.remembered(
+                {"find": case.name, "knowing": knowing},
+                lambda case=case, knowing=knowing: _found_in_case(case, knowing, segment),
+            )
+            found.setdefault((case.source, knowing), []).append(row)
+    yield from _table(found, options.knowing)
+
+
+def _table(found: Mapping[tuple[str, str], Sequence[dict]], knowing: Sequence[str]) -> Iterator[str]:
+    yield "| field | known | views | accepted and near | accepted, wrong | near, not accepted | core-s | longest |"
+    yield "|---" * 8 + "|"
+    total = {
+        (f"all, {known}", known): [r for key, rows in found.items() if key[1] == known for r in rows]
+        for known in knowing
+    }
+    for (name, known), rows in [*found.items(), *total.items()]:
+        if not rows:
+            continue
+        cores = [row["core_s"] for row in rows]
+        yield (
+            f"| {name} | {known} | {len(rows)} | {share([row['accepted'] and row['near'] for row in rows])} "
+            f"| {sum(row['accepted'] and not row['near'] for row in rows)} "
+            f"| {sum(row['near'] and not row['accepted'] for row in rows)} "
+            f"| {np.median(cores):.1f} | {max(cores):.1f} |"
+        )
+    yield ""
+    for (name, known), rows in found.items():
+        for row in rows:
+            if not (row["accepted"] and row["near"]):
+                end = "ACCEPTED, WRONG" if row["accepted"] else "near, refused" if row["near"] else "not found"
+                view = row["key"].get("n", row["key"]["find"])
+                yield f"{name}, {known}, {view}: {end}, {row['off_px']} px; {row['why'][:150]}"
+    yield ""
+
+
+def _found_in_shot(name: str, number: int, knowing: str, segment: Segmenter) -> dict:
+    taken = shot(name, number)
+    row = _found(taken.pitch, taken.camera, taken.frame, knowing, number, segment)
+    return {**row, "shown": taken.shown, "ground": taken.ground}
+
+
+def _found_in_case(case: Case, knowing: str, segment: Segmenter) -> dict:
+    return _found(case.pitch, case.camera, case.frame(), knowing, 0, segment)
+
+
+def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, segment: Segmenter) -> dict:
+    """What is found of a camera, and what it costs."""
+    sought = SoughtCamera(truth.id, _lenses(truth, knowing, np.random.default_rng([seed, 5])))
+    cpu = time.process_time()
+    found = find_cameras(pitch, [sought], [], {truth.id: [frame]}, segment, seed)
+    core_s = time.process_time() - cpu
+    (camera,) = found.cameras
+    off = _off_px(pitch, truth, camera)
+    return {
+        "accepted": camera.accepted,
+        "near": bool(off <= NEAR * truth.intrinsics.size[0]),
+        "off_px": round(off, 2),
+        "why": "" if camera.refusal is None else camera.refusal.words,
+        "candidates": len(camera.candidates),
+        "core_s": core_s,
+        "stages": found.timings.core_seconds,
+    }
+
+
+def _lenses(truth: Camera, knowing: str, rng: np.random.Generator) -> list[SoughtLens]:
+    size = truth.intrinsics.size
+    if knowing == "lens":
+        return [SoughtLens.known(truth.intrinsics)]
+    if knowing == "view":
+        focal = truth.intrinsics.focal_length_px * (1 + VIEW_OFF * rng.uniform(-1, 1))
+        return lenses_of_view(size, float(2 * np.degrees(np.arctan(size[0] / 2 / focal))), VIEW_UNCERTAIN)
+    return unknown_lenses(size)
+
+
+def _off_px(pitch: Field, truth: Camera, found: FoundCamera) -> float:
+    """Mean distance of the markings in view from where the camera found, or its twin, puts them."""
+    if found.camera is None:
+        return float("inf")
+    lines = pitch.line_points().position
+    there = truth.project(lines)
+    seen = inside(there, truth.intrinsics.size)
+    symmetric = FieldMap.of(pitch).is_symmetric
+    return min(
+        float(np.mean(np.nan_to_num(np.linalg.norm(camera.project(lines[seen]) - there[seen], axis=1), nan=1e4)))
+        for camera in ([found.camera, twin(found.camera)] if symmetric else [found.camera])
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+"""`esc find`, as somebody calls it who has frames and knows the sport."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.e2e.commands import esc_here
+from tests.e2e.worker.test_real_engine import cameras, frames, venue
+from tests.once import made_once
+
+
+def site(**known):
+    """Nothing but field and names of the cameras, and what is known of each."""
+    place = venue("stadium")
+    own = {one["id"]: one for one in place["cameras"]}
+    place["cameras"] = [{"id": name, **{part: own[name][part] for part in known.get(name, ())}} for name in own]
+    return place
+
+
+def write(folder, place):
+    (folder / "site.json").write_text(json.dumps(place))
+    for camera, frame in frames().items():
+        (folder / f"{camera}.jpg").write_bytes(frame)
+
+
+def find(folder, *more):
+    given = ("left=left.jpg", "right=right.jpg")
+    return esc_here(folder, "find", "site.json", *given, "-o", "venue.json", "--pictures", "pictures", *more)
+
+
+def found_by_lens(folder):
+    lens = ("image_size", "intrinsics")
+    write(folder, site(left=lens, right=lens))
+    answer = find(folder)
+    (folder / "answer.json").write_text(json.dumps([answer.returncode, answer.stdout, answer.stderr]))
+
+
+@pytest.fixture
+def answered(tmp_path_factory):
+    """The folder of a site whose lenses are known, and the answer."""
+    folder = made_once(tmp_path_factory, "found-by-lens", found_by_lens)
+    return folder, *json.loads((folder / "answer.json").read_text())
+
+
+def test_cameras_of_known_lenses_are_found_and_the_venue_is_written(answered):
+    folder, code, out, err = answered
+    assert code == 0, err
+    found = json.loads((folder / "venue.json").read_text())
+    for truth, camera in zip(cameras(), found["cameras"], strict=True):
+        assert np.linalg.norm(np.array(camera["pose"]["position"]) - truth.pose.position) < 0.15
+    assert json.loads(out)["accepted"]
+    assert "Camera left: (-0." in err
+    assert "taken: camera left stands on the near side" in err
+
+
+def test_what_was_found_calibrates(answered, tmp_path):
+    folder, *_ = answered
+    command = ("run", "venue.json", "left=left.jpg", "right=right.jpg", "-o", str(tmp_path / "out"))
+    answer = esc_here(folder, *command)
+    assert answer.returncode == 0, answer.stderr
+    assert json.loads(answer.stdout)["path"] == "near"
+
+
+def test_each_candidate_has_a_picture(answered):
+    folder, *_ = answered
+    picture = cv2.imread(str(folder / "pictures" / "candidate_left_1.jpg"))
+    assert picture.shape == (720, 1280, 3)
+
+
+def test_a_frame_that_shows_no_field_is_refused_with_why_and_writes_no_venue(tmp_path):
+    lens = ("image_size", "intrinsics")
+    write(tmp_path, site(left=lens, right=lens))
+    grey = np.full((720, 1280, 3), 128, np.uint8)
+    for camera in ("left", "right"):
+        cv2.imwrite(str(tmp_path / f"{camera}.jpg"), grey)
+    answer = find(tmp_path)
+    assert answer.returncode == 3
+    assert "Camera left was not found: " in answer.stderr
+    assert not (tmp_path / "venue.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "frames_given", "said"),
+    [
+        (lambda place: None, ("left=left.jpg",), "Give a frame of each camera without a pose: right=FILE"),
+        (lambda place: None, ("left=left.jpg", "right=right.jpg", "top=left.jpg"), "The site has no camera top"),
+        (lambda place: place["cameras"].pop(), ("left=left.jpg", "right=right.jpg"), "The site has no camera right"),
+        (
+            lambda place: place["cameras"][0].update(field_of_view_deg=70, **lens_of(0)),
+            ("left=left.jpg", "right=right.jpg"),
+            "has intrinsics and field_of_view_deg",
+        ),
+        (
+            lambda place: place.update(cameras=venue("stadium")["cameras"]),
+            ("left=left.jpg",),
+            "All cameras of the site have poses already",
+        ),
+    ],
+)
+def test_what_cannot_be_asked_is_said(tmp_path, change, frames_given, said):
+    place = site()
+    change(place)
+    write(tmp_path, place)
+    answer = esc_here(tmp_path, "find", "site.json", *frames_given, "-o", "venue.json")
+    assert answer.returncode == 2
+    assert said in answer.stderr
+
+
+def lens_of(number):
+    camera = venue("stadium")["cameras"][number]
+    return {part: camera[part] for part in ("image_size", "intrinsics")}

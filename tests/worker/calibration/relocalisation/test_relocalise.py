@@ -1,0 +1,79 @@
+"""A camera found from nothing but its frame and the field."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import BARREL, PITCH, camera, paint_frame
+from tests.worker.calibration.test_calibrate import white_on_green
+from tests.worker.calibration.test_sports import field
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.segmentation import Region
+from worker.calibration.geometry.camera import inside
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.relocalise import relocalise, twin
+from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens, unknown_lenses
+
+GREEN = np.full((540, 960, 3), (60, 130, 70), np.uint8)
+SIDELINE = camera("one", (-12.0, -50.0, 11.0), (-28.0, -4.0), distortion=BARREL)
+BEHIND_A_GOAL = camera("one", (-70.0, 9.0, 13.0), (-20.0, 0.0))
+COURT = camera("one", (-4.0, -13.0, 6.0), (-1.0, 0.0), focal=500.0)
+
+
+@cache
+def found(pitch_name, truth_name, lens_is_known, place=None):
+    pitch = PITCH if pitch_name == "football" else field(pitch_name)
+    truth = globals()[truth_name]
+    return pitch, truth, search(pitch, truth, paint_frame(pitch, truth), lens_is_known, place or Place())
+
+
+def search(pitch, truth, frame, lens_is_known=True, place=Place()):  # noqa: B008  (frozen)
+    lenses = [SoughtLens.known(truth.intrinsics)] if lens_is_known else unknown_lenses(truth.intrinsics.size)
+    response = white_on_green(frame, [Region(0, 0, *truth.intrinsics.size)]).astype(np.float32) / 255
+    sought = SoughtCamera(truth.id, lenses, place)
+    return relocalise(pitch, FieldMap.of(pitch), sought, Channels([frame]), response, 1)
+
+
+def off_px(pitch, truth, best):
+    """How far on mean the markings in view are from where a camera, or its twin, puts them."""
+    lines = pitch.line_points().position
+    there = truth.project(lines)
+    seen = inside(there, truth.intrinsics.size)
+    return min(np.linalg.norm(one.project(lines[seen]) - there[seen], axis=1).mean() for one in (best, twin(best)))
+
+
+@pytest.mark.parametrize(
+    ("sport", "truth"), [("football", "SIDELINE"), ("football", "BEHIND_A_GOAL"), ("basketball", "COURT")]
+)
+def test_a_camera_of_a_known_lens_is_found(sport, truth):
+    pitch, camera, answer = found(sport, truth, lens_is_known=True)
+    assert answer.refusal is None, answer.refusal
+    assert off_px(pitch, camera, answer.candidates[0].camera) < 0.5
+
+
+def test_lens_and_pose_are_found_together():
+    pitch, camera, answer = found("football", "SIDELINE", lens_is_known=False)
+    assert answer.refusal is None, answer.refusal
+    best = answer.candidates[0].camera
+    assert off_px(pitch, camera, best) < 1.0
+    off = best.intrinsics.focal_length_px - camera.intrinsics.focal_length_px
+    assert abs(off) < max(4 * best.intrinsics.sigma["fx"], 6.0)
+
+
+def test_a_camera_stands_where_it_may():
+    _, _, answer = found("football", "SIDELINE", lens_is_known=True, place=Place("far"))
+    assert answer.candidates[0].camera.pose.position[1] > 0
+
+
+def test_a_frame_without_lines_finds_nothing_and_says_so():
+    answer = search(PITCH, SIDELINE, GREEN)
+    assert answer.refusal.reason in ("no-lines", "lines", "few-lines")
+
+
+def test_two_parallel_lines_are_no_field():
+    frame = GREEN.copy()
+    frame[200:204] = frame[300:304] = 240
+    answer = search(PITCH, SIDELINE, frame)
+    assert answer.refusal is not None
+    assert answer.refusal.words

@@ -1,0 +1,58 @@
+"""Several cameras found at once, and what a calibration that begins with them says."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames
+from tests.worker.calibration.test_calibrate import white_on_green
+from worker.calibration.find_cameras import find_cameras
+from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.records import Stopped
+from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
+
+FRAMES = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
+
+
+def sought(one, place=Place()):  # noqa: B008  (frozen)
+    return SoughtCamera(one.id, [SoughtLens.known(one.intrinsics)], place)
+
+
+@cache
+def both():
+    steps = []
+    return find_cameras(CROWNED, [sought(one) for one in pair()], [], FRAMES, white_on_green, 1, steps.append), steps
+
+
+def test_a_pair_is_found_on_one_side_and_fits_together():
+    found, _ = both()
+    for truth, camera in zip(pair(), found.cameras, strict=True):
+        assert camera.accepted, camera.refusal
+        assert np.linalg.norm(camera.camera.pose.position - truth.pose.position) < 0.03
+        assert rotation_angles_deg(camera.camera.pose.rotation, truth.pose.rotation) < 0.05
+    assert found.stitch_error_px < 0.2
+
+
+def test_what_was_assumed_of_the_side_is_said():
+    remarks = [remark for camera in both()[0].cameras for remark in camera.remarks]
+    assert any("stands on the near side" in remark for remark in remarks)
+
+
+def test_progress_grows_from_stage_to_stage():
+    _, steps = both()
+    assert [step.fraction for step in steps] == sorted(step.fraction for step in steps)
+    assert list(dict.fromkeys(step.stage for step in steps)) == ["segmentation", "evolution", "refinement"]
+
+
+def test_a_camera_is_found_beside_one_that_is_known():
+    left, right = pair()
+    found = find_cameras(CROWNED, [sought(right)], [left], FRAMES, white_on_green, 1)
+    (camera,) = found.cameras
+    assert camera.accepted
+    assert np.linalg.norm(camera.camera.pose.position - right.pose.position) < 0.03
+
+
+def test_who_is_asked_to_stop_stops():
+    with pytest.raises(Stopped):
+        find_cameras(CROWNED, [sought(pair()[0])], [], FRAMES, white_on_green, 1, stop=lambda: True)

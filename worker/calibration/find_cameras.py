@@ -1,0 +1,170 @@
+"""The engine's other page: frames without poses in; the cameras that took them out, each with a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.calibrate import calibrate
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.frame_fusion import median, sways
+from worker.calibration.detection.segmentation import Region
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.field import Field
+from worker.calibration.records import Calibration, Options, Progress, ProgressReporter, Segment, StageTimings
+from worker.calibration.relocalisation.field_halves import choose_sides
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.relocalise import Candidate, Refusal, Relocalisation, relocalise, twin
+from worker.calibration.relocalisation.sought import SoughtCamera
+
+SEGMENTED, SEARCHED = 0.2, 0.85
+"""Share of the whole at which the frames are segmented, and the cameras found; to calibrate them is the rest."""
+
+
+@dataclass(frozen=True)
+class FoundCamera:
+    """What was found for one camera that was sought.
+
+    `candidates`: cameras that may have taken its frame, the best first, for a person to choose from; `refusal`: why the
+    best one is not taken, None where it is; `remarks`: what was assumed. `calibrated`: as a calibration has it that
+    began with the best candidate, None where it came to none.
+    """
+
+    id: str
+    candidates: Sequence[Candidate]
+    refusal: Refusal | None
+    remarks: Sequence[str]
+    calibrated: CameraResult | None
+
+    @property
+    def camera(self) -> Camera | None:
+        """The best candidate, as calibrated with the others; None without any."""
+        if self.calibrated is not None and self.calibrated.accepted:
+            return self.calibrated.camera
+        return self.candidates[0].camera if self.candidates else None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether a calibration can begin with it."""
+        return self.refusal is None
+
+
+@dataclass(frozen=True)
+class FoundCameras:
+    """The cameras that were sought; `stitch_error_px`: between those that were accepted, None where none overlap."""
+
+    pitch: Field
+    cameras: Sequence[FoundCamera]
+    stitch_error_px: float | None
+    timings: StageTimings
+
+
+def find_cameras(
+    pitch: Field,
+    sought: Sequence[SoughtCamera],
+    known: Sequence[Camera],
+    frames: Mapping[str, Sequence[Frame]],
+    segment: Segment,
+    seed: int,
+    report: Callable[[Progress], None] = lambda _: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> FoundCameras:
+    """Find the cameras that took `frames[camera.id]`, BGR (height, width, 3), from the markings in them alone.
+
+    `known`: cameras of the same field whose poses are known; those of them that have frames are calibrated with the
+    others. Deterministic for a `seed`. Raises `Stopped` soon after `stop()` turns true.
+    """
+    progress = ProgressReporter(report, stop)
+    markings = FieldMap.of(pitch)
+
+    # Observe.
+    responses: dict[str, list[NDArray[np.uint8]]] = {}
+    with progress.timed("segmentation"):
+        for number, one in enumerate(sought):
+            progress.at_fraction("segmentation", SEGMENTED * number / len(sought))
+            responses[one.id] = [segment(frame, [_whole(frame)]) for frame in frames[one.id]]
+
+    # Find each camera alone, and choose the halves of the field that they look at.
+    alone: dict[str, Relocalisation] = {}
+    with progress.timed("evolution"):
+        for number, one in enumerate(sought):
+            progress.at_fraction("evolution", SEGMENTED + (SEARCHED - SEGMENTED) * number / len(sought))
+            lens = one.lenses[0].lens
+            swayed = sways(frames[one.id], lens)
+            response = median(responses[one.id], swayed) / np.float32(255)
+            if one.ignored is not None:
+                response[one.ignored.area] = 0
+            alone[one.id] = relocalise(pitch, markings, one, Channels(frames[one.id], swayed), response, seed)
+    placed = _on_their_sides(alone, sought, known) if markings.is_symmetric else alone
+
+    # Calibrate those that were found, as every later job will.
+    found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
+    seen = [camera for camera in known if camera.id in frames]
+    calibrated = None
+    if found:
+        progress.at_fraction("refinement", SEARCHED)
+        remembered = _Remembered(
+            segment, {id(frames[one][n]): r for one in placed for n, r in enumerate(responses[one])}
+        )
+        with progress.timed("calibration"):
+            calibrated = calibrate(pitch, [*found, *seen], frames, remembered, Options(seed=seed), stop=stop)
+    return FoundCameras(
+        pitch,
+        [_judged(camera, placed[camera.id], calibrated) for camera in sought],
+        None if calibrated is None else calibrated.stitch_error_px,
+        progress.timings,
+    )
+
+
+class _Remembered:
+    """A network that has been asked about some frames before."""
+
+    def __init__(self, segment: Segment, responses: Mapping[int, NDArray[np.uint8]]) -> None:
+        self._segment, self._responses = segment, responses
+
+    def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
+        """As the network."""
+        known = self._responses.get(id(frame))
+        return self._segment(frame, regions) if known is None else known
+
+
+def _whole(frame: Frame) -> Region:
+    height, width = frame.shape[:2]
+    return Region(0, 0, width, height)
+
+
+def _on_their_sides(
+    alone: Mapping[str, Relocalisation], sought: Sequence[SoughtCamera], known: Sequence[Camera]
+) -> dict[str, Relocalisation]:
+    """The same with each camera on its side of a symmetric field; refused where that is not clear."""
+    best = [one.candidates[0].camera for one in alone.values() if one.refusal is None]
+    sides = {one.camera.id: one for one in choose_sides(best, {one.id: one.place for one in sought}, known)}
+    placed = dict[str, Relocalisation]()
+    for camera, found in alone.items():
+        side = sides.get(camera)
+        if side is None:
+            placed[camera] = found
+            continue
+        first, *others = found.candidates
+        if side.camera is not first.camera:
+            first = replace(first, camera=side.camera)
+        if side.decided:
+            remarks = [*found.remarks, *([side.remark] if side.remark else [])]
+            placed[camera] = replace(found, candidates=[first, *others], remarks=remarks)
+            continue
+        both = [first, replace(first, camera=twin(side.camera)), *others]
+        placed[camera] = replace(found, candidates=both, refusal=Refusal("not-unique", side.remark or ""))
+    return placed
+
+
+def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration | None) -> FoundCamera:
+    """What was found, and what a calibration that began with it says."""
+    if found.refusal is not None or calibrated is None:
+        return FoundCamera(sought.id, found.candidates, found.refusal, found.remarks, None)
+    (result,) = (one for one in calibrated.cameras if one.camera.id == sought.id)
+    refusal = None if result.refusal is None else Refusal("not-confirmed", result.refusal.words)
+    return FoundCamera(sought.id, found.candidates, refusal, found.remarks, result)

@@ -1,0 +1,44 @@
+"""The paint that a frame shows, and how much of it a camera explains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.detection.exclusions import line_band
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.relocalisation.line_view import middles_of_paint
+
+WIDTH_PX = 960
+TOLERANCE_PX = 3.0
+"""How far from an expected line paint is explained by it, in pixels of the shrunk frame."""
+
+
+@dataclass(frozen=True)
+class Paint:
+    """Pixels (n, 2), column and row, on the middles of what is painted, of a frame that is `WIDTH_PX` wide."""
+
+    middles: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, response: NDArray[np.uint8]) -> Paint:
+        """Of a response (height, width), 0..255."""
+        height, width = response.shape
+        size = (WIDTH_PX, round(height * WIDTH_PX / width))
+        small = np.asarray(cv2.resize(response, size, interpolation=cv2.INTER_AREA), np.uint8)
+        return cls(middles_of_paint(small).astype(np.intp))
+
+    def explained_by(self, field: Field, camera: Camera) -> float:
+        """The share of it, 0..1, that lies on the markings as a camera puts them, on the roof of the field."""
+        if len(self.middles) == 0:
+            return 0.0
+        small = camera.with_lens(camera.intrinsics.scaled(WIDTH_PX / camera.intrinsics.size[0]))
+        band = line_band(VisibleLines.from_camera(field.line_points(), small), small.intrinsics.size, TOLERANCE_PX)
+        column, row = self.middles.T
+        inside = row < band.shape[0]
+        return float((band[np.minimum(row, band.shape[0] - 1), column] > 0)[inside].mean())

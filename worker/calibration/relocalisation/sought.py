@@ -1,0 +1,119 @@
+"""What is known of a camera whose pose is sought: its lens, or how long one may be, and roughly where it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.ignored_areas import Ignored
+from worker.calibration.geometry.lens import Intrinsics, Lens
+
+Side = Literal["near", "far", "left", "right"]
+"""Of the field: near is y < 0, far y > 0, left x < 0, right x > 0."""
+SHORTEST_FOCAL, LONGEST_FOCAL = 0.4, 4.5
+"""Of lenses that nothing is known of, in widths of the frame: views of 103° to 13°."""
+BENDS = (0.0, -0.07)
+"""Of such lenses: the radial term k1 at half the width of the frame, which tells lenses of one bend apart from those of
+another whatever their focal length."""
+WELL_KNOWN = 0.02
+"""Focal lengths that are known to this part need no search."""
+SIGMAS = 2.0
+"""So many standard deviations around a given focal length are searched."""
+
+
+@dataclass(frozen=True)
+class SoughtLens:
+    """A lens through which a frame may have been taken, with a focal length between `shortest_px` and `longest_px`."""
+
+    lens: Lens
+    shortest_px: float
+    longest_px: float
+
+    @classmethod
+    def known(cls, lens: Lens) -> SoughtLens:
+        """A lens with its focal length."""
+        return cls(lens, lens.focal_length_px, lens.focal_length_px)
+
+    @classmethod
+    def around(cls, lens: Lens, uncertain: float) -> SoughtLens:
+        """A lens whose focal length is known to a part (one standard deviation): `WELL_KNOWN` and less is known."""
+        if uncertain <= WELL_KNOWN:
+            return cls.known(lens)
+        reach = 1 + SIGMAS * uncertain
+        return cls(lens, lens.focal_length_px / reach, lens.focal_length_px * reach)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether its focal length need not be searched for."""
+        return self.shortest_px == self.longest_px
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a camera may stand: on a `side` of the field, and within `radius_m` of a `position` (3,) m, or anywhere."""
+
+    side: Side | None = None
+    position: Array | None = None
+    radius_m: float = 10.0
+
+    @property
+    def is_anywhere(self) -> bool:
+        """Whether nothing is known."""
+        return self.side is None and self.position is None
+
+    def allows(self, positions: Array) -> NDArray[np.bool_]:
+        """Whether a camera may stand at each of the positions (..., 3)."""
+        x, y = positions[..., 0], positions[..., 1]
+        on_side = {"near": y < 0, "far": y > 0, "left": x < 0, "right": x > 0}
+        allowed = np.ones(x.shape, dtype=bool) if self.side is None else on_side[self.side]
+        if self.position is None:
+            return np.asarray(allowed)
+        return np.asarray(allowed & (np.linalg.norm(positions - self.position, axis=-1) <= self.radius_m))
+
+
+ANYWHERE = Place()
+
+
+@dataclass(frozen=True)
+class SoughtCamera:
+    """A camera without a pose: `lenses` through which it may look, where it may stand, what of its frame is ignored."""
+
+    id: str
+    lenses: Sequence[SoughtLens]
+    place: Place = ANYWHERE
+    ignored: Ignored | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of its frames."""
+        return self.lenses[0].lens.size
+
+    @property
+    def lens_is_known(self) -> bool:
+        """Whether pose alone is sought."""
+        return all(one.is_known for one in self.lenses)
+
+
+def unknown_lenses(size: tuple[int, int]) -> list[SoughtLens]:
+    """Lenses of each usual bend and focal length for a frame (width, height) about whose lens nothing is known."""
+    width = size[0]
+    lenses = [_bent(size, float(width), bend) for bend in BENDS]
+    return [SoughtLens(lens, SHORTEST_FOCAL * width, LONGEST_FOCAL * width) for lens in lenses]
+
+
+def lenses_of_view(size: tuple[int, int], field_of_view_deg: float, uncertain: float) -> list[SoughtLens]:
+    """Lenses of each usual bend for a horizontal field of view that is known to a part of the focal length."""
+    focal = size[0] / 2 / float(np.tan(np.radians(field_of_view_deg) / 2))
+    return [SoughtLens.around(_bent(size, focal, bend), uncertain) for bend in BENDS]
+
+
+def _bent(size: tuple[int, int], focal: float, bend: float) -> Intrinsics:
+    width, height = size
+    matrix = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
+    # k1 counts in the square of the distance from the centre, in focal lengths.
+    return Intrinsics(matrix, np.array([bend * (2 * focal / width) ** 2, 0.0, 0.0, 0.0]), size)

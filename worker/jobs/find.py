@@ -1,0 +1,179 @@
+"""From frames of cameras without poses to these cameras, and a picture of each candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
+from typing import cast
+
+import cv2
+import numpy as np
+
+from service.schemas.find import SoughtCameraIn, SoughtSite
+from service.schemas.geometry import Intrinsics, PosedCamera
+from service.schemas.geometry import Pose as PoseSchema
+from service.schemas.job import Progress
+from service.schemas.results import CandidateResult, FindResult, FoundCameraResult, Provenance, Sigma
+from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ignored_areas import Ignored
+from worker.calibration.records import CalibrationError
+from worker.calibration.relocalisation.relocalise import Candidate
+from worker.calibration.relocalisation.sought import (
+    Place,
+    SoughtCamera,
+    SoughtLens,
+    lenses_of_view,
+    unknown_lenses,
+)
+from worker.calibration.rendering.overlays import candidate_picture
+from worker.jobs.from_schemas import (
+    JobFailedError,
+    Picture,
+    camera_of,
+    decode_frame,
+    decode_image,
+    encode_jpeg,
+    lens_of,
+    pitch_of,
+)
+from worker.jobs.to_schemas import (
+    Solution,
+    finite_or_none,
+    lens_to_schema,
+    load_segmenter,
+    pose_to_schema,
+    progress_to_schema,
+    round_to_ms,
+)
+from worker.protocol import ComputeResources
+
+FIELD_OF_VIEW_UNCERTAIN = 0.15
+"""One standard deviation of the focal length that a given field of view leaves, as a part of it."""
+
+
+def solve(
+    site: SoughtSite,
+    files: Mapping[str, Sequence[bytes]],
+    seed: int,
+    means: ComputeResources,
+    report: Callable[[Progress], None],
+) -> Solution[FindResult]:
+    """Find the cameras of a site that have no pose, from the files of their frames."""
+    segmenter = load_segmenter(means)
+    cv2.setNumThreads(means.threads)
+    frames = {camera.id: _decoded(camera, files[camera.id]) for camera in site.cameras if camera.id in files}
+    pitch = pitch_of(site.field)
+    sought = [_sought(camera, frames[camera.id][0]) for camera in site.cameras if camera.pose is None]
+    known = [_known(camera) for camera in site.cameras if camera.pose is not None]
+    try:
+        found = find_cameras(
+            pitch, sought, known, frames, segmenter, seed, lambda step: report(progress_to_schema(step))
+        )
+    except CalibrationError as error:
+        raise JobFailedError(error.kind, error.detail, error.camera) from error
+    pictures = {
+        name: picture
+        for camera in found.cameras
+        for name, picture in _pictures(pitch, camera, frames[camera.id][0]).items()
+    }
+    provenance = Provenance(
+        software=version("esc-calibration"), model_sha256=segmenter.sha256, seed=seed, options={"seed": seed}
+    )
+    return Solution(_result(found, sought, provenance), pictures)
+
+
+def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:
+    """The frames of a camera, all of one size."""
+    size = camera.image_size
+    if size is None:
+        first = decode_image(files[0], cv2.IMREAD_COLOR_BGR)
+        if first is None:
+            detail = f"A frame of camera {camera.id} cannot be decoded; grab it again."
+            raise JobFailedError("broken-image", detail, camera.id)
+        size = [first.shape[1], first.shape[0]]
+    return [decode_frame(camera.id, size, file) for file in files]
+
+
+def _sought(camera: SoughtCameraIn, frame: Picture) -> SoughtCamera:
+    """What is known of a camera, for the engine."""
+    height, width = frame.shape[:2]
+    size = (width, height)
+    position = None if camera.position is None else np.array(camera.position)
+    polygons = [np.array(polygon, dtype=float) for polygon in camera.ignore]
+    return SoughtCamera(
+        camera.id,
+        _lenses(camera, size),
+        Place(camera.side, position, camera.position_radius_m),
+        Ignored(polygons, size) if polygons else None,
+    )
+
+
+def _lenses(camera: SoughtCameraIn, size: tuple[int, int]) -> list[SoughtLens]:
+    if camera.intrinsics is not None:
+        lens = lens_of(camera.intrinsics, list(size))
+        return [SoughtLens.around(lens, lens.sigma.get("fx", 0.0) / lens.focal_length_px)]
+    if camera.field_of_view_deg is not None:
+        return lenses_of_view(size, camera.field_of_view_deg, FIELD_OF_VIEW_UNCERTAIN)
+    return unknown_lenses(size)
+
+
+def _known(camera: SoughtCameraIn) -> Camera:
+    """A camera that need not be found; the schema has seen to it that it is complete."""
+    assert camera.pose is not None
+    pose = PoseSchema.from_input(camera.pose)
+    intrinsics = cast(Intrinsics, camera.intrinsics)
+    return camera_of(PosedCamera(id=camera.id, image_size=camera.image_size or [], intrinsics=intrinsics, pose=pose))
+
+
+def _pictures(pitch: Field, camera: FoundCamera, frame: Picture) -> dict[str, bytes]:
+    """A picture of each candidate, the best first."""
+    best = camera.camera
+    shown = [one.camera for one in camera.candidates]
+    if best is not None:
+        shown[0] = best
+    return {
+        f"candidate_{camera.id}_{number}": encode_jpeg(candidate_picture(pitch, one, frame, f"candidate {number}"))
+        for number, one in enumerate(shown, start=1)
+    }
+
+
+def _result(found: FoundCameras, sought: Sequence[SoughtCamera], provenance: Provenance) -> FindResult:
+    refusals = [f"camera {one.id}: {one.refusal.words}" for one in found.cameras if one.refusal is not None]
+    return FindResult(
+        accepted=not refusals,
+        rejected_because="; ".join(refusals) or None,
+        cameras=[_camera(one, its.size) for one, its in zip(found.cameras, sought, strict=True)],
+        stitch_error_px=finite_or_none(found.stitch_error_px),
+        timings_s=round_to_ms(found.timings.seconds),
+        cpu_s=round_to_ms(found.timings.core_seconds),
+        provenance=provenance,
+    )
+
+
+def _camera(found: FoundCamera, size: tuple[int, int]) -> FoundCameraResult:
+    candidates = [_candidate(one) for one in found.candidates]
+    if found.calibrated is not None and found.calibrated.accepted:
+        candidates[0] = candidates[0].model_copy(update={"pose": pose_to_schema(found.calibrated.camera.pose)})
+    return FoundCameraResult(
+        id=found.id,
+        accepted=found.accepted,
+        reason=None if found.refusal is None else found.refusal.reason,
+        rejected_because=None if found.refusal is None else found.refusal.words,
+        remarks=list(found.remarks),
+        image_size=list(size),
+        candidates=candidates,
+    )
+
+
+def _candidate(candidate: Candidate) -> CandidateResult:
+    sigma = candidate.sigma
+    return CandidateResult(
+        intrinsics=lens_to_schema(candidate.camera.intrinsics),
+        pose=pose_to_schema(candidate.camera.pose),
+        agreement=candidate.agreement,
+        lines_found=candidate.evidence.share,
+        residual_px=finite_or_none(candidate.residual_px),
+        sigma=None if sigma is None else Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m),
+    )
