@@ -451,8 +451,6 @@ FindReason = Annotated[
         "no-lines",
         "lines",
         "few-lines",
-        "residual",
-        "undetermined",
         "implausible",
         "not-unique",
         "not-confirmed",

@@ -29,7 +29,7 @@ from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
 from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER as RUNS
 from worker.calibration.detection.segmentation import Segmenter
-from worker.calibration.find_cameras import FoundCamera, find_cameras
+from worker.calibration.find_cameras import find_cameras
 from worker.calibration.geometry.camera import Camera, Frame, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.relocalisation.field_map import FieldMap
@@ -143,13 +143,22 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, s
     found = find_cameras(pitch, [sought], [], {truth.id: [frame]}, segment, seed)
     core_s = time.process_time() - cpu
     (camera,) = found.cameras
-    off = _off_px(pitch, truth, camera)
+    off = float("inf") if camera.camera is None else _off_px(pitch, truth, camera.camera)
     return {
         "accepted": camera.accepted,
         "near": bool(off <= NEAR * truth.intrinsics.size[0]),
         "off_px": round(off, 2),
         "why": "" if camera.refusal is None else camera.refusal.words,
-        "candidates": len(camera.candidates),
+        "candidates": [
+            {
+                "agreement": one.agreement,
+                "found": one.evidence.agreement,
+                "unexpected": one.overlap.unexpected,
+                "iou": one.overlap.iou,
+                "off_px": _off_px(pitch, truth, one.camera),
+            }
+            for one in camera.candidates
+        ],
         "core_s": core_s,
         "stages": found.timings.core_seconds,
     }
@@ -165,17 +174,15 @@ def _lenses(truth: Camera, knowing: str, rng: np.random.Generator) -> list[Sough
     return unknown_lenses(size)
 
 
-def _off_px(pitch: Field, truth: Camera, found: FoundCamera) -> float:
+def _off_px(pitch: Field, truth: Camera, found: Camera) -> float:
     """Mean distance of the markings in view from where the camera found, or its twin, puts them."""
-    if found.camera is None:
-        return float("inf")
     lines = pitch.line_points().position
     there = truth.project(lines)
     seen = inside(there, truth.intrinsics.size)
     symmetric = FieldMap.of(pitch).is_symmetric
     return min(
         float(np.mean(np.nan_to_num(np.linalg.norm(camera.project(lines[seen]) - there[seen], axis=1), nan=1e4)))
-        for camera in ([found.camera, twin(found.camera)] if symmetric else [found.camera])
+        for camera in ([found, twin(found)] if symmetric else [found])
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.frame_fusion import median, sways
-from worker.calibration.detection.segmentation import Region
+from worker.calibration.detection.segmentation import Region, whole_frame
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
@@ -86,7 +86,7 @@ def find_cameras(
     with progress.timed("segmentation"):
         for number, one in enumerate(sought):
             progress.at_fraction("segmentation", SEGMENTED * number / len(sought))
-            responses[one.id] = [segment(frame, [_whole(frame)]) for frame in frames[one.id]]
+            responses[one.id] = [segment(frame, whole_frame(one.size)) for frame in frames[one.id]]
 
     # Find each camera alone, and choose the halves of the field that they look at.
     alone: dict[str, Relocalisation] = {}
@@ -130,11 +130,6 @@ class _Remembered:
         """As the network."""
         known = self._responses.get(id(frame))
         return self._segment(frame, regions) if known is None else known
-
-
-def _whole(frame: Frame) -> Region:
-    height, width = frame.shape[:2]
-    return Region(0, 0, width, height)
 
 
 def _on_their_sides(

@@ -94,9 +94,9 @@ class SoughtCamera:
         return self.lenses[0].lens.size
 
     @property
-    def lens_is_known(self) -> bool:
-        """Whether pose alone is sought."""
-        return all(one.is_known for one in self.lenses)
+    def is_lens_sought(self) -> bool:
+        """Whether the lens is to be found along with the pose."""
+        return not all(one.is_known for one in self.lenses)
 
 
 def unknown_lenses(size: tuple[int, int]) -> list[SoughtLens]:
