@@ -11,8 +11,7 @@ from service.cli.arguments import Frames, parse_document, parse_frame_files
 from service.cli.printing import REJECTED, USAGE, fail, job_progress_bar, print_json, print_note
 
 if TYPE_CHECKING:
-    from service.schemas.find import SoughtCameraIn, SoughtSite
-    from service.schemas.results import FindResult, FoundCameraResult
+    from service.schemas.find import FindResult, FoundCameraResult, SoughtCameraIn, SoughtSite
     from service.settings import Settings
 
 

@@ -1,4 +1,4 @@
-"""Cameras without poses, and what may be known of them."""
+"""Cameras without poses: what may be known of them, and what is found."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from pydantic import Field, model_validator
 from service.schemas.addresses import SourceUrl
 from service.schemas.base import OPEN_WORD, Id, Name, Number, Schema
 from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Intrinsics, PoseIn, Position, Side
+from service.schemas.geometry import Intrinsics, Pose, PoseIn, Position, Side
 from service.schemas.names import OPTIONS_PART
+from service.schemas.results import CPU_S, Provenance, Sigma
 from service.schemas.venue import Ignore
 
 FieldSide = Annotated[
@@ -69,3 +70,54 @@ class SoughtSite(Schema):
         if len(set(ids)) < len(ids):
             raise ValueError("two cameras have the same id")
         return self
+
+
+class CandidateResult(Schema):
+    """A camera that may have taken the frame. `agreement`: how well the lines agree with it both ways, 0..1: is the
+    expected seen, and the seen expected? `lines_found`: the share of the expected that is seen; `residual_px`: rms of
+    the measured lines, null where too few were measured.
+    """
+
+    intrinsics: Intrinsics
+    pose: Pose
+    agreement: float
+    lines_found: float
+    residual_px: float | None
+    sigma: Sigma | None
+
+
+FindReason = Annotated[
+    Literal[
+        "no-lines",
+        "lines",
+        "few-lines",
+        "implausible",
+        "not-unique",
+        "not-confirmed",
+    ],
+    OPEN_WORD,
+]
+
+
+class FoundCameraResult(Schema):
+    """What was found for a camera: `candidates`, the best first; where it is accepted, its first one is the camera."""
+
+    id: Id
+    accepted: bool
+    reason: FindReason | None = Field(description="Why it is not accepted, in a word.")
+    rejected_because: str | None
+    remarks: list[str] = Field(description="What was assumed, such as the side of a field that looks the same twice.")
+    image_size: list[int]
+    candidates: list[CandidateResult]
+
+
+class FindResult(Schema):
+    """Cameras found from their frames alone. `accepted`: all of them were."""
+
+    accepted: bool
+    rejected_because: str | None
+    cameras: list[FoundCameraResult]
+    stitch_error_px: float | None
+    timings_s: dict[str, float]
+    cpu_s: dict[str, float] = CPU_S
+    provenance: Provenance

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import cast
 
 import cv2
 import numpy as np
 
-from service.schemas.find import SoughtCameraIn, SoughtSite
+from service.schemas.find import CandidateResult, FindResult, FoundCameraResult, SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, PosedCamera
 from service.schemas.geometry import Pose as PoseSchema
 from service.schemas.job import Progress
-from service.schemas.results import CandidateResult, FindResult, FoundCameraResult, Provenance, Sigma
+from service.schemas.results import Provenance, Sigma
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
@@ -39,7 +40,6 @@ from worker.jobs.from_schemas import (
     pitch_of,
 )
 from worker.jobs.to_schemas import (
-    Solution,
     finite_or_none,
     lens_to_schema,
     load_segmenter,
@@ -53,13 +53,21 @@ FIELD_OF_VIEW_UNCERTAIN = 0.15
 """One standard deviation of the focal length that a given field of view leaves, as a part of it."""
 
 
+@dataclass(frozen=True)
+class FoundSite:
+    """What was found of a site, and the file of a picture of each candidate by its name, `candidate_left_1`."""
+
+    result: FindResult
+    pictures: dict[str, bytes]
+
+
 def solve(
     site: SoughtSite,
     files: Mapping[str, Sequence[bytes]],
     seed: int,
     means: ComputeResources,
     report: Callable[[Progress], None],
-) -> Solution[FindResult]:
+) -> FoundSite:
     """Find the cameras of a site that have no pose, from the files of their frames."""
     segmenter = load_segmenter(means)
     cv2.setNumThreads(means.threads)
@@ -81,7 +89,7 @@ def solve(
     provenance = Provenance(
         software=version("esc-calibration"), model_sha256=segmenter.sha256, seed=seed, options={"seed": seed}
     )
-    return Solution(_result(found, sought, provenance), pictures)
+    return FoundSite(_result(found, sought, provenance), pictures)
 
 
 def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:
