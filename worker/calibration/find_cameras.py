@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,10 @@ from worker.calibration.records import Calibration, Options, Progress, ProgressR
 from worker.calibration.relocalisation.field_halves import choose_sides
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import Candidate, Refusal, Relocalisation, relocalise, twin
-from worker.calibration.relocalisation.sought import SoughtCamera
+from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
+OF_ONE_KIND = 0.03
+"""By which part the focal lengths of cameras of one kind differ, one standard deviation."""
 SEGMENTED, SEARCHED = 0.2, 0.85
 """Share of the whole at which the frames are segmented, and the cameras found; to calibrate them is the rest."""
 
@@ -88,30 +90,30 @@ def find_cameras(
             progress.at_fraction("segmentation", SEGMENTED * number / len(sought))
             responses[one.id] = [segment(frame, whole_frame(one.size)) for frame in frames[one.id]]
 
-    # Find each camera alone, and choose the halves of the field that they look at.
-    alone: dict[str, Relocalisation] = {}
+    # Find each camera alone; who was found helps who was not. Then choose the halves of the field that they look at.
     with progress.timed("evolution"):
+        seen = {one.id: _seen(one, frames[one.id], responses[one.id]) for one in sought}
+        alone = dict[str, Relocalisation]()
         for number, one in enumerate(sought):
             progress.at_fraction("evolution", SEGMENTED + (SEARCHED - SEGMENTED) * number / len(sought))
-            lens = one.lenses[0].lens
-            swayed = sways(frames[one.id], lens)
-            response = median(responses[one.id], swayed) / np.float32(255)
-            if one.ignored is not None:
-                response[one.ignored.area] = 0
-            alone[one.id] = relocalise(pitch, markings, one, Channels(frames[one.id], swayed), response, seed)
+            alone[one.id] = relocalise(pitch, markings, one, *seen[one.id], seed)
+        for helped in _with_lenses_of_others(sought, alone):
+            progress.at_fraction("evolution", SEARCHED)
+            again = relocalise(pitch, markings, helped, *seen[helped.id], seed)
+            alone[helped.id] = again if again.refusal is None else alone[helped.id]
     placed = _on_their_sides(alone, sought, known) if markings.is_symmetric else alone
 
     # Calibrate those that were found, as every later job will.
     found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
-    seen = [camera for camera in known if camera.id in frames]
     calibrated = None
     if found:
         progress.at_fraction("refinement", SEARCHED)
         remembered = _Remembered(
             segment, {id(frames[one][n]): r for one in placed for n, r in enumerate(responses[one])}
         )
+        beside = [camera for camera in known if camera.id in frames]
         with progress.timed("calibration"):
-            calibrated = calibrate(pitch, [*found, *seen], frames, remembered, Options(seed=seed), stop=stop)
+            calibrated = calibrate(pitch, [*found, *beside], frames, remembered, Options(seed=seed), stop=stop)
     return FoundCameras(
         pitch,
         [_judged(camera, placed[camera.id], calibrated) for camera in sought],
@@ -130,6 +132,33 @@ class _Remembered:
         """As the network."""
         known = self._responses.get(id(frame))
         return self._segment(frame, regions) if known is None else known
+
+
+def _seen(
+    sought: SoughtCamera, frames: Sequence[Frame], responses: Sequence[NDArray[np.uint8]]
+) -> tuple[Channels, NDArray[np.float32]]:
+    """The frames of a camera, and the fused response of the network (H, W) in 0..1, 0 where they are ignored."""
+    swayed = sways(frames, sought.lenses[0].lens)
+    response = median(responses, swayed) / np.float32(255)
+    if sought.ignored is not None:
+        response[sought.ignored.area] = 0
+    return Channels(frames, swayed), response
+
+
+def _with_lenses_of_others(
+    sought: Sequence[SoughtCamera], alone: Mapping[str, Relocalisation]
+) -> Iterator[SoughtCamera]:
+    """Cameras that were not found, each with the lenses that were found for others: often all are of one kind."""
+    for one in sought:
+        if not one.is_lens_sought or alone[one.id].refusal is None:
+            continue
+        lenses = [
+            SoughtLens.around(alone[other.id].candidates[0].camera.intrinsics, OF_ONE_KIND)
+            for other in sought
+            if other.size == one.size and alone[other.id].refusal is None
+        ]
+        if lenses:
+            yield replace(one, lenses=lenses)
 
 
 def _on_their_sides(

@@ -17,11 +17,12 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import HALF_TURN, Hypotheses
 from worker.calibration.relocalisation.line_assignment import positions
 from worker.calibration.relocalisation.line_view import LineView
-from worker.calibration.relocalisation.rotation_voting import focal_lengths, vote
+from worker.calibration.relocalisation.rotation_voting import Direction, focal_lengths, vote
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
 
 DIRECTIONS_KNOWN, DIRECTIONS_UNKNOWN = 24, 36
 POSITIONS_KNOWN, POSITIONS_UNKNOWN = 220, 120
+WITH_NEIGHBOURS, NEIGHBOURS, NEIGHBOUR_DEG = 6, 6, (1.5, 1.5, 0.5)
 FIRST_TOLERANCE_PX, DRAWN_TOLERANCE_PX = 8.0, 10.0
 CLIMBING_KNOWN, CLIMBING_UNKNOWN = 60, 160
 CLEARLY_FOUND = 0.45
@@ -59,7 +60,7 @@ def _through(
     if view.painted_px == 0:
         return []
     focal, known = focal_lengths(view, lens), lens.is_known
-    directions = vote(view, focal, DIRECTIONS_KNOWN if known else DIRECTIONS_UNKNOWN, rng)
+    directions = _with_neighbours(vote(view, focal, DIRECTIONS_KNOWN if known else DIRECTIONS_UNKNOWN, rng), rng)
     most = POSITIONS_KNOWN if known else POSITIONS_UNKNOWN
     by_lines = _at(place, field, Hypotheses.joined([positions(field, view, one, most) for one in directions]))
     start = _best(field, view, by_lines, FIRST_TOLERANCE_PX, CLIMBING_KNOWN if known else CLIMBING_UNKNOWN)
@@ -73,6 +74,15 @@ def _through(
         for rotation, position, focal, score in zip(
             found.rotations, found.positions, found.focal_px, scores, strict=True
         )
+    ]
+
+
+def _with_neighbours(directions: list[Direction], rng: np.random.Generator) -> list[Direction]:
+    """The directions, and some around the best ones: votes of a strongly bent or noisy picture are off by a degree."""
+    return directions + [
+        replace(one, pan_tilt_roll=one.pan_tilt_roll + np.radians(NEIGHBOUR_DEG) * rng.normal(size=3))
+        for one in directions[:WITH_NEIGHBOURS]
+        for _ in range(NEIGHBOURS)
     ]
 
 

@@ -39,12 +39,13 @@ PROPOSED_APART, DIFFERENT = 0.04, 0.01
 of the frame, on mean."""
 LEAST_FOUND = 0.7
 """Of the expected lines, beyond chance. Right poses on real frames find 0.86 and more, wrong ones up to 0.9."""
-RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.15
+RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, MORE_EXPLAINED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.05, 0.15
 """A different pose may be the true one that agrees little less both ways, and whose overlap with the lines is this part
-of that of the best, or which misses no more than so many times as much of its lines and a few more."""
+of that of the best, or which misses no more than so many times as much of its lines and a few more, or explains more of
+the paint."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
-"""How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 at
-half the width of the frame."""
+"""How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
+k2 at half the width of the frame."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
@@ -53,13 +54,14 @@ Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", 
 class Candidate:
     """A camera that may have taken the frame, refined.
 
-    `agreement`: the harmonic mean of how much of the lines that it expects is seen beyond chance, as `evidence` has it,
-    and of how much of the paint in the frame lies on such a line, 0..1; `residual_px`: rms of its lines, None where too
-    few were measured, as `sigma`.
+    `agreement` 0..1: the harmonic mean of how much of the lines that it expects is seen beyond chance, as `evidence`
+    has it, and of how much of the paint in the frame is `explained`, lies on such a line; `residual_px`: rms of its
+    lines, None where too few were measured, as `sigma`.
     """
 
     camera: Camera
     agreement: float
+    explained: float
     evidence: Evidence
     overlap: Overlap
     residual_px: float | None
@@ -115,15 +117,16 @@ class _Sight:
         return self._candidate(refine(self.field, [camera], self.observations, 0.0, searches_px=SEARCH_PX).each[0])
 
     def with_lens_and_pose(self, camera: Camera) -> Candidate:
-        """The same with focal length and bend, and with the principal point once its pose has caught the lines."""
+        """The same with focal length and bend, and with principal point and k2 once its pose has caught the lines."""
         width, focal = camera.intrinsics.size[0], camera.intrinsics.focal_length_px
         coarse = [
             LensParameter(0, "focal_length_px", FREE_FOCAL * focal),
             LensParameter(0, "k1", FREE_BEND * (2 * focal / width) ** 2),
         ]
-        centre = [LensParameter(0, f"principal_point_{axis}_px", FREE_CENTRE * width) for axis in ("x", "y")]
+        fine = [LensParameter(0, f"principal_point_{axis}_px", FREE_CENTRE * width) for axis in ("x", "y")]
+        fine += [LensParameter(0, "k2", FREE_BEND * (2 * focal / width) ** 4)]
         caught = refine(self.field, [camera], self.observations, 0.0, coarse, SEARCH_PX).each[0].camera
-        found = refine(self.field, [caught], self.observations, 0.0, [*coarse, *centre]).each[0]
+        found = refine(self.field, [caught], self.observations, 0.0, [*coarse, *fine]).each[0]
         return self._candidate(replace(found, camera=_with_sigmas(found)))
 
     def _candidate(self, found: RefinedPose) -> Candidate:
@@ -132,7 +135,7 @@ class _Sight:
         both = 2 * seen * explained / max(seen + explained, 1e-9)
         sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
         overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
-        return Candidate(found.camera, both, found.evidence, overlap, found.residual_px, sigma)
+        return Candidate(found.camera, both, explained, found.evidence, overlap, found.residual_px, sigma)
 
 
 def _distinct(field: Field, markings: FieldMap, sought: SoughtCamera, proposals: Sequence[Proposal]) -> list[Camera]:
@@ -192,7 +195,11 @@ def _explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
     if other.agreement < best.agreement - LESS_AGREEMENT:
         return False
     missed, its = (1 - one.evidence.agreement for one in (best, other))
-    return its < MORE_MISSED * missed + FEW_MISSED or other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou
+    return (
+        its < MORE_MISSED * missed + FEW_MISSED
+        or other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou
+        or other.explained > best.explained + MORE_EXPLAINED
+    )
 
 
 def twin(camera: Camera) -> Camera:
