@@ -32,6 +32,8 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
+ATTEMPTS = 2
+"""Where no pose explains the lines the search, which draws at random, is begun anew: so often in all."""
 REFINED, MUCH_WORSE = 4, 0.12
 """So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
 PROPOSED_APART, DIFFERENT = 0.04, 0.01
@@ -96,12 +98,18 @@ def relocalise(
     """
     small = np.rint(response * 255).astype(np.uint8)
     sight = _Sight(field, Observations([channels], [response]), Paint.of(small))
-    candidates = [
-        sight.with_lens_and_pose(camera) if sought.is_lens_sought else sight.with_pose(camera)
-        for camera in _distinct(field, markings, sought, propose(markings, small, sought, seed))
-    ]
-    candidates.sort(key=lambda one: -one.agreement)
-    return Relocalisation(candidates, _refusal(field, markings, candidates))
+    candidates = list[Candidate]()
+    for attempt in range(ATTEMPTS):
+        proposals = propose(markings, small, sought, seed + attempt)
+        candidates += [
+            sight.with_lens_and_pose(camera) if sought.is_lens_sought else sight.with_pose(camera)
+            for camera in _distinct(field, markings, sought, proposals)
+        ]
+        candidates.sort(key=lambda one: -one.agreement)
+        found = Relocalisation(candidates[:REFINED], _refusal(field, markings, candidates))
+        if not candidates or found.refusal is None or found.refusal.reason != "lines":
+            break
+    return found
 
 
 @dataclass(frozen=True)
