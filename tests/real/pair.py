@@ -57,8 +57,11 @@ class RealPair:
 
     def clicked_rms(self, camera_id: str, pose: Pose) -> float:
         """Rms (px) of the hand-clicked pitch points."""
-        camera = next(c for c in self.cameras if c.id == camera_id).with_pose(pose)
-        world = np.array([click["world"] for click in self.clicks[camera_id]], dtype=float)
-        pixel = np.array([click["pixel"] for click in self.clicks[camera_id]])
+        return self.clicked_rms_of(next(c for c in self.cameras if c.id == camera_id).with_pose(pose))
+
+    def clicked_rms_of(self, camera: Camera) -> float:
+        """The same of a camera with a lens of its own."""
+        world = np.array([click["world"] for click in self.clicks[camera.id]], dtype=float)
+        pixel = np.array([click["pixel"] for click in self.clicks[camera.id]])
         off = camera.project(self.pitch.lift(world)) - pixel
         return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
