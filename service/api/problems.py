@@ -47,7 +47,7 @@ def validation_problem(
 
 
 def not_json(request: Request) -> Problem:
-    """The same answer wherever a document comes as something else."""
+    """Answer a document that came as another media type."""
     got = request.headers.get("content-type", "")[:200]
     # RFC 5789, section 2.2.
     headers = {"Accept-Patch": MERGE_PATCH} if request.method == "PATCH" else None

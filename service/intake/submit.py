@@ -14,7 +14,7 @@ from service.store.database import DATABASE_OUTAGES
 from service.store.expiry import ExpiryRepository
 from service.store.jobs.attempts import Enqueue
 from service.store.jobs.files import frame_folder
-from service.store.jobs.submission import Refusal, Submission, SubmissionRepository
+from service.store.jobs.submission import Submission, SubmissionRefused, SubmissionRepository
 from service.store.jobs.task import Origin
 
 # Longer than any upload takes from its first stored frame to its job.
@@ -41,7 +41,7 @@ class Intake:
     def take(self, submission: Submission, store: Callable[[], None]) -> tuple[Job, bool]:
         """Store the files of a checked submission and make it a job, or find the job it already is; says if it is new.
 
-        `store` puts them where the submission says. Raises a `Refusal`, and a `Problem` that `store` raises.
+        `store` puts them where the submission says. Raises a `SubmissionRefused`, and a `Problem` that `store` raises.
         """
         venue_id = None if submission.venue is None else submission.venue.id
         known = self._submissions.same_as(
@@ -56,7 +56,7 @@ class Intake:
         try:
             store()
             job, new = self._submissions.submit(submission, self._settings.queue_limit, self._enqueue)
-        except (Refusal, Problem):
+        except (SubmissionRefused, Problem):
             self._take_back(submission.job_id)
             raise
         if not new:

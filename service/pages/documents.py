@@ -61,7 +61,7 @@ def _section(name: str, anchor: str) -> list[Token]:
 
 @cache
 def reason(name: str, anchor: str, word: str) -> str:
-    """Of a section that is about several reasons, what is about this one; else the whole section."""
+    """Return what a section that is about several reasons says of this one; else the whole section."""
     tokens = _section(name, anchor)
     begins = [
         (number, f"`{word}`" in tokens[number + 1].content)

@@ -117,7 +117,7 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
 
 
 def kept_jobs(context: Repositories, revisions: list[Revision], health: VenueHealth | None) -> Collection[str]:
-    """Of the jobs that a page names beside the last calibrations, those that were not deleted."""
+    """Return the jobs that a page names beside the last calibrations, but for those that were deleted."""
     jobs = {one.job for one in revisions if one.job}
     if health and health.schedule and health.schedule.last_job:
         jobs.add(health.schedule.last_job)

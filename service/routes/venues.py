@@ -56,7 +56,7 @@ PATCH_BODY: dict[str, Any] = {
 
 
 def venue_busy(job_id: str) -> Problem:
-    """The same answer wherever a venue's active job is in the way."""
+    """Answer whose request a venue's active job is in the way of."""
     return Problem(
         "venue-busy",
         f"Wait for job {job_id} of the same venue or cancel it.",
@@ -95,12 +95,12 @@ def no_refined_since(venue_id: str) -> str:
 
 
 def revision_unfit(unfit: RevisionUnfit) -> Problem:
-    """The same answer wherever a revision is put back."""
+    """Answer who puts a revision back that cannot hold."""
     return Problem("revision-unfit", f"{unfit} PUT the venue with the poses that you want.")
 
 
 def venue_moved_on(venue_id: str | None, job_id: str, moved: VenueHasChanged) -> Problem:
-    """The same answer wherever something of a job is to hold, and the venue has changed since."""
+    """Answer who wants something of a job to hold after the venue has changed."""
     newest = moved.newest
     is_now = f"at revision {newest.revision} ({newest.cause})" if newest else "deleted"
     return Problem(

@@ -18,7 +18,7 @@ from service.schemas.names import FieldNumber
 from service.schemas.results import AdoptableNumber, Result
 from service.schemas.venue import Venue
 from service.store.alarms import update_alarms
-from service.store.database import Repository, advisory_lock, reading, writing
+from service.store.database import Repository, reading
 from service.store.events.event_log import add_venue_event
 from service.store.jobs.decisions import VenueHasChanged
 from service.store.jobs.queries import found_poses
@@ -34,7 +34,7 @@ from service.store.revisions import (
 )
 from service.store.statistics.venue_quality import update_quality
 from service.store.trends import forget_trends
-from service.store.venues import StoredVenue, find_stored, find_venue, save_venue, venue_lock, with_result
+from service.store.venues import StoredVenue, changing_venue, find_venue, save_venue, with_result
 
 
 class NoSuchJob(Exception):  # noqa: N818
@@ -90,13 +90,8 @@ class AdoptedFieldRepository(Repository):
         calibration moves them. Raises `NoSuchJob`, `NotAdoptable`, `VenueHasChanged` and `NumberRefused`. Nothing is
         written if the field has that number already.
         """
-        with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue_id))
-            stored = find_stored(connection, venue_id)
-            before = None if stored is None else stored.venue
-            allow(before)
-            assert stored is not None
-            assert before is not None
+        with changing_venue(self._engine, venue_id, allow) as (connection, stored):
+            before = stored.venue
             found = found_poses(connection, job_id)
             if found is None or found[0].id != venue_id:
                 raise NoSuchJob

@@ -16,12 +16,12 @@ from service.schemas.results import Refined
 from service.schemas.venue import Camera, Venue
 from service.store import tables
 from service.store.alarms import update_alarms
-from service.store.database import Repository, advisory_lock, reading, writing
+from service.store.database import Repository, reading
 from service.store.jobs.queries import found_poses
 from service.store.memories import keep_memories, newest_memories
 from service.store.revisions import CALIBRATION_CAUSES, add_revision
 from service.store.statistics.venue_quality import update_quality
-from service.store.venues import find_stored, save_venue, venue_lock, with_result
+from service.store.venues import changing_venue, save_venue, with_result
 
 # Revisions in which the last accepted pose of a camera is looked for: others may have been accepted without it since.
 LOOKED_BACK = 20
@@ -63,12 +63,8 @@ class RefinedPoseRepository(Repository):
         The memories stay: they hold measurements, which are the same whatever the lens is taken to be. Raises
         `NoRefinedPose`. Nothing is written if the camera has that pose and lens already.
         """
-        with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue_id))
-            stored = find_stored(connection, venue_id)
-            before = None if stored is None else stored.venue
-            allow(before)
-            assert before is not None
+        with changing_venue(self._engine, venue_id, allow) as (connection, stored):
+            before = stored.venue
             found = _refined_of(connection, before).get(camera_id)
             if found is None:
                 raise NoRefinedPose

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal
@@ -144,11 +145,7 @@ class VenueRepository(Repository):
 
         Raises `NoSuchRevision` and `RevisionUnfit`. Nothing is written if it holds anyway.
         """
-        with writing(self._engine) as connection:
-            advisory_lock(connection, venue_lock(venue_id))
-            before = find_stored(connection, venue_id)
-            allow(None if before is None else before.venue)
-            assert before is not None
+        with changing_venue(self._engine, venue_id, allow) as (connection, before):
             with update_quality(connection, venue_id) as quality:
                 restored = restore_state(connection, quality, before, number, by)
                 update_alarms(connection, quality, restored)
@@ -206,6 +203,22 @@ class VenueRepository(Repository):
         """Up to `limit` revisions of a venue, newest first, those before number `before`."""
         with reading(self._engine) as connection:
             return revisions_of(connection, venue_id, before, limit)
+
+
+@contextmanager
+def changing_venue(
+    engine: sa.Engine, venue_id: str, allow: Callable[[Venue | None], None]
+) -> Iterator[tuple[sa.Connection, StoredVenue]]:
+    """A transaction that alone may change a venue, and what is stored of it, unless `allow` raises at the sight.
+
+    `allow` raises where it is given None: there is no such venue.
+    """
+    with writing(engine) as connection:
+        advisory_lock(connection, venue_lock(venue_id))
+        stored = find_stored(connection, venue_id)
+        allow(None if stored is None else stored.venue)
+        assert stored is not None
+        yield connection, stored
 
 
 def venue_lock(venue_id: str) -> str:

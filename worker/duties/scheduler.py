@@ -24,7 +24,7 @@ from service.schemas.problems import Problem
 from service.schemas.schedule import Schedule
 from service.schemas.venue import Venue
 from service.settings import Settings
-from service.store.jobs.submission import QueueFull, Refusal, SubmissionRepository, VenueBusy, VenueReplaced
+from service.store.jobs.submission import QueueFull, SubmissionRefused, SubmissionRepository, VenueBusy, VenueReplaced
 from service.store.jobs.task import SCHEDULE, Origin
 from service.store.schedules import Due, Firing, ScheduleRepository
 from service.store.venues import VenueRepository
@@ -127,7 +127,7 @@ class Scheduler:
             except DeferredError as deferred:
                 self._schedules.postpone(firing, self._schedules.now() + DEFER, str(deferred))
                 log.warning("schedule put off", why=str(deferred))
-            except Refusal as refusal:
+            except SubmissionRefused as refusal:
                 self._schedules.done(firing, self._schedules.now(), None, refusal.__doc__)
                 log.warning("schedule fired in vain", why=refusal.__doc__)
             else:

@@ -78,7 +78,7 @@ def with_refined_poses(venue: Venue, refined: dict[str, Refined], camera: str | 
 
 
 def no_refined_pose(camera: str, why: str) -> Problem:
-    """The same answer wherever a refined pose is asked for."""
+    """Answer who asks for a refined pose that a camera does not have."""
     return Problem("refined-not-found", f"Camera {camera} has none: {why}", camera=camera)
 
 

@@ -15,7 +15,7 @@ from service.schemas.job import Job
 from service.schemas.names import JobKind
 from service.schemas.options import FieldOptions, Options
 from service.schemas.venue import Venue
-from service.store.jobs.submission import Refusal
+from service.store.jobs.submission import SubmissionRefused
 
 router = APIRouter(tags=["jobs"], route_class=Guarded)
 
@@ -81,6 +81,6 @@ def fetch(context: Context, venue_id: str, options: Options, sender: Sender) -> 
     """Make what the cameras of a venue show now a job."""
     try:
         job, new = context.from_sources.calibrate(venue_id, options, sender.idempotency_key, sender.origin)
-    except Refusal as refusal:
+    except SubmissionRefused as refusal:
         raise job_submission.refusal_problem(refusal, venue_id, context.settings) from None
     return job_submission.submission_response(job, new)

@@ -23,7 +23,15 @@ from service.schemas.venue import Venue
 from service.settings import Settings
 from service.store.ids import new_id
 from service.store.jobs.files import frame_folder
-from service.store.jobs.submission import KeyReused, QueueFull, Refusal, Submission, VenueBusy, VenueGone, VenueReplaced
+from service.store.jobs.submission import (
+    KeyReused,
+    QueueFull,
+    Submission,
+    SubmissionRefused,
+    VenueBusy,
+    VenueGone,
+    VenueReplaced,
+)
 from service.store.jobs.task import AnyOptions, Origin, kind_of, seeded
 
 # By camera, of photos by their names.
@@ -75,7 +83,7 @@ def enqueue(context: Context, submission: Submission, store: Callable[[], None])
     """A submission as a job, or the job that it already is; says if it is new. `store` puts its frames in place."""
     try:
         return context.intake.take(submission, store)
-    except Refusal as refusal:
+    except SubmissionRefused as refusal:
         raise refusal_problem(
             refusal, "" if submission.venue is None else submission.venue.id, context.settings
         ) from None
@@ -128,7 +136,7 @@ def _submission(context: Context, venue: Venue | None, options: AnyOptions, file
     )
 
 
-def refusal_problem(refusal: Refusal, venue_id: str, settings: Settings) -> Problem:
+def refusal_problem(refusal: SubmissionRefused, venue_id: str, settings: Settings) -> Problem:
     """Why a submission becomes no job."""
     match refusal:
         case KeyReused():

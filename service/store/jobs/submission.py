@@ -50,33 +50,33 @@ def fetched_hash(options: Options) -> str:
     return FETCHED + hashlib.sha256(options.model_dump_json().encode()).hexdigest()[: 64 - len(FETCHED)]
 
 
-class Refusal(Exception):  # noqa: N818
+class SubmissionRefused(Exception):  # noqa: N818
     """Why a submission becomes no job."""
 
 
-class KeyReused(Refusal):
+class KeyReused(SubmissionRefused):
     """The idempotency key belongs to a job of other content."""
 
     def __init__(self, job_id: str) -> None:
         self.job_id = job_id
 
 
-class VenueBusy(Refusal):
+class VenueBusy(SubmissionRefused):
     """The venue has an active job of other content."""
 
     def __init__(self, job_id: str) -> None:
         self.job_id = job_id
 
 
-class VenueGone(Refusal):
+class VenueGone(SubmissionRefused):
     """The venue was deleted while its frames arrived."""
 
 
-class VenueReplaced(Refusal):
+class VenueReplaced(SubmissionRefused):
     """The pitch or a lens of the venue was changed while its frames arrived: they were checked against another one."""
 
 
-class QueueFull(Refusal):
+class QueueFull(SubmissionRefused):
     """As many jobs wait as may."""
 
     def __init__(self, waiting: int, kept: int) -> None:

@@ -61,7 +61,7 @@ class Origin:
 
     @property
     def actor(self) -> Actor | None:
-        """Who is said to have made the change; None: nothing is known of it."""
+        """The actor that history and events name for the change; None: nothing is known of one."""
         if self.request_id is None and self.asked_by is None:
             return None
         return Actor(name=self.asked_by or ANYONE, address=self.address, request_id=self.request_id)
