@@ -7,12 +7,10 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from service.schemas.addresses import SourceUrl
-from service.schemas.base import OPEN_WORD, Id, Name, Number, Schema
-from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Intrinsics, Pose, PoseIn, Position, Side
-from service.schemas.names import OPTIONS_PART
+from service.schemas.base import OPEN_WORD, Id, Number, Schema
+from service.schemas.geometry import Intrinsics, Pose, PoseIn, Position, Side, require_camera_id
 from service.schemas.results import CPU_S, Provenance, Sigma
-from service.schemas.venue import Ignore
+from service.schemas.venue import Ignore, NamedField, require_distinct_ids
 
 FieldSide = Annotated[
     Literal["near", "far", "left", "right"],
@@ -45,8 +43,7 @@ class SoughtCameraIn(Schema):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if self.id == OPTIONS_PART:
-            raise ValueError("a camera cannot be called 'options': that is a part of the upload")
+        require_camera_id(self.id)
         if self.intrinsics is not None and self.field_of_view_deg is not None:
             raise ValueError(f"camera {self.id} has intrinsics and field_of_view_deg: leave one of them out")
         if self.pose is not None and (self.intrinsics is None or self.image_size is None):
@@ -56,19 +53,14 @@ class SoughtCameraIn(Schema):
         return self
 
 
-class SoughtSite(Schema):
+class SoughtSite(NamedField):
     """The file of a venue whose cameras may lack poses, and lenses."""
 
-    id: Id
-    name: Name = ""
-    field: FieldOfPlay
     cameras: Annotated[list[SoughtCameraIn], Field(min_length=1, max_length=32)]
 
     @model_validator(mode="after")
     def _cameras_differ(self) -> Self:
-        ids = [camera.id for camera in self.cameras]
-        if len(set(ids)) < len(ids):
-            raise ValueError("two cameras have the same id")
+        require_distinct_ids([camera.id for camera in self.cameras])
         return self
 
 

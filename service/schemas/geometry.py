@@ -170,6 +170,12 @@ class Light(Schema):
     reach: Annotated[Number, Field(ge=-3, le=3)] = 0.0
 
 
+def require_camera_id(camera_id: str) -> None:
+    """Raise `ValueError` for an id that no camera can have."""
+    if camera_id == OPTIONS_PART:
+        raise ValueError("a camera cannot be called 'options': that is a part of the upload")
+
+
 class UnposedCamera(Schema):
     """What a camera is, but for its pose."""
 
@@ -179,8 +185,7 @@ class UnposedCamera(Schema):
 
     @model_validator(mode="after")
     def _plausible(self) -> Self:
-        if self.id == OPTIONS_PART:
-            raise ValueError("a camera cannot be called 'options': that is a part of the upload")
+        require_camera_id(self.id)
         (fx, _, cx), (_, fy, cy), _ = self.intrinsics.matrix
         width, height = self.image_size
         for focal, centre, size in ((fx, cx, width), (fy, cy, height)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
@@ -139,19 +139,27 @@ PATCH_EXAMPLES: dict[str, Any] = {
 }
 
 
-class _Place(Schema):
+def require_distinct_ids(ids: Sequence[str]) -> None:
+    """Raise `ValueError` where two cameras of a venue have the same id."""
+    if len(set(ids)) < len(ids):
+        raise ValueError("two cameras have the same id")
+
+
+class NamedField(Schema):
+    """What every venue has, whether its cameras have poses or not."""
+
     id: Id
     name: Name = ""
     field: FieldOfPlay
 
 
-class Site(_Place):
+class Site(NamedField):
     """The file of a venue before its cameras have poses: the pitch, and the cameras that are known."""
 
     cameras: list[CameraIn] = Field([])
 
 
-class VenueIn(_Place):
+class VenueIn(NamedField):
     """A venue as it is sent."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [VENUE_EXAMPLE]})
@@ -177,9 +185,7 @@ class VenueIn(_Place):
 
     @model_validator(mode="after")
     def _cameras_differ(self) -> Self:
-        ids = [camera.id for camera in self.cameras]
-        if len(set(ids)) < len(ids):
-            raise ValueError("two cameras have the same id")
+        require_distinct_ids([camera.id for camera in self.cameras])
         return self
 
     @property
@@ -196,7 +202,7 @@ class VenueIn(_Place):
         return Venue(**parts | {"cameras": cameras})
 
 
-class Venue(_Place):
+class Venue(NamedField):
     """A venue with the poses that hold now."""
 
     cameras: list[Camera]

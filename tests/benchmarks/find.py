@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -30,16 +31,18 @@ from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER as RUNS
 from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.find_cameras import find_cameras
-from worker.calibration.geometry.camera import Camera, Frame, inside
+from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.relocalise import twin
+from worker.calibration.relocalisation.relocalise import mean_shift_px
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens, lenses_of_view, unknown_lenses
+from worker.jobs.find import FIELD_OF_VIEW_UNCERTAIN
 
 KNOWING = ("lens", "view", "nothing")
 VIEW_OFF = 0.3
 """A given field of view makes the focal length at most this part longer or shorter than it is."""
-VIEW_UNCERTAIN = 0.15
+UNSEEN_PX = 1e4
+"""How far off a marking counts that a camera does not see which is found."""
 NEAR = 0.0026
 """Found: the markings in view lie, on mean, within this part of the frame's width of where they are (5 px of 1920)."""
 
@@ -143,7 +146,8 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, s
     found = find_cameras(pitch, [sought], [], {truth.id: [frame]}, segment, seed)
     core_s = time.process_time() - cpu
     (camera,) = found.cameras
-    off = float("inf") if camera.camera is None else _off_px(pitch, truth, camera.camera)
+    off_px = partial(mean_shift_px, pitch, FieldMap.of(pitch), truth, unseen_px=UNSEEN_PX)
+    off = off_px(camera.candidates[0].camera) if camera.candidates else float("inf")
     return {
         "accepted": camera.accepted,
         "near": bool(off <= NEAR * truth.intrinsics.size[0]),
@@ -155,7 +159,7 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, s
                 "found": one.evidence.agreement,
                 "unexpected": one.overlap.unexpected,
                 "iou": one.overlap.iou,
-                "off_px": _off_px(pitch, truth, one.camera),
+                "off_px": off_px(one.camera),
             }
             for one in camera.candidates
         ],
@@ -170,20 +174,8 @@ def _lenses(truth: Camera, knowing: str, rng: np.random.Generator) -> list[Sough
         return [SoughtLens.known(truth.intrinsics)]
     if knowing == "view":
         focal = truth.intrinsics.focal_length_px * (1 + VIEW_OFF * rng.uniform(-1, 1))
-        return lenses_of_view(size, float(2 * np.degrees(np.arctan(size[0] / 2 / focal))), VIEW_UNCERTAIN)
+        return lenses_of_view(size, float(2 * np.degrees(np.arctan(size[0] / 2 / focal))), FIELD_OF_VIEW_UNCERTAIN)
     return unknown_lenses(size)
-
-
-def _off_px(pitch: Field, truth: Camera, found: Camera) -> float:
-    """Mean distance of the markings in view from where the camera found, or its twin, puts them."""
-    lines = pitch.line_points().position
-    there = truth.project(lines)
-    seen = inside(there, truth.intrinsics.size)
-    symmetric = FieldMap.of(pitch).is_symmetric
-    return min(
-        float(np.mean(np.nan_to_num(np.linalg.norm(camera.project(lines[seen]) - there[seen], axis=1), nan=1e4)))
-        for camera in ([found, twin(found)] if symmetric else [found])
-    )
 
 
 if __name__ == "__main__":

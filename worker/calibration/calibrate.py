@@ -280,7 +280,7 @@ def segment_all(
             progress.at("segmentation", done / total)
             seen.append(segment(frame, regions))
             done += 1
-        responses.append(of_use(camera, median(seen, swayed[camera.id]) / np.float32(255)))
+        responses.append(of_use(camera.ignored, median(seen, swayed[camera.id]) / np.float32(255)))
     return responses
 
 

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.exclusions import of_use
 from worker.calibration.detection.frame_fusion import median, sways
 from worker.calibration.detection.segmentation import Region, whole_frame
-from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options, Progress, ProgressReporter, Segment, StageTimings
 from worker.calibration.relocalisation.field_halves import choose_sides
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.relocalise import Candidate, Refusal, Relocalisation, relocalise, twin
+from worker.calibration.relocalisation.relocalise import Candidate, NotFound, Relocalisation, relocalise, twin
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
 OF_ONE_KIND = 0.03
@@ -31,27 +31,19 @@ SEGMENTED, SEARCHED = 0.2, 0.85
 class FoundCamera:
     """What was found for one camera that was sought.
 
-    `candidates`: cameras that may have taken its frame, the best first, for a person to choose from; `refusal`: why the
-    best one is not taken, None where it is; `remarks`: what was assumed. `calibrated`: as a calibration has it that
-    began with the best candidate, None where it came to none.
+    `candidates`: cameras that may have taken its frame, the best first, for a person to choose from; a best one that is
+    accepted is at the pose of a calibration that began with it. `refusal`: why the best one is not taken, None where it
+    is; `remarks`: what was assumed.
     """
 
     id: str
     candidates: Sequence[Candidate]
-    refusal: Refusal | None
+    refusal: NotFound | None
     remarks: Sequence[str]
-    calibrated: CameraResult | None
-
-    @property
-    def camera(self) -> Camera | None:
-        """The best candidate, as calibrated with the others; None without any."""
-        if self.calibrated is not None and self.calibrated.accepted:
-            return self.calibrated.camera
-        return self.candidates[0].camera if self.candidates else None
 
     @property
     def accepted(self) -> bool:
-        """Whether a calibration can begin with it."""
+        """Whether a calibration can begin with the best candidate."""
         return self.refusal is None
 
 
@@ -59,7 +51,6 @@ class FoundCamera:
 class FoundCameras:
     """The cameras that were sought; `stitch_error_px`: between those that were accepted, None where none overlap."""
 
-    pitch: Field
     cameras: Sequence[FoundCamera]
     stitch_error_px: float | None
     timings: StageTimings
@@ -115,7 +106,6 @@ def find_cameras(
         with progress.timed("calibration"):
             calibrated = calibrate(pitch, [*found, *beside], frames, remembered, Options(seed=seed), stop=stop)
     return FoundCameras(
-        pitch,
         [_judged(camera, placed[camera.id], calibrated) for camera in sought],
         None if calibrated is None else calibrated.stitch_error_px,
         progress.timings,
@@ -139,10 +129,7 @@ def _seen(
 ) -> tuple[Channels, NDArray[np.float32]]:
     """The frames of a camera, and the fused response of the network (H, W) in 0..1, 0 where they are ignored."""
     swayed = sways(frames, sought.lenses[0].lens)
-    response = median(responses, swayed) / np.float32(255)
-    if sought.ignored is not None:
-        response[sought.ignored.area] = 0
-    return Channels(frames, swayed), response
+    return Channels(frames, swayed), of_use(sought.ignored, median(responses, swayed) / np.float32(255))
 
 
 def _with_lenses_of_others(
@@ -181,14 +168,17 @@ def _on_their_sides(
             placed[camera] = replace(found, candidates=[first, *others], remarks=remarks)
             continue
         both = [first, replace(first, camera=twin(side.camera)), *others]
-        placed[camera] = replace(found, candidates=both, refusal=Refusal("not-unique", side.remark or ""))
+        placed[camera] = replace(found, candidates=both, refusal=NotFound("not-unique", side.remark or ""))
     return placed
 
 
 def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration | None) -> FoundCamera:
     """What was found, and what a calibration that began with it says."""
     if found.refusal is not None or calibrated is None:
-        return FoundCamera(sought.id, found.candidates, found.refusal, found.remarks, None)
+        return FoundCamera(sought.id, found.candidates, found.refusal, found.remarks)
     (result,) = (one for one in calibrated.cameras if one.camera.id == sought.id)
-    refusal = None if result.refusal is None else Refusal("not-confirmed", result.refusal.words)
-    return FoundCamera(sought.id, found.candidates, refusal, found.remarks, result)
+    if result.refusal is not None:
+        refusal = NotFound("not-confirmed", result.refusal.words)
+        return FoundCamera(sought.id, found.candidates, refusal, found.remarks)
+    best, *others = found.candidates
+    return FoundCamera(sought.id, [replace(best, camera=result.camera), *others], None, found.remarks)

@@ -199,18 +199,18 @@ class ProgressReporter:
 
     def at(self, stage: Stage, share: float, generation: int | None = None, loss: float | None = None) -> None:
         """Report `share` 0..1 of `stage`; raise `Stopped` when asked to stop."""
-        if self.stop():
-            raise Stopped
         begin, end = SHARE_OF_JOB[stage]
-        # A second search does not take back what has been reported.
-        self.fraction = max(self.fraction, begin + share * (end - begin))
-        self.report(Progress(stage, self.fraction, generation, loss))
+        self.at_fraction(stage, begin + share * (end - begin), generation, loss)
 
-    def at_fraction(self, stage: Stage, fraction: float) -> None:
+    def at_fraction(
+        self, stage: Stage, fraction: float, generation: int | None = None, loss: float | None = None
+    ) -> None:
         """Report a `fraction` 0..1 of the whole, where stages have other shares; raise `Stopped` when asked to stop."""
         if self.stop():
             raise Stopped
-        self.report(Progress(stage, fraction))
+        # A second search does not take back what has been reported.
+        self.fraction = max(self.fraction, fraction)
+        self.report(Progress(stage, self.fraction, generation, loss))
 
     def evolution(self, total: int) -> Callable[[int, float], None]:
         """Return the callback that a search of at most `total` generations calls after each one."""

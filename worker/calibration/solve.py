@@ -276,7 +276,7 @@ def ridge_responses(problem: Problem) -> list[Response]:
 def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:
     """Return the ridge response (H, W) of a frame wherever the network would look for markings."""
     lines = VisibleLines.from_camera(pitch.line_points(), camera)
-    return of_use(camera, ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px))
+    return of_use(camera.ignored, ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px))
 
 
 def refine_poses(problem: Problem, begun: Sequence[Camera], progress: ProgressReporter) -> RefinedPoses:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import cast
 
 import cv2
@@ -14,11 +13,10 @@ from service.schemas.find import CandidateResult, FindResult, FoundCameraResult,
 from service.schemas.geometry import Intrinsics, PosedCamera
 from service.schemas.geometry import Pose as PoseSchema
 from service.schemas.job import Progress
-from service.schemas.results import Provenance, Sigma
+from service.schemas.results import Provenance
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.ignored_areas import Ignored
 from worker.calibration.records import CalibrationError
 from worker.calibration.relocalisation.relocalise import Candidate
 from worker.calibration.relocalisation.sought import (
@@ -36,6 +34,7 @@ from worker.jobs.from_schemas import (
     decode_frame,
     decode_image,
     encode_jpeg,
+    ignored_areas_of,
     lens_of,
     pitch_of,
 )
@@ -45,7 +44,9 @@ from worker.jobs.to_schemas import (
     load_segmenter,
     pose_to_schema,
     progress_to_schema,
+    provenance_of,
     round_to_ms,
+    sigma_to_schema,
 )
 from worker.protocol import ComputeResources
 
@@ -86,10 +87,7 @@ def solve(
         for camera in found.cameras
         for name, picture in _pictures(pitch, camera, frames[camera.id][0]).items()
     }
-    provenance = Provenance(
-        software=version("esc-calibration"), model_sha256=segmenter.sha256, seed=seed, options={"seed": seed}
-    )
-    return FoundSite(_result(found, sought, provenance), pictures)
+    return FoundSite(_result(found, sought, provenance_of(segmenter, seed, {"seed": seed})), pictures)
 
 
 def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:
@@ -109,12 +107,11 @@ def _sought(camera: SoughtCameraIn, frame: Picture) -> SoughtCamera:
     height, width = frame.shape[:2]
     size = (width, height)
     position = None if camera.position is None else np.array(camera.position)
-    polygons = [np.array(polygon, dtype=float) for polygon in camera.ignore]
     return SoughtCamera(
         camera.id,
         _lenses(camera, size),
         Place(camera.side, position, camera.position_radius_m),
-        Ignored(polygons, size) if polygons else None,
+        ignored_areas_of(camera.ignore, size),
     )
 
 
@@ -137,13 +134,11 @@ def _known(camera: SoughtCameraIn) -> Camera:
 
 def _pictures(pitch: Field, camera: FoundCamera, frame: Picture) -> dict[str, bytes]:
     """A picture of each candidate, the best first."""
-    best = camera.camera
-    shown = [one.camera for one in camera.candidates]
-    if best is not None:
-        shown[0] = best
     return {
-        f"candidate_{camera.id}_{number}": encode_jpeg(candidate_picture(pitch, one, frame, f"candidate {number}"))
-        for number, one in enumerate(shown, start=1)
+        f"candidate_{camera.id}_{number}": encode_jpeg(
+            candidate_picture(pitch, one.camera, frame, f"candidate {number}")
+        )
+        for number, one in enumerate(camera.candidates, start=1)
     }
 
 
@@ -161,9 +156,6 @@ def _result(found: FoundCameras, sought: Sequence[SoughtCamera], provenance: Pro
 
 
 def _camera(found: FoundCamera, size: tuple[int, int]) -> FoundCameraResult:
-    candidates = [_candidate(one) for one in found.candidates]
-    if found.calibrated is not None and found.calibrated.accepted:
-        candidates[0] = candidates[0].model_copy(update={"pose": pose_to_schema(found.calibrated.camera.pose)})
     return FoundCameraResult(
         id=found.id,
         accepted=found.accepted,
@@ -171,17 +163,16 @@ def _camera(found: FoundCamera, size: tuple[int, int]) -> FoundCameraResult:
         rejected_because=None if found.refusal is None else found.refusal.words,
         remarks=list(found.remarks),
         image_size=list(size),
-        candidates=candidates,
+        candidates=[_candidate(one) for one in found.candidates],
     )
 
 
 def _candidate(candidate: Candidate) -> CandidateResult:
-    sigma = candidate.sigma
     return CandidateResult(
         intrinsics=lens_to_schema(candidate.camera.intrinsics),
         pose=pose_to_schema(candidate.camera.pose),
         agreement=candidate.agreement,
         lines_found=candidate.evidence.share,
         residual_px=finite_or_none(candidate.residual_px),
-        sigma=None if sigma is None else Sigma(rotation_deg=sigma.rotation_deg, position_m=sigma.position_m),
+        sigma=sigma_to_schema(candidate.sigma),
     )

@@ -98,5 +98,7 @@ def solve(
     spent.add(answer.timings)
     with spent.timed("preview"):
         drawn = draw(given, answer)
-    result = tell(answer, spent, provenance_of(segmenter, options))
+    # Who is told changes no number, and the address may be a secret.
+    asked = options.model_dump(mode="json", exclude={"callback_url"})
+    result = tell(answer, spent, provenance_of(segmenter, options.seed or 0, asked))
     return Solution(result, drawn.pictures, drawn.later, remember(answer))

@@ -118,6 +118,11 @@ def light_of(light: geometry.Light) -> Light:
 
 def camera_with_ignored_areas(camera: geometry.PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:
     """The engine's camera, with the polygons of its frames that are to be ignored."""
-    width, height = camera.image_size
+    return replace(camera_of(camera), ignored=ignored_areas_of(ignore, camera.image_size))
+
+
+def ignored_areas_of(ignore: Sequence[Sequence[Sequence[float]]], image_size: Sequence[int]) -> Ignored | None:
+    """The polygons of a camera's frames that are to be ignored, for the engine; None without any."""
+    width, height = image_size
     polygons = [np.array(polygon, dtype=float) for polygon in ignore]
-    return replace(camera_of(camera), ignored=Ignored(polygons, (width, height)) if polygons else None)
+    return Ignored(polygons, (width, height)) if polygons else None

@@ -20,13 +20,10 @@ from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.far_marking import far_marking_shift_m
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement import uncertainty
 from worker.jobs.to_schemas import lens_to_schema, pose_to_schema, sigma_to_schema
-
-WIRE_NAMES = dict(zip(LENS_NUMBERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
-"""What the numbers of a lens are called in `geometry.Intrinsics.sigma`."""
 
 
 def read_memories(told: Mapping[str, Mapping[str, Any]]) -> dict[str, CameraMemory]:
@@ -66,7 +63,7 @@ def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:
     if covariance is None:
         return None
     sigma = np.sqrt(np.diag(covariance)[POSE_NUMBERS:]).clip(geometry.LEAST_SIGMA, geometry.LARGEST_SIGMA)
-    return dict(zip(WIRE_NAMES.values(), sigma.tolist(), strict=True))
+    return dict(zip(SIGMA_NAMES.values(), sigma.tolist(), strict=True))
 
 
 def lens_change_to_schema(found: CameraResult, tonight: datetime | None) -> LensChange | None:

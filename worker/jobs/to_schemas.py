@@ -11,7 +11,6 @@ from typing import Any, Generic, TypeVar
 from service.schemas import geometry
 from service.schemas.geometry import Moved
 from service.schemas.job import Progress
-from service.schemas.options import FieldOptions, Options
 from service.schemas.problems import refusal_uri
 from service.schemas.results import (
     AnyResult,
@@ -60,15 +59,9 @@ class Solution(Generic[R]):
     memories: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def provenance_of(segmenter: Segmenter, options: Options | FieldOptions) -> Provenance:
-    """What computes a solution, so that it can be computed again."""
-    return Provenance(
-        software=version("esc-calibration"),
-        model_sha256=segmenter.sha256,
-        seed=options.seed or 0,
-        # Who is told changes no number, and the address may be a secret.
-        options=options.model_dump(mode="json", exclude={"callback_url"}),
-    )
+def provenance_of(segmenter: Segmenter, seed: int, options: dict[str, Any]) -> Provenance:
+    """What computes a solution by these options, so that it can be computed again."""
+    return Provenance(software=version("esc-calibration"), model_sha256=segmenter.sha256, seed=seed, options=options)
 
 
 def round_to_ms(timings_s: Mapping[str, float]) -> dict[str, float]:

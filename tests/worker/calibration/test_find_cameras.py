@@ -29,8 +29,8 @@ def test_a_pair_is_found_on_one_side_and_fits_together():
     found, _ = both()
     for truth, camera in zip(pair(), found.cameras, strict=True):
         assert camera.accepted, camera.refusal
-        assert np.linalg.norm(camera.camera.pose.position - truth.pose.position) < 0.03
-        assert rotation_angles_deg(camera.camera.pose.rotation, truth.pose.rotation) < 0.05
+        assert np.linalg.norm(camera.candidates[0].camera.pose.position - truth.pose.position) < 0.03
+        assert rotation_angles_deg(camera.candidates[0].camera.pose.rotation, truth.pose.rotation) < 0.05
     assert found.stitch_error_px < 0.2
 
 
@@ -50,7 +50,7 @@ def test_a_camera_is_found_beside_one_that_is_known():
     found = find_cameras(CROWNED, [sought(right)], [left], FRAMES, white_on_green, 1)
     (camera,) = found.cameras
     assert camera.accepted
-    assert np.linalg.norm(camera.camera.pose.position - right.pose.position) < 0.03
+    assert np.linalg.norm(camera.candidates[0].camera.pose.position - right.pose.position) < 0.03
 
 
 def test_who_is_asked_to_stop_stops():

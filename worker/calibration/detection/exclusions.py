@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ignored_areas import Ignored
 from worker.calibration.geometry.visibility import VisibleLines
 
 BESIDE_PX = 6.0
@@ -32,9 +33,9 @@ def left_out(pitch: Field, camera: Camera) -> NDArray[np.bool_] | None:
     return band if ignored is None else band | ignored
 
 
-def of_use(camera: Camera, response: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A response (H, W) to the frame of a camera, 0 where it is ignored."""
-    return response if camera.ignored is None else np.where(camera.ignored.area, np.float32(0), response)
+def of_use(ignored: Ignored | None, response: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A response (H, W) to the frame of a camera, 0 where the frame is ignored."""
+    return response if ignored is None else np.where(ignored.area, np.float32(0), response)
 
 
 def line_band(seen: VisibleLines, size: tuple[int, int], tolerance: float) -> NDArray[np.uint8]:

@@ -26,6 +26,8 @@ IN_PIXELS = ("fx", "fy", "cx", "cy")
 LENS_NUMBERS = ("focal_length_px", "principal_point_x_px", "principal_point_y_px", "aspect", "k1", "k2")
 """The numbers of a lens that lines are asked for: fx, with which fy changes in proportion; cx and cy; fy / fx, which
 changes fy alone; the first two coefficients of the distortion."""
+SIGMA_NAMES = dict(zip(LENS_NUMBERS, ("fx", "cx", "cy", "aspect", "k1", "k2"), strict=True))
+"""What these numbers are called in the `sigma` of a lens."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,14 @@ class Lens(ABC):
     @abstractmethod
     def _bent_by_terms(self, rays: Array) -> Array:
         """The derivative (..., 2, 2) of the distorted coordinates of rays (..., 2) by k1 and k2."""
+
+    def border(self, a_side: int) -> Array:
+        """Pixels (4 `a_side`, 2) around the picture, in order, so many on each side."""
+        width, height = self.size
+        across, down = np.linspace(0, width - 1, a_side), np.linspace(0, height - 1, a_side)
+        top, right = np.c_[across, 0 * across], np.c_[0 * down + width - 1, down]
+        bottom, left = np.c_[across[::-1], 0 * across + height - 1], np.c_[0 * down, down[::-1]]
+        return np.concatenate([top, right, bottom, left])
 
     @property
     def focal_length_px(self) -> float:

@@ -103,7 +103,7 @@ def two_terms(lens: Lens) -> Lens:
     matrix[0, 1] = 0.0
     if abs(matrix[1, 1] / matrix[0, 0] - 1) < SQUARE_WITHIN:
         matrix[0, 0] = matrix[1, 1] = np.sqrt(matrix[0, 0] * matrix[1, 1])
-    farthest = np.nanmax(np.linalg.norm(lens.undistort(_border(lens)), axis=1))
+    farthest = np.nanmax(np.linalg.norm(lens.undistort(lens.border(20)), axis=1))
     radius = np.linspace(0.0, farthest, 50)[1:-1]
     across = np.stack([radius, np.zeros_like(radius)], axis=1)
     plain = type(lens)(np.eye(3), np.zeros(0), lens.size)
@@ -124,11 +124,3 @@ def _radial_only(lens: Lens) -> Array:
         distortion[2:4] = 0.0
         distortion[8:] = 0.0
     return distortion
-
-
-def _border(lens: Lens) -> Array:
-    """Pixels (M, 2) along the border of the picture."""
-    width, height = lens.size
-    x, y = np.linspace(0, width - 1, 20), np.linspace(0, height - 1, 20)
-    sides = [(x, 0 * x), (x, 0 * x + height - 1), (0 * y, y), (0 * y + width - 1, y)]
-    return np.concatenate([np.stack(side, axis=1) for side in sides])

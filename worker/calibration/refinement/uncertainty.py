@@ -121,7 +121,7 @@ class LensChange:
 
 
 def _not_cross_checked() -> CrossCheck | None:
-    """Of a camera with too few measurements for two halves of them."""
+    """The cross-check of a camera that has too few measurements for two halves: none."""
     return None
 
 

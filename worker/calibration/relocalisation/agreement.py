@@ -47,7 +47,7 @@ def _agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
 def _expected_and_found(
     field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float
 ) -> tuple[Array, Array, Array]:
-    """Of each hypothesis the length of line in view, how much of it is painted (view pixels), and its points."""
+    """For each hypothesis the length of line in view, how much of it is painted (view pixels), and how many points."""
     rotations = cameras.rotations.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]
     moved = rotations @ field.points.T - (rotations @ cameras.positions[..., None].astype(np.float32))
@@ -68,7 +68,7 @@ def _expected_and_found(
 
 
 def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: float) -> Array:
-    """Of each hypothesis the share of the places on paint that lie on a marking, 0..1."""
+    """For each hypothesis the share of the places on paint that lie on a marking, 0..1."""
     rotations = cameras.rotations.astype(np.float32)
     positions = cameras.positions.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]

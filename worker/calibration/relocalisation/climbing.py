@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.relocalisation.agreement import LOWEST_M, agreement
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.hypotheses import Hypotheses, small_rotations
+from worker.calibration.relocalisation.hypotheses import Hypotheses
 from worker.calibration.relocalisation.line_view import LineView
 
 OFFSPRING = 12
@@ -25,7 +26,7 @@ AIMING = 0.3
 
 
 @dataclass(frozen=True)
-class Level:
+class ClimbingRound:
     """Generations at one tolerance (view px), with steps `scale` as wide as at first; `survivors` go on from it."""
 
     tolerance_px: float
@@ -34,7 +35,12 @@ class Level:
     survivors: int
 
 
-LEVELS = (Level(8.0, 8, 1.0, 40), Level(5.0, 10, 0.5, 20), Level(3.0, 10, 0.25, 12), Level(2.0, 12, 0.1, 6))
+LEVELS = (
+    ClimbingRound(8.0, 8, 1.0, 40),
+    ClimbingRound(5.0, 10, 0.5, 20),
+    ClimbingRound(3.0, 10, 0.25, 12),
+    ClimbingRound(2.0, 12, 0.1, 6),
+)
 
 
 def climb(
@@ -78,12 +84,12 @@ def _mutated(cameras: Hypotheses, scale: float, frees_focal: bool, rng: np.rando
     aim /= np.linalg.norm(aim, axis=-1, keepdims=True)
     towards = np.einsum("nij,nkj->nki", cameras.rotations, np.cross(forward[:, None], aim))
     turns[:, :half] *= AIMING
-    rotations[:, :half] = small_rotations(-towards) @ rotations[:, :half]
-    rotations = small_rotations(turns) @ rotations
+    rotations[:, :half] = rotation_matrices(-towards) @ rotations[:, :half]
+    rotations = rotation_matrices(turns) @ rotations
     return Hypotheses(rotations.reshape(-1, 3, 3), places.reshape(-1, 3), focal.reshape(-1))
 
 
-def _apart(cameras: Hypotheses, scores: Array, level: Level) -> NDArray[np.intp]:
+def _apart(cameras: Hypotheses, scores: Array, level: ClimbingRound) -> NDArray[np.intp]:
     """The numbers of the best cameras no two of which are alike."""
     kept = list[int]()
     for n in np.argsort(-scores):

@@ -45,14 +45,3 @@ def rotations_of(pan: Array, tilt: Array, roll: Array) -> Array:
     down = np.cross(forward, right)
     cosine, sine = np.cos(roll)[..., None], np.sin(roll)[..., None]
     return np.stack([cosine * right + sine * down, cosine * down - sine * right, forward], axis=-2)
-
-
-def small_rotations(vectors: Array) -> Array:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues)."""
-    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(vectors / np.maximum(angle[..., 0], 1e-12), -1, 0)
-    zero = np.zeros_like(x)
-    cross = np.stack(
-        [np.stack([zero, -z, y], axis=-1), np.stack([z, zero, -x], axis=-1), np.stack([-y, x, zero], axis=-1)], axis=-2
-    )
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross))

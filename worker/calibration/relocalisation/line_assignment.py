@@ -110,7 +110,7 @@ def _heights_and_places(measures: Array, markings: Array) -> Array:
 
 
 def _score(lines: tuple[Array, Array], markings: Array, heights: Array, places: Array) -> Array:
-    """Of each height and place (n,) the share of the length of lines that lie on markings."""
+    """For each height and place (n,) the share of the length of the lines that lies on markings."""
     if len(heights) == 0:
         return np.zeros(0)
     measures, lengths = lines

@@ -23,6 +23,7 @@ MOST_SEGMENTS, SHORTEST_SEGMENT_PX = 140, 10.0
 PLACES = 320
 """So many places on paint are projected to the ground by each pose of a population."""
 BORDER_POINTS = 60
+"""On each side of the frame."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class LineView:
         small = np.asarray(
             cv2.resize(response, (2 * WIDTH_PX, round(2 * height * scale)), interpolation=cv2.INTER_AREA), np.uint8
         )
-        border = _undistorted(_border(width, height), lens, focal)
+        border = _undistorted(lens.border(BORDER_POINTS), lens, focal)
         low = np.maximum(border.min(axis=0), -WIDEST * WIDTH_PX)
         high = np.minimum(border.max(axis=0), WIDEST * WIDTH_PX)
         shape = tuple(np.floor(high - low).astype(int)[::-1] + 1)
@@ -79,7 +80,7 @@ class LineView:
 
     @property
     def lengths(self) -> Array:
-        """Of the segments (S,), view pixels."""
+        """The lengths (S,) of the segments, view pixels."""
         return np.asarray(np.linalg.norm(self.ends - self.starts, axis=1))
 
     def normals(self, focal_px: float) -> Array:
@@ -93,14 +94,6 @@ def _undistorted(pixels: Array, lens: Lens, focal: float) -> Array:
     """Pixels (n, 2) of a frame in view pixels; those without a ray are left out."""
     plane = lens.undistort(pixels) * focal
     return np.asarray(plane[np.isfinite(plane).all(axis=-1)])
-
-
-def _border(width: int, height: int) -> Array:
-    """Pixels around the frame, in order."""
-    across, down = np.linspace(0, width - 1, BORDER_POINTS), np.linspace(0, height - 1, BORDER_POINTS)
-    top, right = np.c_[across, 0 * across], np.c_[0 * down + width - 1, down]
-    bottom, left = np.c_[across[::-1], 0 * across + height - 1], np.c_[0 * down, down[::-1]]
-    return np.concatenate([top, right, bottom, left])
 
 
 def middles_of_paint(small: NDArray[np.uint8]) -> Array:

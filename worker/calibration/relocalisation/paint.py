@@ -27,7 +27,7 @@ class Paint:
 
     @classmethod
     def of(cls, response: NDArray[np.uint8]) -> Paint:
-        """Of a response (height, width), 0..255."""
+        """Return the paint in a response (height, width), 0..255, of the network."""
         height, width = response.shape
         size = (WIDTH_PX, round(height * WIDTH_PX / width))
         small = np.asarray(cv2.resize(response, size, interpolation=cv2.INTER_AREA), np.uint8)

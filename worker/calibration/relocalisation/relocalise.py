@@ -17,8 +17,9 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.geometry.camera import Camera, Pose, inside
+from worker.calibration.geometry.derivatives import POSE_NUMBERS
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import LENS_NUMBERS
+from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.geometry.parameters import LensParameter
 from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.geometry.rotation import rotation_vectors
@@ -71,7 +72,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Refusal:
+class NotFound:
     """Why a camera that was found is not taken: the `reason` in a word, and in words with numbers and what to do."""
 
     reason: Reason
@@ -85,7 +86,7 @@ class Relocalisation:
     """
 
     candidates: Sequence[Candidate]
-    refusal: Refusal | None
+    refusal: NotFound | None
     remarks: Sequence[str] = ()
 
 
@@ -106,7 +107,7 @@ def relocalise(
             for camera in _distinct(field, markings, sought, proposals)
         ]
         candidates.sort(key=lambda one: -one.agreement)
-        found = Relocalisation(candidates[:REFINED], _refusal(field, markings, candidates))
+        found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, candidates))
         if not candidates or found.refusal is None or found.refusal.reason != "lines":
             break
     return found
@@ -125,7 +126,7 @@ class _Sight:
         return self._candidate(refine(self.field, [camera], self.observations, 0.0, searches_px=SEARCH_PX).each[0])
 
     def with_lens_and_pose(self, camera: Camera) -> Candidate:
-        """The same with focal length and bend, and with principal point and k2 once its pose has caught the lines."""
+        """A proposed camera on the measured lines, with focal length and k1, and then with principal point and k2."""
         width, focal = camera.intrinsics.size[0], camera.intrinsics.focal_length_px
         coarse = [
             LensParameter(0, "focal_length_px", FREE_FOCAL * focal),
@@ -162,35 +163,31 @@ def _with_sigmas(found: RefinedPose) -> Camera:
     """The camera with what is known of its lens written beside it."""
     if found.refined is None:
         return found.camera
-    sigma = dict(zip(LENS_NUMBERS, np.sqrt(np.diag(found.refined.covariance)[-len(LENS_NUMBERS) :]), strict=True))
-    focal, aspect = float(sigma["focal_length_px"]), float(sigma["aspect"])
-    known = {"fx": focal, "fy": float(np.hypot(focal, aspect * found.camera.intrinsics.focal_length_px))}
-    known |= {
-        short: float(sigma[name])
-        for short, name in (("cx", "principal_point_x_px"), ("cy", "principal_point_y_px"), ("k1", "k1"), ("k2", "k2"))
-    }
+    deviations = np.sqrt(np.diag(found.refined.covariance)[POSE_NUMBERS:]).tolist()
+    known = dict(zip(SIGMA_NAMES.values(), deviations, strict=True))
+    known["fy"] = float(np.hypot(known["fx"], known.pop("aspect") * found.camera.intrinsics.focal_length_px))
     return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known))
 
 
-def _refusal(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> Refusal | None:
+def _why_not_taken(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> NotFound | None:
     """Why the best candidate is not taken. Whether it is exact enough a calibration says that begins with it."""
     if not candidates:
-        return Refusal("no-lines", "no lines of a field are seen in the frame; is the view free and lit?")
+        return NotFound("no-lines", "no lines of a field are seen in the frame; is the view free and lit?")
     best, *others = candidates
     seen = best.evidence
     if seen.agreement < LEAST_FOUND:
-        return Refusal(
+        return NotFound(
             "lines",
             f"no pose explains the lines: at the best one {seen.share:.0%} of the markings in view are seen "
             f"({seen.by_chance:.0%} would be anywhere); are sport and measures of the field right, is the view free?",
         )
     if best.residual_px is None or best.sigma is None:
-        return Refusal("few-lines", "too few points of lines could be measured; is the view free and lit?")
+        return NotFound("few-lines", "too few points of lines could be measured; is the view free and lit?")
     if not films_a_field(best.camera.pose):
-        return Refusal("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
+        return NotFound("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
     for other in others:
         if _explains_nearly_as_well(other, best) and _differ(field, markings, best.camera, other.camera, DIFFERENT):
-            return Refusal(
+            return NotFound(
                 "not-unique",
                 f"two poses explain the lines: {seen.share:.0%} and {other.evidence.share:.0%} of the markings in view "
                 "are seen where they put them; say where the camera stands, or let it see more of the field",
@@ -218,19 +215,24 @@ def twin(camera: Camera) -> Camera:
 
 
 def _differ(field: Field, markings: FieldMap, one: Camera, other: Camera, apart: float) -> bool:
-    """Whether two cameras put the markings that the first one sees elsewhere, by such a part of the frame's width.
-
-    On a symmetric field the one is compared with the twin of the other, too.
-    """
-    same = [other, twin(other)] if markings.is_symmetric else [other]
-    lines = field.line_points().position
+    """Whether two cameras put the markings that the first one sees elsewhere, by such a part of the frame's width."""
     width = one.intrinsics.size[0]
+    return not mean_shift_px(field, markings, one, other, width) < apart * width
+
+
+def mean_shift_px(field: Field, markings: FieldMap, one: Camera, other: Camera, unseen_px: float) -> float:
+    """How far on mean another camera puts the markings that one has in view; NaN where it has none in view.
+
+    On a symmetric field it is the nearer of the other camera and its twin. What that does not see is `unseen_px` off.
+    """
+    lines = field.line_points().position
     seen = one.project(lines)
-    lines, seen = lines[inside(seen, one.intrinsics.size)], seen[inside(seen, one.intrinsics.size)]
-    if len(lines) == 0:
-        return True
-    off = min(
-        float(np.mean(np.nan_to_num(np.linalg.norm(camera.project(lines) - seen, axis=1), nan=width)))
-        for camera in same
+    in_view = inside(seen, one.intrinsics.size)
+    if not in_view.any():
+        return float("nan")
+    return min(
+        float(
+            np.nan_to_num(np.linalg.norm(camera.project(lines[in_view]) - seen[in_view], axis=1), nan=unseen_px).mean()
+        )
+        for camera in ([other, twin(other)] if markings.is_symmetric else [other])
     )
-    return off >= apart * width
