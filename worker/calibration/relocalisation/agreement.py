@@ -21,6 +21,7 @@ USUAL_ROLL = np.sin(np.radians(6.0))
 ROLLED = 0.04
 """What a roll of 6° takes from an agreement: cameras stand about upright."""
 LOWEST_M = 1.2
+"""Lower no camera is sought: from the ground everything can be explained by a few lines."""
 
 
 def agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: float) -> Array:

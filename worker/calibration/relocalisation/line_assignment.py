@@ -12,6 +12,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from worker.calibration.geometry.camera import Array
+from worker.calibration.relocalisation.agreement import LOWEST_M
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses, rotations_of
 from worker.calibration.relocalisation.line_view import LineView
@@ -19,7 +20,7 @@ from worker.calibration.relocalisation.rotation_voting import Direction
 
 ALONG = 0.012
 """How far, rad, the plane of a segment may be from a direction that it is taken to run along."""
-LOWEST_M, HIGHEST_M, HEIGHTS = 1.2, 50.0, 22
+HIGHEST_M, HEIGHTS = 50.0, 22
 TOGETHER = 0.01
 """Segments whose measures differ by less than such a part are pieces of one line."""
 MOST_LINES = 9

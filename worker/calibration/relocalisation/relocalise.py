@@ -95,7 +95,7 @@ def relocalise(
 ) -> Relocalisation:
     """Find the camera that took a frame; `response` (height, width) in 0..1 of the network; `markings`: of the field.
 
-    Where its focal length is not known, principal point and k1 are found with it and the pose.
+    Where its focal length is not known, k1, k2 and principal point are found with it and the pose.
     """
     small = np.rint(response * 255).astype(np.uint8)
     sight = _Sight(field, Observations([channels], [response]), Paint.of(small))

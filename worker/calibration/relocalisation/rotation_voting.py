@@ -101,10 +101,10 @@ def _climbed(view: LineView, start: Direction, frees_focal: bool, rng: np.random
         narrower = NARROWER**number
         spread = np.radians(SPREAD_DEG) * narrower
         offspring = best.pan_tilt_roll + spread * rng.normal(size=(OFFSPRING, 3))
-        focal_lengths = [best.focal_px]
+        tried = [best.focal_px]
         if frees_focal:
-            focal_lengths += list(best.focal_px * np.exp(FOCAL_SPREAD * narrower * rng.normal(size=FOCAL_OFFSPRING)))
-        for focal in focal_lengths:
+            tried += list(best.focal_px * np.exp(FOCAL_SPREAD * narrower * rng.normal(size=FOCAL_OFFSPRING)))
+        for focal in tried:
             votes = _votes(view, offspring, focal, FINE)
             if votes.max() > best.votes:
                 best = Direction(offspring[votes.argmax()], focal, float(votes.max()))

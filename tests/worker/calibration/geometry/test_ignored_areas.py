@@ -35,7 +35,7 @@ def test_lines_in_an_ignored_area_are_not_expected():
 
 
 def test_nothing_is_measured_in_an_ignored_area_and_the_rest_as_ever():
-    sight = Observations([Channels([pair_frames()[0]])], [of_use(PARTLY, pair_markings()[0])])
+    sight = Observations([Channels([pair_frames()[0]])], [of_use(PARTLY.ignored, pair_markings()[0])])
     whole_sight = Observations(sight.channels, [pair_markings()[0]])
     (kept,) = sight.reader().measure(CROWNED.line_points(), [PARTLY], 8.0)
     (whole,) = whole_sight.reader().measure(CROWNED.line_points(), [WHOLE], 8.0)
@@ -50,13 +50,15 @@ def test_what_lies_in_an_ignored_area_neither_counts_for_a_pose_nor_against_it()
     frame[260:530:6, 490:950] = 240
     channels = Channels([frame])
     spoiled, saved = (
-        evidence_of(CROWNED.line_points(), camera, channels, of_use(camera, cluttered), left_out(CROWNED, camera))
+        evidence_of(
+            CROWNED.line_points(), camera, channels, of_use(camera.ignored, cluttered), left_out(CROWNED, camera)
+        )
         for camera in (WHOLE, PARTLY)
     )
     assert saved.by_chance < spoiled.by_chance
     assert saved.share > 0.95
     assert overlap_of(CROWNED, WHOLE, cluttered).unexpected > 0.3
-    assert overlap_of(CROWNED, PARTLY, of_use(PARTLY, cluttered)).unexpected < 0.1
+    assert overlap_of(CROWNED, PARTLY, of_use(PARTLY.ignored, cluttered)).unexpected < 0.1
 
 
 def test_a_camera_keeps_what_it_ignores_wherever_it_goes():
