@@ -99,23 +99,30 @@ def _matched(
 
 def _heights_and_places(measures: Array, markings: Array) -> Array:
     """Heights and places (n, 2) that put two lines on two markings, or one line on one marking from a usual height."""
-    found = []
-    for one, other in combinations(measures, 2):
-        for marking, another in permutations(markings, 2):
-            height = (marking - another) / (one - other)
-            if LOWEST_M < height < HIGHEST_M:
-                found.append((height, marking - height * one))
-    for height in np.geomspace(LOWEST_M, HIGHEST_M, HEIGHTS):
-        found += [(height, marking - height * measure) for measure in measures[:2] for marking in markings]
-    return np.array(found).reshape(-1, 2)
+    markings_of_pairs = _ordered_pairs(markings)
+    lines_of_pairs = np.array(list(combinations(measures, 2))).reshape(-1, 2)
+    apart = markings_of_pairs[:, 0] - markings_of_pairs[:, 1]
+    height = apart / (lines_of_pairs[:, :1] - lines_of_pairs[:, 1:])
+    place = markings_of_pairs[:, 0] - height * lines_of_pairs[:, :1]
+    possible = (height > LOWEST_M) & (height < HIGHEST_M)
+    by_two = np.stack([height[possible], place[possible]], axis=1)
+
+    usual = np.geomspace(LOWEST_M, HIGHEST_M, HEIGHTS)[:, None, None]
+    by_one = np.stack(np.broadcast_arrays(usual, markings - usual * measures[:2, None]), axis=-1).reshape(-1, 2)
+    return np.concatenate([by_two, by_one])
+
+
+def _ordered_pairs(values: Array) -> Array:
+    """All pairs (n, 2) of two different values, in both orders."""
+    return np.array(list(permutations(values, 2))).reshape(-1, 2)
 
 
 def _score(lines: tuple[Array, Array], markings: Array, heights: Array, places: Array) -> Array:
-    """For each height and place (n,) the share of the length of the lines that lies on markings."""
+    """For each height and place (n,) the share of the length of the lines that lies on `markings`, in order (m,)."""
     if len(heights) == 0:
         return np.zeros(0)
     measures, lengths = lines
     at = heights[:, None] * measures + places[:, None]
-    off = np.abs(at[..., None] - markings).min(axis=-1)
+    off = np.abs(at - markings[np.searchsorted((markings[1:] + markings[:-1]) / 2, at)])
     near = np.exp(-((off / (OFF_M + OFF_OF_HEIGHT * heights[:, None])) ** 2))
     return np.asarray(near @ lengths / lengths.sum())
