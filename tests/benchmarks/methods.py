@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import cma
@@ -19,8 +20,10 @@ from tests.benchmarks.truth import apart_by_homography_px, overlapping
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.segmentation import Region, Segmenter, whole_frame
 from worker.calibration.geometry.camera import Camera, Frame, inside
+from worker.calibration.paper.calibrate import PRESETS, calibrate_by_paper
 from worker.calibration.records import Calibration, Options, StageTimings
 from worker.calibration.search.genome import genome_of, with_genome
+from worker.calibration.search.objective import Objective
 from worker.calibration.search.search import COARSE_TO_FINE, MUTATION_M, MUTATION_RAD
 
 THREADS = 2
@@ -156,12 +159,12 @@ def _corners(seen: Seen) -> np.ndarray:
     return np.array(corners)
 
 
-def engine(**options: object) -> Method:
-    """The engine with some options."""
+def engine(calibrating: Callable[..., Calibration] = calibrate, **options: object) -> Method:
+    """The engine with some options, or the paper's method in its place."""
 
     def run(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
         asked = replace(Options(seed=seed), **options)
-        said = calibrate(seen.scene.pitch, cameras, seen.scene.frames, seen.segment, asked)
+        said = calibrating(seen.scene.pitch, cameras, seen.scene.frames, seen.segment, asked)
         poses = [camera.with_pose(result.camera.pose) for camera, result in zip(cameras, said.cameras, strict=True)]
         seconds, core_seconds = (
             spent["evolution"] + spent["refinement"] for spent in (said.timings.seconds, said.timings.core_seconds)
@@ -197,7 +200,7 @@ def _by_cma_es(seen: Seen, cameras: list[Camera], options: Options, seed: int) -
     here = list(cameras)
     generations = options.generations // len(COARSE_TO_FINE)
     for number, level in enumerate(COARSE_TO_FINE):
-        objective = level.objective(seen.scene.pitch, here, responses, options.stitch_weight)
+        objective = Objective(seen.scene.pitch, here, responses, options.stitch_weight, level.blur_px)
         centre = genome_of(here)
         strategy = cma.CMAEvolutionStrategy(
             np.zeros(len(centre)),
@@ -249,8 +252,8 @@ METHODS: dict[str, Method] = {
     "OTLE": learned("otle"),
     "IHN": learned("ihn"),
     "CMA-ES on our objective": cma_es,
-    "SCPR": engine(preset="scpr"),
-    "ESC `paper`": engine(preset="paper"),
+    "SCPR": engine(partial(calibrate_by_paper, PRESETS["scpr"])),
+    "ESC `paper`": engine(partial(calibrate_by_paper, PRESETS["paper"])),
     "ESC `esc`": engine(),
     "ESC `esc`, refined lens": refined,
     "ESC `esc`, flat": engine(flat=True),

@@ -47,7 +47,6 @@ from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.refinement.refine import Observations
 from worker.calibration.solve import (
     CAPTURE_RAD,
-    METHODS,
     NO_CAMERAS,
     ObservedCameras,
     PoseSolution,
@@ -88,58 +87,33 @@ def calibrate(
     for `options.seed`, whatever the number of the network's threads. Raises `CalibrationError` when no stored pose sees
     markings, `Stopped` soon after `stop()` turns true.
     """
-    method = METHODS[options.preset]
     # What is measured beside a field that is not the venue's is nothing to remember.
-    flattened = pitch.ridge is not None and (options.flat or method.flat)
+    flattened = pitch.ridge is not None and options.flat
     pitch = pitch.flat() if flattened else pitch
     progress = ProgressReporter(report, stop)
 
     # Observe.
     observed = observe(pitch, cameras, frames, segment, progress, usual)
     known = [memories.get(camera.id) for camera in cameras]
-    problem = Problem(method, pitch, cameras, observed, options, known, recorder=recorder)
-    if method.tries_again:
-        problem = replace(problem, observed=mark_swapped_frames(problem, frames, progress))
+    problem = Problem(pitch, cameras, observed, options, known, recorder=recorder)
+    problem = replace(problem, observed=mark_swapped_frames(problem, frames, progress))
     recorder.observed(cameras, frames, problem.observed.views, problem.observed.observations.responses)
 
     # Solve and judge: by the near path if all usable cameras pass there, else by search and refinement.
     solution, judged, path = _solve(problem, progress)
     recorder.judged(judged.pitch, cameras, judged.cameras)
 
-    # Diagnose.
+    # Diagnose, and remember.
     with progress.timed("quality"):
-        stitch_error_before_px = stitch_error_px(_compared_before(problem, judged), Gate())
         loss = loss_of(problem, judged.pitch, [result.camera for result in judged.cameras])
-        doubts = find_suspicions(credible_deviations(solution.deviations, judged.cameras, Gate()))
-        progress.at("refinement", 1.0)
-    with progress.timed("light"):
-        accepted = [result.camera for result in judged.cameras if result.accepted]
-        lights = evened_out(judged.pitch, accepted, {camera.id: frames[camera.id][0] for camera in accepted})
-    progress.timings.ensure("evolution")
-
-    # Remember.
-    remembered = {} if flattened else remember(judged, cameras, frames, memories, taken_at)
-    return Calibration(
-        pitch=judged.pitch,
-        cameras=judged.cameras,
-        rejected_because=judged.rejected_because,
-        stitch_error_px=judged.stitch_error_px,
-        timings=judged.timings,
-        pairs=judged.pairs,
-        stitch_error_before_px=stitch_error_before_px,
-        loss=loss,
-        generations=solution.generations,
-        suspicions=doubts,
-        path=path,
-        lights=lights,
-        memories=remembered,
-    )
+    found = diagnose(problem, solution, judged, path, loss, frames, progress)
+    return found if flattened else replace(found, memories=remember(judged, cameras, frames, memories, taken_at))
 
 
 def _solve(problem: Problem, progress: ProgressReporter) -> tuple[PoseSolution, EngineResult, Path]:
     """Solve for the poses and judge them. Only cameras that are not near their stored poses are searched for."""
     near = None
-    if problem.options.search == "auto" and problem.method.tries_again:
+    if problem.options.search == "auto":
         near = refine_near_stored(problem, progress.muted())
     if near is not None and near.numbers == problem.usable:
         solution = with_unusable_cameras(near, problem, progress)
@@ -154,7 +128,7 @@ def _solve(problem: Problem, progress: ProgressReporter) -> tuple[PoseSolution, 
     while True:
         judged = judge_together(solution.pitch, solution.results, problem.observed.observations, progress)
         contradicted = [n for n in solution.together if not judged.cameras[n].accepted]
-        if not problem.method.tries_again or len(contradicted) in (0, len(solution.together)):
+        if len(contradicted) in (0, len(solution.together)):
             return solution, judged, "wide"
         # A camera that the others contradict must not have pulled at them.
         solution = refine_without(contradicted, problem, solution, progress)
@@ -240,6 +214,41 @@ def _compared_before(problem: Problem, judged: EngineResult) -> list[Pair]:
         found = {result.camera.id: result.camera for result in judged.cameras}
         return compare_pairs_before(problem.pitch, stored, found, [pair for pair, _ in judged.pairs])
     return compare_pairs(problem.pitch, [stored[cameras[n].id] for n in _comparable(judged.cameras)])
+
+
+def diagnose(
+    problem: Problem,
+    solution: PoseSolution,
+    judged: EngineResult,
+    path: Path,
+    loss: float,
+    frames: Mapping[str, Sequence[Frame]],
+    progress: ProgressReporter,
+) -> Calibration:
+    """Report on judged cameras: the stitch error before, what contradicts lens or field, what evens out their light."""
+    with progress.timed("quality"):
+        stitch_error_before_px = stitch_error_px(_compared_before(problem, judged), Gate())
+        doubts = find_suspicions(credible_deviations(solution.deviations, judged.cameras, Gate()))
+        progress.at("refinement", 1.0)
+    with progress.timed("light"):
+        accepted = [result.camera for result in judged.cameras if result.accepted]
+        lights = evened_out(judged.pitch, accepted, {camera.id: frames[camera.id][0] for camera in accepted})
+    progress.timings.ensure("evolution")
+    return Calibration(
+        pitch=judged.pitch,
+        cameras=judged.cameras,
+        rejected_because=judged.rejected_because,
+        stitch_error_px=judged.stitch_error_px,
+        timings=judged.timings,
+        pairs=judged.pairs,
+        stitch_error_before_px=stitch_error_before_px,
+        loss=loss,
+        generations=solution.generations,
+        suspicions=doubts,
+        path=path,
+        lights=lights,
+        memories={},
+    )
 
 
 def cameras_without_markings(pitch: Field, cameras: Sequence[Camera]) -> dict[str, str]:

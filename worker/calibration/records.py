@@ -22,7 +22,6 @@ from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement.diagnosis import Suspicion
 from worker.calibration.stitching.photometry import Light
 
-Preset = Literal["esc", "paper", "scpr"]
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
 Search = Literal["auto", "wide"]
 Path = Literal["near", "wide"]
@@ -46,10 +45,10 @@ class Options:
 
     `search`: `auto` tries the near path before it searches, `wide` always searches. `fit_focal_length`: solve for the
     focal length of each camera, which heat changes; `fit_ridge`: for the ridge's height; `lens_may_drift`: whether a
-    pose may be accepted with another focal length than the stored one. All are for preset `esc`.
+    pose may be accepted with another focal length than the stored one. The first three are
+    for ESC's own method alone.
     """
 
-    preset: Preset = "esc"
     search: Search = "auto"
     seed: int = 0
     generations: int = 100

@@ -28,46 +28,18 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
-from worker.calibration.records import NOT_RECORDED, Options, Preset, ProgressReporter, Recorder
+from worker.calibration.records import NOT_RECORDED, Options, ProgressReporter, Recorder
 from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
 from worker.calibration.refinement.uncertainty import Deviation, RefinedPoses
 from worker.calibration.search.genome import genome_of
-from worker.calibration.search.search import (
-    ALONE_ON_THE_GROUND,
-    COARSE_TO_FINE,
-    ON_THE_GROUND,
-    Found,
-    Level,
-    Strategy,
-    search,
-)
+from worker.calibration.search.objective import Objective
+from worker.calibration.search.search import COARSE_TO_FINE, Found, Strategy, search
 
 CAPTURE_RAD = 0.1
 """How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
+SEARCHED_POWER = 3
+"""Power of the network's responses in the search: what it half believes (a shadow's edge, a board) hardly pulls."""
 NO_CAMERAS: Mapping[int, Camera] = MappingProxyType({})
-
-
-@dataclass(frozen=True)
-class Method:
-    """What a preset does: the levels of its search, the shape of the ground, and how it ends.
-
-    `power`: of the network's responses in the search, so that what it half believes (the edge of a shadow, a board)
-    hardly pulls; `tries_again`: whether a camera that does not pass the gate is tried on its own.
-    """
-
-    levels: Sequence[Level]
-    flat: bool
-    power: int
-    tries_again: bool
-    finish: Callable[..., RefinedPoses]
-
-
-METHODS: Mapping[Preset, Method] = {
-    "esc": Method(COARSE_TO_FINE, flat=False, power=3, tries_again=True, finish=refine),
-    "paper": Method(ON_THE_GROUND, flat=False, power=1, tries_again=False, finish=evaluate_poses),
-    "scpr": Method(ALONE_ON_THE_GROUND, flat=True, power=1, tries_again=False, finish=evaluate_poses),
-}
-"""`esc`: the default. `paper`: the paper's own objective. `scpr`: its predecessor, flat and without a stitch term."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +58,6 @@ class ObservedCameras:
 class Problem:
     """Inputs of a calibration: a pitch, cameras at their stored poses, and per camera its observations and memory."""
 
-    method: Method
     pitch: Field
     cameras: Sequence[Camera]
     observed: ObservedCameras
@@ -143,7 +114,7 @@ def search_and_refine(
         refined = refine_poses(group, [begun[n] for n in together], progress)
         results |= zip(together, judge_each(group, refined, progress), strict=True)
         failing = [n for n in together if not results[n].accepted]
-        if not (failing and problem.method.tries_again):
+        if not failing:
             break
         for n in failing:
             tried_before = n in alone
@@ -153,37 +124,20 @@ def search_and_refine(
             if tried_before or not alone[n].result.accepted:
                 together = [other for other in together if other != n]
                 results[n] = alone[n].result
-    deviations = _joined_deviations(refined, [alone[n].refined for n in everyone if n not in together])
+    deviations = joined_deviations(refined, [alone[n].refined for n in everyone if n not in together])
     in_order = [results[n] for n in everyone]
     return PoseSolution(refined.pitch, begun, in_order, together, deviations, searched.generations)
 
 
-def refine_without(
-    excluded: Collection[int], problem: Problem, solution: PoseSolution, progress: ProgressReporter
-) -> PoseSolution:
-    """Refine the other cameras without those `excluded` ones that were refined with them; these stay as they are."""
-    together = [n for n in solution.together if n not in excluded]
-    if len(together) in (0, len(solution.together)):
-        return replace(solution, together=together)
-    group = problem.of(together)
-    refined = refine_poses(group, [solution.begun[n] for n in together], progress)
-    results = dict(enumerate(solution.results)) | dict(zip(together, judge_each(group, refined, progress), strict=True))
-    ids = {problem.cameras[n].id for n in together}
-    of_others = [d for d in solution.deviations if d.camera is not None and d.camera not in ids]
-    return replace(
-        solution,
-        pitch=refined.pitch,
-        results=list(results.values()),
-        together=together,
-        deviations=refined.deviations + of_others,
-    )
-
-
-def _joined_deviations(together: RefinedPoses, apart: Sequence[RefinedPoses]) -> list[Deviation]:
-    """Deviations of lenses and field: of a camera that stands apart its own, all others from the joint refinement."""
+def joined_deviations(together: RefinedPoses, apart: Sequence[RefinedPoses]) -> list[Deviation]:
+    """Return deviations of lenses and field: of a camera that stands apart its own, the others of those `together`."""
     of_lenses = [deviation for one in apart for deviation in one.deviations if deviation.camera is not None]
     apart_ids = {deviation.camera for deviation in of_lenses}
     return [deviation for deviation in together.deviations if deviation.camera not in apart_ids] + of_lenses
+
+
+Finish = Callable[[Problem, Sequence[Camera], ProgressReporter], RefinedPoses]
+"""From a problem and the poses where a search of it ended to poses with all that the lines say of them."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +189,6 @@ def assess_stored(problem: Problem, progress: ProgressReporter) -> Attempt:
             problem.pitch,
             problem.cameras,
             problem.observed.observations,
-            problem.options.stitch_weight,
             free_parameters(problem),
             memories=problem.memories,
         )
@@ -253,7 +206,6 @@ def search_poses(problem: Problem, responses: Sequence[Response], progress: Prog
             problem.pitch,
             problem.cameras,
             responses,
-            problem.method.levels,
             strategy,
             rng,
             on_generation,
@@ -262,9 +214,9 @@ def search_poses(problem: Problem, responses: Sequence[Response], progress: Prog
 
 
 def network_responses(problem: Problem) -> list[Response]:
-    """Return the network's responses (H, W) in 0..1 as the search uses them, raised to the power of the preset."""
+    """Return the network's responses (H, W) in 0..1 as the search uses them, raised to `SEARCHED_POWER`."""
     responses = problem.observed.observations.responses
-    return [np.asarray(cv2.pow(response, problem.method.power), dtype=np.float32) for response in responses]
+    return [np.asarray(cv2.pow(response, SEARCHED_POWER), dtype=np.float32) for response in responses]
 
 
 def ridge_responses(problem: Problem) -> list[Response]:
@@ -283,7 +235,7 @@ def refine_poses(problem: Problem, begun: Sequence[Camera], progress: ProgressRe
     """Refine the cameras jointly, from where the search left them (`begun`)."""
     with progress.timed("refinement"):
         progress.at("refinement", 0.0)
-        return problem.method.finish(
+        return refine(
             problem.pitch,
             begun,
             problem.observed.observations,
@@ -292,6 +244,31 @@ def refine_poses(problem: Problem, begun: Sequence[Camera], progress: ProgressRe
             stored=problem.cameras,
             memories=problem.memories,
         )
+
+
+def refine_without(
+    excluded: Collection[int],
+    problem: Problem,
+    solution: PoseSolution,
+    progress: ProgressReporter,
+    finish: Finish = refine_poses,
+) -> PoseSolution:
+    """Refine the other cameras without those `excluded` ones that were refined with them; these stay as they are."""
+    together = [n for n in solution.together if n not in excluded]
+    if len(together) in (0, len(solution.together)):
+        return replace(solution, together=together)
+    group = problem.of(together)
+    refined = finish(group, [solution.begun[n] for n in together], progress)
+    results = dict(enumerate(solution.results)) | dict(zip(together, judge_each(group, refined, progress), strict=True))
+    ids = {problem.cameras[n].id for n in together}
+    of_others = [d for d in solution.deviations if d.camera is not None and d.camera not in ids]
+    return replace(
+        solution,
+        pitch=refined.pitch,
+        results=list(results.values()),
+        together=together,
+        deviations=refined.deviations + of_others,
+    )
 
 
 def free_parameters(problem: Problem) -> list[Parameter]:
@@ -349,10 +326,16 @@ def loss_of(problem: Problem, pitch: Field, answered: Sequence[Camera]) -> float
     if not group:
         return float("inf")
     cameras = [answered[n] for n in group]
-    responses = [
-        response if (out := left_out(pitch, camera)) is None else np.where(out, np.float32(0), response)
-        for camera, response in zip(cameras, network_responses(problem.of(group)), strict=True)
-    ]
-    level = problem.method.levels[len(problem.method.levels) // 2]
-    objective = level.objective(pitch, cameras, responses, 0.0 if level.alone else problem.options.stitch_weight)
+    responses = of_use_at(cameras, network_responses(problem.of(group)), pitch)
+    blur_px = COARSE_TO_FINE[1].blur_px
+    objective = Objective(pitch, cameras, responses, stitch_weight=0.0, blur_px=blur_px)
     return float(objective.losses(genome_of(cameras)[None])[0])
+
+
+def of_use_at(cameras: Sequence[Camera], responses: Sequence[Response], pitch: Field) -> list[Response]:
+    """Return the responses (H, W) with 0 where nothing is looked at from the poses of the cameras."""
+    areas = [left_out(pitch, camera) for camera in cameras]
+    return [
+        response if out is None else np.where(out, np.float32(0), response)
+        for response, out in zip(responses, areas, strict=True)
+    ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
+from functools import partial
 from typing import Any, cast
 
 from service.schemas.job import Progress
@@ -20,6 +21,7 @@ from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import field_parameters
 from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
+from worker.calibration.paper.calibrate import PRESETS, calibrate_by_paper
 from worker.calibration.refinement import diagnosis
 from worker.calibration.stitching.photometry import Light
 from worker.jobs import frames_job
@@ -81,7 +83,7 @@ def solve(
         options,
         means,
         report,
-        lambda given, step: calibrate(
+        lambda given, step: _method(options)(
             given.pitch,
             given.cameras,
             given.frames,
@@ -120,6 +122,11 @@ def _steadied(venue: Venue, found: engine.Calibration) -> dict[str, Light]:
     """The light of the cameras that were evened out, steadied by what the venue keeps of it."""
     kept = {camera: light_of(light) for camera, light in venue.lights.items()}
     return {camera: light.after(kept.get(camera)) for camera, light in found.lights.items()}
+
+
+def _method(options: Options) -> Callable[..., engine.Calibration]:
+    """Return the engine's own method, or for comparison the paper's."""
+    return calibrate if options.preset == "esc" else partial(calibrate_by_paper, PRESETS[options.preset])
 
 
 def _engine_options(venue: Venue, options: Options) -> engine.Options:

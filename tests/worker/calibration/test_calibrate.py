@@ -143,13 +143,6 @@ def test_a_request_to_stop_ends_it_at_the_next_generation():
     assert sum(step.stage == "evolution" for step in seen) == 3
 
 
-@pytest.mark.parametrize("preset", ["paper", "scpr"])
-def test_the_papers_presets_run_through_the_same_door(preset):
-    found = run(preset=preset, generations=2, parents=4, offspring=4)
-    assert found.generations == 2
-    assert len(found.cameras) == 2
-
-
 def with_longer_lens(camera, by):
     return free_focal_lengths([camera])[0].applied([camera], CROWNED, by)[0][0]
 

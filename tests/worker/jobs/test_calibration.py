@@ -24,9 +24,9 @@ from worker.calibration.gate.quality import CameraResult, Movement, Refusal
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.memory.camera_memory import CameraMemory, fingerprint
 from worker.calibration.memory.epoch import Epoch
+from worker.calibration.paper.calibrate import PRESETS
 from worker.calibration.refinement.diagnosis import Suspicion
 from worker.calibration.refinement.uncertainty import Sigma
-from worker.calibration.solve import METHODS
 from worker.calibration.stitching.photometry import Light
 from worker.jobs import calibration, from_schemas, pictures, to_schemas
 from worker.jobs.calibration import NightHistory
@@ -140,14 +140,25 @@ def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, 
 
 
 def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, means):
-    options = Options(seed=7, preset="paper", stitch_weight=0.25, parents=8)
+    options = Options(seed=7, stitch_weight=0.25, parents=8)
     calibration.solve(venue, files, options, means, lambda _: None)
     assert asked["pitch"].ridge.tolist() == [[-18, 0, 0.2], [18, 0, 0.2]]
     left = asked["cameras"][0]
     assert (left.id, left.intrinsics.size, left.pose.rotation.tolist()) == ("left", SIZE, UP_LEFT)
     assert [len(asked["frames"][camera]) for camera in ("left", "right")] == [2, 1]
     assert asked["frames"]["left"][0].shape == (180, 320, 3)
-    assert asked["options"] == engine.Options(preset="paper", seed=7, parents=8, stitch_weight=0.25)
+    assert asked["options"] == engine.Options(seed=7, parents=8, stitch_weight=0.25)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_papers_presets_are_calculated_by_its_own_method(venue, files, asked, means, preset, monkeypatch):
+    def calibrate_by_paper(by, *given, **known):
+        asked["preset"] = by
+        return calibration.calibrate(*given, **known)
+
+    monkeypatch.setattr(calibration, "calibrate_by_paper", calibrate_by_paper)
+    calibration.solve(venue, files, Options(preset=preset), means, lambda _: None)
+    assert asked["preset"] is PRESETS[preset]
 
 
 def test_what_else_is_painted_and_what_is_to_be_ignored_reach_the_engine(venue, files, asked, means):
@@ -242,7 +253,7 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
 
 
 def test_a_flat_method_is_drawn_flat():
-    assert tuple(name for name, method in METHODS.items() if method.flat) == FLAT
+    assert tuple(name for name, preset in PRESETS.items() if preset.flat) == FLAT
 
 
 def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, means):

@@ -20,7 +20,7 @@ from worker.calibration.geometry.parameters import FieldParameter, LensParameter
 from worker.calibration.records import EngineResult, Options, Progress, ProgressReporter, Segment
 from worker.calibration.refinement.refine import SEARCH_PX, Observations, refine
 from worker.calibration.refinement.uncertainty import ParameterUncertainty, RefinedPoses
-from worker.calibration.solve import METHODS, Problem, judge_each, search_and_refine
+from worker.calibration.solve import Problem, judge_each, search_and_refine
 
 FIRST_SEARCH_PX = (40.0, 24.0)
 """A pitch whose measures are guesses has its lines farther from where they are expected than one that is known."""
@@ -83,7 +83,7 @@ def fit_field(
     """
     options, progress = Options(seed=seed), ProgressReporter(report, stop)
     observed = observe(pitch, cameras, frames, segment, progress)
-    problem = Problem(METHODS["esc"], pitch, cameras, observed, options, [None] * len(cameras))
+    problem = Problem(pitch, cameras, observed, options, [None] * len(cameras))
     solution = search_and_refine(problem, progress)
     if len(problem.usable) < len(cameras):
         fitted, results, measures = pitch, solution.results, leave_measures(pitch)

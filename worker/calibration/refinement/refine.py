@@ -266,7 +266,6 @@ def evaluate_poses(
     pitch: Field,
     cameras: Sequence[Camera],
     sight: Observations,
-    stitch_weight: float,  # noqa: ARG001  (every finish of a preset is asked alike)
     free: Sequence[Parameter] = (),
     stored: Sequence[Camera] | None = None,
     memories: Sequence[CameraMemory | None] | None = None,

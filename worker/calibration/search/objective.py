@@ -1,4 +1,4 @@
-"""What a pose is worth: the coarse-to-fine objective of the preset `esc`, in image space.
+"""What a pose is worth: the coarse-to-fine objective, in image space.
 
 The paper warps segmentations to a bird's-eye grid and compares them with a template there, which gives the far half of
 the pitch (mostly noise) as much say as the near one. Here points on the markings are projected into the segmentation

@@ -113,7 +113,7 @@ def test_what_lies_beside_the_lines_of_a_lost_camera_is_not_told_as_paint_that_i
     paint = paint_markings(PITCH, moved(CORNER, (0.0, 0.12, 0.0)))
     frame = np.repeat((70 + 160 * paint).astype(np.uint8)[..., None], 3, axis=2)
     channels = Channels([frame])
-    (lost,) = evaluate_poses(PITCH, [CORNER], Observations([channels], [paint]), 0.5).each
+    (lost,) = evaluate_poses(PITCH, [CORNER], Observations([channels], [paint])).each
     told = report_markings(PITCH, lost, channels, paint)
     assert told
     assert [one.offset_m for one in told] == [None] * len(told)

@@ -17,7 +17,7 @@ def seam(by=(0.0, 0.0, 0.0)):
     """Of the pair, the right camera believed to stand beside where it does."""
     left, right = pair()
     sight = Observations([Channels([frame]) for frame in pair_frames()], pair_markings())
-    return measure_seam(CROWNED, *evaluate_poses(CROWNED, [left, moved(right, by=by)], sight, 0.5).each)
+    return measure_seam(CROWNED, *evaluate_poses(CROWNED, [left, moved(right, by=by)], sight).each)
 
 
 def test_cameras_in_their_places_agree_all_along_the_seam():
@@ -47,6 +47,6 @@ def test_the_places_are_in_order_from_end_to_end_and_the_worst_is_named():
 def test_cameras_that_have_measured_nothing_in_common_have_no_seam():
     left, right = pair()
     sight = Observations([Channels([frame]) for frame in pair_frames()], pair_markings())
-    first, second = evaluate_poses(CROWNED, [left, right], sight, 0.5).each
+    first, second = evaluate_poses(CROWNED, [left, right], sight).each
     assert measure_seam(CROWNED, first, replace(second, measured=None)).places == []
     assert measure_seam(CROWNED, first, replace(second, measured=None)).worst is None

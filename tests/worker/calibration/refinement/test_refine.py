@@ -187,7 +187,7 @@ def test_a_camera_without_lines_stays_where_it_is_and_has_no_sigma():
 def test_assessing_moves_nothing():
     cameras, channels, responses = scene()
     start = [moved(c, SMALL_TURN) for c in cameras]
-    assessed = evaluate_poses(CROWNED, start, Observations(channels, responses), 0.5)
+    assessed = evaluate_poses(CROWNED, start, Observations(channels, responses))
     assert assessed.cameras == start
     assert all(one.residual_px > 0.3 for one in assessed.each)
 

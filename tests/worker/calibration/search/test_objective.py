@@ -6,7 +6,6 @@ import pytest
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair, pair_markings
 from worker.calibration.detection.line_profile import blurred_line
 from worker.calibration.search.genome import genome_of
-from worker.calibration.search.ground_objective import BROAD, NARROW, GroundObjective
 from worker.calibration.search.objective import BlurredResponse, Objective
 
 
@@ -95,22 +94,6 @@ def test_outside_the_picture_there_is_nothing():
     blurred = BlurredResponse.from_response(np.ones((100, 100), dtype=np.float32), 2.0)
     column, row = np.array([[-50.0, 20.0, np.nan, np.inf]]), np.array([[20.0, 1e9, np.nan, 3.0]])
     np.testing.assert_array_equal(blurred.at(column, row), 0)
-
-
-@pytest.mark.parametrize("blurs", [BROAD, NARROW])
-def test_the_papers_objective_prefers_the_truth_too(blurs):
-    cameras, responses = scene()
-    objective = GroundObjective(CROWNED, cameras, responses, 0.5, blurs)
-    truth = loss(objective, cameras)
-    assert truth < loss(objective, [moved(c, (0.005, 0, 0)) for c in cameras])
-    assert truth < 0.7
-
-
-def test_the_papers_objective_sees_a_crown_through_its_planes():
-    cameras, responses = scene()
-    with_roof = GroundObjective(CROWNED, cameras, responses, 0.5, BROAD)
-    without = GroundObjective(CROWNED.flat(), cameras, responses, 0.5, BROAD)
-    assert loss(with_roof, cameras) < loss(without, cameras)
 
 
 def test_the_size_of_a_picture_does_not_move_its_surround():

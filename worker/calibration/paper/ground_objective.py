@@ -8,8 +8,8 @@ template and segmentation blurred alike, and the loss is their mean: broad lines
 What is segmented far from any line of the template, other pitches' lines above all, is in no union: it would be there
 whatever the pose, and drown what the pose changes. Cameras with each other are compared wherever both see.
 
-Kept for comparison: the far half of the pitch, mostly noise there, counts as much as the near one. `objective` says
-what the preset `esc` does instead.
+Kept for comparison: the far half of the pitch, mostly noise there, counts as much as the near one.
+`search/objective.py` says what ESC does instead.
 """
 
 from __future__ import annotations

@@ -1,0 +1,31 @@
+"""The paper's objective: the truth is best there too."""
+
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
+from worker.calibration.paper.ground_objective import BROAD, NARROW, GroundObjective
+from worker.calibration.search.genome import genome_of
+
+
+def scene():
+    return pair(), list(pair_markings())
+
+
+def loss(objective, cameras):
+    return float(objective.losses(genome_of(cameras)[None])[0])
+
+
+@pytest.mark.parametrize("blurs", [BROAD, NARROW])
+def test_the_papers_objective_prefers_the_truth_too(blurs):
+    cameras, responses = scene()
+    objective = GroundObjective(CROWNED, cameras, responses, 0.5, blurs)
+    truth = loss(objective, cameras)
+    assert truth < loss(objective, [moved(c, (0.005, 0, 0)) for c in cameras])
+    assert truth < 0.7
+
+
+def test_the_papers_objective_sees_a_crown_through_its_planes():
+    cameras, responses = scene()
+    with_roof = GroundObjective(CROWNED, cameras, responses, 0.5, BROAD)
+    without = GroundObjective(CROWNED.flat(), cameras, responses, 0.5, BROAD)
+    assert loss(with_roof, cameras) < loss(without, cameras)
