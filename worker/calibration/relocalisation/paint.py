@@ -35,10 +35,17 @@ class Paint:
 
     def explained_by(self, field: Field, camera: Camera) -> float:
         """The share of it, 0..1, that lies on the markings as a camera puts them, on the roof of the field."""
-        if len(self.middles) == 0:
-            return 0.0
+        return share(self.on_markings(field, camera))
+
+    def on_markings(self, field: Field, camera: Camera) -> NDArray[np.bool_]:
+        """Whether each of the places (n,) lies on a marking as a camera puts it, on the roof of the field."""
         small = camera.with_lens(camera.intrinsics.scaled(WIDTH_PX / camera.intrinsics.size[0]))
         band = line_band(VisibleLines.from_camera(field.line_points(), small), small.intrinsics.size, TOLERANCE_PX)
         column, row = self.middles.T
         inside = row < band.shape[0]
-        return float((band[np.minimum(row, band.shape[0] - 1), column] > 0)[inside].mean())
+        return inside & (band[np.minimum(row, band.shape[0] - 1), column] > 0)
+
+
+def share(chosen: NDArray[np.bool_]) -> float:
+    """The share 0..1 of the places (n,) that are chosen, 0 where there are none."""
+    return float(chosen.mean()) if len(chosen) else 0.0

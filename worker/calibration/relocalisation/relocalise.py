@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import Evidence
@@ -27,7 +28,7 @@ from worker.calibration.refinement.refine import Observations, refine
 from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import HALF_TURN
-from worker.calibration.relocalisation.paint import Paint
+from worker.calibration.relocalisation.paint import Paint, share
 from worker.calibration.relocalisation.propose import Proposal, propose
 from worker.calibration.relocalisation.sought import SoughtCamera
 
@@ -43,9 +44,10 @@ of the frame, on mean."""
 LEAST_FOUND = 0.7
 """Of the expected lines, beyond chance. Right poses on real frames find 0.86 and more, wrong ones up to 0.9."""
 RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, MORE_EXPLAINED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.05, 0.15
-"""A different pose may be the true one that agrees little less both ways, and whose overlap with the lines is this part
-of that of the best, or which misses no more than so many times as much of its lines and a few more, or explains more of
-the paint."""
+OWN_PAINT = 0.02
+"""A different pose may be the true one that agrees little less both ways, and which misses no more than so many times
+as much of its lines and a few more, or explains more of the paint, or alone explains so much of it and overlaps with
+the lines by this part of what the best does."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
@@ -58,17 +60,22 @@ class Candidate:
     """A camera that may have taken the frame, refined.
 
     `agreement` 0..1: the harmonic mean of how much of the lines that it expects is seen beyond chance, as `evidence`
-    has it, and of how much of the paint in the frame is `explained`, lies on such a line; `residual_px`: rms of its
-    lines, None where too few were measured, as `sigma`.
+    has it, and of how much of the paint in the frame is `explained`; `explains` (n,): which places on paint lie on such
+    a line; `residual_px`: rms of its lines, None where too few were measured, as `sigma`.
     """
 
     camera: Camera
     agreement: float
-    explained: float
+    explains: NDArray[np.bool_]
     evidence: Evidence
     overlap: Overlap
     residual_px: float | None
     sigma: Sigma | None
+
+    @property
+    def explained(self) -> float:
+        """The share of the paint in the frame, 0..1, that lies on a line of the field."""
+        return share(self.explains)
 
 
 @dataclass(frozen=True)
@@ -139,12 +146,13 @@ class _Sight:
         return self._candidate(replace(found, camera=_with_sigmas(found)))
 
     def _candidate(self, found: RefinedPose) -> Candidate:
-        explained = self.paint.explained_by(self.field, found.camera)
+        explains = self.paint.on_markings(self.field, found.camera)
+        explained = share(explains)
         seen = max(found.evidence.agreement, 0.0)
         both = 2 * seen * explained / max(seen + explained, 1e-9)
         sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
         overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
-        return Candidate(found.camera, both, explained, found.evidence, overlap, found.residual_px, sigma)
+        return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma)
 
 
 def _distinct(field: Field, markings: FieldMap, sought: SoughtCamera, proposals: Sequence[Proposal]) -> list[Camera]:
@@ -186,7 +194,7 @@ def _why_not_taken(field: Field, markings: FieldMap, candidates: Sequence[Candid
     if not films_a_field(best.camera.pose):
         return NotFound("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
     for other in others:
-        if _explains_nearly_as_well(other, best) and _differ(field, markings, best.camera, other.camera, DIFFERENT):
+        if explains_nearly_as_well(other, best) and _differ(field, markings, best.camera, other.camera, DIFFERENT):
             return NotFound(
                 "not-unique",
                 f"two poses explain the lines: {seen.share:.0%} and {other.evidence.share:.0%} of the markings in view "
@@ -195,15 +203,16 @@ def _why_not_taken(field: Field, markings: FieldMap, candidates: Sequence[Candid
     return None
 
 
-def _explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
+def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
     """Whether another candidate may be the true one: it misses little more, and explains little less of the paint."""
     if other.agreement < best.agreement - LESS_AGREEMENT:
         return False
     missed, its = (1 - one.evidence.agreement for one in (best, other))
     return (
         its < MORE_MISSED * missed + FEW_MISSED
-        or other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou
         or other.explained > best.explained + MORE_EXPLAINED
+        # What misses clearly more, and explains nothing that the best does not explain, is a worse reading of the same.
+        or (share(other.explains & ~best.explains) > OWN_PAINT and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)
     )
 
 

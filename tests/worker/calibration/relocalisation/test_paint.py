@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import PITCH, camera, paint_markings
-from worker.calibration.relocalisation.paint import Paint
+from worker.calibration.relocalisation.paint import Paint, share
 
 TRUTH = camera("one", (0.0, -48.0, 12.0), (-10.0, -8.0))
 RESPONSE = np.rint(255 * paint_markings(PITCH, TRUTH)).astype(np.uint8)
@@ -27,3 +27,10 @@ def test_paint_beside_the_field_is_explained_by_nobody():
 
 def test_of_no_paint_nothing_is_explained():
     assert Paint.of(np.zeros((540, 960), np.uint8)).explained_by(PITCH, TRUTH) == pytest.approx(0.0)
+
+
+def test_the_places_on_markings_are_those_that_are_explained():
+    paint = Paint.of(RESPONSE)
+    on_markings = paint.on_markings(PITCH, TRUTH)
+    assert on_markings.shape == (len(paint.middles),)
+    assert share(on_markings) == paint.explained_by(PITCH, TRUTH)

@@ -9,10 +9,12 @@ from tests.worker.calibration.synthetic import BARREL, PITCH, camera, paint_fram
 from tests.worker.calibration.test_calibrate import white_on_green
 from tests.worker.calibration.test_sports import field
 from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.segmentation import Region
+from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.geometry.camera import inside
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.relocalise import relocalise, twin
+from worker.calibration.relocalisation.relocalise import Candidate, explains_nearly_as_well, relocalise, twin
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens, unknown_lenses
 
 GREEN = np.full((540, 960, 3), (60, 130, 70), np.uint8)
@@ -77,3 +79,22 @@ def test_two_parallel_lines_are_no_field():
     answer = search(PITCH, SIDELINE, frame)
     assert answer.refusal is not None
     assert answer.refusal.words
+
+
+def candidate(found_of_100, explained_of_100, iou):
+    """What is seen of 100 pieces of expected line, and which of 100 places on paint lie on one."""
+    seen = Evidence(np.arange(100), np.zeros(100, int), np.ones(100), np.arange(100) < found_of_100, np.zeros(100))
+    explains = np.isin(np.arange(100), explained_of_100)
+    agreement = 2 / (1 / seen.agreement + 1 / explains.mean())
+    return Candidate(SIDELINE, agreement, explains, seen, Overlap(iou, found_of_100 / 100, 0.0), 0.4, None)
+
+
+def test_a_pose_that_misses_more_and_explains_nothing_of_its_own_is_no_rival():
+    # American football: the same field a few yard lines farther on, with its goal line where there is none.
+    best, shifted = candidate(99, range(90), iou=0.91), candidate(90, range(88), iou=0.81)
+    assert not explains_nearly_as_well(shifted, best)
+
+
+def test_a_pose_that_explains_paint_that_the_best_does_not_is_a_rival():
+    best, other = candidate(99, range(90), iou=0.91), candidate(90, range(5, 93), iou=0.81)
+    assert explains_nearly_as_well(other, best)
