@@ -22,7 +22,7 @@ from service.pages import ROUTERS as PAGES
 from service.routes import docs, event_streams, health, jobs, pictures, snapshot, stitch, venues
 from service.routes.contract import documented
 from service.routes.contract.introduction import DESCRIPTION, TAGS
-from service.routes.submissions import frames, intrinsics, locate, resubmit
+from service.routes.submissions import find, frames, intrinsics, locate, resubmit
 from service.schemas.problems import Problem
 from service.settings import Settings
 from service.store.blobs import BLOB_OUTAGES
@@ -69,6 +69,7 @@ def create_app(settings: Settings) -> FastAPI:
         frames,
         intrinsics,
         locate,
+        find,
         jobs,
         resubmit,
         pictures,

@@ -41,6 +41,7 @@ from service.schemas.history import History, Revision
 from service.schemas.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.schemas.names import (
     OPTIONS_PART,
+    SITE_PART,
     EventKind,
     FieldNumber,
     FormatName,
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from datetime import date
 
     from service.schemas.events.venue_event import Event
+    from service.schemas.find import SoughtSite
     from service.schemas.job import Job
     from service.schemas.trend import Trend
 
@@ -162,6 +164,15 @@ class AsyncClient:
         wanted = {"job": job_id, "name": name}
         return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-field", json=wanted))
 
+    async def adopt_found(self, venue_id: str, job_id: str, candidates: Mapping[str, int | None] = NOTHING) -> Venue:
+        """Store the cameras that a job has found, as a new venue or as a revision.
+
+        `candidates`: the number of the one that a camera is taken to be, from 1, None: none of them; of other cameras
+        the first one that was accepted.
+        """
+        wanted = {"job": job_id, "candidates": dict(candidates)}
+        return _read(Venue, await self._ask("POST", f"/venues/{venue_id}/adopt-found", json=wanted))
+
     async def venue_poses(
         self, venue_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
     ) -> bytes:
@@ -257,6 +268,24 @@ class AsyncClient:
         """Submit frames by which to fit the measures of a venue's pitch; the venue stays as it is."""
         sent = _upload(files, options, idempotency_key)
         return _job(await self._ask("POST", f"/venues/{venue_id}/field/fit", **sent))
+
+    async def find(
+        self,
+        venue_id: str,
+        files: Mapping[str, Path | Sequence[Path]],
+        options: Mapping[str, Any] = NOTHING,
+        site: SoughtSite | None = None,
+        idempotency_key: str | None = None,
+    ) -> Job:
+        """Submit frames of cameras that are to be found; `site`: of a venue that is not stored yet.
+
+        Nothing is stored by itself, see `adopt_found`.
+        """
+        sent = _upload(files, options, idempotency_key)
+        if site is not None:
+            document = site.model_dump_json(exclude_defaults=True).encode()
+            sent["files"].append((SITE_PART, ("site.json", document, "application/json")))
+        return _job(await self._ask("POST", f"/venues/{venue_id}/find", **sent))
 
     async def job(self, job_id: str, wait_s: float = 0) -> Job:
         """A job, at its end or after `wait_s`."""
@@ -412,12 +441,14 @@ class Client:
     restore = Call(AsyncClient.restore)
     adopt_refined = Call(AsyncClient.adopt_refined)
     adopt_field = Call(AsyncClient.adopt_field)
+    adopt_found = Call(AsyncClient.adopt_found)
     venue_poses = Call(AsyncClient.venue_poses)
     venue_stitch = Call(AsyncClient.venue_stitch)
     venue_events = Stream(AsyncClient.venue_events)
     snapshot = Call(AsyncClient.snapshot)
     calibrate = Call(AsyncClient.calibrate)
     fit_field = Call(AsyncClient.fit_field)
+    find = Call(AsyncClient.find)
     job = Call(AsyncClient.job)
     jobs = Call(AsyncClient.jobs)
     again = Call(AsyncClient.again)

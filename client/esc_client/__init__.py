@@ -14,12 +14,13 @@ from service.client import AsyncClient, Client, NotUnderstood, Refused
 from service.schemas.events.venue_event import Event, PosesEvent, VenueEvent
 from service.schemas.events.webhooks import Webhook
 from service.schemas.field import FieldOfPlay
+from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, Pose, PoseIn
 from service.schemas.health import Alarm, AlarmEvent, Alarms, VenueHealth
 from service.schemas.history import Revision
 from service.schemas.job import Job, JobEvent, Progress
 from service.schemas.options import Options
-from service.schemas.results import CameraResult, Result
+from service.schemas.results import CameraResult, FindResult, Result
 from service.schemas.schedule import Schedule
 from service.schemas.trend import Trend
 from service.schemas.venue import Camera, CameraIn, ChangedVenue, Venue, VenueIn
@@ -38,6 +39,7 @@ __all__ = [
     "Client",
     "Event",
     "FieldOfPlay",
+    "FindResult",
     "Intrinsics",
     "Job",
     "JobEvent",
@@ -51,6 +53,8 @@ __all__ = [
     "Result",
     "Revision",
     "Schedule",
+    "SoughtCameraIn",
+    "SoughtSite",
     "Trend",
     "Venue",
     "VenueEvent",

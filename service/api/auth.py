@@ -55,6 +55,18 @@ class _CachedKey:
     until: float
 
 
+def require_scope(key: Key | None, needed: Scope) -> None:
+    """Raise the problem that names the scope unless the key has it; None: where no keys are asked for."""
+    if key is not None and SCOPES.index(key.scope) < SCOPES.index(needed):
+        raise Problem(
+            "scope-too-small",
+            f"This needs a key of scope {needed}; {key.name} has {key.scope}.",
+            headers={"WWW-Authenticate": f'Bearer error="insufficient_scope", scope="{needed}"'},
+            expected=needed,
+            got=key.scope,
+        )
+
+
 class Authenticator:
     """Authenticates callers by API key or session cookie, and checks scope and rate (RFC 6750)."""
 
@@ -90,14 +102,7 @@ class Authenticator:
         # Every line that the request leaves in the log.
         structlog.contextvars.bind_contextvars(key=key.name)
         self._count_request(key)
-        if SCOPES.index(key.scope) < SCOPES.index(needed):
-            raise Problem(
-                "scope-too-small",
-                f"This needs a key of scope {needed}; {key.name} has {key.scope}.",
-                headers={"WWW-Authenticate": f'Bearer error="insufficient_scope", scope="{needed}"'},
-                expected=needed,
-                got=key.scope,
-            )
+        require_scope(key, needed)
         return key
 
     async def sign_in(self, request: HTTPConnection, given: str) -> str:

@@ -136,6 +136,24 @@ Frames = Annotated[
         help="A JPEG or PNG of each camera, such as left=left.jpg; several of one camera are fused.",
     ),
 ]
+AdoptedFinding = Annotated[
+    str | None,
+    typer.Option(
+        "--found",
+        metavar="JOB",
+        callback=_check_optional_job_id,
+        help="Instead of a lens: the cameras that this job of `esc venue find` has found.",
+    ),
+]
+Candidates = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--candidate",
+        metavar="CAMERA=NUMBER",
+        help="With --found: the candidate that a camera is taken to be, from 1; 0: none of them. Otherwise the first "
+        "one, of cameras that were accepted.",
+    ),
+]
 FormatOption = Annotated[
     FormatName,
     typer.Option(
@@ -201,6 +219,17 @@ def parse_frame_files(frames: Sequence[str]) -> dict[str, list[Path]]:
             fail(f"There is no file {name} (camera {camera})", USAGE)
         files.setdefault(camera, []).append(Path(name))
     return files
+
+
+def parse_candidates(choices: Sequence[str]) -> dict[str, int | None]:
+    """The candidate of each camera, of arguments CAMERA=NUMBER; None: none of them."""
+    chosen: dict[str, int | None] = {}
+    for choice in choices:
+        camera, equals, number = choice.partition("=")
+        if not (camera and equals and number.isdecimal()):
+            fail(f"{choice!r} is not CAMERA=NUMBER, for instance right=2", USAGE)
+        chosen[camera] = int(number) or None
+    return chosen
 
 
 def parse_options(text: str) -> Options:

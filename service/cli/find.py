@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.arguments import Frames, parse_document, parse_frame_files
-from service.cli.printing import REJECTED, USAGE, fail, job_progress_bar, print_json, print_note
+from service.cli.printing import REJECTED, USAGE, fail, job_progress_bar, print_found_summary, print_json
 
 if TYPE_CHECKING:
-    from service.schemas.find import FindResult, FoundCameraResult, SoughtCameraIn, SoughtSite
+    from service.schemas.find import SoughtSite
     from service.settings import Settings
 
 
@@ -56,10 +56,11 @@ def find(
         for name, picture in solution.pictures.items():
             (pictures / f"{name}.jpg").write_bytes(picture)
     print_json(solution.result)
-    _print_summary(solution.result)
+    print_found_summary(solution.result)
     if not solution.result.accepted:
         raise typer.Exit(REJECTED)
-    output.write_text(_venue_document(place, solution.result))
+    venue = place.completed(solution.result, solution.result.chosen())
+    output.write_text(venue.model_dump_json(indent=2, exclude_none=True) + "\n")
 
 
 def _checked_files(place: SoughtSite, frames: list[str], settings: Settings) -> dict[str, list[bytes]]:
@@ -82,40 +83,3 @@ def _checked_files(place: SoughtSite, frames: list[str], settings: Settings) -> 
             for data in several:
                 image_checks.check_photo("frame", data, settings)
     return files
-
-
-def _print_summary(result: FindResult) -> None:
-    """A line for each camera: where it stands, or why it was not found."""
-    for camera in result.cameras:
-        print_note(_summary(camera))
-        for remark in camera.remarks:
-            print_note(f"  {remark}")
-
-
-def _summary(camera: FoundCameraResult) -> str:
-    if not camera.accepted:
-        return f"Camera {camera.id} was not found: {camera.rejected_because}"
-    best = camera.candidates[0]
-    x, y, z = best.pose.position
-    focal = best.intrinsics.matrix[0][0]
-    lines = f"{best.lines_found:.0%} of the lines"
-    return f"Camera {camera.id}: ({x:.2f}, {y:.2f}, {z:.2f}) m, focal length {focal:.0f} px, {lines}"
-
-
-def _venue_document(place: SoughtSite, result: FindResult) -> str:
-    """The venue with the cameras that were found and those that were known, in the order of the site."""
-    from service.schemas.geometry import PoseIn
-    from service.schemas.venue import CameraIn, VenueIn
-
-    found = {camera.id: camera for camera in result.cameras}
-
-    def complete(camera: SoughtCameraIn) -> CameraIn:
-        kept = {"id": camera.id, "ignore": camera.ignore, "source": camera.source}
-        if camera.id not in found:
-            return CameraIn(**kept, image_size=camera.image_size, intrinsics=camera.intrinsics, pose=camera.pose)
-        best = found[camera.id].candidates[0]
-        pose = PoseIn(rotation=best.pose.rotation, position=best.pose.position)
-        return CameraIn(**kept, image_size=found[camera.id].image_size, intrinsics=best.intrinsics, pose=pose)
-
-    venue = VenueIn(id=place.id, name=place.name, field=place.field, cameras=[complete(one) for one in place.cameras])
-    return venue.model_dump_json(indent=2, exclude_none=True) + "\n"

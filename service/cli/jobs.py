@@ -9,15 +9,12 @@ import typer
 
 from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, FormatOption, JobId, LensOption, OneCamera, Output, Url
 from service.cli.printing import (
-    ACCEPTED,
     FAILED,
-    REJECTED,
     fail,
     follow_to_end,
     job_exit_code,
     outcome_text,
     print_json,
-    print_note,
     write_document,
 )
 from service.cli.service_client import open_client
@@ -112,7 +109,7 @@ def picture_of_job(
         content = client.picture(found, picture) if picture in names else None
         if content is None:
             fail(f"Job {job} has no picture {picture}; it has {', '.join(names) or 'none'}.", FAILED)
-        file = output or Path(picture_file(picture.replace("/", "_", 1)))
+        file = output or Path(picture_file(picture.replace("/", "_")))
         file.write_bytes(content)
         print(file)
 
@@ -161,16 +158,6 @@ def delete_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> No
 
 
 def _follow_and_exit(client: Client, job: Job) -> None:
-    from service.schemas.results import FieldResult, IntrinsicsResult, LocateResult
-
     job = follow_to_end(client, job)
     print_json(job)
-    match job.result:
-        case IntrinsicsResult():
-            raise typer.Exit(ACCEPTED)
-        case LocateResult() | FieldResult():
-            if not job.result.accepted:
-                print_note(f"Rejected: {job.result.rejected_because}")
-            raise typer.Exit(ACCEPTED if job.result.accepted else REJECTED)
-        case _:
-            raise typer.Exit(job_exit_code(job))
+    raise typer.Exit(job_exit_code(job))

@@ -15,7 +15,14 @@ if TYPE_CHECKING:
     from service.client import Client
     from service.schemas.job import Job
     from service.schemas.job import Progress as Step
-    from service.schemas.results import FieldResult, IntrinsicsResult, LocateResult, Result
+    from service.schemas.results import (
+        FieldResult,
+        FindResult,
+        FoundCameraResult,
+        IntrinsicsResult,
+        LocateResult,
+        Result,
+    )
     from service.schemas.venue import ChangedVenue
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
@@ -81,10 +88,19 @@ def key_hint(status: int) -> str:
 
 def job_exit_code(job: Job) -> int:
     """The exit code for a job that has ended, and a line for whoever looks."""
-    from service.schemas.results import Result
+    from service.schemas.results import IntrinsicsResult, Result
 
-    if isinstance(job.result, Result):
-        return calibration_exit_code(job.result)
+    match job.result:
+        case None:
+            pass
+        case Result():
+            return calibration_exit_code(job.result)
+        case IntrinsicsResult():
+            return ACCEPTED
+        case _:
+            if not job.result.accepted:
+                print_note(f"Rejected: {job.result.rejected_because}")
+            return ACCEPTED if job.result.accepted else REJECTED
     if job.status == "cancelled":
         print_note(f"Job {job.id} was cancelled before it had a result.")
     if job.error is not None:
@@ -167,6 +183,24 @@ def print_field_summary(result: FieldResult) -> None:
             print_note(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m ({differs})")
         else:
             print_note(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
+
+
+def print_found_summary(result: FindResult) -> None:
+    """A line for each camera: where it stands, or why it was not found."""
+    for camera in result.cameras:
+        print_note(_found_text(camera))
+        for remark in camera.remarks:
+            print_note(f"  {remark}")
+
+
+def _found_text(camera: FoundCameraResult) -> str:
+    if not camera.accepted:
+        return f"Camera {camera.id} was not found: {camera.rejected_because}"
+    best = camera.candidates[0]
+    x, y, z = best.pose.position
+    focal = best.intrinsics.matrix[0][0]
+    lines = f"{best.lines_found:.0%} of the lines"
+    return f"Camera {camera.id}: ({x:.2f}, {y:.2f}, {z:.2f}) m, focal length {focal:.0f} px, {lines}"
 
 
 # How far a job is

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import zipfile
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,24 +16,32 @@ from service.cli.arguments import (
     DEFAULT_URL,
     AdoptedCamera,
     AdoptedField,
+    AdoptedFinding,
     AdoptedJob,
     ApiKey,
     AsJson,
+    Candidates,
     FormatOption,
+    Frames,
     LensOption,
     OneCamera,
     Output,
     Url,
     VenueId,
+    parse_candidates,
     parse_document,
+    parse_frame_files,
 )
 from service.cli.printing import (
     FAILED,
     REJECTED,
     USAGE,
     fail,
+    follow_to_end,
+    job_exit_code,
     outcome_text,
     print_changed_venue,
+    print_found_summary,
     print_json,
     print_note,
     write_document,
@@ -40,6 +49,7 @@ from service.cli.printing import (
 from service.cli.service_client import open_client
 from service.cli.venue_edits import describe_losses, edit_text, merge_patch_between, parse_patch, with_poses_of
 from service.schemas.names import EventKind, Projection, StitchFormat
+from service.store.jobs.files import CANDIDATE, picture_file
 
 if TYPE_CHECKING:
     from datetime import date
@@ -47,7 +57,9 @@ if TYPE_CHECKING:
     from service.client import Client
     from service.schemas.actor import Actor
     from service.schemas.events.venue_event import Event
+    from service.schemas.find import SoughtSite
     from service.schemas.geometry import Moved
+    from service.schemas.job import Job
     from service.schemas.trend import Trend
     from service.schemas.venue import Venue
 
@@ -316,28 +328,130 @@ def restore_venue(
         print_json(client.restore(venue, revision))
 
 
+@app.command("find")
+def find_cameras(
+    venue: VenueId,
+    frames: Frames,
+    sport: Annotated[
+        str | None,
+        typer.Option("--sport", help="Of a venue that is not stored yet: football, tennis ... in its usual measures."),
+    ] = None,
+    site: Annotated[
+        Path | None,
+        typer.Option(
+            "--site",
+            metavar="SITE.json",
+            exists=True,
+            dir_okay=False,
+            help="Of a venue that is not stored yet: field, and what is known of its cameras, as for `esc find`.",
+        ),
+    ] = None,
+    options: Annotated[
+        str,
+        typer.Option(
+            "--options",
+            metavar="JSON",
+            help='Of a stored venue: {"cameras": ["left"]} looks for these and takes the others as they are, {"lens": '
+            '"unknown"} finds lenses as well, {"position_radius_m": 2} looks within 2 m of the stored place.',
+        ),
+    ] = "{}",
+    wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end and print it.")] = False,
+    adopt_them: Annotated[
+        bool, typer.Option("--adopt", help="Follow the job, and store the cameras if all are accepted.")
+    ] = False,
+    pictures: Annotated[
+        Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera; waits.")
+    ] = None,
+    key: Annotated[
+        str | None,
+        typer.Option(
+            "--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."
+        ),
+    ] = None,
+    url: Url = DEFAULT_URL,
+    api_key: ApiKey = None,
+) -> None:
+    """Find cameras of a venue from their frames alone. Exit: 0 all found, 1 failed, 2 usage, 3 not all, or not sure.
+
+    Of a stored venue those that frames are given of; of a venue that is not stored yet, with --sport or --site, all.
+    Nothing is stored before --adopt, or `esc venue adopt VENUE --found JOB`.
+    """
+    from service.schemas.options import FindOptions
+    from service.schemas.results import FindResult
+
+    files = parse_frame_files(frames)
+    chosen = parse_document(FindOptions, options, "--options")
+    sought = _sought_site(venue, files, sport, site)
+    with open_client(url, api_key) as client:
+        job = client.find(venue, files, chosen.model_dump(mode="json", exclude_unset=True), sought, key)
+        if not (wait or adopt_them or pictures):
+            print_json({"job": job.id, "url": client.url_of(job.links["self"])})
+            return
+        job = follow_to_end(client, job)
+        print_json(job)
+        if isinstance(job.result, FindResult):
+            print_found_summary(job.result)
+            if pictures is not None:
+                _save_candidates(client, job, pictures)
+            if adopt_them and job.result.accepted:
+                client.adopt_found(venue, job.id)
+                print_note(f"Stored: venue {venue} has these cameras now.")
+    raise typer.Exit(job_exit_code(job))
+
+
 @app.command("adopt")
 def adopt(
     venue: VenueId,
     camera: AdoptedCamera = None,
     field: AdoptedField = None,
     job: AdoptedJob = None,
+    found: AdoptedFinding = None,
+    candidate: Candidates = None,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Store what the lines of an accepted calibration say of a lens, or of the field, as a new revision.
+    """Store what the lines of a job say of a lens, of the field, or of where cameras stand, as a new revision.
 
     Of a CAMERA: its refined pose and lens, which the last accepted calibration found; what that changes is in the job,
     `longer` and `differs_m` of the camera's `refined`. With --field: one of the numbers in `adoptable` of the job's
-    result, which has the change as well.
+    result, which has the change as well. With --found: the cameras that `esc venue find` has found; a venue that is
+    not stored yet is created.
     """
-    if (camera is None) == (field is None) or (field is None) != (job is None):
-        raise typer.BadParameter("name a CAMERA, or a number of the field with --field and --job")
+    one_of_three = sum(one is not None for one in (camera, field, found)) == 1
+    if not one_of_three or (field is None) != (job is None) or (candidate and found is None):
+        raise typer.BadParameter("name a CAMERA, or a number of the field with --field and --job, or --found JOB")
+    choice = parse_candidates(candidate or ())
     with open_client(url, api_key) as client:
         if camera is not None:
             print_json(client.adopt_refined(venue, camera))
         elif field is not None and job is not None:
             print_json(client.adopt_field(venue, job, field))
+        elif found is not None:
+            print_json(client.adopt_found(venue, found, choice))
+
+
+def _sought_site(
+    venue: str, files: Mapping[str, Sequence[Path]], sport: str | None, file: Path | None
+) -> SoughtSite | None:
+    """The site of a venue that is not stored yet, by its file or by its sport; None: neither is given."""
+    from service.schemas.find import SoughtSite
+
+    if sport is not None and file is not None:
+        raise typer.BadParameter("give --sport or --site, not both")
+    if file is not None:
+        return parse_document(SoughtSite, file.read_bytes(), str(file))
+    if sport is None:
+        return None
+    described = {"id": venue, "field": {"template": sport}, "cameras": [{"id": camera} for camera in files]}
+    return parse_document(SoughtSite, json.dumps(described), "--sport")
+
+
+def _save_candidates(client: Client, job: Job, folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in job.links:
+        picture = client.picture(job, name) if name.startswith(f"{CANDIDATE}/") else None
+        if picture is not None:
+            (folder / picture_file(name.replace("/", "_"))).write_bytes(picture)
 
 
 def _event_text(event: Event) -> str:

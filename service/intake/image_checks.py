@@ -10,11 +10,12 @@ from __future__ import annotations
 import re
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera, Venue
 
@@ -39,8 +40,10 @@ class TooManyParts(Exception):  # noqa: N818
     """A file is made of more parts than any encoder writes; the message says how many."""
 
 
-def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -> None:
-    """Every camera of the venue has frames, not too many, and no other camera has."""
+def check_cameras(
+    venue: Venue | SoughtSite, counts: Mapping[str, int], settings: Settings, needed: Collection[str] | None = None
+) -> None:
+    """Every camera of the venue has frames, not too many, and no other camera has; `needed`: only these must have."""
     ids = [camera.id for camera in venue.cameras]
     for name in counts:
         if name not in ids:
@@ -52,23 +55,23 @@ def check_cameras(venue: Venue, counts: Mapping[str, int], settings: Settings) -
                 expected=ids,
             )
     for camera in ids:
-        if not counts.get(camera):
+        if not counts.get(camera) and (needed is None or camera in needed):
             raise Problem("missing-camera", f"Send at least one frame of camera {camera}.", camera=camera, expected=ids)
-        if counts[camera] > settings.max_frames_per_camera:
+        if counts.get(camera, 0) > settings.max_frames_per_camera:
             raise Problem(
                 "too-many-frames",
                 f"Send at most {settings.max_frames_per_camera} frames of camera {camera}.",
                 camera=camera,
                 expected=settings.max_frames_per_camera,
-                got=counts[camera],
+                got=counts.get(camera, 0),
             )
 
 
-def check(camera: Camera, data: bytes, settings: Settings) -> None:
-    """One frame: an entire JPEG or PNG of the camera's size."""
+def check(camera: Camera | SoughtCameraIn, data: bytes, settings: Settings) -> None:
+    """One frame: an entire JPEG or PNG of the camera's size, where that is known."""
     size = _size_of_whole_picture(data, settings, camera=camera.id)
     wanted = camera.image_size
-    if size != wanted:
+    if wanted is not None and size != wanted:
         exchanged = tuple(size) == tuple(reversed(wanted))
         asked = " The frame has them the other way round: are width and height of the venue's image_size exchanged?"
         raise Problem(

@@ -43,9 +43,8 @@ class Intake:
 
         `store` puts them where the submission says. Raises a `SubmissionRefused`, and a `Problem` that `store` raises.
         """
-        venue_id = None if submission.venue is None else submission.venue.id
         known = self._submissions.same_as(
-            venue_id, submission.idempotency_key, submission.content_hash, submission.kind
+            submission.venue_id, submission.idempotency_key, submission.content_hash, submission.kind
         )
         if known is not None:
             return known, False

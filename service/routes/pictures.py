@@ -44,6 +44,11 @@ PICTURES = (
         "Draw where in the picture of a lens the board was seen, and residuals enlarged.",
     ),
     (
+        "candidate",
+        "candidate/{camera}/{number}.jpg",
+        "Draw the field on a camera's frame as a candidate of it has it, from 1, the best first.",
+    ),
+    (
         "points",
         "points.jpg",
         "Draw the clicked points of a first pose and the pitch as the pose has it, in the frame if one was sent.",
@@ -60,10 +65,15 @@ def _show(route: str, address: str, shows: str) -> None:
     async def of_camera(job: ExistingJob, camera: CameraPath, context: InContext) -> Response:
         return await _picture(context, job, name.format(camera=camera))
 
+    async def of_candidate(
+        job: ExistingJob, camera: CameraPath, number: Annotated[int, Path(ge=1, le=100)], context: InContext
+    ) -> Response:
+        return await _picture(context, job, name.format(camera=camera, number=number))
+
     content = {PNG if suffix == "png" else JPEG: BINARY}
     router.add_api_route(
         f"/{{job_id}}/{address}",
-        of_camera if "{camera}" in address else of_job,
+        of_candidate if "{number}" in address else of_camera if "{camera}" in address else of_job,
         name=route,
         description=shows,
         openapi_extra=needs_scope("read"),

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Body, Depends, Header, Path, Query, Request, Resp
 from pydantic import ValidationError
 
 from service.api import etags
+from service.api.auth import require_scope
 from service.api.context import ByActor, Context, InContext, VenueIdPath
 from service.api.problems import validation_problem
 from service.intake import sources
@@ -30,7 +31,7 @@ from service.schemas.base import Day, Name
 from service.schemas.events import callback_urls
 from service.schemas.geometry import PoseIn
 from service.schemas.health import VenueHealth
-from service.schemas.history import AdoptField, History, Restore
+from service.schemas.history import AdoptField, AdoptFound, History, Restore
 from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
 from service.schemas.names import ID_PATTERN, FormatName, ListFields
 from service.schemas.problems import Problem
@@ -38,6 +39,7 @@ from service.schemas.trend import Trend
 from service.schemas.venue import PATCH_EXAMPLES, Camera, ChangedVenue, Venue, VenueIn, Venues, VenueSummary
 from service.settings import Settings
 from service.store.adopted_fields import NoSuchJob, NotAdoptable, NumberRefused
+from service.store.found_venues import CandidateNeeded, CandidateRefused, NoSuchCandidate, NothingFound
 from service.store.jobs.decisions import VenueHasChanged
 from service.store.refined import NoRefinedPose
 from service.store.revisions import NoSuchRevision, RevisionUnfit
@@ -401,6 +403,59 @@ def adopt_field(
     return adopted.with_hidden_callbacks()
 
 
+@router.post(
+    "/{venue_id}/adopt-found",
+    openapi_extra=needs_scope("calibrate"),
+    responses={
+        200: header_docs("ETag"),
+        201: {"model": Venue, **header_docs("ETag")},
+        **problem_responses(400, 404, 408, 409, 412, 413, 415, 422),
+    },
+)
+def adopt_found(
+    venue_id: VenueIdPath,
+    wanted: AdoptFound,
+    request: Request,
+    response: Response,
+    context: InContext,
+    by: ByActor,
+    if_match: Annotated[str | None, Header()] = None,
+) -> Venue:
+    """Store cameras that a job has found, lenses too, as a revision, or with an admin's key as a new venue.
+
+    The job is one of `POST /venues/{id}/find`. Of each camera its first candidate is stored if that was accepted, or
+    the one that `candidates` names, accepted or not. Only while the field and these cameras are as the job began with
+    them. What the cameras remember of earlier nights ends. Nothing changes if they stand so already.
+    """
+
+    def allow(before: Venue | None) -> None:
+        _require_match(if_match, before)
+        if before is None:
+            require_scope(request.state.key, "admin")
+
+    try:
+        adopted, new = context.found_venues.adopt(venue_id, wanted.job, allow, wanted.candidates, by)
+    except NothingFound:
+        detail = f"Venue {venue_id} has no job of this id that looked for its cameras and ended."
+        raise Problem("poses-not-found", detail, job=wanted.job) from None
+    except NoSuchCandidate as error:
+        raise _no_such_candidate(error, wanted.job) from None
+    except CandidateNeeded as error:
+        raise Problem(
+            "candidate-needed",
+            f"Choose one of the candidates of {', '.join(error.cameras)}, or null to leave it out.",
+            job=wanted.job,
+            expected=list(error.cameras),
+        ) from None
+    except CandidateRefused as error:
+        raise Problem("candidate-refused", f"{error}.", job=wanted.job) from None
+    except VenueHasChanged as moved:
+        raise venue_moved_on(venue_id, wanted.job, moved) from None
+    response.headers["ETag"] = etags.quoted(venue_etag(adopted))
+    response.status_code = 201 if new else 200
+    return adopted.with_hidden_callbacks()
+
+
 @router.delete(
     "/{venue_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses(404, 409, 412)
 )
@@ -417,6 +472,15 @@ def delete_venue(
         _require_match(if_match, before)
 
     context.venues.delete(venue_id, allow, by)
+
+
+def _no_such_candidate(error: NoSuchCandidate, job_id: str) -> Problem:
+    """Answer who names a candidate that is not there."""
+    if error.count is None:
+        detail = f"The job looked for {', '.join(error.sought)}."
+        return Problem("candidate-not-found", detail, job=job_id, camera=error.camera, expected=list(error.sought))
+    detail = f"Camera {error.camera} has {error.count} candidates."
+    return Problem("candidate-not-found", detail, job=job_id, camera=error.camera, expected=error.count)
 
 
 def _summaries(context: Context, venues: Sequence[Venue]) -> list[VenueSummary]:

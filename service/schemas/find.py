@@ -1,16 +1,18 @@
-"""Cameras without poses: what may be known of them, and what is found."""
+"""Cameras without poses: what may be known of them, and the venue that they become once they are found."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from service.schemas.addresses import SourceUrl
 from service.schemas.base import OPEN_WORD, Id, Number, Schema
-from service.schemas.geometry import Intrinsics, Pose, PoseIn, Position, Side, require_camera_id
-from service.schemas.results import CPU_S, Provenance, Sigma
-from service.schemas.venue import Ignore, NamedField, require_distinct_ids
+from service.schemas.geometry import Intrinsics, PoseIn, Position, Side, require_camera_id
+from service.schemas.options import FindOptions
+from service.schemas.results import CandidateResult, FindResult
+from service.schemas.venue import Camera, CameraIn, Ignore, NamedField, Venue, VenueIn, require_distinct_ids
 
 FieldSide = Annotated[
     Literal["near", "far", "left", "right"],
@@ -63,53 +65,68 @@ class SoughtSite(NamedField):
         require_distinct_ids([camera.id for camera in self.cameras])
         return self
 
+    @property
+    def sought(self) -> list[str]:
+        """The ids of the cameras that are to be found: those without a pose."""
+        return [camera.id for camera in self.cameras if camera.pose is None]
 
-class CandidateResult(Schema):
-    """A camera that may have taken the frame. `agreement`: how well the lines agree with it both ways, 0..1: is the
-    expected seen, and the seen expected? `lines_found`: the share of the expected that is seen; `residual_px`: rms of
-    the measured lines, null where too few were measured.
-    """
+    @classmethod
+    def of(cls, venue: Venue, options: FindOptions, with_frames: Collection[str]) -> SoughtSite:
+        """A stored venue whose cameras are to be found again: those of the options, or all that have frames."""
+        sought = with_frames if options.cameras is None else options.cameras
+        cameras = [_sought(one, options) if one.id in sought else _known(one) for one in venue.cameras]
+        return cls(id=venue.id, name=venue.name, field=venue.field, cameras=cameras)
 
-    intrinsics: Intrinsics
-    pose: Pose
-    agreement: float
-    lines_found: float
-    residual_px: float | None
-    sigma: Sigma | None
+    def completed(self, result: FindResult, chosen: Mapping[str, CandidateResult]) -> VenueIn:
+        """The venue of the cameras that were known and of those that were found, in the order of the site.
 
-
-FindReason = Annotated[
-    Literal[
-        "no-lines",
-        "lines",
-        "few-lines",
-        "implausible",
-        "not-unique",
-        "not-confirmed",
-    ],
-    OPEN_WORD,
-]
-
-
-class FoundCameraResult(Schema):
-    """What was found for a camera: `candidates`, the best first; where it is accepted, its first one is the camera."""
-
-    id: Id
-    accepted: bool
-    reason: FindReason | None = Field(description="Why it is not accepted, in a word.")
-    rejected_because: str | None
-    remarks: list[str] = Field(description="What was assumed, such as the side of a field that looks the same twice.")
-    image_size: list[int]
-    candidates: list[CandidateResult]
+        `chosen`: the candidate that each found camera is taken to be; a sought camera without one is left out. Raises
+        `ValidationError` where that leaves no camera, or a candidate is none that a venue can have.
+        """
+        sizes = {camera.id: camera.image_size for camera in result.cameras}
+        standing = [
+            CameraIn(id=one.id, ignore=one.ignore, source=one.source, **what)
+            for one in self.cameras
+            if (what := _placed(one, chosen, sizes)) is not None
+        ]
+        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=standing)
 
 
-class FindResult(Schema):
-    """Cameras found from their frames alone. `accepted`: all of them were."""
+def _sought(camera: Camera, options: FindOptions) -> SoughtCameraIn:
+    """A stored camera that is looked for, with what of it is said to hold still."""
+    is_lens_known = options.lens == "stored"
+    near = (
+        {}
+        if options.position_radius_m is None
+        else {
+            "position": camera.pose.position,
+            "position_radius_m": options.position_radius_m,
+        }
+    )
+    return SoughtCameraIn(
+        id=camera.id,
+        image_size=camera.image_size,
+        intrinsics=camera.intrinsics if is_lens_known else None,
+        ignore=camera.ignore,
+        **near,
+    )
 
-    accepted: bool
-    rejected_because: str | None
-    cameras: list[FoundCameraResult]
-    stitch_error_px: float | None
-    timings_s: dict[str, float]
-    cpu_s: dict[str, float] = CPU_S
-    provenance: Provenance
+
+def _known(camera: Camera) -> SoughtCameraIn:
+    pose = PoseIn(rotation=camera.pose.rotation, position=camera.pose.position)
+    return SoughtCameraIn(
+        id=camera.id, image_size=camera.image_size, intrinsics=camera.intrinsics, pose=pose, ignore=camera.ignore
+    )
+
+
+def _placed(
+    camera: SoughtCameraIn, chosen: Mapping[str, CandidateResult], sizes: Mapping[str, list[int]]
+) -> dict[str, object] | None:
+    """Size, lens and pose of a camera; None: it is sought, and none of its candidates is taken."""
+    if camera.pose is not None:
+        return {"image_size": camera.image_size, "intrinsics": camera.intrinsics, "pose": camera.pose}
+    if camera.id not in chosen:
+        return None
+    found = chosen[camera.id]
+    pose = PoseIn(rotation=found.pose.rotation, position=found.pose.position)
+    return {"image_size": sizes[camera.id], "intrinsics": found.intrinsics, "pose": pose}

@@ -28,8 +28,9 @@ class NumberChange(Schema):
 
 
 # What brought a revision: a PUT, a calibration by itself, a result that was accepted by hand, an older revision, or, by
-# hand as well, the refined pose and lens of a camera or a number of the field as the lines have it.
-Cause = Literal["put", "calibrated", "accepted", "restored", "adopted"]
+# hand as well, the refined pose and lens of a camera or a number of the field as the lines have it, or cameras that a
+# job found from their frames alone.
+Cause = Literal["put", "calibrated", "accepted", "restored", "adopted", "found"]
 
 
 class Revision(Schema):
@@ -103,3 +104,18 @@ class AdoptField(Schema):
 
     job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)]
     name: FieldNumber
+
+
+class AdoptFound(Schema):
+    """Which cameras that a job found are to be stored."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"job": "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "candidates": {"right": 2}}]}
+    )
+
+    job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)]
+    candidates: dict[Id, Annotated[Integer, Field(ge=1, le=100)] | None] = Field(
+        {},
+        description="The candidate that a camera is taken to be, from 1; null: none of them, the camera keeps its pose "
+        "or, of a new venue, is left out. A camera that is not named is its first candidate if that is accepted.",
+    )

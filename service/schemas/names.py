@@ -9,6 +9,7 @@ JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
 # Parts of an upload.
 OPTIONS_PART = "options"
 PHOTOS_PART = "photos"
+SITE_PART = "site"
 
 LensModel = Literal["opencv", "fisheye"]
 # Of files that poses leave in; `service.formats.table` has what is behind the names.
@@ -27,7 +28,7 @@ Scope = Literal["read", "calibrate", "admin"]
 # Of what happens to venues; `venue.*`: whatever begins so.
 EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
 # Of jobs.
-JobKind = Literal["calibration", "intrinsics", "locate", "field"]
+JobKind = Literal["calibration", "intrinsics", "locate", "field", "find"]
 JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 # Of calibrations.
 Verdict = Literal["accepted", "partly", "rejected"]

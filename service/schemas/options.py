@@ -132,3 +132,25 @@ class FieldOptions(Handling):
     model_config = ConfigDict(json_schema_extra={"examples": [{"seed": 7}]})
 
     seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
+
+
+class FindOptions(Handling):
+    """Which cameras are to be found, and what of them holds still; everything is optional.
+
+    All but the seed is about a venue that is stored: the part `site` says it of each camera itself.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"cameras": ["left"], "position_radius_m": 2}]})
+
+    cameras: Annotated[list[Id], Field(min_length=1, max_length=32)] | None = Field(
+        None,
+        description="Those that are looked for. Absent: all that frames were sent of. The others help as they are.",
+    )
+    lens: Annotated[Literal["stored", "unknown"], OPEN_WORD] = Field(
+        "stored", description="Of the cameras that are looked for: the stored one holds, or it is found, too."
+    )
+    position_radius_m: Annotated[Number, Field(gt=0, le=1000)] | None = Field(
+        None,
+        description="How far at most the cameras stand from where they are stored. Absent: they may stand anywhere.",
+    )
+    seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")

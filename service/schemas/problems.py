@@ -51,6 +51,7 @@ PROBLEM_TYPES: dict[str, ProblemType] = {
     "venue-id-mismatch": ProblemType(422, "The venue's id differs from the address"),
     "venue-changed": ProblemType(412, "The venue is not the one the request expects"),
     "venue-replaced": ProblemType(409, "The venue was changed during the upload"),
+    "venue-stored": ProblemType(409, "The venue is stored already"),
     "no-such-camera": ProblemType(404, "The venue has no camera of this id"),
     "venue-busy": ProblemType(409, "The venue has an active job"),
     "venue-moved-on": ProblemType(409, "The venue is not as the job left or found it"),
@@ -59,6 +60,12 @@ PROBLEM_TYPES: dict[str, ProblemType] = {
     "refined-not-found": ProblemType(404, "The camera has no refined pose and lens"),
     "field-number-not-found": ProblemType(404, "The job offers no such number of the field"),
     "field-number-refused": ProblemType(422, "The field cannot have this number"),
+    # Cameras that were found.
+    "site-missing": ProblemType(422, "The venue is not stored, and no site says what it is"),
+    "nothing-to-find": ProblemType(422, "No camera is to be found"),
+    "candidate-not-found": ProblemType(404, "The job has no such candidate"),
+    "candidate-needed": ProblemType(409, "A camera of the new venue was not accepted"),
+    "candidate-refused": ProblemType(422, "No venue can have this camera"),
     # Frames.
     "unknown-camera": ProblemType(422, "The venue has no such camera"),
     "missing-camera": ProblemType(422, "A camera of the venue has no frame"),

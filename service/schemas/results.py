@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -15,6 +17,7 @@ from service.schemas.options import Coordinates, Landmark
 from service.schemas.problems import refusal_uri
 from service.schemas.trend import Displacement
 
+NO_CHOICE: Mapping[str, int | None] = MappingProxyType({})
 CPU_S: Any = Field(
     {}, description="Core-seconds, of all threads, of the stages that `timings_s` times; {} of earlier releases."
 )
@@ -432,4 +435,69 @@ class FieldResult(Schema):
     provenance: Provenance
 
 
-AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult
+class CandidateResult(Schema):
+    """A camera that may have taken the frame. `agreement`: how well the lines agree with it both ways, 0..1: is the
+    expected seen, and the seen expected? `lines_found`: the share of the expected that is seen; `residual_px`: rms of
+    the measured lines, null where too few were measured.
+    """
+
+    intrinsics: Intrinsics
+    pose: Pose
+    agreement: float
+    lines_found: float
+    residual_px: float | None
+    sigma: Sigma | None
+
+
+FindReason = Annotated[
+    Literal[
+        "no-lines",
+        "lines",
+        "few-lines",
+        "implausible",
+        "not-unique",
+        "not-confirmed",
+    ],
+    OPEN_WORD,
+]
+
+
+class FoundCameraResult(Schema):
+    """What was found for a camera: `candidates`, the best first; where it is accepted, its first one is the camera."""
+
+    id: Id
+    accepted: bool
+    reason: FindReason | None = Field(description="Why it is not accepted, in a word.")
+    rejected_because: str | None
+    remarks: list[str] = Field(description="What was assumed, such as the side of a field that looks the same twice.")
+    image_size: list[int]
+    candidates: list[CandidateResult]
+
+
+class FindResult(Schema):
+    """Cameras found from their frames alone. `accepted`: all of them were.
+
+    Nothing is stored by itself: `POST /venues/{id}/adopt-found` takes what was found.
+    """
+
+    accepted: bool
+    rejected_because: str | None
+    cameras: list[FoundCameraResult]
+    stitch_error_px: float | None
+    warnings: list[str] = Field([], description="Pictures that are missing.")
+    timings_s: dict[str, float]
+    cpu_s: dict[str, float] = CPU_S
+    provenance: Provenance
+
+    def chosen(self, choice: Mapping[str, int | None] = NO_CHOICE) -> dict[str, CandidateResult]:
+        """The candidate that each camera is taken to be, by camera.
+
+        `choice`: the number of one from 1, or None where none is taken; a camera that it does not name is its first
+        candidate if that is accepted.
+        """
+        first = {camera.id: 1 for camera in self.cameras if camera.accepted}
+        candidates = {camera.id: camera.candidates for camera in self.cameras}
+        return {camera: candidates[camera][n - 1] for camera, n in {**first, **choice}.items() if n is not None}
+
+
+AnyResult = Result | IntrinsicsResult | LocateResult | FieldResult | FindResult

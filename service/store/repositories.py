@@ -7,6 +7,7 @@ from service.store.database import connect, migrate
 from service.store.events.feed import EventRepository
 from service.store.events.outbox import OutboxRepository
 from service.store.expiry import ExpiryRepository
+from service.store.found_venues import FoundVenueRepository
 from service.store.jobs.attempts import AttemptRepository
 from service.store.jobs.decisions import DecisionRepository
 from service.store.jobs.queries import JobRepository
@@ -34,6 +35,7 @@ class Repositories:
         self.schedules = ScheduleRepository(engine)
         self.refined = RefinedPoseRepository(engine)
         self.adopted_fields = AdoptedFieldRepository(engine)
+        self.found_venues = FoundVenueRepository(engine)
         self.submissions = SubmissionRepository(engine)
         self.jobs = JobRepository(engine)
         self.attempts = AttemptRepository(engine)

@@ -31,6 +31,9 @@ from service.store.trends import begin_anchors, go_back
 r = tables.revisions.c
 # Whose poses hold, or held.
 CALIBRATION_CAUSES: tuple[Cause, ...] = ("calibrated", "accepted")
+JOB_CAUSES: tuple[Cause, ...] = (*CALIBRATION_CAUSES, "found")
+# By which cameras stand anew, whatever they did before.
+PLACED_CAUSES: tuple[Cause, ...] = ("put", "found")
 FIELD_NUMBERS: tuple[FieldNumber, ...] = get_args(FieldNumber)
 NUMBERS_BESIDE_RIDGE: tuple[FieldNumber, ...] = ("length_m", "width_m")
 # Numbers of a field that revisions have changed: `NumberChange` by name, with the number of the revision.
@@ -83,7 +86,7 @@ def add_revision(
     changed = _changed(venue, _cameras(before))
     if restored is not None:
         go_back(connection, venue, restored.revision)
-    elif cause in ("put", "adopted"):
+    elif cause in (*PLACED_CAUSES, "adopted"):
         begin_anchors(connection, venue, changed, number)
     poses = Poses(
         venue=venue.id,
@@ -140,7 +143,7 @@ def revisions_of_jobs(connection: sa.Connection, job_ids: Collection[str]) -> di
     if not job_ids:
         return {}
     newest = sa.func.max(r.number).label("newest")
-    query = sa.select(r.job, newest).where(r.job.in_(job_ids), r.cause.in_(CALIBRATION_CAUSES)).group_by(r.job)
+    query = sa.select(r.job, newest).where(r.job.in_(job_ids), r.cause.in_(JOB_CAUSES)).group_by(r.job)
     return {row.job: row.newest for row in connection.execute(query)}
 
 
@@ -240,7 +243,7 @@ def _movements(
     for camera in venue.cameras:
         previous = last.get(camera.id)
         replaced = previous is None or previous.pose_and_lens != camera.posed.pose_and_lens
-        if camera.id not in since or (cause == "put" and replaced):
+        if camera.id not in since or (cause in PLACED_CAUSES and replaced):
             since[camera.id] = number
     firsts = {first: _cameras_at(connection, venue.id, first) for first in set(since.values()) - {number}}
     return {

@@ -86,7 +86,8 @@ jobs = sa.Table(
     sa.Column("venue", sa.String(64)),
     sa.Column("status", sa.String(16), nullable=False),
     sa.Column("priority", sa.Integer, nullable=False),
-    # What was asked: schemas.options.Options or FieldOptions (the seed filled in), IntrinsicsOptions or LocateOptions.
+    # What was asked: schemas.options.Options, FieldOptions or FindOptions (the seed filled in), IntrinsicsOptions or
+    # LocateOptions.
     sa.Column("options", sa.JSON, nullable=False),
     # Of the frames and options as they were sent: the same content is the same job.
     sa.Column("content_hash", sa.String(64), nullable=False),
@@ -94,6 +95,8 @@ jobs = sa.Table(
     # The venue as it was when the frames were checked against it; JSON's null where there is none.
     sa.Column("venue_document", sa.JSON, nullable=False),
     sa.Column("venue_additions", sa.JSON(none_as_null=True)),
+    # schemas.find.SoughtSite: a venue that is not stored yet, whose cameras are to be found.
+    sa.Column("site", sa.JSON(none_as_null=True)),
     # Camera id (of photos: their names) to the paths of its frames in the blob store.
     sa.Column("frames", sa.JSON, nullable=False),
     sa.Column("attempt", sa.Integer, nullable=False, default=0),

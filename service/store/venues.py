@@ -127,15 +127,7 @@ class VenueRepository(Repository):
             before = None if stored is None else stored.venue
             venue, credentials = change(before, _credentials(connection, venue_id))
             _keep(connection, venue_id, credentials)
-            save_venue(connection, venue, clock(connection), stored)
-            if before is None:
-                add_venue_event(connection, venue, "venue.created", [], by)
-            elif changed := venue.changed_parts(before):
-                add_venue_event(connection, venue, "venue.changed", changed, by)
-            with update_quality(connection, venue_id) as quality:
-                _note_put(connection, quality, before, venue, by)
-                update_alarms(connection, quality, venue)
-            plan_schedule(connection, venue)
+            store_venue(connection, stored, venue, "put", by)
             return venue, before is None
 
     def restore(
@@ -249,10 +241,40 @@ def save_venue(connection: sa.Connection, venue: Venue, now: datetime, before: S
         connection.execute(sa.update(tables.venues).where(v.id == venue.id).values(document=whole, **values))
 
 
-def _note_put(
-    connection: sa.Connection, quality: VenueQuality, before: Venue | None, venue: Venue, by: Actor | None
+def store_venue(
+    connection: sa.Connection,
+    stored: StoredVenue | None,
+    venue: Venue,
+    cause: Cause,
+    by: Actor | None,
+    job_id: str | None = None,
 ) -> None:
-    """Write down the revision that a PUT may be, with the memories that it leaves.
+    """Create or replace a venue as somebody wants it, inside the caller's serialised transaction.
+
+    `stored`: what is there; `cause` and `job_id`: of the revision, where that changes a pose or a lens.
+    """
+    before = None if stored is None else stored.venue
+    save_venue(connection, venue, clock(connection), stored)
+    if before is None:
+        add_venue_event(connection, venue, "venue.created", [], by)
+    elif changed := venue.changed_parts(before):
+        add_venue_event(connection, venue, "venue.changed", changed, by)
+    with update_quality(connection, venue.id) as quality:
+        _note_placed(connection, quality, before, venue, cause, job_id, by)
+        update_alarms(connection, quality, venue)
+    plan_schedule(connection, venue)
+
+
+def _note_placed(
+    connection: sa.Connection,
+    quality: VenueQuality,
+    before: Venue | None,
+    venue: Venue,
+    cause: Cause,
+    job_id: str | None,
+    by: Actor | None,
+) -> None:
+    """Write down the revision that a venue may have become, with the memories that it leaves.
 
     A camera that was put elsewhere, or has another lens, begins anew, and on another field all of them do.
     """
@@ -262,7 +284,7 @@ def _note_put(
     if before is None or not venue.has_same_poses_as(before):
         memories = newest_memories(connection, venue.id)
         left = {} if before is None else without_those_that_changed(memories, before, venue)
-        keep_memories(connection, venue.id, add_revision(connection, quality, venue, "put", by=by), left)
+        keep_memories(connection, venue.id, add_revision(connection, quality, venue, cause, job_id, by=by), left)
 
 
 def apply_result(

@@ -4,6 +4,7 @@ It reads and writes plain JSON: the models of the messages take a quarter of a s
 """
 
 import json
+import math
 import os
 import signal
 import sys
@@ -54,7 +55,8 @@ def main() -> None:
     child_process.end_with_parent()
     given = json.loads(sys.stdin.buffer.readline())
     task = given["task"]
-    behaviour, _, seconds = task["venue"]["name"].partition(" ") if task["venue"] else ("", "", "")
+    about = task["venue"] or task.get("site")
+    behaviour, _, seconds = about["name"].partition(" ") if about else ("", "", "")
     with Path(given["means"]["model"]).with_name("begun").open("a") as begun:
         begun.write(f"{task['job_id']} {os.getpid()}\n")
     say(progress={"stage": "segmentation", "fraction": 0.1})
@@ -76,6 +78,11 @@ def main() -> None:
         case "fail":
             fail("no-markings-in-view", "It is black.", "left")
             return
+    if task["kind"] == "find":
+        sought = sought_cameras(task, list(given["sizes"]))
+        pictures = [f"candidate_{camera}_{number}" for camera in sought for number in (1, 2)]
+        done(found_cameras(sought, behaviour, task), pictures)
+        return
     if task["kind"] not in ("calibration", "field"):
         fail("no-pose", "This program only moves cameras.")
         return
@@ -119,6 +126,50 @@ def main() -> None:
             pictures,
             memories,
         )
+
+
+def sought_cameras(task: dict, with_frames: list[str]) -> list[str]:
+    """The cameras that are to be found."""
+    if task.get("site"):
+        return [camera["id"] for camera in task["site"]["cameras"] if not camera.get("pose")]
+    return task["options"]["cameras"] or with_frames
+
+
+def found_cameras(sought: list[str], behaviour: str, task: dict) -> dict:
+    """Two candidates of each camera, 40 and 60 m from the pitch; none or the first camera alone is accepted by name."""
+    good = {"reject": 0, "partly": 1}.get(behaviour, len(sought))
+    why = "two poses explain the frame alike"
+    return {
+        "accepted": good == len(sought),
+        "rejected_because": None if good == len(sought) else "; ".join(f"camera {one}: {why}" for one in sought[good:]),
+        "cameras": [
+            {
+                "id": camera,
+                "accepted": number < good,
+                "reason": None if number < good else "not-unique",
+                "rejected_because": None if number < good else why,
+                "remarks": ["taken: it stands on the near side"],
+                "image_size": [64, 48],
+                "candidates": [candidate(away) for away in (40.0, 60.0)],
+            }
+            for number, camera in enumerate(sought)
+        ],
+        "stitch_error_px": 0.4,
+        "timings_s": {"evolution": 0.1},
+        "provenance": {"software": "0", "model_sha256": "0", "seed": task["options"]["seed"], "options": {}},
+    }
+
+
+def candidate(away_m: float) -> dict:
+    """A camera that looks at the pitch from the near side, 8 m high; its translation is -R position."""
+    return {
+        "intrinsics": {"matrix": [[50, 0, 32], [0, 50, 24], [0, 0, 1]], "distortion": [], "sigma": {"fx": 0.5}},
+        "pose": {"rotation": [math.pi / 2, 0, 0], "position": [0, -away_m, 8], "translation": [0, 8, away_m]},
+        "agreement": 0.8,
+        "lines_found": 0.9,
+        "residual_px": 1.0,
+        "sigma": None,
+    }
 
 
 def remembered(task: dict, cameras: list[str]) -> dict:

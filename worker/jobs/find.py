@@ -1,19 +1,20 @@
-"""From frames of cameras without poses to these cameras, and a picture of each candidate."""
+"""A job of the kind `find`: from frames of cameras without poses to these cameras, and a picture of each candidate."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import cast
 
 import cv2
 import numpy as np
 
-from service.schemas.find import CandidateResult, FindResult, FoundCameraResult, SoughtCameraIn, SoughtSite
+from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, PosedCamera
 from service.schemas.geometry import Pose as PoseSchema
 from service.schemas.job import Progress
-from service.schemas.results import Provenance
+from service.schemas.results import CandidateResult, FindResult, FoundCameraResult, Provenance
+from service.store.jobs.files import candidate_picture_name
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
@@ -39,6 +40,7 @@ from worker.jobs.from_schemas import (
     pitch_of,
 )
 from worker.jobs.to_schemas import (
+    Solution,
     finite_or_none,
     lens_to_schema,
     load_segmenter,
@@ -50,16 +52,9 @@ from worker.jobs.to_schemas import (
 )
 from worker.protocol import ComputeResources
 
+log = logging.getLogger(__name__)
 FIELD_OF_VIEW_UNCERTAIN = 0.15
 """One standard deviation of the focal length that a given field of view leaves, as a part of it."""
-
-
-@dataclass(frozen=True)
-class FoundSite:
-    """What was found of a site, and the file of a picture of each candidate by its name, `candidate_left_1`."""
-
-    result: FindResult
-    pictures: dict[str, bytes]
 
 
 def solve(
@@ -68,8 +63,8 @@ def solve(
     seed: int,
     means: ComputeResources,
     report: Callable[[Progress], None],
-) -> FoundSite:
-    """Find the cameras of a site that have no pose, from the files of their frames."""
+) -> Solution[FindResult]:
+    """Find the cameras of a site that have no pose, from the files of their frames, and draw each candidate."""
     segmenter = load_segmenter(means)
     cv2.setNumThreads(means.threads)
     frames = {camera.id: _decoded(camera, files[camera.id]) for camera in site.cameras if camera.id in files}
@@ -87,7 +82,7 @@ def solve(
         for camera in found.cameras
         for name, picture in _pictures(pitch, camera, frames[camera.id][0]).items()
     }
-    return FoundSite(_result(found, sought, provenance_of(segmenter, seed, {"seed": seed})), pictures)
+    return Solution(_result(found, sought, provenance_of(segmenter, seed, {"seed": seed})), pictures)
 
 
 def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:
@@ -134,12 +129,14 @@ def _known(camera: SoughtCameraIn) -> Camera:
 
 def _pictures(pitch: Field, camera: FoundCamera, frame: Picture) -> dict[str, bytes]:
     """A picture of each candidate, the best first."""
-    return {
-        f"candidate_{camera.id}_{number}": encode_jpeg(
-            candidate_picture(pitch, one.camera, frame, f"candidate {number}")
-        )
-        for number, one in enumerate(camera.candidates, start=1)
-    }
+    pictures = {}
+    for number, one in enumerate(camera.candidates, start=1):
+        name = candidate_picture_name(camera.id, number)
+        try:
+            pictures[name] = encode_jpeg(candidate_picture(pitch, one.camera, frame, f"candidate {number}"))
+        except Exception:  # what is no camera of this frame may look anywhere; a picture is not worth losing the others
+            log.warning("cannot draw %s", name, exc_info=True)
+    return pictures
 
 
 def _result(found: FoundCameras, sought: Sequence[SoughtCamera], provenance: Provenance) -> FindResult:

@@ -15,8 +15,9 @@ from collections.abc import Callable, Mapping, Sequence
 import cv2
 
 from service import child_process
+from service.schemas.find import SoughtSite
 from service.schemas.job import Progress
-from service.schemas.options import FieldOptions, IntrinsicsOptions, LocateOptions
+from service.schemas.options import FieldOptions, FindOptions, IntrinsicsOptions, LocateOptions
 from service.schemas.results import AnyResult
 from service.store.jobs.task import Task
 from worker.jobs.from_schemas import JobFailedError
@@ -65,12 +66,24 @@ def _compute(
 
             assert task.venue is not None
             return field.solve(task.venue, files, options, means, report)
+        case FindOptions() as options:
+            from worker.jobs import find
+
+            return find.solve(_site_of(task, options, files), files, options.seed or 0, means, report)
         case options:
             from worker.jobs import calibration
 
             assert task.venue is not None
             nights = calibration.NightHistory(task.last_views, task.memories, task.anchors, task.taken_at)
             return calibration.solve(task.venue, files, options, means, report, nights)
+
+
+def _site_of(task: Task, options: FindOptions, files: Mapping[str, Sequence[bytes]]) -> SoughtSite:
+    """The site whose cameras are to be found: the one that was sent, or the stored venue."""
+    if task.site is not None:
+        return task.site
+    assert task.venue is not None
+    return SoughtSite.of(task.venue, options, files)
 
 
 class Parent(logging.Handler):

@@ -11,14 +11,15 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 
 from service.schemas.events.venue_event import Event
+from service.schemas.find import SoughtSite
 from service.schemas.health import AlarmEvent
 from service.schemas.job import Job, JobEvent
 from service.schemas.names import OPTIONS_PART, Scope
-from service.schemas.options import FieldOptions, IntrinsicsOptions, LocateOptions, Options
+from service.schemas.options import FieldOptions, FindOptions, IntrinsicsOptions, LocateOptions, Options
 from service.schemas.problems import MEDIA_TYPE, ProblemDetails
 
 # Models that no route takes or returns as a JSON body, and that a generated client should still know by name.
-MODELS = (Options, IntrinsicsOptions, LocateOptions, FieldOptions, ProblemDetails)
+MODELS = (Options, IntrinsicsOptions, LocateOptions, FieldOptions, FindOptions, SoughtSite, ProblemDetails)
 SCHEMAS = "#/components/schemas/"
 KEY_SCHEME = "key"
 SECURITY_SCHEMES = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
 from typing import TypeVar
 
@@ -16,7 +16,9 @@ from service.api.problems import validation_problem
 from service.api.spool import Spool, parsed_form
 from service.intake import image_checks
 from service.routes.contract.missing import no_such_venue
+from service.schemas.base import Schema
 from service.schemas.events import callback_urls
+from service.schemas.find import SoughtSite
 from service.schemas.names import OPTIONS_PART
 from service.schemas.options import Handling
 from service.schemas.problems import Problem
@@ -26,6 +28,7 @@ from service.settings import Settings
 LONGEST_OPTIONS = 64 * 1024
 PARTS_TOO_MANY = 100
 Chosen = TypeVar("Chosen", bound=Handling)
+Document = TypeVar("Document", bound=Schema)
 
 
 def require_form(request: Request) -> None:
@@ -82,32 +85,46 @@ def most_frames(context: Context, venue: Venue) -> int:
 
 def parse_options(form: FormData, model: type[Chosen], settings: Settings) -> Chosen:
     """The part `options`; without one, what the model is when nothing is chosen."""
-    parts = form.getlist(OPTIONS_PART)
-    if len(parts) > 1:
-        raise Problem("invalid-request", "Send one options part.", errors=[])
-    part = parts[0] if parts else "{}"
-    try:
-        data: str | bytes = part.file.read(LONGEST_OPTIONS + 1) if isinstance(part, UploadFile) else part
-        document = json.loads(data)
-    except (ValueError, RecursionError):
-        raise Problem("invalid-request", "The options part is not JSON.", errors=[]) from None
-    try:
-        options = model.model_validate(document)
-    except ValidationError as error:
-        raise validation_problem(error, model, document, OPTIONS_PART) from None
+    options = parse_part(form, OPTIONS_PART, model, absent="{}")
     if options.callback_url is not None:
         callback_urls.check(options.callback_url, settings)
     return options
 
 
-def frames_by_camera(venue: Venue, form: FormData, context: Context) -> dict[str, list[UploadFile]]:
-    """The frames of each camera of a venue, none of which may be missing."""
-    names = [name for name, _ in form.multi_items() if name != OPTIONS_PART]
-    image_checks.check_cameras(venue, {name: names.count(name) for name in names}, context.settings)
-    files: dict[str, list[UploadFile]] = {camera.id: [] for camera in venue.cameras}
-    for name, part in form.multi_items():
-        if name == OPTIONS_PART:
-            continue
+def parse_part(form: FormData, name: str, model: type[Document], absent: str = "null") -> Document:
+    """The part of a form that is a document, or what it is taken to say where it is `absent`."""
+    parts = form.getlist(name)
+    if len(parts) > 1:
+        raise Problem("invalid-request", f"Send one {name} part.", errors=[])
+    part = parts[0] if parts else absent
+    try:
+        data: str | bytes = part.file.read(LONGEST_OPTIONS + 1) if isinstance(part, UploadFile) else part
+        document = json.loads(data)
+    except (ValueError, RecursionError):
+        raise Problem("invalid-request", f"The {name} part is not JSON.", errors=[]) from None
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        raise validation_problem(error, model, document, name) from None
+
+
+def frames_by_camera(
+    place: Venue | SoughtSite,
+    form: FormData,
+    context: Context,
+    needed: Collection[str] | None = None,
+    documents: Collection[str] = (OPTIONS_PART,),
+) -> dict[str, list[UploadFile]]:
+    """The frames of each camera of a venue, in its order.
+
+    `needed`: the cameras of which there must be some, None: all. `documents`: the parts that are no frames.
+    """
+    parts = [(name, part) for name, part in form.multi_items() if name not in documents]
+    names = [name for name, _ in parts]
+    counts = {name: names.count(name) for name in names}
+    image_checks.check_cameras(place, counts, context.settings, needed)
+    files: dict[str, list[UploadFile]] = {camera.id: [] for camera in place.cameras if camera.id in counts}
+    for name, part in parts:
         if not isinstance(part, UploadFile):
             raise Problem("not-a-file", f"Send camera {name} as a file, with curl: -F {name}=@frame.jpg", camera=name)
         files[name].append(part)

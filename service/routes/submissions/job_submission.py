@@ -16,6 +16,7 @@ from service.intake.submit import frame_paths
 from service.routes.contract.missing import no_such_venue
 from service.routes.jobs import job_response
 from service.routes.venues import RETRY_AFTER_S, venue_busy
+from service.schemas.find import SoughtSite
 from service.schemas.job import Job
 from service.schemas.names import JobKind
 from service.schemas.problems import Problem
@@ -31,6 +32,7 @@ from service.store.jobs.submission import (
     VenueBusy,
     VenueGone,
     VenueReplaced,
+    VenueStored,
 )
 from service.store.jobs.task import AnyOptions, Origin, kind_of, seeded
 
@@ -63,10 +65,13 @@ FromSender = Annotated[Sender, Depends(_sender)]
 
 
 def submit_files(
-    context: Context, venue: Venue | None, options: AnyOptions, files: Files, sender: Sender
+    context: Context, about: Venue | SoughtSite | None, options: AnyOptions, files: Files, sender: Sender
 ) -> tuple[Job, bool]:
-    """Check and store the files, and make them a job or find the job that they already are; says if it is new."""
-    submission = _submission(context, venue, options, files, sender)
+    """Check and store the files, and make them a job or find the job that they already are; says if it is new.
+
+    `about`: the venue, or one that is not stored yet; None: photos of a lens are about none.
+    """
+    submission = _submission(context, about, options, files, sender)
 
     def store() -> None:
         for name, paths in submission.frames.items():
@@ -84,14 +89,11 @@ def enqueue(context: Context, submission: Submission, store: Callable[[], None])
     try:
         return context.intake.take(submission, store)
     except SubmissionRefused as refusal:
-        raise refusal_problem(
-            refusal, "" if submission.venue is None else submission.venue.id, context.settings
-        ) from None
+        raise refusal_problem(refusal, submission.venue_id or "", context.settings) from None
 
 
-def require_queue_room(context: Context, venue: Venue | None, kind: JobKind, sender: Sender) -> None:
+def require_queue_room(context: Context, venue_id: str | None, kind: JobKind, sender: Sender) -> None:
     """Refuse an upload that a full queue will refuse, before it is read."""
-    venue_id = None if venue is None else venue.id
     try:
         context.submissions.require_place_for(venue_id, sender.idempotency_key, kind, context.settings.queue_limit)
     except QueueFull as full:
@@ -103,20 +105,24 @@ def submission_response(job: Job, new: bool) -> Response:
     return job_response(job, status=202 if new else 200)
 
 
-def _submission(context: Context, venue: Venue | None, options: AnyOptions, files: Files, sender: Sender) -> Submission:
+def _submission(
+    context: Context, about: Venue | SoughtSite | None, options: AnyOptions, files: Files, sender: Sender
+) -> Submission:
     kind, job_id = kind_of(options), new_id()
+    site = about if isinstance(about, SoughtSite) else None
     # The kind too: the same frames with the same key may be those of another job.
-    content = hashlib.sha256(f"{kind} {options.model_dump_json()}".encode())
-    part = "photo" if venue is None else "camera"
+    asked = f"{kind} {options.model_dump_json()}" + ("" if site is None else f" {site.model_dump_json()}")
+    content = hashlib.sha256(asked.encode())
+    part = "photo" if about is None else "camera"
     for name, upload in ((name, upload) for name, several in files.items() for upload in several):
         # All of them before the first is read: a size costs nothing.
         image_checks.check_length(upload.size or 0, context.settings, **{part: name})
-    cameras = {camera.id: camera for camera in venue.cameras} if venue else {}
+    cameras = {camera.id: camera for camera in about.cameras} if about else {}
     for name, several in files.items():
         content.update(f"\n{name}".encode())
         for upload in several:
             with context.uploads.content(upload) as data:
-                if venue is None:
+                if about is None:
                     image_checks.check_photo(name, data, context.settings)
                 else:
                     image_checks.check(cameras[name], data, context.settings)
@@ -127,12 +133,22 @@ def _submission(context: Context, venue: Venue | None, options: AnyOptions, file
     return Submission(
         job_id=job_id,
         kind=kind,
-        venue=venue,
+        venue=None if isinstance(about, SoughtSite) else about,
+        site=site,
         options=seeded(options),
-        frames=frame_paths(job_id, {name: len(several) for name, several in files.items()}) if venue else photos,
+        frames=frame_paths(job_id, {name: len(several) for name, several in files.items()}) if about else photos,
         origin=sender.origin,
         content_hash=content.hexdigest(),
         idempotency_key=sender.idempotency_key,
+    )
+
+
+def venue_is_stored(venue_id: str) -> Problem:
+    """Answer who sends a site for a venue that is there."""
+    return Problem(
+        "venue-stored",
+        f"Venue {venue_id} says itself what it is: leave out the part site, and name in options.cameras those that are "
+        "to be found again.",
     )
 
 
@@ -151,6 +167,8 @@ def refusal_problem(refusal: SubmissionRefused, venue_id: str, settings: Setting
                 "Its pitch, cameras or lenses were changed while the frames arrived; see that they fit and send again.",
                 headers={"Retry-After": str(RETRY_AFTER_S)},
             )
+        case VenueStored():
+            return venue_is_stored(venue_id)
         case QueueFull():
             kept = f", and {refusal.kept} of {settings.queue_limit} places are kept for schedules that are due"
             detail = f"{refusal.waiting} jobs wait{kept if refusal.kept else ''}; try again."

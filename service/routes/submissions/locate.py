@@ -55,7 +55,7 @@ async def locate(
     """
     forms.require_form(request)
     stored = await run_in_threadpool(forms.venue_for_upload, context, venue_id)
-    await run_in_threadpool(job_submission.require_queue_room, context, stored, "locate", sender)
+    await run_in_threadpool(job_submission.require_queue_room, context, stored.id, "locate", sender)
     async with forms.parsed_upload(request, context, 1) as form:
         job, new = await run_in_threadpool(_submit, context, stored, camera, form, sender)
     job = await wait_for_end(context, job, wait)

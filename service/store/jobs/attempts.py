@@ -148,11 +148,11 @@ class AttemptRepository(Repository):
         `memories` those of their cameras.
         """
         with writing(self._engine) as connection:
-            if task.venue is not None:
-                advisory_lock(connection, venue_lock(task.venue.id))
+            if task.venue_id is not None:
+                advisory_lock(connection, venue_lock(task.venue_id))
             if not _locked(connection, _fence(task)):
                 return
-            with nullcontext() if task.venue is None else update_quality(connection, task.venue.id) as quality:
+            with nullcontext() if task.venue_id is None else update_quality(connection, task.venue_id) as quality:
                 if isinstance(result, Result) and quality is not None:
                     result = _move_poses(connection, quality, task, result, memories)
                 end_job(

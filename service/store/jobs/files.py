@@ -9,6 +9,8 @@ LAYERS = ("seam", "stored", "new", "mask")
 STITCHED = ("preview", "preview_before", "seam")
 BIRDSEYE = ("birdseye",)
 OF_CAMERA = ("overlay", "frame", "stored", "new")
+# Of a camera that was looked for.
+CANDIDATE = "candidate"
 
 
 def frame_folder(job_id: str) -> str:
@@ -39,6 +41,23 @@ def drawn_together(name: str) -> tuple[str, ...]:
 def source_file(folder: str, camera: str) -> str:
     """What pictures can be drawn of after the frames have gone from their own folder, in the folder of the pictures."""
     return f"{folder}/source/{camera}"
+
+
+def picture_address(name: str) -> str:
+    """A picture's name as its address has it: `overlay_left` is `overlay/left`, `candidate_left_1` `candidate/left/1`.
+
+    Ids of cameras may have underscores, kinds of pictures and numbers of candidates have none.
+    """
+    kind, _, rest = name.partition("_")
+    if kind == CANDIDATE:
+        camera, _, number = rest.rpartition("_")
+        rest = f"{camera}/{number}"
+    return f"{kind}/{rest}" if rest else kind
+
+
+def candidate_picture_name(camera: str, number: int) -> str:
+    """The name of the picture of a candidate, which are counted from 1."""
+    return f"{CANDIDATE}_{camera}_{number}"
 
 
 def picture_file(name: str) -> str:

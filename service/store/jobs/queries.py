@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
+from pathlib import PurePath
 from typing import Any
 
 import sqlalchemy as sa
 
 from service.schemas.base import TOLERANTLY
+from service.schemas.find import SoughtSite
 from service.schemas.job import CallbackState, Job, JobSummary
-from service.schemas.names import JobStatus
-from service.schemas.results import Result
+from service.schemas.names import JobKind, JobStatus
+from service.schemas.options import FindOptions
+from service.schemas.results import NO_CHOICE, FindResult, Result
 from service.schemas.venue import Venue
 from service.store import tables
 from service.store.database import Repository, reading
 from service.store.documents import join_additions, stored_result, stored_venue
 from service.store.events.outbox import deliveries_of
-from service.store.jobs.files import picture_file, picture_folder
+from service.store.jobs.files import picture_address, picture_file, picture_folder
 from service.store.jobs.task import Origin
 from service.store.revisions import revisions_of_jobs
 from service.store.venues import with_result
 
 j = tables.jobs.c
+BRING_POSES: tuple[JobKind, ...] = ("calibration", "find")
 # What pollers ask for, hundreds of times a second: to put the statement together takes longer than to run it.
 ONE = sa.select(tables.jobs).where(j.id == sa.bindparam("job_id"))
 # First poses have a queue of their own.
@@ -47,6 +51,19 @@ class Drawable:
     venue: Venue
     result: Result
     frames: dict[str, str]
+
+
+@dataclass(frozen=True)
+class FoundSite:
+    """What a job found that looked for cameras: of the venue that it began with, None: it was not stored yet."""
+
+    began_with: Venue | None
+    site: SoughtSite
+    result: FindResult
+
+    def venue(self, choice: Mapping[str, int | None] = NO_CHOICE) -> Venue:
+        """The venue with the chosen candidates, see `FindResult.chosen`; raises as `SoughtSite.completed`."""
+        return self.site.completed(self.result, self.result.chosen(choice)).to_venue()
 
 
 @dataclass(frozen=True)
@@ -149,9 +166,14 @@ class JobRepository(Repository):
         return Drawable(*found, {camera: paths[0] for camera, paths in frames.items()})
 
     def posed(self, job_id: str) -> Venue | None:
-        """The venue as a calibration found it, lenses and ridge of its poses too; None: it found none (yet)."""
+        """The venue as a job found it, lenses and ridge of its poses too; None: it found none (yet).
+
+        Of cameras that were looked for, those that were accepted.
+        """
         with reading(self._engine) as connection:
-            found = found_poses(connection, job_id)
+            found, site = found_poses(connection, job_id), found_site(connection, job_id)
+        if site is not None:
+            return site.venue() if any(camera.accepted for camera in site.result.cameras) else None
         return None if found is None else with_result(*found)
 
     def frame(self, job_id: str, number: int) -> str | None:
@@ -189,12 +211,26 @@ def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] 
     return stored_venue(row.venue_document, row.venue_additions), stored_result(row.result, row.result_additions)
 
 
+def found_site(connection: sa.Connection, job_id: str) -> FoundSite | None:
+    """What a job found that looked for cameras; None: it has no result (yet), or looked for none."""
+    row = connection.execute(ONE, {"job_id": job_id}).one_or_none()
+    if row is None or row.kind != "find" or not row.result:
+        return None
+    result = FindResult.model_validate(join_additions(row.result, row.result_additions), **TOLERANTLY)
+    if row.site is not None:
+        return FoundSite(None, SoughtSite.model_validate(row.site, **TOLERANTLY), result)
+    venue = stored_venue(row.venue_document, row.venue_additions)
+    options = FindOptions.model_validate(row.options, **TOLERANTLY)
+    return FoundSite(venue, SoughtSite.of(venue, options, row.frames), result)
+
+
 def job_input_values(row: Any) -> dict[str, Any]:
-    """What was asked of a job, as the members of `Asked`."""
+    """What was asked of a job, as the members of `JobInput`."""
     return {
         "job_id": row.id,
         "kind": row.kind,
         "venue": row.venue_document and join_additions(row.venue_document, row.venue_additions),
+        "site": row.site,
         "options": row.options,
         "frames": row.frames,
         "origin": Origin(row.request_id, row.traceparent, row.asked_by, row.address),
@@ -205,7 +241,7 @@ def _jobs(connection: sa.Connection, rows: Sequence[Any]) -> list[Job]:
     """What is known of them beside their rows is read of all at once."""
     positions = _positions(connection, [row.id for row in rows if row.status == "queued"])
     callbacks = deliveries_of(connection, [row.id for row in rows if row.finished_at and row.options["callback_url"]])
-    taken = revisions_of_jobs(connection, [row.id for row in rows if row.kind == "calibration" and row.result])
+    taken = revisions_of_jobs(connection, [row.id for row in rows if row.kind in BRING_POSES and row.result])
     return [_job(row, positions.get(row.id), callbacks.get(row.id), taken.get(row.id)) for row in rows]
 
 
@@ -249,6 +285,7 @@ def _links(row: Any) -> dict[str, str]:
     links = {"self": base, "events": f"{base}/events", "cancel": f"{base}/cancel"}
     if row.venue is not None:
         links["venue"] = f"/venues/{row.venue}"
-    # `overlay_left` in the store is `overlay/left` in an address.
     names = row.pictures or () if row.pictures_deleted_at is None else ()
-    return links | {name.replace("_", "/", 1): f"{base}/{picture_file(name).replace('_', '/', 1)}" for name in names}
+    return links | {
+        picture_address(name): f"{base}/{picture_address(name)}{PurePath(picture_file(name)).suffix}" for name in names
+    }

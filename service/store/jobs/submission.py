@@ -14,7 +14,7 @@ from service.schemas.options import Options
 from service.schemas.venue import Venue
 from service.store import tables
 from service.store.database import Repository, advisory_lock, clock, reading, writing
-from service.store.documents import venue_columns
+from service.store.documents import to_document, venue_columns
 from service.store.events.event_log import add_queued_event
 from service.store.jobs.attempts import Enqueue, end_without_result
 from service.store.jobs.files import frame_folder
@@ -76,6 +76,10 @@ class VenueReplaced(SubmissionRefused):
     """The pitch or a lens of the venue was changed while its frames arrived: they were checked against another one."""
 
 
+class VenueStored(SubmissionRefused):
+    """The venue whose cameras were to be found before it is stored is stored by now."""
+
+
 class QueueFull(SubmissionRefused):
     """As many jobs wait as may."""
 
@@ -94,7 +98,7 @@ class SubmissionRepository(Repository):
         The job begins from the poses that hold now: others may have been found since the upload began.
         """
         with writing(self._engine) as connection:
-            venue_id = None if submission.venue is None else submission.venue.id
+            venue_id = submission.venue_id
             # Those of no venue wait for each other, so that the same content sent twice at once is one job.
             advisory_lock(connection, submission.kind if venue_id is None else venue_lock(venue_id))
             same = _duplicate(
@@ -102,6 +106,8 @@ class SubmissionRepository(Repository):
             )
             if same is not None:
                 return read_job(connection, same), False
+            if submission.site is not None and find_venue(connection, submission.site.id) is not None:
+                raise VenueStored
             venue = None if submission.venue is None else _as_it_is_now(connection, submission.venue)
             # From here on the frames are the job's.
             folder = frame_folder(submission.job_id)
@@ -182,7 +188,7 @@ def _insert(
     values = {
         "id": submission.job_id,
         "kind": submission.kind,
-        "venue": None if venue is None else venue.id,
+        "venue": submission.venue_id,
         "status": status,
         "priority": PRIORITIES[submission.options.priority],
         "options": submission.options.model_dump(mode="json"),
@@ -190,6 +196,7 @@ def _insert(
         "idempotency_key": submission.idempotency_key,
         "venue_document": document,
         "venue_additions": additions,
+        "site": None if submission.site is None else to_document(submission.site),
         "frames": submission.frames,
         "asked_by": submission.origin.asked_by,
         "address": submission.origin.address,

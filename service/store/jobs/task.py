@@ -11,20 +11,22 @@ from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, fie
 
 from service.schemas.actor import Actor
 from service.schemas.base import TOLERANTLY
+from service.schemas.find import SoughtSite
 from service.schemas.names import JobKind
-from service.schemas.options import FieldOptions, Handling, IntrinsicsOptions, LocateOptions, Options
+from service.schemas.options import FieldOptions, FindOptions, Handling, IntrinsicsOptions, LocateOptions, Options
 from service.schemas.results import View
 from service.schemas.trend import Anchor
 from service.schemas.venue import Venue
 
 # Where no keys are asked for.
 ANYONE = "anyone"
-AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions
+AnyOptions = Options | IntrinsicsOptions | LocateOptions | FieldOptions | FindOptions
 OPTIONS: dict[JobKind, type[AnyOptions]] = {
     "calibration": Options,
     "intrinsics": IntrinsicsOptions,
     "locate": LocateOptions,
     "field": FieldOptions,
+    "find": FindOptions,
 }
 
 
@@ -40,7 +42,7 @@ def kind_of(options: AnyOptions) -> JobKind:
 
 def seeded(options: AnyOptions) -> AnyOptions:
     """The options with a seed where one can be chosen and was not, so that a job can be computed again alike."""
-    if not isinstance(options, Options | FieldOptions) or options.seed is not None:
+    if not isinstance(options, Options | FieldOptions | FindOptions) or options.seed is not None:
         return options
     return options.model_copy(update={"seed": secrets.randbelow(2**31)})
 
@@ -80,8 +82,8 @@ class Origin:
 class JobInput(BaseModel):
     """The input of a job: venue snapshot, options, frames, origin.
 
-    `options` are those of its kind; only photos of a lens have no venue.
-    `frames`: the paths in the blob store by camera, of photos by their names.
+    `options` are those of its kind; photos of a lens have no venue, and `site` is one that is not stored yet, whose
+    cameras are to be found. `frames`: the paths in the blob store by camera, of photos by their names.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -92,6 +94,13 @@ class JobInput(BaseModel):
     options: AnyOptions
     frames: dict[str, list[str]]
     origin: Origin = Origin()
+    site: SoughtSite | None = None
+
+    @property
+    def venue_id(self) -> str | None:
+        """The venue that the job is about, which need not be stored yet; None: photos of a lens are about none."""
+        about = self.venue or self.site
+        return None if about is None else about.id
 
     @field_validator("options", mode="before")
     @classmethod

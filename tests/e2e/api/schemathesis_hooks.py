@@ -1,5 +1,7 @@
 """Makes of what schemathesis invents something that gets further: real frames, and one id in address and body."""
 
+import json
+
 import schemathesis
 from schemathesis.generation import GenerationMode
 from schemathesis.openapi.checks import ContentDeserializationError, IgnoredAuth
@@ -16,6 +18,13 @@ def map_case(context, case):
             case.body["id"] = case.path_parameters["venue_id"]
         case "POST /venues/{venue_id}/calibrate" | "POST /venues/{venue_id}/field/fit":
             case.body = _options(case) | {camera: _frame(case) for camera in ("left", "right")}
+        case "POST /venues/{venue_id}/find":
+            place = {
+                "id": case.path_parameters["venue_id"],
+                "field": {"template": "tennis"},
+                "cameras": [{"id": "left"}],
+            }
+            case.body = _options(case) | {"left": _frame(case), "site": json.dumps(place)}
         case "POST /intrinsics":
             case.body = _options(case) | {"photos": _frame(case)}
     return case

@@ -101,7 +101,7 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             job_id=JOB,
             venue_id="nowhere",
             camera="left",
-            number=0,
+            number=1,
             kind="not-found",
             reason="lines",
             of_edition="0",
@@ -121,6 +121,19 @@ def test_every_route_says_who_may_call_it_and_means_it(guarded, key, routes):
             if isinstance(route.original_route, Page) and answer.headers.get("location", "").startswith(SIGN_IN):
                 got = 401
             assert (method, route.path, caller, got) == (method, route.path, caller, expected)
+
+
+def test_found_cameras_of_a_new_venue_are_stored_by_an_admins_key_alone(guarded, key):
+    site = {"id": "found", "field": {"template": "football"}, "cameras": [{"id": "left"}]}
+    sent = [*upload(cameras=("left",)), ("site", (None, json.dumps(site)))]
+    job = guarded.http.post("/venues/found/find", files=sent, headers=bearer(key["calibrate"])).json()
+    ended = f"/jobs/{job['id']}"
+    wait_for(lambda: guarded.http.get(ended, headers=bearer(key["read"])).json()["status"] == "succeeded")
+    told = [
+        guarded.http.post("/venues/found/adopt-found", json={"job": job["id"]}, headers=bearer(key[scope])).status_code
+        for scope in ("read", "calibrate", "admin", "calibrate")
+    ]
+    assert told == [403, 403, 201, 200]
 
 
 def test_the_document_says_which_scope_a_route_needs(guarded):

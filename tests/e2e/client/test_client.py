@@ -16,7 +16,10 @@ from service import client as client_module
 from service import client_errors as refused_module
 from service.client import AsyncClient, Client, Refused
 from service.schemas.events.venue_event import VenueChange, VenueEvent
+from service.schemas.field import FieldOfPlay
+from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.health import AlarmEvent, VenueAlarm
+from service.schemas.results import FindResult
 from service.schemas.venue import VenueIn
 from tests.e2e.running import DEADLINE_S, png, venue, wait_for
 
@@ -50,6 +53,20 @@ def test_a_year_in_the_life_of_a_venue_by_blocking_calls(service, frames, name):
     assert (refused.value.status, refused.value.busy) == (404, False)
 
 
+def test_a_venue_begins_with_frames_and_a_sport(service, frames, name):
+    cameras = [SoughtCameraIn(id=side, side="near") for side in frames]
+    site = SoughtSite(id=name, name="partly", field=FieldOfPlay(template="football"), cameras=cameras)
+    with Client(service.url) as client:
+        job = client.follow(client.find(name, frames, {"seed": 1}, site), print)
+        assert isinstance(job.result, FindResult)
+        assert [camera.reason for camera in job.result.cameras] == [None, "not-unique"]
+        assert client.picture(job, "candidate/right/2").startswith(b"\xff\xd8")
+        stored = client.adopt_found(name, job.id, {"right": 2})
+        assert [camera.pose.position[1] for camera in stored.cameras] == [-40, -60]
+        again = client.follow(client.find(name, {"left": frames["left"]}, {"lens": "unknown"}), print)
+        assert [camera.id for camera in again.result.cameras] == ["left"]
+
+
 def test_the_same_without_blocking(service, frames, name):
     async def life():
         async with AsyncClient(service.url) as client:
@@ -68,7 +85,7 @@ def test_the_same_without_blocking(service, frames, name):
 def test_both_clients_have_the_same_methods_with_the_same_signatures():
     clients = Client("http://127.0.0.1:9"), AsyncClient("http://127.0.0.1:9")
     names = [name for name in dir(Client) if not name.startswith("_") and name != "url_of"]
-    assert len(names) == 28
+    assert len(names) == 30
     for name in names:
         blocking, awaited = (getattr(client, name) for client in clients)
         assert inspect.signature(blocking) == inspect.signature(awaited)

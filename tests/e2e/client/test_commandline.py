@@ -506,9 +506,18 @@ def test_a_number_of_the_field_that_a_job_offers_is_stored_by_name(service, esc,
 
 @pytest.mark.parametrize(
     "arguments",
-    [(), ("left", "--field", "length_m"), ("--field", "length_m"), ("left", "--job", "0" * 26), ("--job", "7")],
+    [
+        (),
+        ("left", "--field", "length_m"),
+        ("--field", "length_m"),
+        ("left", "--job", "0" * 26),
+        ("--job", "7"),
+        ("left", "--found", "0" * 26),
+        ("left", "--candidate", "left=2"),
+        ("--found", "0" * 26, "--candidate", "left"),
+    ],
 )
-def test_either_a_lens_is_stored_or_a_number_of_the_field(esc, arguments):
+def test_either_a_lens_is_stored_or_a_number_of_the_field_or_found_cameras(esc, arguments):
     refused = esc("venue", "adopt", "main", *arguments)
     assert (refused.returncode, refused.stdout) == (2, "")
 

@@ -1,4 +1,4 @@
-"""`esc find`, as somebody calls it who has frames and knows the sport."""
+"""`esc find` and `esc venue find`, as somebody calls them who has frames and knows the sport."""
 
 import json
 
@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.e2e.commands import esc_here
+from tests.e2e.running import FRAMES
 from tests.e2e.worker.test_real_engine import cameras, frames, venue
 from tests.once import made_once
 
@@ -111,3 +112,56 @@ def test_what_cannot_be_asked_is_said(tmp_path, change, frames_given, said):
 def lens_of(number):
     camera = venue("stadium")["cameras"][number]
     return {part: camera[part] for part in ("image_size", "intrinsics")}
+
+
+CANDIDATES = ["candidate_left_1.jpg", "candidate_left_2.jpg", "candidate_right_1.jpg", "candidate_right_2.jpg"]
+
+
+def test_a_service_is_asked_for_a_venue_that_is_not_there_yet_and_stores_it_when_told(service, esc, name, tmp_path):
+    asked = ("venue", "find", name, *FRAMES, "--sport", "football")
+    done = esc(*asked, "--pictures", "seen")
+    assert done.returncode == 0, done.stderr
+    assert "Camera left: (0.00, -40.00, 8.00) m, focal length 50 px, 90% of the lines" in done.stderr
+    assert sorted(file.name for file in (tmp_path / "seen").iterdir()) == CANDIDATES
+    assert service.http.get(f"/venues/{name}").status_code == 404
+    assert "has these cameras now" in esc(*asked, "--adopt").stderr
+    assert esc("venue", "history", name).stdout.split("\t")[2] == "found"
+    again = esc(*asked)
+    assert (again.returncode, "leave out the part site" in again.stderr) == (1, True)
+
+
+def test_a_candidate_is_chosen_by_its_number(service, esc, name, tmp_path):
+    known = {"id": name, "name": "partly", "field": {"template": "football"}}
+    (tmp_path / "site.json").write_text(json.dumps(known | {"cameras": [{"id": "left"}, {"id": "right"}]}))
+    done = esc("venue", "find", name, *FRAMES, "--site", "site.json", "--adopt")
+    assert done.returncode == 3
+    assert "Rejected: camera right: two poses explain the frame alike" in done.stderr
+    assert service.http.get(f"/venues/{name}").status_code == 404
+    job = json.loads(done.stdout)["id"]
+    open_one = esc("venue", "adopt", name, "--found", job)
+    assert open_one.returncode == 1
+    assert "Choose one of the candidates of right" in open_one.stderr
+    assert esc("venue", "adopt", name, "--found", job, "--candidate", "right=2").returncode == 0
+    cameras = service.http.get(f"/venues/{name}").json()["cameras"]
+    assert [camera["pose"]["position"][1] for camera in cameras] == [-40, -60]
+
+
+def test_without_wait_a_search_is_told_and_waited_for_by_its_job(service, esc, name):
+    service.venue(name, "reject")
+    done = esc("venue", "find", name, FRAMES[0], "--options", '{"lens": "unknown"}')
+    assert done.returncode == 0
+    assert esc("job", "wait", json.loads(done.stdout)["job"]).returncode == 3
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--sport", "quidditch"),
+        ("--sport", "football", "--site", "left.png"),
+        ("--site", "left.png"),
+        ("--options", '{"dry_run": true}'),
+    ],
+)
+def test_a_search_that_cannot_be_asked_of_a_service_is_a_usage_error(esc, arguments):
+    refused = esc("venue", "find", "v", *FRAMES, *arguments)
+    assert (refused.returncode, refused.stdout) == (2, "")

@@ -130,7 +130,7 @@ def test_what_is_already_a_job_is_answered_with_it_though_the_queue_is_full(cont
     resubmit = frames.submit(context, read, uploaded(), Options, sender)
     assert (first.status_code, resubmit.status_code) == (202, 200)
     with pytest.raises(Problem) as problem:
-        job_submission.require_queue_room(context, read, "field", Sender(None, Origin()))
+        job_submission.require_queue_room(context, read.id, "field", Sender(None, Origin()))
     assert problem.value.kind == "queue-full"
 
 

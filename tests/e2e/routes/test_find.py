@@ -1,0 +1,206 @@
+"""Finding cameras by HTTP: of a venue that is not stored yet and of one that is, and taking what was found."""
+
+import json
+
+import pytest
+
+from tests.e2e.running import png, upload, venue
+
+
+def site(name, behaviour="accept", cameras=("left", "right"), **known):
+    """A venue of which nothing is known but the sport and the names of its cameras."""
+    places = [{"id": camera, **known.get(camera, {})} for camera in cameras]
+    return {"id": name, "name": behaviour, "field": {"template": "football"}, "cameras": places}
+
+
+def find(service, name, *, place=None, files=None, headers=None, **options):
+    parts = upload() if files is None else files
+    if place is not None:
+        parts = [*parts, ("site", ("site.json", json.dumps(place)))]
+    if options:
+        parts = [*parts, ("options", (None, json.dumps(options)))]
+    return service.http.post(f"/venues/{name}/find", files=parts, headers=headers)
+
+
+def found(service, name, **asked):
+    """A search at its end."""
+    return service.end(find(service, name, **asked).raise_for_status().json()["id"])
+
+
+def adopt(service, name, job, headers=None, **candidates):
+    return service.http.post(
+        f"/venues/{name}/adopt-found", json={"job": job["id"], "candidates": candidates}, headers=headers
+    )
+
+
+def refused(answer):
+    assert answer.headers["content-type"] == "application/problem+json"
+    return answer.status_code, answer.json()["type"].removeprefix("/problems/")
+
+
+def depth(stored, camera):
+    """How far in front of the pitch a camera stands, m: 40 is the first candidate, 60 the second, 50 none of them."""
+    return -next(one for one in stored["cameras"] if one["id"] == camera)["pose"]["position"][1]
+
+
+def test_a_search_is_a_job_with_candidates_and_a_picture_of_each(service, name):
+    answer = find(service, name, place=site(name), seed=5)
+    job = answer.json()
+    assert (answer.status_code, job["kind"], job["venue"]) == (202, "find", name)
+    assert answer.headers["location"] == f"/jobs/{job['id']}"
+    job = service.end(job["id"])
+    assert job["result"]["accepted"]
+    assert job["result"]["provenance"]["seed"] == job["options"]["seed"] == 5
+    assert [len(camera["candidates"]) for camera in job["result"]["cameras"]] == [2, 2]
+    assert job["links"]["candidate/left/2"] == f"/jobs/{job['id']}/candidate/left/2.jpg"
+    assert service.http.get(job["links"]["candidate/left/2"]).headers["content-type"] == "image/jpeg"
+    assert refused(service.http.get(f"/jobs/{job['id']}/candidate/left/3.jpg")) == (404, "picture-not-found")
+
+
+def test_a_search_stores_nothing_and_one_call_makes_the_venue_of_it(service, name):
+    job = found(service, name, place=site(name))
+    assert service.http.get(f"/venues/{name}").status_code == 404
+    answer = adopt(service, name, job)
+    assert answer.status_code == 201
+    assert answer.headers["etag"]
+    stored = service.http.get(f"/venues/{name}").json()
+    assert stored == answer.json()
+    assert [depth(stored, camera) for camera in ("left", "right")] == [40, 40]
+    assert stored["cameras"][0]["intrinsics"]["sigma"] == {"fx": 0.5}
+    (revision,) = service.http.get(f"/venues/{name}/history").json()["revisions"]
+    assert (revision["cause"], revision["job"]) == ("found", job["id"])
+    assert service.job(job["id"])["venue_revision"] == 1
+    assert adopt(service, name, job).status_code == 200
+    assert len(service.http.get(f"/venues/{name}/history").json()["revisions"]) == 1
+    assert service.calibrated(name)["result"]["accepted"]
+
+
+def test_of_a_camera_that_is_not_sure_a_person_chooses_a_candidate_or_leaves_it_out(service, name):
+    job = found(service, name, place=site(name, "partly"))
+    assert refused(adopt(service, name, job)) == (409, "candidate-needed")
+    assert adopt(service, name, job).json()["expected"] == ["right"]
+    assert refused(adopt(service, name, job, right=3)) == (404, "candidate-not-found")
+    assert refused(adopt(service, name, job, top=1)) == (404, "candidate-not-found")
+    assert refused(adopt(service, name, job, left=None, right=None)) == (422, "candidate-refused")
+    stored = adopt(service, name, job, right=2).json()
+    assert [depth(stored, camera) for camera in ("left", "right")] == [40, 60]
+    other = found(service, f"{name}-2", place=site(f"{name}-2", "partly"))
+    assert [one["id"] for one in adopt(service, f"{name}-2", other, right=None).json()["cameras"]] == ["left"]
+
+
+def test_of_a_stored_venue_those_with_frames_are_found_and_the_others_stay(service, name):
+    service.venue(name)
+    before = service.http.get(f"/venues/{name}").json()
+    job = found(service, name, files=upload(cameras=("left",)))
+    assert service.http.get(f"/venues/{name}").json() == before
+    answer = adopt(service, name, job)
+    assert answer.status_code == 200
+    assert [depth(answer.json(), camera) for camera in ("left", "right")] == [40, 50]
+    newest, first = service.http.get(f"/venues/{name}/history").json()["revisions"]
+    assert [(one["cause"], one["revision"]) for one in (newest, first)] == [("found", 2), ("put", 1)]
+    back = service.http.post(f"/venues/{name}/restore", json={"revision": 1}).json()
+    assert [depth(back, camera) for camera in ("left", "right")] == [50, 50]
+    assert back["cameras"] == before["cameras"]
+
+
+def test_options_name_the_cameras_that_are_found_of_those_with_frames(service, name):
+    service.venue(name)
+    job = found(service, name, cameras=["right"])
+    assert [camera["id"] for camera in job["result"]["cameras"]] == ["right"]
+    assert [depth(adopt(service, name, job).json(), camera) for camera in ("left", "right")] == [50, 40]
+
+
+def test_a_camera_that_was_put_elsewhere_meanwhile_keeps_that_pose(service, name):
+    service.venue(name)
+    job = found(service, name, files=upload(cameras=("left",)))
+    assert service.calibrated(name)["result"]["accepted"]
+    moved = depth(service.http.get(f"/venues/{name}").json(), "left")
+    assert refused(adopt(service, name, job)) == (409, "venue-moved-on")
+    assert depth(service.http.get(f"/venues/{name}").json(), "left") == moved
+
+
+def test_the_venue_of_a_search_that_somebody_has_put_meanwhile_stays(service, name):
+    job = found(service, name, place=site(name))
+    service.venue(name)
+    assert refused(adopt(service, name, job)) == (409, "venue-moved-on")
+    assert refused(find(service, name, place=site(name))) == (409, "venue-stored")
+    assert refused(service.http.post(f"/jobs/{job['id']}/again")) == (409, "venue-stored")
+    service.http.delete(f"/venues/{name}").raise_for_status()
+    assert service.http.post(f"/jobs/{job['id']}/again").status_code == 202
+    assert adopt(service, name, job).status_code == 201
+
+
+def test_memories_of_a_found_camera_end_and_those_of_the_others_stay(service, name):
+    service.venue(name, "refine")
+    for shade in (1, 2):
+        service.calibrated(name, shade)
+    adopt(service, name, found(service, name, files=upload(cameras=("left",)))).raise_for_status()
+    nights = {camera["id"]: camera["nights"] for camera in service.calibrated(name, 3)["result"]["cameras"]}
+    assert nights == {"left": 1, "right": 3}
+
+
+def test_found_poses_leave_in_the_formats_of_other_tools(service, name):
+    job = found(service, name, place=site(name, "partly"))
+    exported = service.http.get(f"/jobs/{job['id']}/poses").raise_for_status().json()
+    assert [camera["id"] for camera in exported["cameras"]] == ["left"]
+    none = found(service, f"{name}-2", place=site(f"{name}-2", "reject"))
+    assert refused(service.http.get(f"/jobs/{none['id']}/poses")) == (404, "poses-not-found")
+
+
+def test_a_key_is_one_search_by_its_content(service, name):
+    key = {"Idempotency-Key": f"{name}-1"}
+    first = find(service, name, place=site(name), headers=key, seed=1)
+    again = find(service, name, place=site(name), headers=key, seed=1)
+    other = find(service, name, place=site(name, left={"side": "near"}), headers=key, seed=1)
+    assert (first.status_code, again.status_code, other.status_code) == (202, 200, 422)
+    assert first.json()["id"] == again.json()["id"]
+
+
+def test_a_search_is_cancelled_and_its_frames_are_listed(service, name):
+    job = find(service, name, place=site(name, "hang")).json()
+    service.running(job["id"])
+    assert list(job["frames"]) == ["left", "right"]
+    assert service.http.post(f"/jobs/{job['id']}/cancel").json()["status"] == "cancelled"
+
+
+@pytest.mark.parametrize(
+    ("asked", "answered"),
+    [
+        ({}, (422, "site-missing")),
+        ({"place": {"cameras": []}}, (422, "invalid-request")),
+        ({"place": site("another")}, (422, "venue-id-mismatch")),
+        ({"place": "left"}, (422, "invalid-request")),
+        ({"place": site("v", left={"source": "http://10.1.0.7/a.jpg"})}, (422, "invalid-request")),
+        ({"place": site("v", cameras=["site"])}, (422, "invalid-request")),
+        ({"place": site("v"), "cameras": ["left"]}, (422, "invalid-request")),
+        ({"place": site("v"), "dry_run": True}, (422, "invalid-request")),
+        ({"place": site("v"), "files": upload()[:1]}, (422, "missing-camera")),
+        ({"place": site("v"), "files": upload(cameras=("left", "right", "top"))}, (422, "unknown-camera")),
+        ({"place": site("v", left={"image_size": [128, 96]})}, (422, "frame-size")),
+        ({"place": site("v"), "files": [("left", ("a.png", png()[:-20])), *upload()[1:]]}, (422, "truncated-image")),
+    ],
+)
+def test_what_is_wrong_with_a_search_is_said_at_once(service, name, asked, answered):
+    if isinstance(asked.get("place"), dict) and asked["place"].get("id") == "v":
+        asked = asked | {"place": asked["place"] | {"id": name}}
+    assert refused(find(service, name, **asked)) == answered
+
+
+def test_what_is_wrong_with_a_search_of_a_stored_venue_is_said_at_once(service, name):
+    whole = venue(name)
+    assert refused(find(service, name, place=site(name) | {"cameras": whole["cameras"]})) == (422, "nothing-to-find")
+    service.venue(name)
+    assert refused(find(service, name, cameras=["top"])) == (404, "no-such-camera")
+    assert refused(find(service, name, files=upload()[:1], cameras=["right"])) == (422, "missing-camera")
+    assert refused(find(service, name, files=[("options", (None, "{}"))])) == (422, "nothing-to-find")
+    assert refused(service.http.post(f"/venues/{name}/find", json={})) == (415, "not-multipart")
+
+
+def test_what_cannot_be_taken_is_said(service, name):
+    service.venue(name)
+    calibration = service.calibrated(name)
+    assert refused(adopt(service, name, calibration)) == (404, "poses-not-found")
+    job = found(service, name)
+    assert refused(adopt(service, f"{name}-not", job)) == (404, "poses-not-found")
+    assert refused(adopt(service, name, job, {"If-Match": '"other"'})) == (412, "venue-changed")
+    assert refused(service.http.post(f"/jobs/{job['id']}/accept")) == (404, "poses-not-found")
