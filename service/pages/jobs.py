@@ -69,6 +69,8 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
         sizes=sizes_of(context.venues.get(found.venue) if found.venue else None),
         decidable=context.decisions.decidable(job_id),
         adoptable=context.adopted_fields.adoptable(job_id),
+        can_take=found.kind == "find" and context.found_venues.is_adoptable(job_id),
+        is_stored=found.venue is not None and context.venues.get(found.venue) is not None,
         can_be_repeated=can_be_resubmitted(context, found),
     )
 

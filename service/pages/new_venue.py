@@ -1,15 +1,16 @@
-"""The way to a first calibration: the pitch, the lenses, the first poses, and off it goes."""
+"""The ways to a first calibration: by frames alone, or by the pitch, the lenses and clicked first poses."""
 
 from __future__ import annotations
 
 import math
+from itertools import count
 from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
 from fields.shapes import Arc, Line, Point, Shape
 from fields.template import NAMES
-from service.api.context import InContext
+from service.api.context import Context, InContext
 from service.pages.page_rendering import Page, render_page
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
@@ -24,14 +25,30 @@ data = APIRouter(prefix="/ui/new-venue", route_class=Guarded, include_in_schema=
 
 @router.get("/ui/new-venue", openapi_extra=needs_scope("admin"))
 def new_venue(request: Request, context: InContext) -> Response:
+    """The sport and a frame of each camera, from which a job finds the cameras."""
+    return _described(request, context, "new_venue.html")
+
+
+@router.get("/ui/new-venue/by-hand", openapi_extra=needs_scope("admin"))
+def by_hand(request: Request, context: InContext) -> Response:
     """The guided way; what it gathers stays in the browser until the venue is created."""
+    return _described(request, context, "venue_by_hand.html")
+
+
+def _described(request: Request, context: Context, template: str) -> Response:
     return render_page(
         request,
-        "new_venue.html",
+        template,
         templates=NAMES,
         models=get_args(LensModel),
         most=round(context.settings.max_frame_mb * 1e6),
+        free_id=_free_id(context),
     )
+
+
+def _free_id(context: Context) -> str:
+    """An id that no venue has, for those who do not care."""
+    return next(name for number in count(1) if context.venues.get(name := f"venue-{number}") is None)
 
 
 @data.get("/taken", openapi_extra=needs_scope("read"))

@@ -35,11 +35,12 @@ def main(folder: Path) -> None:
         raise SystemExit("install Chromium (Debian: apt-get install chromium)")
     with tempfile.TemporaryDirectory(prefix="esc-pages-") as data, service(Path(data)) as url, browser_at(path) as one:
         with person(one, url) as somebody, tab(somebody) as page:
+            search = newcomer.finds_the_cameras(page)
             newcomer.goes_the_whole_way(page)
             job = page.url.rpartition("/")[2]
             stock(page, Path(data))
         for scheme in ("dark", "light"):
-            take_all(one, url, job, scheme, folder)
+            take_all(one, url, job, search, scheme, folder)
 
 
 def stock(page: Page, data: Path) -> None:
@@ -52,7 +53,7 @@ def stock(page: Page, data: Path) -> None:
     engine.dispose()
 
 
-def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) -> None:
+def take_all(browser: Browser, url: str, job: str, search: str, scheme: str, folder: Path) -> None:
     with person(browser, url, scheme, DESK) as somebody, tab(somebody) as page:
         for name, address in (
             ("venues", "/"),
@@ -60,6 +61,7 @@ def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) ->
             ("history", "/ui/venues/north"),
             ("jobs", "/ui/jobs"),
             ("job", f"/ui/jobs/{job}"),
+            ("found", f"/ui/jobs/{search}"),
             ("calibrate", "/ui/venues/newcomer/calibrate"),
             ("ignore", "/ui/venues/newcomer/ignore"),
             ("settings", "/ui/venues/newcomer/settings"),
@@ -75,11 +77,14 @@ def take_all(browser: Browser, url: str, job: str, scheme: str, folder: Path) ->
                 page.locator(".thumbs canvas").nth(1).wait_for()
             save(page, folder / f"{name}-{scheme}.webp")
         page.goto("/ui/new-venue")
+        newcomer.drop_the_frames(page)
+        save(page, folder / f"new-venue-{scheme}.webp")
+        page.goto("/ui/new-venue/by-hand")
         newcomer.describe_the_pitch(page)
         page.get_by_label("Id", exact=True).first.fill("south-pitch")
         newcomer.describe_a_camera(page, 0)
         newcomer.click_points(page, 0, "left")
-        save(page, folder / f"new-venue-{scheme}.webp")
+        save(page, folder / f"new-venue-by-hand-{scheme}.webp")
     with person(browser, url, scheme, PHONE) as somebody, tab(somebody) as page:
         for name, address in (("venues", "/"), ("venue", "/ui/venues/newcomer")):
             page.goto(address)

@@ -131,7 +131,7 @@ def test_the_stitched_view_says_that_it_is_being_drawn(real, visit):
 
 @pytest.mark.parametrize("sport", ["tennis", "football", "basketball"])
 def test_points_of_a_plan_lie_apart_and_each_can_be_picked(stub, visit, sport):
-    page = visit(stub.url, "/ui/new-venue")
+    page = visit(stub.url, "/ui/new-venue/by-hand")
     page.get_by_label("Sport").select_option(sport)
     describe_a_camera(page, 0)
     plan = page.locator("[data-plan]")
@@ -151,7 +151,7 @@ def test_points_of_a_plan_lie_apart_and_each_can_be_picked(stub, visit, sport):
 
 
 def test_a_pose_that_one_point_contradicts_is_not_called_good(stub, visit):
-    page = visit(stub.url, "/ui/new-venue")
+    page = visit(stub.url, "/ui/new-venue/by-hand")
     points = [{"residual_px": 0.7, "looks_like": None, "doubted": doubted} for doubted in (False, False, False, True)]
     answer = {
         "result": {

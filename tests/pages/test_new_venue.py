@@ -17,7 +17,7 @@ POSE = "**/ui/new-venue/pose"
 @pytest.fixture
 def page(stub, visit):
     """The page on which a camera has been clicked, where photos give its lens and how well they know it."""
-    page = visit(stub.url, "/ui/new-venue")
+    page = visit(stub.url, "/ui/new-venue/by-hand")
     lens = newcomer.VENUE.cameras[0].intrinsics.model_dump() | {"sigma": SIGMA}
     end = json.dumps({"status": "succeeded", "result": {"intrinsics": lens, "rms_px": 0.2, "warnings": []}})
     page.route("**/intrinsics", lambda route: route.fulfill(json={"links": {"events": EVENTS}}))
@@ -45,7 +45,7 @@ def test_how_well_photos_know_a_lens_goes_with_it_until_somebody_changes_its_num
 
 
 def test_a_frame_that_is_not_there_yet_cannot_be_pointed_at(stub, visit):
-    page = visit(stub.url, "/ui/new-venue")
+    page = visit(stub.url, "/ui/new-venue/by-hand")
     newcomer.describe_the_pitch(page)
     # What the script says to its console is looked at when the page is left.
     page.locator(".sighting").first.evaluate(

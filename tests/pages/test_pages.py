@@ -254,6 +254,8 @@ PAGES = {
     "job": "/ui/jobs/{job}",
     "failed-job": "/ui/jobs/{failed}",
     "new-venue": "/ui/new-venue",
+    "new-venue-by-hand": "/ui/new-venue/by-hand",
+    "find": "/ui/venues/years/find",
 }
 
 

@@ -1,76 +1,92 @@
-// The way to a first calibration. What is gathered stays here until the venue is created.
+// A new venue by its sport and a frame of each camera: sent to be found, and shown as the job that finds them.
 
-import {call, Refused, signed} from "./page.js";
-import {Camera, common, complain, drawPlan, later, number} from "./posing.js";
+import {call} from "./page.js";
+import {objection, sizeOf, thumbnail} from "./frames.js";
+import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
+import {complain, number} from "./steps.js";
 
-const pitchForm = document.getElementById("pitch");
-const createButton = document.getElementById("create");
+const box = document.getElementById("frames");
+const list = box.querySelector("ul");
+const input = box.querySelector("input[type=file]");
+const button = document.getElementById("find");
 const missing = document.getElementById("missing");
-const {cameras} = common;
-let isTaken = false;
+const refused = document.getElementById("refused");
+const most = Number(box.dataset.bytes);
+const cameras = [];
 
-// The pitch
-
-function fieldAsTyped() {
-  const value = (name) => number(pitchForm.elements[name].value);
-  const field = {template: pitchForm.elements.template.value};
-  for (const name of ["length_m", "width_m", "line_width_m"]) if (value(name) !== undefined) field[name] = value(name);
-  const height = value("ridge_height");
-  if (height) {
-    const usual = common.plan ? common.plan.field.length_m - common.plan.field.width_m : 37;
-    const half = (value("ridge_length") ?? usual) / 2;
-    field.ridge = [[-half, 0, height], [half, 0, height]];
-  }
-  return field;
+/** What a file is called, as the id of a camera that no other one has. */
+function idOf(file) {
+  const known = cameras.map((camera) => camera.id);
+  const named = file.name.toLowerCase().replace(/\.[a-z]+$/, "").replace(/[^a-z0-9_-]+/g, "-").replace(/^[^a-z0-9]+/, "").slice(0, 60);
+  const first = ["", "options", "site"].includes(named) ? "camera" : named;
+  let id = first;
+  for (let count = 2; known.includes(id); count += 1) id = `${first}-${count}`;
+  return id;
 }
 
-async function readPitch() {
-  const wrong = pitchForm.querySelector(".wrong");
-  try {
-    common.plan = await call("POST", "/ui/new-venue/plan", fieldAsTyped());
-    complain(wrong, "");
-  } catch (refused) {
-    common.plan = null;
-    complain(wrong, refused.message);
-    return tell();
+/** A camera of which there is a frame, and what is said of it. */
+class Camera {
+  constructor(file) {
+    this.file = file;
+    this.row = document.getElementById("found-frame").content.firstElementChild.cloneNode(true);
+    this.field("camera").value = idOf(file);
+    this.row.addEventListener("input", tell);
+    this.row.querySelector("[data-remove]").addEventListener("click", () => {
+      cameras.splice(cameras.indexOf(this), 1);
+      this.row.remove();
+      tell();
+    });
   }
-  for (const name of ["length_m", "width_m", "line_width_m"]) pitchForm.elements[name].placeholder = common.plan.field[name];
-  drawPlan(document.getElementById("plan"));
-  for (const camera of cameras) camera.offerPoints();
-  return tell();
+
+  field(name) { return this.row.querySelector(`[name="${name}"]`); }
+
+  get id() { return this.field("camera").value; }
+
+  /** As the interface takes it; what was left open is not sent. */
+  get wire() {
+    const view = number(this.field("view").value);
+    const side = this.field("side").value;
+    return {id: this.id, ...(side ? {side} : {}), ...(view === undefined ? {} : {field_of_view_deg: view})};
+  }
+}
+
+async function add(files) {
+  const complaints = [];
+  for (const file of files) {
+    const wrong = await objection(file, await sizeOf(file).catch(() => [0, 0]), most);
+    if (wrong) {
+      complaints.push(wrong);
+      continue;
+    }
+    const camera = new Camera(file);
+    cameras.push(camera);
+    camera.row.querySelector("[data-thumb]").append(await thumbnail(file));
+    list.append(camera.row);
+  }
+  complain(box.querySelector(".wrong"), complaints.join(" "));
+  tell();
 }
 
 /** What is still to be done. */
 function tell() {
-  const open = [];
-  const {id} = pitchForm.elements;
-  if (isTaken) open.push("an id that no other venue has");
-  if (!id.value || !id.checkValidity()) open.push("an id of small letters, digits, - and _");
-  if (!common.plan) open.push("a pitch");
-  if (!cameras.length) open.push("a camera");
+  const open = missingOfPitch();
+  if (!cameras.length) open.push("a frame");
+  if (cameras.some((camera) => !camera.id || !camera.field("camera").checkValidity())) open.push("an id of each camera");
   if (new Set(cameras.map((camera) => camera.id)).size < cameras.length) open.push("cameras of different names");
-  for (const camera of cameras) {
-    if (!camera.id || !camera.field("id").checkValidity()) open.push("an id of each camera");
-    else if (!camera.file) open.push(`a frame of ${camera.id}`);
-    else if (!camera.result) open.push(`the first pose of ${camera.id}`);
-  }
-  createButton.disabled = open.length > 0;
+  button.disabled = open.length > 0;
   missing.textContent = open.length ? `Still missing: ${open.join("; ")}.` : "";
 }
 
-async function create() {
-  const refused = document.getElementById("refused");
+async function find() {
   const id = pitchForm.elements.id.value;
-  createButton.disabled = refused.hidden = true;
+  const site = {id, name: pitchForm.elements.name.value, field: pitch.plan.field, cameras: cameras.map((camera) => camera.wire)};
+  const body = new FormData();
+  body.append("site", new Blob([JSON.stringify(site)], {type: "application/json"}), "site.json");
+  for (const camera of cameras) body.append(camera.id, camera.file);
+  button.disabled = refused.hidden = true;
+  missing.textContent = "Sending the frames …";
   try {
-    const venue = {id, name: pitchForm.elements.name.value, field: common.plan.field, cameras: cameras.map((camera) => camera.wire)};
-    const answer = await fetch(`/venues/${id}`, {method: "PUT", headers: {...signed, "Content-Type": "application/json", ...(create.done ? {} : {"If-None-Match": "*"})}, body: JSON.stringify(venue)});
-    if (!answer.ok) throw new Refused(await answer.json(), answer.status);
-    create.done = true;
-    const body = new FormData();
-    for (const camera of cameras) body.append(camera.id, camera.file);
-    missing.textContent = "Sending the frames …";
-    const job = await call("POST", `/venues/${id}/calibrate`, body);
+    const job = await call("POST", `/venues/${id}/find`, body);
     location.assign(`/ui/jobs/${job.id}`);
   } catch (problem) {
     refused.textContent = problem.message;
@@ -79,27 +95,14 @@ async function create() {
   }
 }
 
-/** Say at once that an id is another venue's, and not after all the clicks. */
-async function readId() {
-  const {id} = pitchForm.elements;
-  const place = document.getElementById("taken");
-  const asked = id.value;
-  const answer = asked && id.checkValidity() ? await call("GET", `/ui/new-venue/taken?id=${encodeURIComponent(asked)}`) : {taken: false};
-  if (asked !== id.value) return;
-  isTaken = answer.taken;
-  place.hidden = !isTaken;
-  place.querySelector("a").href = `/ui/venues/${asked}/first-pose`;
-  tell();
-}
-
-pitchForm.addEventListener("input", later(readPitch));
-pitchForm.elements.id.addEventListener("input", later(() => readId().catch(() => {})));
-pitchForm.addEventListener("submit", (event) => event.preventDefault());
-document.getElementById("add").addEventListener("click", () => {
-  cameras.push(new Camera(["left", "right", "middle"][cameras.length] || `camera-${cameras.length + 1}`));
-  tell();
+input.addEventListener("change", () => {
+  add([...input.files]);
+  input.value = "";
 });
-createButton.addEventListener("click", create);
-common.tell = tell;
-cameras.push(new Camera("left"));
-readPitch();
+document.addEventListener("dragover", (event) => event.preventDefault());
+document.addEventListener("drop", (event) => {
+  event.preventDefault();
+  add([...event.dataTransfer.files]);
+});
+button.addEventListener("click", find);
+readForm(tell);

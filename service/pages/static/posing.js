@@ -3,9 +3,9 @@
 import {call, Refused} from "./page.js";
 import {objection, sizeOf} from "./frames.js";
 import {drawn, Sighting} from "./sighting.js";
+import {complain, drawPlan, later, number} from "./steps.js";
 
 const FEWEST = 4;
-const PAUSE = 250;
 // Shares of the length of the pitch.
 const LARGEST_POINT = 0.014;
 const SMALLEST_POINT = 0.006;
@@ -13,37 +13,6 @@ const most = Number(document.getElementById("limits").dataset.bytes);
 
 /** What the cameras of a page have in common: the plan of their pitch, and who is told that one of them has changed. */
 export const common = {plan: null, cameras: [], tell() {}};
-
-export function complain(place, text) {
-  place.textContent = text || "";
-  place.hidden = !text;
-}
-
-export function number(text) {
-  return text.trim() === "" ? undefined : Number(text.replace(",", "."));
-}
-
-export function later(act) {
-  let timer = 0;
-  return () => {
-    clearTimeout(timer);
-    timer = setTimeout(act, PAUSE);
-  };
-}
-
-/** The pitch from above, y up, with the words that points are named by. */
-export function drawPlan(svg) {
-  const {length_m: length, width_m: width} = common.plan.field;
-  const margin = 0.07 * length;
-  const [side, end] = [length / 2 + margin, width / 2 + margin];
-  svg.replaceChildren();
-  svg.setAttribute("viewBox", `${-side} ${-end} ${2 * side} ${2 * end}`);
-  for (const line of common.plan.lines) drawn("polyline", {points: line.map(([x, y]) => `${x},${-y}`).join(" ")}, svg);
-  const between = margin / 2;
-  for (const [word, x, y, turn] of [["far", 0, -end + between, 0], ["near", 0, end - between, 0], ["left", -side + between, 0, -90], ["right", side - between, 0, 90]]) {
-    drawn("text", {x, y, "font-size": 0.6 * margin, transform: `rotate(${turn} ${x} ${y})`}, svg).textContent = word;
-  }
-}
 
 /** How large points of the plan may be, so that no two of them touch where that leaves anything to be seen. */
 function pointRadius() {
@@ -193,7 +162,7 @@ export class Camera {
 
   drawPlan() {
     const svg = this.one("[data-plan]");
-    drawPlan(svg);
+    drawPlan(svg, common.plan);
     const radius = pointRadius();
     for (const [name, [x, y]] of Object.entries(common.plan.points)) {
       const set = this.points.some((point) => point.name === name);

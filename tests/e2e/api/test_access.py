@@ -38,7 +38,9 @@ OTHERWISE = {
     "/ui/venues/{venue_id}/ignore": "admin",
     "/ui/venues/{venue_id}/settings": "admin",
     "/ui/venues/{venue_id}/first-pose": "admin",
+    "/ui/venues/{venue_id}/find": "calibrate",
     "/ui/new-venue": "admin",
+    "/ui/new-venue/by-hand": "admin",
     "/ui/new-venue/plan": "read",
 }
 JOB = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"

@@ -1,9 +1,9 @@
-// The form of a calibration: frames for each camera, looked at here, sent with their progress shown.
+// Forms that send frames: for each camera, or for some, looked at here, sent with their progress shown.
 
 import {signed} from "./page.js";
 import {objection, thumbnail} from "./frames.js";
 
-const form = document.getElementById("calibrate");
+const form = document.getElementById("send-frames");
 const button = form.querySelector("button[type=submit]");
 const bar = document.getElementById("sent");
 const missing = document.getElementById("missing");
@@ -74,8 +74,9 @@ const drops = [...form.querySelectorAll(".drop")].map((box) => new Drop(box));
 /** What still has to be chosen. */
 function tell() {
   const without = drops.filter((drop) => drop.files.length === 0).map((drop) => drop.camera);
-  button.disabled = without.length > 0;
-  missing.textContent = without.length ? `No frame yet of ${without.join(", ")}` : "";
+  const isEnough = "some" in form.dataset ? without.length < drops.length : without.length === 0;
+  button.disabled = !isEnough;
+  missing.textContent = isEnough ? "" : `No frame yet of ${without.join(", ")}`;
 }
 
 /** What was chosen, as the interface takes it; what was left open is not sent. */
@@ -103,7 +104,7 @@ function send(event) {
   body.append("options", JSON.stringify(options()));
   // Unlike fetch, it tells how much has been sent.
   const request = new XMLHttpRequest();
-  request.open("POST", `/venues/${form.dataset.venue}/calibrate`);
+  request.open("POST", form.dataset.address);
   for (const [name, value] of Object.entries(signed)) request.setRequestHeader(name, value);
   request.upload.addEventListener("progress", ({loaded, total}) => {
     bar.value = loaded / total;

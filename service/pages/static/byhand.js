@@ -1,0 +1,61 @@
+// The way to a first calibration by clicks. What is gathered stays here until the venue is created.
+
+import {call, Refused, signed} from "./page.js";
+import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
+import {Camera, common} from "./posing.js";
+
+const createButton = document.getElementById("create");
+const missing = document.getElementById("missing");
+const {cameras} = common;
+
+function changed() {
+  if (common.plan !== pitch.plan) {
+    common.plan = pitch.plan;
+    if (common.plan) for (const camera of cameras) camera.offerPoints();
+  }
+  tell();
+}
+
+/** What is still to be done. */
+function tell() {
+  const open = missingOfPitch();
+  if (!cameras.length) open.push("a camera");
+  if (new Set(cameras.map((camera) => camera.id)).size < cameras.length) open.push("cameras of different names");
+  for (const camera of cameras) {
+    if (!camera.id || !camera.field("id").checkValidity()) open.push("an id of each camera");
+    else if (!camera.file) open.push(`a frame of ${camera.id}`);
+    else if (!camera.result) open.push(`the first pose of ${camera.id}`);
+  }
+  createButton.disabled = open.length > 0;
+  missing.textContent = open.length ? `Still missing: ${open.join("; ")}.` : "";
+}
+
+async function create() {
+  const refused = document.getElementById("refused");
+  const id = pitchForm.elements.id.value;
+  createButton.disabled = refused.hidden = true;
+  try {
+    const venue = {id, name: pitchForm.elements.name.value, field: common.plan.field, cameras: cameras.map((camera) => camera.wire)};
+    const answer = await fetch(`/venues/${id}`, {method: "PUT", headers: {...signed, "Content-Type": "application/json", ...(create.done ? {} : {"If-None-Match": "*"})}, body: JSON.stringify(venue)});
+    if (!answer.ok) throw new Refused(await answer.json(), answer.status);
+    create.done = true;
+    const body = new FormData();
+    for (const camera of cameras) body.append(camera.id, camera.file);
+    missing.textContent = "Sending the frames …";
+    const job = await call("POST", `/venues/${id}/calibrate`, body);
+    location.assign(`/ui/jobs/${job.id}`);
+  } catch (problem) {
+    refused.textContent = problem.message;
+    refused.hidden = false;
+    tell();
+  }
+}
+
+document.getElementById("add").addEventListener("click", () => {
+  cameras.push(new Camera(["left", "right", "middle"][cameras.length] || `camera-${cameras.length + 1}`));
+  tell();
+});
+createButton.addEventListener("click", create);
+common.tell = tell;
+cameras.push(new Camera("left"));
+readForm(changed);

@@ -1,0 +1,43 @@
+// What a search found: a candidate of each camera is chosen by a click, and all of them are taken by another.
+
+import {call} from "./page.js";
+
+const form = document.getElementById("found");
+const button = form?.querySelector("button[type=submit]");
+const cameras = [...(form?.querySelectorAll("[data-camera]") || [])].map((section) => section.dataset.camera);
+
+/** The candidate that was chosen of a camera: its number, null for none of them, undefined where it is open. */
+function chosen(camera) {
+  const radio = form.querySelector(`input[name="${camera}"]:checked`);
+  if (!radio) return undefined;
+  return radio.value ? Number(radio.value) : null;
+}
+
+function tell() {
+  const open = cameras.filter((camera) => chosen(camera) === undefined);
+  const isNone = cameras.every((camera) => chosen(camera) === null);
+  button.disabled = open.length > 0 || isNone;
+  const words = open.length ? `Choose a candidate of ${open.join(", ")}, or none.` : isNone ? "None is chosen." : "The blue lines have to lie on the paint.";
+  form.querySelector("[data-open]").textContent = words;
+}
+
+async function take(event) {
+  event.preventDefault();
+  const refused = document.getElementById("refused");
+  button.disabled = refused.hidden = true;
+  const candidates = Object.fromEntries(cameras.map((camera) => [camera, chosen(camera)]));
+  try {
+    await call("POST", `/venues/${form.dataset.venue}/adopt-found`, {job: form.dataset.job, candidates});
+    location.assign(`/ui/venues/${form.dataset.venue}`);
+  } catch (problem) {
+    refused.textContent = problem.message;
+    refused.hidden = false;
+    tell();
+  }
+}
+
+if (button) {
+  form.addEventListener("input", tell);
+  form.addEventListener("submit", take);
+  tell();
+}

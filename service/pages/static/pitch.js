@@ -1,0 +1,69 @@
+// The pitch of a new venue: its id, its sport and its measures, looked at as they are typed.
+
+import {call} from "./page.js";
+import {complain, drawPlan, later, number} from "./steps.js";
+
+export const pitchForm = document.getElementById("pitch");
+
+/** What the form says: `plan` is the pitch from above, null where there is none like that. */
+export const pitch = {plan: null, isTaken: false};
+
+/** The field as it was typed, as the interface takes it. */
+function fieldAsTyped() {
+  const value = (name) => number(pitchForm.elements[name].value);
+  const field = {template: pitchForm.elements.template.value};
+  for (const name of ["length_m", "width_m", "line_width_m"]) if (value(name) !== undefined) field[name] = value(name);
+  const height = value("ridge_height");
+  if (height) {
+    const usual = pitch.plan ? pitch.plan.field.length_m - pitch.plan.field.width_m : 37;
+    const half = (value("ridge_length") ?? usual) / 2;
+    field.ridge = [[-half, 0, height], [half, 0, height]];
+  }
+  return field;
+}
+
+async function readPitch(changed) {
+  const wrong = pitchForm.querySelector(".wrong");
+  try {
+    pitch.plan = await call("POST", "/ui/new-venue/plan", fieldAsTyped());
+    complain(wrong, "");
+  } catch (refused) {
+    pitch.plan = null;
+    complain(wrong, refused.message);
+    return changed();
+  }
+  for (const name of ["length_m", "width_m", "line_width_m"]) pitchForm.elements[name].placeholder = pitch.plan.field[name];
+  drawPlan(document.getElementById("plan"), pitch.plan);
+  return changed();
+}
+
+/** Say at once that an id is another venue's, and not after all the work. */
+async function readId(changed) {
+  const {id} = pitchForm.elements;
+  const place = document.getElementById("taken");
+  const asked = id.value;
+  const answer = asked && id.checkValidity() ? await call("GET", `/ui/new-venue/taken?id=${encodeURIComponent(asked)}`) : {taken: false};
+  if (asked !== id.value) return;
+  pitch.isTaken = answer.taken;
+  place.hidden = !pitch.isTaken;
+  place.querySelector("a").href = `/ui/venues/${asked}/first-pose`;
+  changed();
+}
+
+/** What is still to be said of the pitch. */
+export function missingOfPitch() {
+  const open = [];
+  const {id} = pitchForm.elements;
+  if (pitch.isTaken) open.push("an id that no other venue has");
+  if (!id.value || !id.checkValidity()) open.push("an id of small letters, digits, - and _");
+  if (!pitch.plan) open.push("a pitch");
+  return open;
+}
+
+/** Call `changed()` whenever the form says something else, and once when it was read first. */
+export function readForm(changed) {
+  pitchForm.addEventListener("input", later(() => readPitch(changed)));
+  pitchForm.elements.id.addEventListener("input", later(() => readId(changed).catch(() => {})));
+  pitchForm.addEventListener("submit", (event) => event.preventDefault());
+  readPitch(changed);
+}

@@ -1,0 +1,36 @@
+// What the pages share on which a venue is described step by step.
+
+import {drawn} from "./sighting.js";
+
+const PAUSE = 250;
+
+export function complain(place, text) {
+  place.textContent = text || "";
+  place.hidden = !text;
+}
+
+export function number(text) {
+  return text.trim() === "" ? undefined : Number(text.replace(",", "."));
+}
+
+export function later(act) {
+  let timer = 0;
+  return () => {
+    clearTimeout(timer);
+    timer = setTimeout(act, PAUSE);
+  };
+}
+
+/** The pitch from above, y up, with the words that points are named by. */
+export function drawPlan(svg, plan) {
+  const {length_m: length, width_m: width} = plan.field;
+  const margin = 0.07 * length;
+  const [side, end] = [length / 2 + margin, width / 2 + margin];
+  svg.replaceChildren();
+  svg.setAttribute("viewBox", `${-side} ${-end} ${2 * side} ${2 * end}`);
+  for (const line of plan.lines) drawn("polyline", {points: line.map(([x, y]) => `${x},${-y}`).join(" ")}, svg);
+  const between = margin / 2;
+  for (const [word, x, y, turn] of [["far", 0, -end + between, 0], ["near", 0, end - between, 0], ["left", -side + between, 0, -90], ["right", side - between, 0, 90]]) {
+    drawn("text", {x, y, "font-size": 0.6 * margin, transform: `rotate(${turn} ${x} ${y})`}, svg).textContent = word;
+  }
+}

@@ -1,0 +1,117 @@
+"""Cameras that are found, as somebody sees them: a venue from frames alone, candidates, a camera found again."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from service.store.jobs.queries import ONE
+from tests.e2e.routes.test_find import depth, find, found, site
+from tests.e2e.running import png
+from tests.pages import browsing
+
+
+@pytest.fixture
+def name(request):
+    """A venue's id that no other test has."""
+    return re.sub("[^a-z0-9]+", "-", request.node.name.lower()).strip("-")[-60:].strip("-")
+
+
+@pytest.fixture
+def files(tmp_path):
+    for camera in ("left", "right"):
+        (tmp_path / f"{camera}.png").write_bytes(png())
+    return [tmp_path / "left.png", tmp_path / "right.png"]
+
+
+def test_a_venue_is_made_of_frames_by_three_clicks(stub, visit, files, name):
+    page = visit(stub.url, "/ui/new-venue")
+    assert re.fullmatch("venue-[0-9]+", page.get_by_label("Id", exact=True).first.input_value())
+    page.get_by_label("Id", exact=True).first.fill(name)
+    button = page.get_by_role("button", name="Find the cameras")
+    expect(page.get_by_text("Still missing: a frame.")).to_be_visible()
+    page.locator("#frames input[type=file]").set_input_files(files)
+    expect(button).to_be_enabled()
+    page.get_by_label("Stands on the side").first.select_option("near")
+    page.get_by_label("Field of view").nth(1).fill("65")
+    button.click()
+    page.wait_for_url("**/ui/jobs/*")
+    expect(page.get_by_role("button", name="Create the venue")).to_be_enabled()
+    assert stub.http.get(f"/venues/{name}").status_code == 404
+    with stub.database() as connection:
+        sought = stored_site(connection, page.url.rpartition("/")[2])
+    assert sought["cameras"] == [{"id": "left", "side": "near"}, {"id": "right", "field_of_view_deg": 65}]
+    page.get_by_role("button", name="Create the venue").click()
+    page.wait_for_url(f"**/ui/venues/{name}")
+    expect(page.get_by_text("found from frames")).to_be_visible()
+    assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 40]
+
+
+def stored_site(connection, job):
+    return connection.execute(ONE, {"job_id": job}).one().site
+
+
+def test_where_several_poses_explain_a_frame_a_person_chooses_by_a_click(stub, visit, name):
+    job = found(stub, name, place=site(name, "partly"))
+    page = visit(stub.url, f"/ui/jobs/{job['id']}")
+    button = page.get_by_role("button", name="Create the venue")
+    expect(page.get_by_text("Choose a candidate of right, or none.")).to_be_visible()
+    expect(button).to_be_disabled()
+    expect(page.get_by_text("Two poses explain the frame alike")).to_be_visible()
+    page.locator("[data-camera=right]").get_by_label("Candidate 2").check()
+    button.click()
+    page.wait_for_url(f"**/ui/venues/{name}")
+    assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 60]
+    page.goto(f"/ui/jobs/{job['id']}")
+    expect(page.get_by_text("Taken, as revision 1 of")).to_be_visible()
+    expect(button).to_have_count(0)
+
+
+def test_what_cannot_be_taken_any_more_says_so(stub, visit, name):
+    job = found(stub, name, place=site(name))
+    page = visit(stub.url, f"/ui/jobs/{job['id']}", forgiven=("409",))
+    stub.venue(name)
+    page.get_by_role("button", name="Create the venue").click()
+    expect(page.locator("#refused")).to_have_text(
+        "The venue has been changed since this job. Load the page again to see how it is now."
+    )
+    page.reload()
+    expect(page.get_by_text("The venue was changed since")).to_be_visible()
+
+
+def test_a_camera_of_a_venue_is_found_again_and_its_neighbour_stays(stub, visit, files, name):
+    stub.venue(name)
+    page = visit(stub.url, f"/ui/venues/{name}/settings")
+    page.get_by_role("link", name="Find cameras").click()
+    page.locator("[data-camera=left] input[type=file]").set_input_files(files[0])
+    button = page.get_by_role("button", name="Find", exact=True)
+    expect(button).to_be_enabled()
+    page.get_by_text("What holds still").click()
+    page.get_by_label("Their lenses").select_option("unknown")
+    button.click()
+    page.wait_for_url("**/ui/jobs/*")
+    page.get_by_role("button", name="Store these poses").click()
+    page.wait_for_url(f"**/ui/venues/{name}")
+    assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 50]
+
+
+def test_a_search_is_followed_to_its_end(stub, visit, name):
+    job = find(stub, name, place=site(name, "accept 1")).json()
+    page = visit(stub.url, f"/ui/jobs/{job['id']}")
+    expect(page.get_by_role("heading", name=f"Search for cameras of {name}")).to_be_visible()
+    expect(page.get_by_role("button", name="Create the venue")).to_be_enabled()
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_everybody_can_use_the_pages_on_which_cameras_are_found_on_a_phone_too(stub, visit, name, files, scheme):
+    job = found(stub, name, place=site(name, "partly"))
+    page = visit(stub.url, "/ui/new-venue", scheme=scheme)
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.locator("#frames input[type=file]").set_input_files(files)
+    expect(page.locator(".found-frames li")).to_have_count(2)
+    for address in (None, f"/ui/jobs/{job['id']}"):
+        if address:
+            page.goto(address)
+            page.wait_for_load_state("networkidle")
+        assert browsing.grave(page) == []
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
