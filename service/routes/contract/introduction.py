@@ -13,9 +13,10 @@ from world to camera, `position` the camera's centre in the world, `translation`
 
 **Order of steps:**
 
-1. `POST /intrinsics`: the lens of each camera, from photos of a board.
-2. `PUT /venues/{venue_id}`: the field, and the cameras with first poses;
-   `POST /venues/{venue_id}/cameras/{camera}/locate` finds a first pose from clicked points.
+1. `POST /venues/{venue_id}/find`: a frame per camera and the name of the sport. The job finds lenses and first poses;
+   `POST /venues/{venue_id}/adopt-found` makes them a venue.
+2. Or by hand: `POST /intrinsics` finds the lens of each camera from photos of a board, `PUT /venues/{venue_id}` has the
+   field and the cameras with first poses, and `POST /venues/{venue_id}/cameras/{camera}/locate` finds one from clicks.
 3. `POST /venues/{venue_id}/calibrate`: a frame per camera. The answer is a job; `GET /jobs/{job_id}?wait=60` waits
    for its end. Poses that pass the quality gate become those of the venue.
 4. `GET /venues/{venue_id}/poses?format=...`: the poses that hold, for other tools.
@@ -32,8 +33,8 @@ TAGS = [
     },
     {
         "name": "jobs",
-        "description": "What is computed: calibrations, fits of the field, lenses and first poses, with their "
-        "progress, results and pictures.",
+        "description": "What is computed: calibrations, fits of the field, lenses, first poses and searches for "
+        "cameras, with their progress, results and pictures.",
     },
     {
         "name": "health",
