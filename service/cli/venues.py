@@ -351,8 +351,8 @@ def find_cameras(
         typer.Option(
             "--options",
             metavar="JSON",
-            help='Of a stored venue: {"cameras": ["left"]} looks for these and takes the others as they are, {"lens": '
-            '"unknown"} finds lenses as well, {"position_radius_m": 2} looks within 2 m of the stored place.',
+            help='Of a stored venue: {"cameras": ["left"]} looks for these alone, {"find_lens": '
+            'true} finds lenses as well, {"position_radius_m": 2} looks within 2 m of the stored place.',
         ),
     ] = "{}",
     wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end and print it.")] = False,

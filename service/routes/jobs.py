@@ -184,12 +184,19 @@ def _decide(context: Context, job: Job, decide: Callable[[str], None]) -> Respon
     try:
         decide(job.id)
     except NoPoses:
-        raise _no_poses(job) from None
+        raise _nothing_to_decide(job) from None
     except VenueHasChanged as moved:
         raise venue_moved_on(job.venue, job.id, moved) from None
     except RevisionUnfit as unfit:
         raise revision_unfit(unfit) from None
     return job_response(context.jobs.get(job.id) or job)
+
+
+def _nothing_to_decide(job: Job) -> Problem:
+    if job.kind != "find":
+        return _no_poses(job)
+    detail = f"It stores nothing by itself: POST /venues/{job.venue}/adopt-found takes what it found."
+    return Problem("poses-not-found", detail, job=job.id)
 
 
 def _no_poses(job: Job) -> Problem:

@@ -84,32 +84,23 @@ class SoughtSite(NamedField):
         `ValidationError` where that leaves no camera, or a candidate is none that a venue can have.
         """
         sizes = {camera.id: camera.image_size for camera in result.cameras}
-        standing = [
-            CameraIn(id=one.id, ignore=one.ignore, source=one.source, **what)
-            for one in self.cameras
-            if (what := _placed(one, chosen, sizes)) is not None
-        ]
-        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=standing)
+        placed = [_placed(one, chosen.get(one.id), sizes.get(one.id)) for one in self.cameras]
+        cameras = [one for one in placed if one is not None]
+        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras)
 
 
 def _sought(camera: Camera, options: FindOptions) -> SoughtCameraIn:
     """A stored camera that is looked for, with what of it is said to hold still."""
-    is_lens_known = options.lens == "stored"
-    near = (
-        {}
-        if options.position_radius_m is None
-        else {
-            "position": camera.pose.position,
-            "position_radius_m": options.position_radius_m,
-        }
-    )
-    return SoughtCameraIn(
+    sought = SoughtCameraIn(
         id=camera.id,
         image_size=camera.image_size,
-        intrinsics=camera.intrinsics if is_lens_known else None,
+        intrinsics=None if options.find_lens else camera.intrinsics,
         ignore=camera.ignore,
-        **near,
     )
+    if options.position_radius_m is None:
+        return sought
+    near = {"position": camera.pose.position, "position_radius_m": options.position_radius_m}
+    return sought.model_copy(update=near)
 
 
 def _known(camera: Camera) -> SoughtCameraIn:
@@ -119,14 +110,12 @@ def _known(camera: Camera) -> SoughtCameraIn:
     )
 
 
-def _placed(
-    camera: SoughtCameraIn, chosen: Mapping[str, CandidateResult], sizes: Mapping[str, list[int]]
-) -> dict[str, object] | None:
-    """Size, lens and pose of a camera; None: it is sought, and none of its candidates is taken."""
+def _placed(camera: SoughtCameraIn, found: CandidateResult | None, size: list[int] | None) -> CameraIn | None:
+    """A camera with the pose that is known or was found; None: it is sought, and none of its candidates is taken."""
+    kept = {"id": camera.id, "ignore": camera.ignore, "source": camera.source}
     if camera.pose is not None:
-        return {"image_size": camera.image_size, "intrinsics": camera.intrinsics, "pose": camera.pose}
-    if camera.id not in chosen:
+        return CameraIn(**kept, image_size=camera.image_size, intrinsics=camera.intrinsics, pose=camera.pose)
+    if found is None:
         return None
-    found = chosen[camera.id]
     pose = PoseIn(rotation=found.pose.rotation, position=found.pose.position)
-    return {"image_size": sizes[camera.id], "intrinsics": found.intrinsics, "pose": pose}
+    return CameraIn(**kept, image_size=size, intrinsics=found.intrinsics, pose=pose)

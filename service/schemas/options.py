@@ -146,9 +146,7 @@ class FindOptions(Handling):
         None,
         description="Those that are looked for. Absent: all that frames were sent of. The others help as they are.",
     )
-    lens: Annotated[Literal["stored", "unknown"], OPEN_WORD] = Field(
-        "stored", description="Of the cameras that are looked for: the stored one holds, or it is found, too."
-    )
+    find_lens: Flag = Field(False, description="Find the lenses of these cameras too; otherwise the stored ones hold.")
     position_radius_m: Annotated[Number, Field(gt=0, le=1000)] | None = Field(
         None,
         description="How far at most the cameras stand from where they are stored. Absent: they may stand anywhere.",

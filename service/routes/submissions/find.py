@@ -31,7 +31,7 @@ router = APIRouter(tags=["jobs"], route_class=Guarded)
 
 MOST_CAMERAS = 32
 # Options that say of stored cameras what a site says of its own.
-ABOUT_STORED = ("cameras", "lens", "position_radius_m")
+ABOUT_STORED = ("cameras", "find_lens", "position_radius_m")
 UPLOAD = form_body(
     FindOptions,
     "A JPEG or PNG file per camera that is to be found, the part named by the camera's id; repeat a part to send "

@@ -63,7 +63,7 @@ def test_a_venue_begins_with_frames_and_a_sport(service, frames, name):
         assert client.picture(job, "candidate/right/2").startswith(b"\xff\xd8")
         stored = client.adopt_found(name, job.id, {"right": 2})
         assert [camera.pose.position[1] for camera in stored.cameras] == [-40, -60]
-        again = client.follow(client.find(name, {"left": frames["left"]}, {"lens": "unknown"}), print)
+        again = client.follow(client.find(name, {"left": frames["left"]}, {"find_lens": True}), print)
         assert [camera.id for camera in again.result.cameras] == ["left"]
 
 

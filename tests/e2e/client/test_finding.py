@@ -148,7 +148,7 @@ def test_a_candidate_is_chosen_by_its_number(service, esc, name, tmp_path):
 
 def test_without_wait_a_search_is_told_and_waited_for_by_its_job(service, esc, name):
     service.venue(name, "reject")
-    done = esc("venue", "find", name, FRAMES[0], "--options", '{"lens": "unknown"}')
+    done = esc("venue", "find", name, FRAMES[0], "--options", '{"find_lens": true}')
     assert done.returncode == 0
     assert esc("job", "wait", json.loads(done.stdout)["job"]).returncode == 3
 

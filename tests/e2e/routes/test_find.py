@@ -5,6 +5,7 @@ import json
 import pytest
 
 from tests.e2e.running import png, upload, venue
+from tests.homes import in_both_homes
 
 
 def site(name, behaviour="accept", cameras=("left", "right"), **known):
@@ -57,6 +58,7 @@ def test_a_search_is_a_job_with_candidates_and_a_picture_of_each(service, name):
     assert refused(service.http.get(f"/jobs/{job['id']}/candidate/left/3.jpg")) == (404, "picture-not-found")
 
 
+@in_both_homes
 def test_a_search_stores_nothing_and_one_call_makes_the_venue_of_it(service, name):
     job = found(service, name, place=site(name))
     assert service.http.get(f"/venues/{name}").status_code == 404
@@ -88,6 +90,7 @@ def test_of_a_camera_that_is_not_sure_a_person_chooses_a_candidate_or_leaves_it_
     assert [one["id"] for one in adopt(service, f"{name}-2", other, right=None).json()["cameras"]] == ["left"]
 
 
+@in_both_homes
 def test_of_a_stored_venue_those_with_frames_are_found_and_the_others_stay(service, name):
     service.venue(name)
     before = service.http.get(f"/venues/{name}").json()
@@ -203,4 +206,6 @@ def test_what_cannot_be_taken_is_said(service, name):
     job = found(service, name)
     assert refused(adopt(service, f"{name}-not", job)) == (404, "poses-not-found")
     assert refused(adopt(service, name, job, {"If-Match": '"other"'})) == (412, "venue-changed")
-    assert refused(service.http.post(f"/jobs/{job['id']}/accept")) == (404, "poses-not-found")
+    accepted = service.http.post(f"/jobs/{job['id']}/accept")
+    assert refused(accepted) == (404, "poses-not-found")
+    assert f"/venues/{name}/adopt-found" in accepted.json()["detail"]
