@@ -78,7 +78,10 @@ class Job(Schema):
 
     id: str
     kind: Annotated[JobKind, OPEN_WORD] = "calibration"
-    venue: str | None = Field(description="Null for the intrinsics of a lens, which belong to no venue.")
+    venue: str | None = Field(
+        description="Null for the intrinsics of a lens, which belong to no venue; of a search for cameras, a venue that need "
+        "not be stored yet."
+    )
     status: Annotated[JobStatus, OPEN_WORD]
     progress: Progress | None
     queue_position: int | None = Field(description="1 = next; null unless queued.")

@@ -104,6 +104,27 @@ def test_a_black_frame_is_rejected_by_the_name_of_its_camera_and_the_stored_pose
     assert stored_position(service, name, 1) == venue(name)["cameras"][1]["pose"]["position"]
 
 
+def test_a_camera_that_looks_elsewhere_than_it_is_stored_is_found_by_its_frame_and_taken(service, name):
+    stored = venue(name, right_turn=np.array([1.2, 0.0, 0.0]))
+    service.http.put(f"/venues/{name}", json=stored).raise_for_status()
+    files = [(camera, (f"{camera}.jpg", frame)) for camera, frame in frames().items()]
+    options = ("options", (None, json.dumps({"cameras": ["right"], "seed": 1})))
+    job = service.http.post(f"/venues/{name}/find", files=[*files, options]).raise_for_status().json()
+    job = service.end(job["id"])
+    assert job["result"]["rejected_because"] is None
+    (found,) = job["result"]["cameras"]
+    assert all(f"candidate/right/{number}" in job["links"] for number in range(1, len(found["candidates"]) + 1))
+    picture = service.http.get(job["links"]["candidate/right/1"]).raise_for_status().content
+    assert cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR).shape == (SIZE[1], SIZE[0], 3)
+    taken = service.http.post(f"/venues/{name}/adopt-found", json={"job": job["id"]}).raise_for_status().json()
+    left, right = taken["cameras"]
+    truth = cameras()[1].pose
+    assert np.linalg.norm(np.array(right["pose"]["position"]) - truth.position) < 0.15
+    assert rotation_angles_deg(right["pose"]["rotation"], truth.rotation) < 0.2
+    assert right["intrinsics"]["matrix"] == stored["cameras"][1]["intrinsics"]["matrix"]
+    assert left["pose"]["position"] == stored["cameras"][0]["pose"]["position"]
+
+
 def test_a_stored_pose_that_looks_at_the_sky_is_refused_by_the_name_of_its_camera_and_the_other_is_calibrated(
     service, name
 ):
