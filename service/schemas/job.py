@@ -79,7 +79,7 @@ class Job(Schema):
     id: str
     kind: Annotated[JobKind, OPEN_WORD] = "calibration"
     venue: str | None = Field(
-        description="Null for the intrinsics of a lens, which belong to no venue; of a search for cameras, a venue that need "
+        description="Null for the intrinsics of a lens, which belong to no venue. That of a search for cameras need "
         "not be stored yet."
     )
     status: Annotated[JobStatus, OPEN_WORD]

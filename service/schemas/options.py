@@ -137,8 +137,8 @@ class FieldOptions(Handling):
 class FindOptions(Handling):
     """Which cameras are to be found, and what of them holds still; everything is optional.
 
-    `cameras`, `find_lens` and `position_radius_m` are about a venue that is stored; of another one, the part `site` says
-    it of each camera.
+    `cameras`, `find_lens` and `position_radius_m` are about a venue that is stored; of another one, the part `site`
+    says it of each camera.
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"cameras": ["left"], "position_radius_m": 2}]})
