@@ -396,6 +396,10 @@ def find_cameras(
             if adopt_them and job.result.accepted:
                 client.adopt_found(venue, job.id)
                 print_note(f"Stored: venue {venue} has these cameras now.")
+            elif adopt_them:
+                print_note(
+                    f"Nothing is stored. To choose: esc venue adopt {venue} --found {job.id} --candidate CAMERA=N"
+                )
     raise typer.Exit(job_exit_code(job))
 
 

@@ -1,4 +1,4 @@
-"""Venues of cameras that were found from their frames, which a person lets hold: all SQL about them.
+"""Venues of cameras that were found from their frames, which a person lets hold.
 
 A job that looks for cameras stores nothing. What it found is taken by hand: the venue is created, or cameras of the one
 that is there are put where they were found.
@@ -53,7 +53,7 @@ class FoundVenueRepository(Repository):
                 return False
             now_stored = find_venue(connection, found.site.id)
             if found.began_with is None or now_stored is None:
-                return found.began_with is now_stored
+                return found.began_with is None and now_stored is None
             return _is_untouched(now_stored, found.began_with, found.site.sought)
 
     def adopt(
@@ -78,6 +78,8 @@ class FoundVenueRepository(Repository):
             _require_candidates(found, choice)
             stored = find_stored(connection, venue_id)
             before = None if stored is None else stored.venue
+            if before is None and found.began_with is not None:
+                raise VenueHasChanged(None)
             allow(before)
             wanted = _wanted(before, found, choice)
             if before is not None and wanted.has_same_calibration_input_as(before):
@@ -87,8 +89,6 @@ class FoundVenueRepository(Repository):
                 found.began_with is None or not _is_untouched(before, found.began_with, list(taken))
             ):
                 raise VenueHasChanged(newest_revision(connection, venue_id))
-            if before is None and found.began_with is not None:
-                raise VenueHasChanged(None)
             store_venue(connection, stored, wanted, "found", by, job_id)
             return wanted, before is None
 

@@ -136,6 +136,7 @@ def test_a_candidate_is_chosen_by_its_number(service, esc, name, tmp_path):
     done = esc("venue", "find", name, *FRAMES, "--site", "site.json", "--adopt")
     assert done.returncode == 3
     assert "Rejected: camera right: two poses explain the frame alike" in done.stderr
+    assert f"Nothing is stored. To choose: esc venue adopt {name} --found " in done.stderr
     assert service.http.get(f"/venues/{name}").status_code == 404
     job = json.loads(done.stdout)["id"]
     open_one = esc("venue", "adopt", name, "--found", job)

@@ -133,6 +133,13 @@ def test_the_venue_of_a_search_that_somebody_has_put_meanwhile_stays(service, na
     assert adopt(service, name, job).status_code == 201
 
 
+def test_cameras_of_a_venue_that_was_deleted_meanwhile_make_no_new_one(service, name):
+    service.venue(name)
+    job = found(service, name, files=upload(cameras=("left",)))
+    service.http.delete(f"/venues/{name}").raise_for_status()
+    assert refused(adopt(service, name, job)) == (409, "venue-moved-on")
+
+
 def test_memories_of_a_found_camera_end_and_those_of_the_others_stay(service, name):
     service.venue(name, "refine")
     for shade in (1, 2):
