@@ -6,6 +6,7 @@ import {drawn, Sighting} from "./sighting.js";
 import {complain, drawPlan, later, number} from "./steps.js";
 
 const FEWEST = 4;
+const PAUSE = 250;
 // Shares of the length of the pitch.
 const LARGEST_POINT = 0.014;
 const SMALLEST_POINT = 0.006;
