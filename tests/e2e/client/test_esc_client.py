@@ -220,8 +220,8 @@ def test_alone_it_reads_what_a_newer_service_says(service, program, name):
 
 def test_the_programs_of_its_page_run(service, program, tmp_path, name):
     service.venue(name)
-    blocking, awaited = (
-        text.replace("main-pitch", name)
+    blocking, finding, awaited = (
+        text.replace("main-pitch", name).replace("side-pitch", f"{name}-2")
         for text in re.findall("^```python\n(.+?)^```", (ROOT / "client" / "README.md").read_text(), re.DOTALL | re.M)
     )
     for side in ("left", "right"):
@@ -229,6 +229,7 @@ def test_the_programs_of_its_page_run(service, program, tmp_path, name):
     said = program(blocking)
     assert "accepted" in said
     assert [line.partition(" ")[0] for line in said[-2:]] == ["left", "right"]
+    assert [line.partition(" ")[0] for line in program(finding)[-2:]] == ["left", "right"]
     # It follows until the venue is deleted.
     until_first = awaited.replace("event.data)\n", "event.data)\n            break\n")
     assert [line.split()[1] for line in program(until_first)] == ["poses.current"]

@@ -124,9 +124,9 @@ def test_what_is_already_a_job_is_answered_with_it_though_the_queue_is_full(cont
     first = frames.submit(context, read, form, Options, Sender("key", Origin()))
     context.settings.queue_limit = 1
     sender = Sender("key", Origin())
-    job_submission.require_queue_room(context, read, "calibration", sender)
+    job_submission.require_queue_room(context, read.id, "calibration", sender)
     # The same content without a key, too: it is the venue's active job.
-    job_submission.require_queue_room(context, read, "calibration", Sender(None, Origin()))
+    job_submission.require_queue_room(context, read.id, "calibration", Sender(None, Origin()))
     resubmit = frames.submit(context, read, uploaded(), Options, sender)
     assert (first.status_code, resubmit.status_code) == (202, 200)
     with pytest.raises(Problem) as problem:
