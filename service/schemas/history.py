@@ -116,6 +116,7 @@ class AdoptFound(Schema):
     job: Annotated[str, StringConstraints(pattern=JOB_ID_PATTERN)]
     candidates: dict[Id, Annotated[Integer, Field(ge=1, le=100)] | None] = Field(
         {},
+        json_schema_extra={"additionalProperties": False},
         description="The candidate that a camera is taken to be, from 1; null: none of them, the camera keeps its pose "
         "or, of a new venue, is left out. A camera that is not named is its first candidate if that is accepted.",
     )
