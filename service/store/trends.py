@@ -20,7 +20,7 @@ from service.schemas.results import CameraResult
 from service.schemas.trend import Anchor, Displacement, Trend, TrendState
 from service.schemas.venue import Venue
 from service.store import tables
-from service.store.database import Repository, clock, reading
+from service.store.database import Repository, reading
 from service.store.documents import to_document
 from service.store.trend_charts import ALARM_M, CameraCharts, state_of
 
@@ -119,16 +119,17 @@ def note_night(
     results: Sequence[CameraResult],
     job_id: str,
     revision: int,
+    at: datetime,
     *,
     by_hand: bool,
 ) -> None:
     """Keep how far the cameras of an accepted result are from their anchors, inside the caller's transaction.
 
-    `venue`: as it is with them; `revision`: what it became by them. What a person accepted `by_hand` is right by that
-    person's word: it is the new anchor.
+    `venue`: as it is with them; `revision`: what it became by them, `at` now. What a person accepted `by_hand` is right
+    by that person's word: it is the new anchor.
     """
     posed = {camera.id: camera.posed for camera in venue.cameras}
-    anchors, at = _newest_anchors(connection, venue.id), clock(connection)
+    anchors = _newest_anchors(connection, venue.id)
     is_another = False
     for result in results:
         moved, anchor = result.displacement, anchors.get(result.id)
