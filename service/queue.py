@@ -8,12 +8,17 @@ then it is given up. The queue does not know how a job ended; the job's row does
 from __future__ import annotations
 
 import sqlite3
+import threading
+import uuid
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import sqlalchemy as sa
+import structlog
 from dbos import DBOS, DBOSClient, DBOSConfig
+from dbos import Queue as EngineQueue
 from dbos import WorkflowStatusString as QueueStatus
+from dbos._core import execute_dequeued_workflow
 
 from service.schemas.names import JobKind
 from service.store.database import LIMITS, postgresql
@@ -28,7 +33,9 @@ SCHEMA = "dbos"
 # The engine's default is a hash of the source; after a deployment the jobs of the old version would never be begun.
 VERSION = "1"
 BEGINS_AGAIN = 2
+# A job waits for half of it before an idle worker begins it.
 POLL_S = 0.5
+log = structlog.get_logger()
 
 
 def migrate(url: str) -> None:
@@ -117,10 +124,17 @@ class Queue:
 
 
 class WorkerQueue:
-    """The half of the worker: takes jobs out and calls `run(job_id)` for each, in a thread of its own."""
+    """The half of the worker: takes jobs out and calls `run(job_id)` for each, in a thread of its own.
+
+    The engine's own threads ask the database a dozen times a second, whatever their options: for the settings and the
+    jobs of each queue, and for queues, schedules, delays and timeouts, of which there are none. So they are stopped
+    once they run, and one thread of ours asks about both queues in one statement. Jobs are claimed and begun by the
+    engine all the same; its private calls are those of the version that is pinned exactly.
+    """
 
     def __init__(self, url: str, worker: str, jobs_at_once: int, run: Callable[[str], None]) -> None:
-        self._jobs_at_once = jobs_at_once
+        self._worker = worker
+        self._at_once = {QUEUE: jobs_at_once, LIGHT_QUEUE: 1}
         config: DBOSConfig = {
             "name": APPLICATION,
             "system_database_url": url,
@@ -128,11 +142,13 @@ class WorkerQueue:
             "system_database_engine": _engine(url, limits=""),
             "executor_id": worker,
             "application_version": VERSION,
-            # The queue is polled anyway; what would be listened for are events of workflows, which nobody here sends.
+            # What would be listened for are events of workflows, which nobody here sends.
             "use_listen_notify": False,
             "log_level": "WARNING",
         }
         self._engine = DBOS(config=config)
+        self._queues: list[EngineQueue] = []
+        self._stopped = threading.Event()
 
         @DBOS.workflow(name=WORKFLOW, max_recovery_attempts=BEGINS_AGAIN)
         def attempt(job_id: str) -> None:
@@ -140,16 +156,59 @@ class WorkerQueue:
 
     def start(self) -> None:
         """Begin with what this worker left behind, then take from the queue."""
+        DBOS.listen_queues([])
         DBOS.launch()
-        for queue, at_once in ((QUEUE, self._jobs_at_once), (LIGHT_QUEUE, 1)):
+        self._engine._background_jobs_stop_event.set()
+        for event in list(self._engine.background_thread_stop_events):
+            event.set()
+        self._queues = [
+            # The interval is for workers of 0.1.0, which have the engine look for itself.
             DBOS.register_queue(
-                queue, worker_concurrency=at_once, polling_interval_sec=POLL_S, on_conflict="always_update"
+                name, worker_concurrency=at_once, polling_interval_sec=POLL_S, on_conflict="always_update"
             )
+            for name, at_once in self._at_once.items()
+        ]
+        self.take_over([self._worker])
+        threading.Thread(target=self._take_until_stopped, name="queue", daemon=True).start()
 
     def stop_taking(self) -> None:
         """Take no more jobs; those that were begun go on."""
-        for event in self._engine.background_thread_stop_events:
-            event.set()
+        self._stopped.set()
+
+    def _take_until_stopped(self) -> None:
+        while not self._stopped.wait(POLL_S):
+            try:
+                for queue in self._queues_with_work():
+                    self._take(queue)
+            except Exception:  # the database is away: the next look tries again
+                log.warning("cannot take jobs out of the queue", exc_info=True)
+
+    def _queues_with_work(self) -> list[EngineQueue]:
+        """Return the queues in which jobs wait, of those from which this worker may take more."""
+        free = [queue for queue in self._queues if self._running(queue) < self._at_once[queue.name]]
+        if not free:
+            return []
+        row = self._engine._sys_db.tables.workflow_status.c
+        # Not a parameter: the index holds these alone, which the database must see when it plans.
+        waits = row.status == sa.literal_column(f"'{QueueStatus.ENQUEUED.value}'")
+        found = [sa.exists(sa.select(row.queue_name).where(row.queue_name == queue.name, waits)) for queue in free]
+        with self._engine._sys_db.engine.begin() as connection:
+            answers = connection.execute(sa.select(*found)).one()
+        return [queue for queue, any_wait in zip(free, answers, strict=True) if any_wait]
+
+    def _take(self, queue: EngineQueue) -> None:
+        owner, engine = uuid.uuid4().hex, self._engine._sys_db
+        claimed, _ = engine.start_queued_workflows(
+            queue, self._worker, VERSION, None, self._running(queue), owner_xid=owner
+        )
+        for status in engine.get_workflow_statuses(claimed):
+            try:
+                execute_dequeued_workflow(self._engine, status, owner)
+            except Exception:  # most likely one that was begun too often, which `given_up` then says
+                log.warning("not begun", job=status["workflow_uuid"], exc_info=True)
+
+    def _running(self, queue: EngineQueue) -> int:
+        return self._engine._active_workflows_set.count_for_queue(queue.name)
 
     def is_idle(self) -> bool:
         """Whether every job that was taken has ended, and the queue knows. Private to the engine as well."""

@@ -216,6 +216,16 @@ class Postgres:
     def url(self, database: str) -> str:
         return f"postgresql://esc@/{database}?host={self._folder}"
 
+    def log_statements_of(self, database: str) -> None:
+        """Of every connection that is made to it from now on."""
+        with psycopg.connect(self.url(database), autocommit=True) as connection:
+            connection.execute(f"ALTER DATABASE {database} SET log_statement = 'all'")
+
+    def transactions(self) -> int:
+        """How many have ended of those whose statements are logged."""
+        ends = ("statement: COMMIT", "statement: ROLLBACK")
+        return sum(line.endswith(ends) for line in self._log.read_text(errors="replace").splitlines())
+
     def start(self) -> None:
         options = [word for option in ("listen_addresses=", *self._options) for word in ("-c", option)]
         command = [self._binaries / "postgres", "-D", "data", "-k", self._folder, *options]

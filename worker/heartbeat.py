@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import time
 import uuid
+from collections.abc import Collection
 from pathlib import Path
 
 import structlog
 
 from service import build
 from service.settings import Settings
-from service.store.workers import WorkerRepository
+from service.store.workers import Round, WorkerRepository
 from service.worker_lock import AlreadyRunning
 
 BEAT_S = 2.0
@@ -34,12 +35,21 @@ class Heartbeat:
         self._require_the_name()
         self._enter()
 
-    def beat(self, unreadable_jobs: int = 0) -> bool:
-        """Send a heartbeat; return False if another worker of this name has started meanwhile.
+    def beat(self) -> None:
+        """Send a heartbeat."""
+        self._go_on(self._workers.beat(self._name, self._token))
 
-        `unreadable_jobs`: how many jobs wait that this worker cannot read.
+    def beat_and_listen(self, unreadable_jobs: Collection[str]) -> Round | None:
+        """Send a heartbeat, return what is silent; None if another worker of this name has started meanwhile.
+
+        `unreadable_jobs`: those that wait and that this worker cannot read; they are not among the silent ones.
         """
-        if self._workers.beat(self._name, self._token, unreadable_jobs):
+        heard = self._workers.beat_and_listen(self._name, self._token, self._settings.takeover_after_s, unreadable_jobs)
+        return heard if self._go_on(heard.is_of_this_start) else None
+
+    def _go_on(self, is_of_this_start: bool) -> bool:
+        """Return whether this start goes on, which it does not once another one has its name."""
+        if is_of_this_start:
             return True
         if self._workers.start_of(self._name) is None:
             # The others have given this one up: it was away for longer than they wait.

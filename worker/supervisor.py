@@ -12,7 +12,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
 from typing import TypeVar
@@ -121,15 +121,19 @@ class Worker:
         beaten, judging_from = time.monotonic(), 0.0
         while not stop.wait(BEAT_S):
             try:
-                if not self._heartbeat.beat(len(self._unreadable)):
+                # Of that moment: the threads of jobs add to it.
+                unreadable = set(self._unreadable)
+                heard = self._heartbeat.beat_and_listen(unreadable)
+                if heard is None:
                     return
                 before, beaten = beaten, time.monotonic()
                 if beaten - before > 2 * BEAT_S:
                     # The database was away and nobody could send a heartbeat: silence proves nothing yet.
                     judging_from = beaten + self._settings.takeover_after_s
                 if beaten >= judging_from:
-                    self._take_over()
-                self._reconcile()
+                    self._take_over(heard.silent_workers)
+                self._forget_those_that_do_not_wait(unreadable)
+                self._reconcile(heard.silent_jobs)
             except Exception:  # the database is away: the next round tries again
                 log.warning("cannot look after the jobs", exc_info=True)
 
@@ -159,20 +163,17 @@ class Worker:
             self._hand_back(job_id, task.kind)
             log.info("job handed back", job=job_id)
 
-    def _take_over(self) -> None:
-        silence = self._settings.takeover_after_s
-        dead = self._workers.silent(silence)
+    def _take_over(self, dead: Sequence[str]) -> None:
         if dead:
             log.warning("taking over", workers=dead)
             self._queue.take_over(dead)
             for name in dead:
-                self._workers.forget(name, silence)
+                self._workers.forget(name, self._settings.takeover_after_s)
 
-    def _reconcile(self) -> None:
-        # Of that moment: the threads of jobs add to it.
-        unreadable = set(self._unreadable)
+    def _forget_those_that_do_not_wait(self, unreadable: set[str]) -> None:
         self._unreadable -= unreadable - self._attempts.still_waiting(unreadable)
-        silent = self._attempts.stale_jobs(self._settings.takeover_after_s, but=unreadable)
+
+    def _reconcile(self, silent: Sequence[str]) -> None:
         given_up = self._queue.given_up(silent) if silent else {}
         for job_id, ended in given_up.items():
             try:
@@ -280,6 +281,7 @@ class Worker:
                 elif message.progress is not None:
                     spans.at(message.progress.stage)
                     lease.report(message.progress)
+                    lease.check()
             return Message(error=_error("job-crashed", child.exit_reason())), {}
 
     def _record_end(self, task: Task, last: Message | None) -> None:

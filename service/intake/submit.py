@@ -43,15 +43,10 @@ class Intake:
 
         `store` puts them where the submission says. Raises a `SubmissionRefused`, and a `Problem` that `store` raises.
         """
-        known = self._submissions.same_as(
-            submission.venue_id, submission.idempotency_key, submission.content_hash, submission.kind
-        )
+        # Storing costs more than asking: the place in the queue too, which the transaction of the job asks for again.
+        known = self._submissions.announce(submission, self._settings.queue_limit, UPLOAD_GRACE)
         if known is not None:
             return known, False
-        # Storing costs more than asking. The transaction below asks again, for those that come at once.
-        self.require_place(submission.origin)
-        # On the list of what is to be deleted before the first byte is stored, off it in the job's own transaction.
-        self._expiry.register_upload(submission.job_id, UPLOAD_GRACE)
         try:
             store()
             job, new = self._submissions.submit(submission, self._settings.queue_limit, self._enqueue)

@@ -12,13 +12,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from itertools import takewhile
 
 import sqlalchemy as sa
 
 from service.store import tables
-from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.database import Repository, advisory_lock, reading, writing
 from service.store.events.outbox import CALLBACKS
 from service.store.jobs.files import frame_folder, picture_folder, pictures_folder
 from service.store.revisions import CALIBRATION_CAUSES
@@ -85,7 +85,7 @@ class ExpiryRepository(Repository):
         with writing(self._engine) as connection:
             advisory_lock(connection, "expiry")
             self._mark(connection, job_ids, frames_deleted_at=now)
-            self._leave(connection, [frame_folder(job_id) for job_id in job_ids], now)
+            leave(connection, [frame_folder(job_id) for job_id in job_ids], now)
 
     def expire_pictures(self, ended_before: datetime, now: datetime, limit: int) -> int:
         """The same for pictures, but for those of the last accepted job of each venue."""
@@ -93,7 +93,7 @@ class ExpiryRepository(Repository):
             advisory_lock(connection, "expiry")
             ids = self._ended(connection, ended_before, limit, j.pictures_deleted_at.is_(None), NOT_THE_LAST_ACCEPTED)
             self._mark(connection, ids, pictures_deleted_at=now)
-            self._leave(connection, [pictures_folder(job_id) for job_id in ids], now)
+            leave(connection, [pictures_folder(job_id) for job_id in ids], now)
             return len(ids)
 
     def old_jobs(self, ended_before: datetime, limit: int) -> list[str]:
@@ -172,12 +172,7 @@ class ExpiryRepository(Repository):
             advisory_lock(connection, "expiry")
             connection.execute(sa.delete(tables.jobs).where(j.id.in_(job_ids), j.finished_at.is_not(None)))
             connection.execute(sa.delete(tables.deliveries).where(tables.deliveries.c.id.in_(job_ids)))
-            self._leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)
-
-    def register_upload(self, job_id: str, grace: timedelta) -> None:
-        """Frames are about to be stored; unless they become this job within the grace they are nobody's."""
-        with writing(self._engine) as connection:
-            self._leave(connection, [frame_folder(job_id)], clock(connection) + grace)
+            leave(connection, [of(job_id) for job_id in job_ids for of in (frame_folder, pictures_folder)], now)
 
     def leftovers(self, now: datetime, limit: int) -> list[str]:
         """Up to `limit` folders whose files are to be deleted."""
@@ -206,8 +201,10 @@ class ExpiryRepository(Repository):
         marked = sa.update(tables.jobs).where(j.id.in_(job_ids)).values(revision=j.revision + 1, **moment)
         connection.execute(marked)
 
-    def _leave(self, connection: sa.Connection, folders: Collection[str], due_at: datetime) -> None:
-        connection.execute(sa.delete(tables.leftovers).where(left.folder.in_(folders)))
-        rows = [{"folder": folder, "due_at": due_at} for folder in folders]
-        if rows:
-            connection.execute(sa.insert(tables.leftovers), rows)
+
+def leave(connection: sa.Connection, folders: Collection[str], due_at: datetime) -> None:
+    """Have the files of folders deleted at a time, when and if the caller's transaction commits."""
+    connection.execute(sa.delete(tables.leftovers).where(left.folder.in_(folders)))
+    rows = [{"folder": folder, "due_at": due_at} for folder in folders]
+    if rows:
+        connection.execute(sa.insert(tables.leftovers), rows)

@@ -47,8 +47,7 @@ def keep_memories(connection: sa.Connection, venue_id: str, revision: int, memor
         return
     connection.execute(sa.insert(tables.memories).values(venue=venue_id, revision=revision, document=kept))
     numbers = sa.select(m.revision).where(m.venue == venue_id).order_by(m.revision.desc()).limit(KEPT)
-    oldest_kept = min(connection.scalars(numbers))
-    connection.execute(sa.delete(tables.memories).where(m.venue == venue_id, m.revision < oldest_kept))
+    connection.execute(sa.delete(tables.memories).where(m.venue == venue_id, m.revision.not_in(numbers)))
 
 
 def forget_memories(connection: sa.Connection, venue_id: str) -> None:

@@ -20,7 +20,7 @@ from service.schemas.results import CameraResult
 from service.schemas.trend import Anchor, Displacement, Trend, TrendState
 from service.schemas.venue import Venue
 from service.store import tables
-from service.store.database import Repository, clock, reading
+from service.store.database import Repository, reading
 from service.store.documents import to_document
 from service.store.trend_charts import ALARM_M, CameraCharts, state_of
 
@@ -53,7 +53,7 @@ class TrendRepository(Repository):
         """The trend of one camera since its anchor; `since`: only the nights from then on are told, all are charted."""
         with reading(self._engine) as connection:
             anchor = _newest_anchors(connection, venue.id).get(camera)
-            rows = _rows(connection, venue.id, camera)
+            rows = _rows(connection, venue.id, [camera])[camera]
         return _trend(venue, camera, anchor, rows, since)
 
 
@@ -119,17 +119,19 @@ def note_night(
     results: Sequence[CameraResult],
     job_id: str,
     revision: int,
+    at: datetime,
     *,
     by_hand: bool,
 ) -> None:
     """Keep how far the cameras of an accepted result are from their anchors, inside the caller's transaction.
 
-    `venue`: as it is with them; `revision`: what it became by them. What a person accepted `by_hand` is right by that
-    person's word: it is the new anchor.
+    `venue`: as it is with them; `revision`: what it became by them, `at` now. What a person accepted `by_hand` is right
+    by that person's word: it is the new anchor.
     """
     posed = {camera.id: camera.posed for camera in venue.cameras}
-    anchors, at = _newest_anchors(connection, venue.id), clock(connection)
+    anchors = _newest_anchors(connection, venue.id)
     is_another = False
+    rows: list[dict[str, Any]] = []
     for result in results:
         moved, anchor = result.displacement, anchors.get(result.id)
         anew = by_hand and anchor is not None and anchor.revision != revision
@@ -153,7 +155,8 @@ def note_night(
         elif moved.anchor != number:
             # It was compared with another one than the camera now has.
             continue
-        _add_row(connection, venue.id, result, moved, number, revision, job_id, at)
+        rows.append(_row(result, moved, number))
+    _add_rows(connection, rows, {"venue": venue.id, "revision": revision, "job": job_id, "at": at})
     anchors = _newest_anchors(connection, venue.id) if is_another else anchors
     _chart(connection, venue.id, [result.id for result in results], anchors)
 
@@ -183,46 +186,49 @@ def _set_anchor(connection: sa.Connection, venue_id: str, camera: PosedCamera, r
     connection.execute(sa.update(tables.camera_anchors).where(*_is(venue_id, camera.id, revision)).values(**posed))
 
 
-def _add_row(
-    connection: sa.Connection,
-    venue_id: str,
-    result: CameraResult,
-    moved: Displacement,
-    anchor: int,
-    revision: int,
-    job_id: str,
-    at: datetime,
-) -> None:
-    # A person may accept by hand what a job has brought already.
-    before = sa.delete(tables.camera_trend).where(t.venue == venue_id, t.camera == result.id, t.job == job_id)
-    connection.execute(before)
+def _row(result: CameraResult, moved: Displacement, anchor: int) -> dict[str, Any]:
+    """What the row of a camera says of one night."""
     sigma = result.sigma
-    connection.execute(
-        sa.insert(tables.camera_trend).values(
-            venue=venue_id,
-            camera=result.id,
-            anchor=anchor,
-            revision=revision,
-            job=job_id,
-            at=at,
-            sigma_rotation_deg=sigma.rotation_deg if sigma else None,
-            sigma_position_m=sigma.position_m if sigma else None,
-            **moved.model_dump(exclude={"anchor", "at"}),
-        )
-    )
+    return {
+        "camera": result.id,
+        "anchor": anchor,
+        "sigma_rotation_deg": sigma.rotation_deg if sigma else None,
+        "sigma_position_m": sigma.position_m if sigma else None,
+        **moved.model_dump(exclude={"anchor", "at"}),
+    }
+
+
+def _add_rows(connection: sa.Connection, rows: Sequence[dict[str, Any]], night: dict[str, Any]) -> None:
+    if not rows:
+        return
+    # A person may accept by hand what a job has brought already.
+    of_job = (t.venue == night["venue"], t.job == night["job"], t.camera.in_([row["camera"] for row in rows]))
+    connection.execute(sa.delete(tables.camera_trend).where(*of_job))
+    connection.execute(sa.insert(tables.camera_trend), [row | night for row in rows])
 
 
 def _chart(
     connection: sa.Connection, venue_id: str, cameras: Collection[str], anchors: Mapping[str, sa.Row[Any]]
 ) -> None:
     """Write down what the charts of cameras say now, by their `anchors`, and forget the rows that are too many."""
-    for camera in anchors.keys() & cameras:
-        anchor, rows = anchors[camera], _rows(connection, venue_id, camera)
-        _trim(connection, rows)
-        since = [row for row in rows if row.anchor == anchor.revision]
-        said = _said(camera, since, anchor) if since else _nothing_said(camera)
-        of_anchor = _is(venue_id, camera, anchor.revision)
-        connection.execute(sa.update(tables.camera_anchors).where(*of_anchor).values(**said))
+    charted = sorted(anchors.keys() & cameras)
+    if not charted:
+        return
+    rows = _rows(connection, venue_id, charted)
+    said: list[dict[str, Any]] = []
+    without_a_night: list[dict[str, Any]] = []
+    for camera in charted:
+        _trim(connection, rows[camera])
+        anchor = anchors[camera]
+        of_anchor = {"of_camera": camera, "of_revision": anchor.revision}
+        since = [row for row in rows[camera] if row.anchor == anchor.revision]
+        if since:
+            said.append(of_anchor | _said(camera, since, anchor))
+        else:
+            without_a_night.append(of_anchor | _nothing_said(camera))
+    is_anchor = (c.venue == venue_id, c.camera == sa.bindparam("of_camera"), c.revision == sa.bindparam("of_revision"))
+    for values in filter(None, (said, without_a_night)):
+        connection.execute(sa.update(tables.camera_anchors).where(*is_anchor), values)
 
 
 def _said(camera: str, since: Sequence[Any], anchor: Any) -> dict[str, Any]:
@@ -272,10 +278,13 @@ def _baselines(anchor: Any) -> Mapping[str, Baseline]:
     return {quantity: Baseline(**numbers) for quantity, numbers in anchor.baselines.items()}
 
 
-def _rows(connection: sa.Connection, venue_id: str, camera: str) -> Sequence[Any]:
-    """All rows of a camera, oldest first."""
-    of_camera = (t.venue == venue_id, t.camera == camera)
-    return connection.execute(sa.select(tables.camera_trend).where(*of_camera).order_by(t.id)).all()
+def _rows(connection: sa.Connection, venue_id: str, cameras: Collection[str]) -> dict[str, list[Any]]:
+    """All rows of cameras, oldest first, by camera."""
+    of_cameras = (t.venue == venue_id, t.camera.in_(cameras))
+    rows: dict[str, list[Any]] = {camera: [] for camera in cameras}
+    for row in connection.execute(sa.select(tables.camera_trend).where(*of_cameras).order_by(t.id)):
+        rows[row.camera].append(row)
+    return rows
 
 
 def _newest_anchors(connection: sa.Connection, venue_id: str) -> dict[str, Any]:

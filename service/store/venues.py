@@ -308,7 +308,7 @@ def apply_result(
     number = add_revision(connection, quality, found, cause, job_id, stitch_error_px=result.stitch_error_px, by=by)
     keep_memories(connection, found.id, number, memories)
     night = [camera for camera in result.cameras if camera.id in cameras]
-    note_night(connection, found, night, job_id, number, by_hand=cause == "accepted")
+    note_night(connection, found, night, job_id, number, quality.now, by_hand=cause == "accepted")
     update_alarms(connection, quality, found)
 
 

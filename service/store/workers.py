@@ -5,17 +5,17 @@ A worker has a row by its name, and each of its starts a token in it: two worker
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import sqlalchemy as sa
 
 from service.store.database import Repository, clock, reading, writing
+from service.store.silence import CLOCK_TOLERANCE, silent_jobs
 from service.store.tables import workers
 
 w = workers.c
-# A heartbeat that lies further ahead was given by a clock that has been put right since.
-CLOCK_TOLERANCE = timedelta(seconds=5)
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,18 @@ class WorkerStart:
     seen_at: datetime
 
 
+@dataclass(frozen=True)
+class Round:
+    """What a heartbeat hears of the others: workers that are silent, and open jobs that nothing is heard of.
+
+    `is_of_this_start`: whether the row of the worker was still of the start that sent the heartbeat.
+    """
+
+    is_of_this_start: bool
+    silent_workers: list[str]
+    silent_jobs: list[str]
+
+
 class WorkerRepository(Repository):
     """The workers in the database. Their times are the database's: the clocks of several machines differ."""
 
@@ -77,12 +89,19 @@ class WorkerRepository(Repository):
         A sign of life of another one that lies in the future is put to now, so that its silence counts from here on.
         """
         with writing(self._engine) as connection:
+            return _beat(connection, clock(connection), name, token, unreadable_jobs)
+
+    def beat_and_listen(
+        self, name: str, token: str | None, silence_s: float, unreadable_jobs: Collection[str] = ()
+    ) -> Round:
+        """The same, and what nothing was heard of for `silence_s`, without `unreadable_jobs`, in one transaction."""
+        with writing(self._engine) as connection:
             now = clock(connection)
-            ahead = sa.update(workers).where(w.seen_at > now + CLOCK_TOLERANCE).values(seen_at=now)
-            connection.execute(ahead)
-            of_this_start = [w.name == name, w.token.is_not_distinct_from(token)]
-            beat = sa.update(workers).where(*of_this_start).values(seen_at=now, unreadable_jobs=unreadable_jobs)
-            return connection.execute(beat).rowcount == 1
+            return Round(
+                _beat(connection, now, name, token, len(unreadable_jobs)),
+                _silent(connection, now, silence_s),
+                silent_jobs(connection, now, silence_s, but=unreadable_jobs),
+            )
 
     def start_of(self, name: str) -> WorkerStart | None:
         """The start that the row of a worker is of; None: it has none, or the others have given it up."""
@@ -103,13 +122,25 @@ class WorkerRepository(Repository):
     def silent(self, silence_s: float) -> list[str]:
         """The workers that were not."""
         with reading(self._engine) as connection:
-            return [worker.name for worker in heartbeats(connection, clock(connection)) if worker.is_silent(silence_s)]
+            return _silent(connection, clock(connection), silence_s)
 
     def forget(self, name: str, silence_s: float) -> None:
         """Forget a worker, unless it has come back meanwhile."""
         with writing(self._engine) as connection:
             old = w.seen_at < clock(connection) - timedelta(seconds=silence_s)
             connection.execute(sa.delete(workers).where(w.name == name, old))
+
+
+def _beat(connection: sa.Connection, now: datetime, name: str, token: str | None, unreadable_jobs: int) -> bool:
+    ahead = sa.update(workers).where(w.seen_at > now + CLOCK_TOLERANCE).values(seen_at=now)
+    connection.execute(ahead)
+    of_this_start = [w.name == name, w.token.is_not_distinct_from(token)]
+    beat = sa.update(workers).where(*of_this_start).values(seen_at=now, unreadable_jobs=unreadable_jobs)
+    return connection.execute(beat).rowcount == 1
+
+
+def _silent(connection: sa.Connection, now: datetime, silence_s: float) -> list[str]:
+    return [worker.name for worker in heartbeats(connection, now) if worker.is_silent(silence_s)]
 
 
 def heartbeats(connection: sa.Connection, now: datetime) -> list[WorkerHeartbeat]:

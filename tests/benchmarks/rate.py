@@ -3,6 +3,10 @@
 An API process, several workers and PostgreSQL that writes to its disk as it would for a customer; frames go to a folder
 and are tiny. Instead of the engine a shell script waits as long as a job takes and hands back a result, which moves the
 stored poses. Submissions come by the clock, not by the answers: how late an answer is counts from when it was due.
+Before the first one, all of them are idle for a while.
+
+Transactions and core-milliseconds of a job are what to compare, also between machines that do something else besides.
+Those of the script that stands in for the engine are told apart.
 """
 
 import argparse
@@ -48,6 +52,9 @@ echo '{result}'
 """
 # At the start nothing is warm, and for as long as a job takes nothing can end.
 WARMING_UP_S = 15.0
+# What a start leaves to be done.
+SETTLING_S = 5.0
+STAND_IN = "stand-in for the engine"
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
@@ -87,7 +94,9 @@ def main() -> int:
         names = [f"worker-{number}" for number in range(chosen.workers)]
         workers = [stack.enter_context(process(environment, "worker", "--name", name)) for name in names]
         wait_for(lambda: figures(address)["esc_workers"] == chosen.workers, 60)
-        return measure(chosen, address, server.url("esc"), api, workers)
+        parts = Parts(server.url("esc"), api, workers)
+        measure_idle(chosen, parts)
+        return measure(chosen, address, parts)
 
 
 def arguments() -> argparse.Namespace:
@@ -98,6 +107,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=4)
     parser.add_argument("--jobs-at-once", type=int, default=24, help="per worker")
     parser.add_argument("--seconds", type=float, default=7.0, help="that a job takes")
+    parser.add_argument("--idle-s", type=float, default=20.0, help="without a job, before the first")
     return parser.parse_args()
 
 
@@ -204,12 +214,42 @@ def figures(address: str) -> dict[str, float]:
     return total
 
 
-def measure(
-    chosen: argparse.Namespace, address: str, database_url: str, api: subprocess.Popen, workers: list[subprocess.Popen]
-) -> int:
+@dataclass(frozen=True)
+class Parts:
+    """The processes whose processor time counts."""
+
+    database_url: str
+    api: subprocess.Popen
+    workers: list[subprocess.Popen]
+
+    def cpu_s(self) -> dict[str, float]:
+        """Seconds of processor time so far, by part."""
+        return {
+            "API": cpu_s([self.api]),
+            "workers": cpu_s(self.workers),
+            STAND_IN: cpu_s(self.workers, children=True) - cpu_s(self.workers),
+            "PostgreSQL": cpu_s_of_postgres(self.database_url),
+        }
+
+
+def measure_idle(chosen: argparse.Namespace, parts: Parts) -> None:
+    """Print what all of it costs while there is nothing to do, most of it by the workers."""
+    time.sleep(SETTLING_S)
+    before, spent, begun = state_of(parts.database_url), parts.cpu_s(), time.monotonic()
+    time.sleep(chosen.idle_s)
+    after, idle_s = state_of(parts.database_url), time.monotonic() - begun
+    shares = {part: (seconds - spent[part]) / idle_s for part, seconds in parts.cpu_s().items()}
+    shares["workers"] /= chosen.workers
+    commits = (after["commits"] - before["commits"]) / idle_s / chosen.workers
+    print(
+        f"idle: {commits:.1f} transactions a second for each worker; of a core, a worker {shares['workers']:.2%}, "
+        f"the API {shares['API']:.2%}, PostgreSQL {shares['PostgreSQL']:.2%}"
+    )
+
+
+def measure(chosen: argparse.Namespace, address: str, parts: Parts) -> int:
     seen = Seen()
-    before, begun = state_of(database_url), time.monotonic()
-    spent = {"API": cpu_s([api]), "workers": cpu_s(workers), "PostgreSQL": cpu_s_of_postgres(database_url)}
+    before, spent, begun = state_of(parts.database_url), parts.cpu_s(), time.monotonic()
     count = round(chosen.rate * chosen.minutes * 60)
     limits = httpx.Limits(max_connections=SENDERS)
     with (
@@ -222,15 +262,11 @@ def measure(
             time.sleep(max(0.0, due - time.monotonic()))
             senders.submit(submit, client, number, due, chosen, seen)
         watching.result()
-    busy_s = time.monotonic() - begun
-    spent = {
-        "API": cpu_s([api]) - spent["API"],
-        "workers": cpu_s(workers) - spent["workers"],
-        "PostgreSQL": cpu_s_of_postgres(database_url) - spent["PostgreSQL"],
-    }
-    after = state_of(database_url)
     accepted = seen.answers[202]
     wait_for(lambda: figures(address)["esc_jobs_ended_total"] >= accepted, 60 + 20 * chosen.seconds)
+    busy_s = time.monotonic() - begun
+    spent = {part: seconds - spent[part] for part, seconds in parts.cpu_s().items()}
+    after = state_of(parts.database_url)
     return report(chosen, seen, busy_s, spent, before, after)
 
 
@@ -259,8 +295,9 @@ def state_of(database_url: str) -> dict[str, float]:
         # The statistics of other sessions are a second old at most once these are asked for again.
         time.sleep(1.5)
         commits, written, size, wal = connection.execute(
-            "SELECT xact_commit, tup_inserted + tup_updated + tup_deleted, pg_database_size(current_database()), "
-            "pg_current_wal_lsn() - '0/0' FROM pg_stat_database WHERE datname = current_database()"
+            "SELECT xact_commit + xact_rollback, tup_inserted + tup_updated + tup_deleted, "
+            "pg_database_size(current_database()), pg_current_wal_lsn() - '0/0' "
+            "FROM pg_stat_database WHERE datname = current_database()"
         ).fetchone()
         ours = "SELECT coalesce(sum(pg_total_relation_size(c.oid)), 0) FROM pg_class c JOIN pg_namespace n ON "
         ours += "n.oid = c.relnamespace WHERE c.relkind = 'r' AND n.nspname = %s"
@@ -275,9 +312,9 @@ def state_of(database_url: str) -> dict[str, float]:
     }
 
 
-def cpu_s(processes: list[subprocess.Popen]) -> float:
-    """Seconds of processor time of processes and of the children they have waited for."""
-    return sum(ticks(process.pid, children=True) for process in processes) / TICKS_PER_S
+def cpu_s(processes: list[subprocess.Popen], *, children: bool = False) -> float:
+    """Seconds of processor time of processes; `children`: and of those that they have waited for."""
+    return sum(ticks(process.pid, children=children) for process in processes) / TICKS_PER_S
 
 
 def cpu_s_of_postgres(database_url: str) -> float:
@@ -311,6 +348,7 @@ def report(
     ms = [1000 * seconds for seconds in seen.submitted]
     quantile = statistics.quantiles(ms, n=100)
     per_job = {key: (after[key] - before[key]) / jobs for key in before}
+    path = {part: seconds for part, seconds in spent.items() if part != STAND_IN}
     print(
         f"{chosen.minutes:g} minutes at {chosen.rate:.1f} submissions a second, {chosen.venues} venues, "
         f"{chosen.workers} workers of {chosen.jobs_at_once} jobs at once, a job takes {chosen.seconds:g} s; "
@@ -327,6 +365,7 @@ def report(
             part: f"{seconds / busy_s:.2f} cores, {1000 * seconds / jobs:.0f} ms of a core per job"
             for part, seconds in spent.items()
         },
+        "all but the stand-in": f"{1000 * sum(path.values()) / jobs:.0f} ms of a core per job",
         "PostgreSQL, per job": f"{per_job['commits']:.0f} transactions, {per_job['rows']:.0f} rows written, "
         f"{per_job['wal'] / 1000:.0f} kB of WAL",
         "kept per job": f"{per_job['public'] / 1000:.1f} kB of ours, {per_job['dbos'] / 1000:.1f} kB of the queue's",

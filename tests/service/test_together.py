@@ -145,7 +145,7 @@ def test_what_a_job_says_of_its_times_is_no_matter_of_a_machines_clock(stock, mo
         patch.setattr("service.store.database.datetime", wrong)
         job = stock.jobs.get(stock.submitted("v", callback_url="https://example.com/"))
         stock.decisions.cancel(job.id)
-        stock.expiry.register_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", timedelta(hours=1))
+        assert stock.submissions.announce(stock.submission("w"), 100, timedelta(hours=1)) is None
         assert stock.expiry.leftovers(stock.expiry.now(), 10) == []
         assert stock.outbox.claim_due(stock.outbox.now(), stock.outbox.now(), 10)
         assert stock.expiry.old_frames(stock.expiry.now() - timedelta(days=2), 10) == []

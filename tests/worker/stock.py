@@ -30,21 +30,24 @@ class Stock(Repositories):
         self.blobs = Blobs(self.settings.home_blob_url)
         self.enqueued: list[str] = []
 
-    def submitted(self, venue_id: str, **options) -> str:
-        """A job that waits, with a frame."""
+    def submission(self, venue_id: str, **options) -> Submission:
+        """What is about to become a job."""
         job_id = new_id()
-        frames = {"left": [f"frames/{job_id}/left/0"]}
-        self.blobs.put(frames["left"][0], b"frame")
-        submission = Submission(
+        return Submission(
             job_id=job_id,
             venue=self.venue(venue_id),
             options=Options(seed=1, **options),
-            frames=frames,
+            frames={"left": [f"frames/{job_id}/left/0"]},
             content_hash=job_id,
             idempotency_key=None,
         )
+
+    def submitted(self, venue_id: str, **options) -> str:
+        """A job that waits, with a frame."""
+        submission = self.submission(venue_id, **options)
+        self.blobs.put(submission.frames["left"][0], b"frame")
         self.submissions.submit(submission, 100, lambda _, job_id, *__: self.enqueued.append(job_id))
-        return job_id
+        return submission.job_id
 
     def ended(self, venue_id: str, at: datetime, *, accepted: bool | None = True, drawn: bool = True, **options) -> str:
         """A job that ended at a moment, with a picture; `accepted` None: it failed and has none.

@@ -50,19 +50,44 @@ def test_one_statement_asks_about_all_jobs_of_a_worker(stock, asked, monkeypatch
 
 
 @in_both_homes
-def test_progress_is_written_once_a_stage_and_is_a_look_as_well(stock, asked):
-    task = stock.attempts.begin(stock.submitted("v"))
-    with Leases(stock.attempts).begin(task, 60.0) as held:
+def test_progress_is_written_once_a_stage_by_the_question_that_is_asked_anyway(stock, asked, monkeypatch):
+    monkeypatch.setattr(lease, "PROGRESS_WAITS_S", 0.0)
+    monkeypatch.setattr(lease, "BEAT_S", 60.0)
+    task, silent = (stock.attempts.begin(stock.submitted(venue)) for venue in ("v", "w"))
+    leases = Leases(stock.attempts)
+    with leases.begin(task, 60.0) as held, leases.begin(silent, 60.0) as beside:
+        held.check()
         asked.clear()
-        for fraction in (0.1, 0.2, 0.3):
-            held.report(Progress(stage="segmentation", fraction=fraction))
-        for fraction in (0.4, 0.5):
-            held.report(Progress(stage="evolution", fraction=fraction))
-        assert len(asked) == 2
+        for stage, fraction in (("segmentation", 0.1), ("segmentation", 0.2), ("evolution", 0.4), ("evolution", 0.5)):
+            held.report(Progress(stage=stage, fraction=fraction))
+            held.check()
+            beside.check()
+        # Each stage once, and in the same transaction whether the other job is still this worker's.
+        assert [statement.split()[0] for statement in asked] == 2 * ["UPDATE", "SELECT"]
         assert stock.jobs.get(task.job_id).progress.fraction == 0.4
+        assert stock.jobs.get(silent.job_id).progress is None
         stock.decisions.cancel(task.job_id)
+        held.report(Progress(stage="refinement", fraction=0.9))
         with pytest.raises(LeaseLostError):
-            held.report(Progress(stage="refinement", fraction=0.9))
+            held.check()
+        beside.check()
+
+
+@in_both_homes
+def test_what_several_jobs_have_to_say_is_written_in_one_statement(stock, asked, monkeypatch):
+    monkeypatch.setattr(lease, "ANSWER_VALID_S", 60.0)
+    monkeypatch.setattr(lease, "PROGRESS_WAITS_S", 0.0)
+    monkeypatch.setattr(lease, "BEAT_S", 60.0)
+    tasks = [stock.attempts.begin(stock.submitted(f"v{number}")) for number in range(JOBS)]
+    leases = Leases(stock.attempts)
+    held = [leases.begin(task, 60.0).__enter__() for task in tasks]
+    held[0].check()
+    asked.clear()
+    for number, one in enumerate(held):
+        one.report(Progress(stage="evolution", fraction=number / 10))
+    held[0].check()
+    assert len(asked) == 1
+    assert [stock.jobs.get(task.job_id).progress.fraction for task in tasks] == [0.0, 0.1, 0.2, 0.3, 0.4]
 
 
 def test_an_attempt_that_has_had_its_time_does_not_go_on(stock):

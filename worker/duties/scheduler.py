@@ -32,7 +32,7 @@ from worker.duties.clock_watch import ClockWatch
 from worker.duties.reachability import HostReachability
 from worker.duties.thread_pool import BoundedThreadPool
 
-POLL_S = 1.0
+POLL_S = 2.0
 # The cameras of so many venues are probed at the same time: threads that wait.
 TRIED_AT_ONCE = 64
 # As many venues have their frames fetched at the same time, in each lane: each is a process.

@@ -23,7 +23,7 @@ from worker.duties import webhook_request
 from worker.duties.clock_watch import ClockWatch
 from worker.duties.thread_pool import BoundedThreadPool
 
-POLL_S = 1.0
+POLL_S = 2.0
 # To each receiver two go at once, whatever it takes: those that hang hold up others only when there are eight of them.
 AT_ONCE = 16
 # Longer than an attempt takes, looking its name up included.

@@ -7,16 +7,16 @@ cancelled or given to another attempt meanwhile.
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
-from datetime import datetime, timedelta
 from types import MappingProxyType
+from typing import Any
 
 import sqlalchemy as sa
 
 from service.schemas.job import JobError, Progress
-from service.schemas.names import OPEN_STATUSES, JobKind
+from service.schemas.names import JobKind
 from service.schemas.options import Options
 from service.schemas.results import AnyResult, Result
 from service.schemas.venue import Venue
@@ -27,11 +27,11 @@ from service.store.jobs.ending import Still, changed, end_job, still_open
 from service.store.jobs.queries import ONE, job_input_values
 from service.store.jobs.task import Task, UnreadableJob, parse_job_input
 from service.store.memories import Memories, newest_memories
+from service.store.silence import unheard_for
 from service.store.statistics.camera_history import last_accepted_views
 from service.store.statistics.venue_quality import VenueQuality, update_quality
 from service.store.trends import anchors_of
 from service.store.venues import apply_result, find_stored, find_venue, venue_lock
-from service.store.workers import CLOCK_TOLERANCE
 
 # Job, priority and kind, into the queue in the caller's transaction.
 Enqueue = Callable[[sa.Connection, str, int, JobKind], None]
@@ -105,7 +105,7 @@ class AttemptRepository(Repository):
         """
         with writing(self._engine) as connection:
             now = clock(connection)
-            unchanged = [j.id == job_id, j.status == "queued", _unheard_for(seconds, now)]
+            unchanged = [j.id == job_id, j.status == "queued", unheard_for(seconds, now)]
             reserve = sa.update(tables.jobs).where(*unchanged).values(updated_at=now)
             if connection.execute(reserve).rowcount == 0:
                 return None
@@ -124,22 +124,23 @@ class AttemptRepository(Repository):
         with reading(self._engine) as connection:
             return set(connection.scalars(query)) if job_ids else set()
 
-    def held_leases(self, tasks: Collection[Task]) -> set[str]:
-        """Return the fencing tokens of the attempts that still hold the lease of their job."""
-        with reading(self._engine) as connection:
-            return set(connection.scalars(sa.select(j.run_token).where(*_fences(tasks))))
+    def check_leases(self, tasks: Collection[Task], progress: Mapping[str, Progress], *, renew: bool) -> set[str]:
+        """Return the fencing tokens of the attempts that hold the lease of their job.
 
-    def renew_leases(self, tasks: Collection[Task]) -> set[str]:
-        """Renew the leases of attempts; return the fencing tokens of those that still held theirs."""
+        `progress`: how far some of them are, by fencing token, is written down where the lease is held. `renew`: the
+        leases of all are renewed, else of these.
+        """
+        written = [task for task in tasks if renew or task.run_token in progress]
+        rest = [task for task in tasks if not renew and task.run_token not in progress]
+        if not written:
+            with reading(self._engine) as connection:
+                return _holders(connection, rest)
         with writing(self._engine) as connection:
-            alive = sa.update(tables.jobs).where(*_fences(tasks)).values(updated_at=clock(connection))
-            return set(connection.scalars(alive.returning(j.run_token)))
-
-    def report(self, task: Task, progress: Progress) -> bool:
-        """Show how far the job is; False if the attempt has lost it."""
-        with writing(self._engine) as connection:
-            shown = {"progress": progress.model_dump(), **changed(clock(connection))}
-            return connection.execute(sa.update(tables.jobs).where(*_fence(task)).values(**shown)).rowcount == 1
+            alive = sa.update(tables.jobs).where(*_fences(written)).values(updated_at=clock(connection))
+            if progress:
+                alive = alive.values(_progress_columns(progress))
+            held = set(connection.scalars(alive.returning(j.run_token)))
+            return held | _holders(connection, rest)
 
     def finish(self, task: Task, result: AnyResult, pictures: Sequence[str], memories: Memories = NO_MEMORIES) -> None:
         """End a job with a result and the names of its pictures.
@@ -180,25 +181,11 @@ class AttemptRepository(Repository):
             back = sa.update(tables.jobs).where(*_fence(task)).values(**as_before, **changed(clock(connection)))
             return connection.execute(back).rowcount == 1
 
-    def stale_jobs(self, seconds: float, but: Collection[str] = ()) -> list[str]:
-        """Open jobs that nothing was heard of for a while, or only by a clock that has been put back since.
-
-        `but`: without these.
-        """
-        with reading(self._engine) as connection:
-            unheard = _unheard_for(seconds, clock(connection))
-            query = sa.select(j.id).where(j.status.in_(OPEN_STATUSES), unheard, j.id.not_in(but))
-            return list(connection.scalars(query.order_by(j.updated_at).limit(100)))
-
     def abandon(self, job_id: str, error: JobError, seconds: float) -> bool:
         """End an open job that the queue has given up; False if it has ended or was heard of meanwhile."""
         with writing(self._engine) as connection:
-            still = [*still_open(job_id), _unheard_for(seconds, clock(connection))]
+            still = [*still_open(job_id), unheard_for(seconds, clock(connection))]
             return end_without_result(connection, job_id, still, error)
-
-
-def _unheard_for(seconds: float, now: datetime) -> sa.ColumnElement[bool]:
-    return sa.or_(j.updated_at < now - timedelta(seconds=seconds), j.updated_at > now + CLOCK_TOLERANCE)
 
 
 def _fence(task: Task) -> Still:
@@ -209,6 +196,19 @@ def _fences(tasks: Collection[Task]) -> Still:
     # Tokens are of one attempt each; the ids are what the index is by.
     tokens = [task.run_token for task in tasks]
     return [j.id.in_([task.job_id for task in tasks]), j.run_token.in_(tokens), j.status == "running"]
+
+
+def _holders(connection: sa.Connection, tasks: Collection[Task]) -> set[str]:
+    return set(connection.scalars(sa.select(j.run_token).where(*_fences(tasks)))) if tasks else set()
+
+
+def _progress_columns(progress: Mapping[str, Progress]) -> dict[str, sa.ColumnElement[Any]]:
+    """The columns of jobs in one statement, of which some are further than they were; the others stay as they are."""
+    shown = {token: sa.literal(far.model_dump(), j.progress.type) for token, far in progress.items()}
+    return {
+        "progress": sa.case(shown, value=j.run_token, else_=j.progress),
+        "revision": j.revision + sa.case((j.run_token.in_(progress), 1), else_=0),
+    }
 
 
 def _locked(connection: sa.Connection, still: Still) -> bool:

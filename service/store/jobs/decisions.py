@@ -97,8 +97,8 @@ class DecisionRepository(Repository):
                 and with_result(now_stored, result, chosen).has_same_poses_as(now_stored)
             ):
                 found = [camera for camera in result.cameras if camera.id in chosen]
-                note_night(connection, now_stored, found, job_id, newest.revision, by_hand=True)
                 with update_quality(connection, now_stored.id) as quality:
+                    note_night(connection, now_stored, found, job_id, newest.revision, quality.now, by_hand=True)
                     update_alarms(connection, quality, now_stored)
                 return
             if stored is None or not _untouched(stored.venue, began_with, result, taken=left_by_it):

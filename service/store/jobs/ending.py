@@ -54,14 +54,13 @@ def end_job(
         values["result"], values["result_additions"] = result_columns(result)
     if error is not None:
         values["error"] = to_document(error)
-    ended = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **changed(now))
-    if connection.execute(ended).rowcount == 0:
-        return False
     # Of the venue only what is needed of it here.
-    webhooks = v.document["webhooks"].label("webhooks")
-    query = sa.select(j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt, webhooks)
-    of_venue = tables.jobs.outerjoin(tables.venues, v.id == j.venue)
-    row = connection.execute(query.select_from(of_venue).where(j.id == job_id)).one()
+    webhooks = sa.select(v.document["webhooks"]).where(v.id == j.venue).scalar_subquery().label("webhooks")
+    ended = sa.update(tables.jobs).where(*still).values(status=status, finished_at=now, **values, **changed(now))
+    told_of = (j.kind, j.venue, j.options, j.created_at, j.started_at, j.attempt, webhooks)
+    row = connection.execute(ended.returning(*told_of)).one_or_none()
+    if row is None:
+        return False
     options = stored_options(row.kind, row.options)
     if isinstance(options, Options) and quality is not None:
         quality.ended(status, result, dry_run=options.dry_run)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any
 
 import sqlalchemy as sa
@@ -16,6 +16,7 @@ from service.store import tables
 from service.store.database import Repository, advisory_lock, clock, reading, writing
 from service.store.documents import to_document, venue_columns
 from service.store.events.event_log import add_queued_event
+from service.store.expiry import leave
 from service.store.jobs.attempts import Enqueue, end_without_result
 from service.store.jobs.files import frame_folder
 from service.store.jobs.queries import ONE, job_input_values, read_job
@@ -91,6 +92,22 @@ class QueueFull(SubmissionRefused):
 
 class SubmissionRepository(Repository):
     """The beginning of the jobs in the database."""
+
+    def announce(self, submission: Submission, queue_limit: int, grace: timedelta) -> Job | None:
+        """Return the job that the content already is; else None, and its frames may be stored.
+
+        Unless these become the job within the `grace`, they are deleted. Raises `QueueFull` where it would find no
+        place.
+        """
+        with writing(self._engine) as connection:
+            same = _duplicate(
+                connection, submission.kind, submission.venue_id, submission.idempotency_key, submission.content_hash
+            )
+            if same is not None:
+                return read_job(connection, same)
+            _require_place(connection, _waiting(connection), queue_limit, is_schedule=submission.origin.is_schedule)
+            leave(connection, [frame_folder(submission.job_id)], clock(connection) + grace)
+            return None
 
     def submit(self, submission: Submission, queue_limit: int, enqueue: Enqueue) -> tuple[Job, bool]:
         """Row and queue entry in one transaction, or the job that the content already is; also says which.

@@ -170,7 +170,7 @@ def test_a_job_that_a_newer_worker_began_waits_again_when_it_comes_to_one_that_c
     with pytest.raises(UnreadableJob, match="zoom"):
         stock.attempts.begin(job_id)
     assert stock.jobs.get(job_id).status == "queued"
-    assert stock.attempts.held_leases([begun]) == set()
+    assert stock.attempts.check_leases([begun], {}, renew=False) == set()
     assert not stock.attempts.abandon(job_id, JobError(type="", title="", detail=""), seconds=60)
     with pytest.raises(UnreadableJob):
         stock.attempts.reclaim(job_id, 0)

@@ -134,11 +134,11 @@ def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
 
 
 def test_frames_of_an_upload_that_became_no_job_go_after_their_grace(stock, retention):
-    grace = timedelta(hours=1)
-    stock.expiry.register_upload("01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", grace)
-    stock.blobs.put("frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/left/0", b"frame")
+    grace, submission = timedelta(hours=1), stock.submission("v")
+    assert stock.submissions.announce(submission, 100, grace) is None
+    stock.blobs.put(f"frames/{submission.job_id}/left/0", b"frame")
     retention.round(stock.expiry.now())
-    assert stock.files() == {"frames/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D"}
+    assert stock.files() == {f"frames/{submission.job_id}"}
     retention.round(stock.expiry.now() + grace)
     assert stock.files() == set()
 
