@@ -1,6 +1,7 @@
 """The levels of a search: who hands over to whom, and when."""
 
 import numpy as np
+import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.search.search import COARSE_TO_FINE, PATIENCE, Strategy, search
