@@ -12,6 +12,8 @@ from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Stopped
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
 
+pytestmark = pytest.mark.slow
+
 
 def frames():
     return {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}

@@ -23,6 +23,8 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options
 
+pytestmark = pytest.mark.slow
+
 Pictures = dict[str, NDArray[np.uint8]]
 
 

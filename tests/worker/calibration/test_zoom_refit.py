@@ -15,6 +15,8 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.parameters import with_focal_length
 from worker.calibration.records import Calibration, Options
 
+pytestmark = pytest.mark.slow
+
 ZOOM = 0.015
 WIND = ((2e-4, -1e-4, 1e-4), (0.01, 0.0, -0.01))
 

@@ -14,6 +14,8 @@ from worker.calibration.detection.view_condition import look_at
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.field import Field
 
+pytestmark = pytest.mark.slow
+
 CAMERA = camera("left", (-1.0, -48.0, 12.0), (-14.0, -4.0), focal=450, size=(640, 360))
 STORED = moved(CAMERA, rotation=(0.02, -0.02, 0.01), by=(0.1, 0.05, -0.05))
 """Some two degrees and a decimetre off, as a stored pose may be."""

@@ -26,6 +26,8 @@ from worker.calibration.geometry.camera import Array, Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
 
+pytestmark = pytest.mark.slow
+
 LEFT, RIGHT = pair()
 FACING = camera("facing", (0.0, 48.0, 10.0), (0.0, 0.0))
 

@@ -17,6 +17,8 @@ from worker.calibration.onboarding.first_pose import first_pose
 from worker.calibration.onboarding.freed_lens import two_terms
 from worker.calibration.onboarding.point_fit import fit
 
+pytestmark = pytest.mark.slow
+
 PITCH = Field(105.0, 68.0, ridge=np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
 # Some points have two names.
 NAMED = {name: point for name, point in PITCH.places().items() if not name.endswith(" spot")}

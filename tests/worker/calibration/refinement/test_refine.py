@@ -29,6 +29,8 @@ from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
 from worker.calibration.robust import huber_weights, tukey_weights
 
+pytestmark = pytest.mark.slow
+
 SMALL_TURN = (0.0008, -0.0006, 0.0005)
 SMALL_SHIFT = (0.02, -0.03, 0.02)
 

@@ -24,6 +24,8 @@ from worker.calibration.stitching.panorama import BACKDROP, panorama, seam_weigh
 from worker.calibration.stitching.photometric_alignment import LARGEST_GAIN, evened_out
 from worker.calibration.stitching.views import View, ViewChoice, chosen_view
 
+pytestmark = pytest.mark.slow
+
 CAMERAS = pair()
 FRAME_SIZE = (960, 540)
 

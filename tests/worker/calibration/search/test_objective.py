@@ -9,6 +9,8 @@ from worker.calibration.detection.line_profile import blurred_line
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.objective import BlurredResponse, Objective
 
+pytestmark = pytest.mark.slow
+
 
 def scene():
     return pair(), list(pair_markings())

@@ -8,6 +8,8 @@ from worker.calibration.search.search import COARSE_TO_FINE, PATIENCE, Strategy,
 
 LEVELS = len(COARSE_TO_FINE)
 
+pytestmark = pytest.mark.slow
+
 
 def searched(responses, generations):
     cameras, steps, ends = [moved(camera, (0.01, -0.01, 0.0)) for camera in pair()], [], []
