@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test check wheel bench bench-find bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long check wheel bench bench-find bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
 
 setup: $(VENV)/.installed
 
@@ -18,8 +18,19 @@ demo: setup
 	$(BIN)/python -m tests.demo
 
 # Compiled files are kept even where the machine says not to: each of hundreds of processes would compile them anew.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
+
 test: setup
-	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=auto --dist=worksteal
+	$(PYTEST) -m "not long"
+
+# For the loop of a day. Not in it: the whole service, its pages, older releases, servers, whole calibrations, the network.
+test-fast: setup
+	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=logical --dist=worksteal -m "not (long or slow or servers)" \
+		tests/fields tests/service tests/worker tests/openapi tests/test_architecture.py
+
+# Before a release: a year of a venue, and where ../shared/real is, the walk of docs/first-calibration.md.
+test-long: setup
+	$(PYTEST) -m long
 
 check: setup
 	$(BIN)/ruff format --check .

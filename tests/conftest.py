@@ -29,6 +29,8 @@ structlog.configure(
 
 # Tests of the whole service, and of its pages in a browser.
 WHOLE_SERVICE = [Path(__file__).parent / folder for folder in ("e2e", "pages", "released")]
+# Fixtures that start a server, which `make test-fast` does without.
+SERVERS = {"postgres", "bucket", "servers"}
 # What tests can do without, and how to enable those that cannot.
 PARTS = {
     "postgres": "install PostgreSQL (Debian: apt-get install postgresql)",
@@ -55,25 +57,39 @@ def pytest_configure(config):
         raise pytest.UsageError(f"ESC_TEST_REQUIRE names {', '.join(sorted(unknown))}; known are {known}")
 
 
+@pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(items):
+    for item in items:
+        if needs_servers(item):
+            item.add_marker(pytest.mark.servers)
+    # What is not selected has been left out once this comes back.
+    answer = yield
     items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+    return answer
+
+
+def needs_servers(item):
+    """Whether a test needs PostgreSQL or S3, by its fixtures or by the home that it is to run in."""
+    parameters = item.callspec.params if hasattr(item, "callspec") else {}
+    return parameters.get("home") == "servers" or not SERVERS.isdisjoint(item.fixturenames)
 
 
 def dealt(items, processes):
     """The tests in such an order that no core is idle before all of them are.
 
     xdist gives each process a part of the list, all of a size; who is done takes from the end of what another has. The
-    first process begins with the long tests. The others begin with those of the whole service, which wait more than
-    they compute, and beside which the long ones compute; what only computes fills the end.
+    first process begins with the longest tests. The others begin with those of the whole service, which wait more than
+    they compute, and beside which the longest ones compute; what only computes fills the end.
     """
-    long, waiting, computing = [], [], []
+    longest, waiting, computing = [], [], []
     for item in items:
         of_the_whole = any(item.path.is_relative_to(folder) for folder in WHOLE_SERVICE)
-        (long if item.get_closest_marker("long") else waiting if of_the_whole else computing).append(item)
+        is_one_of_the_longest = item.get_closest_marker("first") or item.get_closest_marker("long")
+        (longest if is_one_of_the_longest else waiting if of_the_whole else computing).append(item)
     others = max(1, processes - 1)
     ends = [len(waiting) * number // others for number in range(others + 1)]
     begins = [waiting[begin:end] for begin, end in itertools.pairwise(ends)]
-    begins = [long, *begins] if processes > 1 else [long + waiting]
+    begins = [longest, *begins] if processes > 1 else [longest + waiting]
     order = []
     for number, begin in enumerate(begins):
         part = (len(items) - len(order)) // (processes - number)
@@ -85,8 +101,9 @@ def dealt(items, processes):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config):
-    """Twice as many as there are cores: tests of the whole service wait longer than they compute."""
-    return 2 * len(os.sched_getaffinity(0))
+    """Of `auto` twice as many as there are cores: tests of the whole service wait longer than they compute."""
+    cores = len(os.sched_getaffinity(0))
+    return 2 * cores if config.option.numprocesses == "auto" else cores
 
 
 @pytest.fixture(scope="session")

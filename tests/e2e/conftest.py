@@ -1,4 +1,8 @@
-"""Services for the tests: one per home that many tests share, and fresh ones to be killed."""
+"""Services for the tests: one per home that many tests share, and fresh ones to be killed.
+
+Those that are shared end with the last test of this folder: a worker looks for work every second, which in ten minutes
+costs as much as thirty starts of a service.
+"""
 
 import json
 import re
@@ -23,12 +27,12 @@ FROM_HERE = {
 }
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def service_of_a_folder(tmp_path_factory):
     yield from shared(tmp_path_factory.mktemp("esc"), **FROM_HERE)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def service_on_servers(servers, tmp_path_factory):
     folder = tmp_path_factory.mktemp("esc")
     yield from shared(folder, **environment(servers.settings(folder)) | FROM_HERE)
@@ -40,7 +44,7 @@ def shared(folder, **settings):
     assert running.stop() == 0
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def service_with_engine(tmp_path_factory):
     """Its jobs are computed, by the real network."""
     program = json.dumps([sys.executable, "-m", "worker.jobs.program"])
@@ -69,7 +73,7 @@ def start(home, tmp_path):
         one.kill()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def unusual(tmp_path_factory):
     """An API without a worker whose settings are none of the defaults: for what depends on a single one of them."""
     settings = {

@@ -24,6 +24,7 @@ from tests.homes import files
 
 PROGRAM = [sys.executable, str(Path(__file__).parent / "program.py")]
 DEADLINE_S = 90
+SHORTEST_PAUSE_S, LONGEST_PAUSE_S = 0.01, 0.2
 SIZE = (64, 48)
 # Of `esc`, for the files that the fixture of this name writes.
 FRAMES = ("left=left.png", "right=right.png")
@@ -195,14 +196,16 @@ def ready(http: httpx.Client) -> bool:
 
 
 def wait_for(condition: Callable, deadline_s: float = DEADLINE_S):
-    """The first truthy answer of `condition`."""
+    """The first truthy answer of `condition`, asked the less often the longer it takes: to ask costs a core some ms."""
     end = time.monotonic() + deadline_s
+    pause_s = SHORTEST_PAUSE_S
     while True:
         with suppress(httpx.TransportError):
             if answer := condition():
                 return answer
         assert time.monotonic() < end, f"did not happen within {deadline_s} s"
-        time.sleep(0.05)
+        time.sleep(pause_s)
+        pause_s = min(1.5 * pause_s, LONGEST_PAUSE_S)
 
 
 def children(process: int) -> list[int]:

@@ -23,6 +23,7 @@ ARGUMENTS = [
 ]
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 PATIENCE_MS = 120_000
+SCHEMES = ("light", "dark")
 LOADED = """
 part => Promise.all([...part.querySelectorAll("img")].filter((one) => one.checkVisibility()).map((one) => one.decode()))
 """
@@ -103,13 +104,28 @@ def differs(one: np.ndarray, other: np.ndarray) -> float:
     return float((np.abs(one.astype(int) - other.astype(int)).max(axis=-1) > 24).mean())
 
 
+def in_each_scheme(page: Page) -> Iterator[str]:
+    """Show an open page in light colours and then in dark ones: its style sheet alone knows of them."""
+    for scheme in SCHEMES:
+        page.emulate_media(color_scheme=scheme)
+        yield scheme
+
+
 def grave(page: Page) -> list[str]:
-    """What keeps people with a screen reader, a keyboard or weak eyes from using the page: axe-core's findings."""
+    """What keeps people with a screen reader, a keyboard or weak eyes from using the page: axe-core's findings.
+
+    In light colours and in dark ones.
+    """
     # Evaluated by the debugger: the policy of the page would refuse a script from elsewhere.
     page.evaluate(AXE.read_text())
-    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+    found = [
+        (scheme, one)
+        for scheme in in_each_scheme(page)
+        for one in page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+    ]
     return [
-        f"{one['impact']}: {one['id']}: {one['nodes'][0]['html'][:200]} {one['nodes'][0]['failureSummary'][:300]}"
-        for one in found
+        f"{scheme}: {one['impact']}: {one['id']}: {one['nodes'][0]['html'][:200]} "
+        f"{one['nodes'][0]['failureSummary'][:300]}"
+        for scheme, one in found
         if one["impact"] in ("serious", "critical")
     ]

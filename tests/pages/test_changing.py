@@ -130,10 +130,9 @@ def test_an_id_that_is_taken_is_said_where_it_is_typed(stub, visit):
     expect(page.get_by_text("There is a venue of this id already.")).to_be_hidden()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("path", ["settings", "first-pose"])
-def test_these_pages_are_for_everybody_and_fit_a_phone(stub, visit, scheme, path):
-    page = visit(stub.url, f"/ui/venues/{stub.venue('usable')}/{path}", scheme=scheme)
+def test_these_pages_are_for_everybody_and_fit_a_phone(stub, visit, path):
+    page = visit(stub.url, f"/ui/venues/{stub.venue('usable')}/{path}")
     page.set_viewport_size({"width": 390, "height": 844})
     page.wait_for_load_state("networkidle")
     assert grave(page) == []

@@ -102,10 +102,9 @@ def test_a_search_is_followed_to_its_end(stub, visit, name):
     expect(page.get_by_role("button", name="Create the venue")).to_be_enabled()
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_everybody_can_use_the_pages_on_which_cameras_are_found_on_a_phone_too(stub, visit, name, files, scheme):
+def test_everybody_can_use_the_pages_on_which_cameras_are_found_on_a_phone_too(stub, visit, name, files):
     job = found(stub, name, place=site(name, "partly"))
-    page = visit(stub.url, "/ui/new-venue", scheme=scheme)
+    page = visit(stub.url, "/ui/new-venue")
     page.set_viewport_size({"width": 390, "height": 844})
     page.locator("#frames input[type=file]").set_input_files(files)
     expect(page.locator(".found-frames li")).to_have_count(2)

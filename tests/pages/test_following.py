@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.e2e.running import Service, venue
-from tests.pages.browsing import wait_until
+from tests.pages.browsing import in_each_scheme, wait_until
 
 # While a service is away, a browser says so at each try.
 AWAY = ("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_EMPTY_RESPONSE", "ERR_CONNECTION_RESET")
@@ -112,21 +112,22 @@ def test_a_hidden_page_holds_no_connection_and_a_page_in_sight_catches_up(tmp_pa
     service.kill()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_what_waits_and_what_runs_are_pills_like_other_states_and_named_alike_all_over_a_page(stub, visit, scheme):
+def test_what_waits_and_what_runs_are_pills_like_other_states_and_named_alike_all_over_a_page(stub, visit):
     stub.calibrated(stub.venue("pill"))
     job = stub.submitted(stub.venue("pills", "accept 60"))
     stub.running(job)
-    list_of_jobs = visit(stub.url, "/ui/jobs", scheme=scheme)
-    heights = {
-        state: list_of_jobs.locator("tbody .badge", has_text=state).first.bounding_box()["height"]
-        for state in ("Running", "Accepted")
-    }
-    assert heights["Running"] == heights["Accepted"]
-    page = visit(stub.url, f"/ui/jobs/{job}", scheme=scheme)
+    list_of_jobs = visit(stub.url, "/ui/jobs")
+    page = visit(stub.url, f"/ui/jobs/{job}")
     badges = page.locator(".badge")
     expect(badges).to_have_text(["Running", "Running"])
-    assert {box["height"] for box in (badges.nth(number).bounding_box() for number in (0, 1))} == {heights["Accepted"]}
+    for _ in zip(in_each_scheme(list_of_jobs), in_each_scheme(page), strict=True):
+        heights = {
+            state: list_of_jobs.locator("tbody .badge", has_text=state).first.bounding_box()["height"]
+            for state in ("Running", "Accepted")
+        }
+        assert heights["Running"] == heights["Accepted"]
+        boxes = [badges.nth(number).bounding_box() for number in (0, 1)]
+        assert {box["height"] for box in boxes} == {heights["Accepted"]}
     stub.http.post(f"/jobs/{job}/cancel")
 
 

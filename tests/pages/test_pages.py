@@ -259,12 +259,10 @@ PAGES = {
 }
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("name", PAGES)
-def test_nothing_serious_keeps_anybody_from_using_a_page(stub, years, ended, one_tab, name, scheme):
+def test_nothing_serious_keeps_anybody_from_using_a_page(stub, years, ended, one_tab, name):
     stub.venue("bare")
     one_tab.set_viewport_size(DESK)
-    one_tab.emulate_media(color_scheme=scheme)
     one_tab.goto(PAGES[name].format(job=ended["fine"]["id"], failed=ended["broken"]["id"]))
     one_tab.wait_for_load_state("networkidle")
     assert grave(one_tab) == []

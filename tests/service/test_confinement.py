@@ -9,6 +9,8 @@ import pytest
 
 from tests.unprivileged import drop_capabilities
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 DECODERS = {
     "worker.jobs.program": [],

@@ -59,7 +59,7 @@ def guarded(tmp_path):
     service.kill()
 
 
-@pytest.mark.long
+@pytest.mark.first
 @pytest.mark.timeout(300 + EXAMPLES * 10)
 def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_path):
     venues, doomed = [f"v{n}" for n in range(9)], [f"d{n}" for n in range(9)]

@@ -17,6 +17,8 @@ from service.store.keys import KeyRepository, hash_of
 from service.store.sessions import SessionRepository
 from tests.service.api.test_rate_limit import Clock
 
+pytestmark = pytest.mark.slow
+
 JUST_BEFORE, JUST_AFTER = KEY_CACHED_FOR_S - 0.1, KEY_CACHED_FOR_S + 0.1
 # `esc calibrate --wait` asks so often for a job.
 FOLLOWS_PER_S = 2

@@ -17,6 +17,8 @@ from service.schemas.venue import Camera
 from service.settings import Settings
 from tests.service.formats.cameras import ALL_OF_OPENCV_8, RADIAL, WITH_TILT, shot
 
+pytestmark = pytest.mark.slow
+
 SIZE = (192, 108)
 SETTINGS = Settings()
 

@@ -11,6 +11,8 @@ from service.store.memories import KEPT, LARGEST_BYTES, newest_memories
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway, result
 
+pytestmark = pytest.mark.slow
+
 LONGER = Intrinsics(matrix=[[61, 0, 32], [0, 61, 24], [0, 0, 1]], distortion=[])
 
 

@@ -22,6 +22,8 @@ from service.store.statistics.job_outcome import ENDED
 from service.store.statistics.snapshot import VenueGauges, read_statistics
 from tests.homes import in_both_homes
 
+pytestmark = pytest.mark.slow
+
 REVISIONS = [script.revision for script in ScriptDirectory(str(MIGRATIONS)).walk_revisions()]
 NEWEST = max(REVISIONS)
 NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)

@@ -11,6 +11,8 @@ from tests.homes import in_both_homes
 from tests.trending import SIGMA_M, displacement, night, nights, noisy
 from tests.worker.stock import anyway
 
+pytestmark = pytest.mark.slow
+
 AUTUMN = datetime(2026, 9, 1, 2, tzinfo=UTC)
 
 

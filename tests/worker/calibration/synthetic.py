@@ -84,14 +84,12 @@ def paint_markings(pitch: Field, camera: Camera, colour: str | None = None) -> N
     middles = _blocks(camera)
     behind = _ground_at(pitch, camera, middles)
     side = BLOCK * SAMPLES
-    offsets = (np.arange(side) + 0.5) / SAMPLES - BLOCK / 2
-    samples = np.stack(np.meshgrid(offsets, offsets), axis=-1)
     paint = np.zeros((*middles.shape[:2], side, side), np.float32)
     for marking in pitch.markings():
         if colour not in (None, marking.colour):
             continue
         close = _close(marking, behind)
-        covered = _covered(marking, _ground_at(pitch, camera, middles[close][:, None, None] + samples))
+        covered = _covered(marking, _met(pitch, camera, _sampled_rays(camera, middles[close])))
         paint[close] = np.maximum(paint[close], np.nan_to_num(covered))
     sampled = paint.transpose(0, 2, 1, 3).reshape(-1, paint.shape[1] * side)
     return cv2.resize(sampled, None, fx=1 / SAMPLES, fy=1 / SAMPLES, interpolation=cv2.INTER_AREA)[:height, :width]
@@ -106,9 +104,27 @@ def _blocks(camera: Camera) -> Array:
     )
 
 
+def _sampled_rays(camera: Camera, middles: Array) -> Array:
+    """Directions (n, h, w, 3) of the samples of blocks with these middles (n, 2), interpolated between nine of each.
+
+    Lenses bend them so little within a block that a sample is off by less than a thousandth of a pixel.
+    """
+    nodes = np.array([-0.5, 0.0, 0.5]) * BLOCK
+    rays = camera.rays(middles[:, None, None] + np.stack(np.meshgrid(nodes, nodes), axis=-1))
+    along = ((np.arange(BLOCK * SAMPLES) + 0.5) / SAMPLES / BLOCK - 0.5)[:, None]
+    # Lagrange's parabolas through the nodes.
+    parabolas = np.hstack([along * (2 * along - 1), 1 - 4 * along**2, along * (2 * along + 1)])
+    side = len(along)
+    return (np.kron(parabolas, parabolas) @ rays.reshape(-1, 9, 3)).reshape(-1, side, side, 3)
+
+
 def _ground_at(pitch: Field, camera: Camera, pixels: Array) -> Array:
     """Points (..., 2) of the pitch plane behind pixels (..., 2), NaN above the horizon."""
-    rays = camera.rays(pixels)
+    return _met(pitch, camera, camera.rays(pixels))
+
+
+def _met(pitch: Field, camera: Camera, rays: Array) -> Array:
+    """Points (..., 2) of the pitch plane where rays (..., 3) of a camera meet the ground, NaN where they never do."""
     down = np.where(rays[..., 2] < -LEVEL, rays[..., 2], np.nan)
     surface = np.zeros(down.shape)
     for _ in range(1 if pitch.ridge is None else 6):

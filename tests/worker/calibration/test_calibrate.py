@@ -13,6 +13,8 @@ from worker.calibration.geometry.parameters import free_focal_lengths
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import CalibrationError, Options, Stopped
 
+pytestmark = pytest.mark.slow
+
 TURN = (0.006, -0.005, 0.004)
 SHIFT = (0.05, -0.06, 0.04)
 

@@ -12,7 +12,11 @@ from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Stopped
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
 
-FRAMES = {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
+pytestmark = pytest.mark.slow
+
+
+def frames():
+    return {one.id: [frame] for one, frame in zip(pair(), pair_frames(), strict=True)}
 
 
 def sought(one, place=Place()):  # noqa: B008  (frozen)
@@ -22,7 +26,7 @@ def sought(one, place=Place()):  # noqa: B008  (frozen)
 @cache
 def both():
     steps = []
-    return find_cameras(CROWNED, [sought(one) for one in pair()], [], FRAMES, white_on_green, 1, steps.append), steps
+    return find_cameras(CROWNED, [sought(one) for one in pair()], [], frames(), white_on_green, 1, steps.append), steps
 
 
 def test_a_pair_is_found_on_one_side_and_fits_together():
@@ -47,7 +51,7 @@ def test_progress_grows_from_stage_to_stage():
 
 def test_a_camera_is_found_beside_one_that_is_known():
     left, right = pair()
-    found = find_cameras(CROWNED, [sought(right)], [left], FRAMES, white_on_green, 1)
+    found = find_cameras(CROWNED, [sought(right)], [left], frames(), white_on_green, 1)
     (camera,) = found.cameras
     assert camera.accepted
     assert np.linalg.norm(camera.candidates[0].camera.pose.position - right.pose.position) < 0.03
@@ -55,4 +59,4 @@ def test_a_camera_is_found_beside_one_that_is_known():
 
 def test_who_is_asked_to_stop_stops():
     with pytest.raises(Stopped):
-        find_cameras(CROWNED, [sought(pair()[0])], [], FRAMES, white_on_green, 1, stop=lambda: True)
+        find_cameras(CROWNED, [sought(pair()[0])], [], frames(), white_on_green, 1, stop=lambda: True)

@@ -19,6 +19,8 @@ from worker.calibration.rendering.overlays import overlay
 from worker.calibration.rendering.stitched_pictures import birdseye, stitched
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 
+pytestmark = pytest.mark.slow
+
 SIZE = (1920, 1080)
 # Of wide action and dome cameras, and a lens of the opposite sign.
 terms = st.tuples(st.floats(-0.05, 0.05), st.floats(-0.02, 0.02), st.floats(-5e-3, 5e-3), st.floats(-1e-3, 1e-3))

@@ -13,6 +13,8 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Calibration, Options
 
+pytestmark = pytest.mark.slow
+
 # What the wind does in a quarter of an hour: a pixel of these small frames.
 WIND = ((0.0012, -0.0008, 0.0005), (0.01, 0.005, -0.01))
 STORM = ((0.012, -0.018, 0.006), (0.12, -0.08, 0.1))

@@ -15,6 +15,8 @@ from worker.calibration.records import Options
 from worker.calibration.rendering.overlays import overlay
 from worker.calibration.rendering.stitched_pictures import birdseye
 
+pytestmark = pytest.mark.slow
+
 # A tennis court, as a venue would give it: half of it, named as its owner likes.
 TENNIS = Template(
     marking=[

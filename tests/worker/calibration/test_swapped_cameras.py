@@ -7,6 +7,8 @@ from tests.worker.calibration.synthetic import CROWNED, camera, paint_markings, 
 from tests.worker.calibration.test_calibrate import frames, outdated, run
 from worker.calibration.geometry.camera import Pose
 
+pytestmark = pytest.mark.slow
+
 OTHER_CAMERA = "other-camera"
 
 

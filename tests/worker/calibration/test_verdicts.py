@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from fields.template import load
+from tests.scenes import chain
 from tests.worker.calibration.detection.spoiling import fogged
 from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
@@ -21,13 +23,9 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options
 
+pytestmark = pytest.mark.slow
+
 Pictures = dict[str, NDArray[np.uint8]]
-
-
-def mast() -> list[Camera]:
-    """Three in a row on one mast: the neighbours overlap, the outer two share hardly more than the halfway line."""
-    aims = (("west", -0.5, -34.0), ("middle", 0.0, 0.0), ("east", 0.5, 34.0))
-    return [camera(name, (x, -50.0, 14.0), (aim, 0.0), focal=725.0, distortion=BARREL) for name, x, aim in aims]
 
 
 def court() -> list[Camera]:
@@ -40,7 +38,7 @@ def court() -> list[Camera]:
 
 @cache
 def pictures_of(rig) -> Pictures:
-    pitch = CROWNED if rig is mast else field("tennis")
+    pitch = CROWNED if rig is chain else field("tennis")
     return {one.id: paint_frame(pitch, one) for one in rig()}
 
 
@@ -48,7 +46,7 @@ def run(rig, by: float = 1.0, **spoiled: NDArray[np.uint8]) -> Calibration:
     """Calibrate from outdated poses, some of the frames replaced."""
     outdated = [moved(one, tuple(by * np.array(TURN)), tuple(by * np.array(SHIFT))) for one in rig()]
     frames = {name: (spoiled.get(name, frame),) for name, frame in pictures_of(rig).items()}
-    pitch = CROWNED if rig is mast else field("tennis")
+    pitch = CROWNED if rig is chain else field("tennis")
     return calibrate(pitch, outdated, frames, white_on_green, Options(seed=3))
 
 
@@ -69,37 +67,37 @@ def of_another_pitch(one: Camera) -> NDArray[np.uint8]:
 
 
 def test_cameras_in_a_row_are_accepted_though_the_outer_two_share_hardly_anything() -> None:
-    found = run(mast)
+    found = run(chain)
     assert (found.verdict, found.rejected_because) == ("accepted", None)
     assert found.accepted
-    assert max(off_m(found, mast()).values()) < 0.03
+    assert max(off_m(found, chain()).values()) < 0.03
 
 
 def test_a_fogged_camera_keeps_its_stored_pose_and_the_others_are_found_as_if_it_did_not_exist() -> None:
-    found = run(mast, middle=fogged(pictures_of(mast)["middle"]))
+    found = run(chain, middle=fogged(pictures_of(chain)["middle"]))
     assert found.verdict == "partly"
     assert not found.accepted
     assert verdicts(found) == {"west": True, "middle": False, "east": True}
     assert found.cameras[1].rejected_because == found.cameras[1].view.words
     assert found.rejected_because == f"camera middle: {found.cameras[1].view.words}"
     assert found.cameras[1].moved.position_m == 0.0
-    off = off_m(found, mast())
+    off = off_m(found, chain())
     assert max(off["west"], off["east"]) < 0.03
 
 
 def test_where_no_frame_can_be_used_nothing_is_searched_and_all_are_rejected() -> None:
-    found = run(mast, **{name: fogged(frame) for name, frame in pictures_of(mast).items()})
+    found = run(chain, **{name: fogged(frame) for name, frame in pictures_of(chain).items()})
     assert (found.verdict, found.generations) == ("rejected", 0)
     assert [one.moved.position_m for one in found.cameras] == [0.0] * 3
     assert found.stitch_error_px is None
 
 
 def test_a_camera_that_sees_something_else_does_not_drag_the_others_along() -> None:
-    found = run(mast, east=of_another_pitch(mast()[2]))
+    found = run(chain, east=of_another_pitch(chain()[2]))
     assert verdicts(found) == {"west": True, "middle": True, "east": False}
     assert "do not fit this pitch" in found.cameras[2].rejected_because
     assert found.rejected_because.startswith("camera east: ")
-    alone = off_m(found, mast())
+    alone = off_m(found, chain())
     assert max(alone["west"], alone["middle"]) < 0.03
     assert found.stitch_error_px is not None
     assert found.stitch_error_px < 0.3
@@ -127,10 +125,10 @@ def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeyp
     finish = solve.refine_poses
     monkeypatch.setattr(solve, "refine_poses", finishing)
     monkeypatch.setattr(engine, "compare_pairs", contradicted)
-    found = run(mast)
+    found = run(chain)
     assert verdicts(found) == {"west": True, "middle": True, "east": False}
     assert finished == [["west", "middle", "east"], ["west", "middle"]]
     assert found.rejected_because.startswith("camera east: the cameras middle and east do not fit each other")
     assert found.stitch_error_px == 0.1
-    off = off_m(found, mast())
+    off = off_m(found, chain())
     assert max(off["west"], off["middle"]) < 0.03

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.scenes import plane
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration import solve
@@ -14,23 +15,20 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.parameters import with_focal_length
 from worker.calibration.records import Calibration, Options
 
+pytestmark = pytest.mark.slow
+
 ZOOM = 0.015
 WIND = ((2e-4, -1e-4, 1e-4), (0.01, 0.0, -0.01))
 
 
-def tele() -> Camera:
-    """Sees circle and halfway line from afar: a zoom and a move along the view look alike to it."""
-    return camera("tele", (-8.0, -62.0, 18.0), (0.0, 0.0), focal=2000.0, size=(1280, 720))
-
-
 @cache
 def picture():
-    return paint_frame(CROWNED, tele())
+    return paint_frame(CROWNED, plane())
 
 
 def believed(longer: float) -> Camera:
     """The camera a venue believes in before its lens became that much longer, moved a little by the wind since."""
-    was = with_focal_length(tele(), -longer / (1 + longer) * 2000.0)
+    was = with_focal_length(plane(), -longer / (1 + longer) * 2000.0)
     return moved(was, *WIND)
 
 
@@ -41,7 +39,7 @@ def calibrated(longer: float, lens_may_drift: bool) -> Calibration:
 
 
 def off_m(found: Calibration) -> float:
-    return float(np.linalg.norm(found.cameras[0].camera.pose.position - tele().pose.position))
+    return float(np.linalg.norm(found.cameras[0].camera.pose.position - plane().pose.position))
 
 
 def test_a_lens_that_has_not_changed_is_not_doubted():
@@ -90,7 +88,7 @@ def test_the_neighbours_of_a_camera_that_zoomed_are_finished_without_it(monkeypa
 
 
 def test_a_camera_that_moved_has_not_zoomed():
-    far = moved(tele(), (0.006, -0.008, 0.004), (0.15, 0.1, -0.1))
+    far = moved(plane(), (0.006, -0.008, 0.004), (0.15, 0.1, -0.1))
     options = Options(seed=1, generations=60, lens_may_drift=True)
     found = calibrate(CROWNED, [far], {"tele": [picture()]}, white_on_green, options)
     assert found.accepted

@@ -15,6 +15,8 @@ from tests.worker.stock import anyway
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 
+pytestmark = pytest.mark.slow
+
 OTHER_PITCH = Field(92.0, 50.0)
 # Of 640: what of 4K would be 9 px. The lines themselves are 1 to 3 px wide here.
 RIGHT_PX = 1.5
@@ -106,6 +108,32 @@ def test_nights_add_up_and_go_on_when_the_refined_lens_is_stored(year, stock):
     year.pass_(1)
     assert year.day("the night after", year.frames())
     assert [one.nights for one in year.last.cameras] == [4, 4]
+
+
+def test_bad_frames_leave_the_stored_poses_as_they_are_and_each_alarm_sounds_once(year):
+    """Four days of the year below, which is not of every run of the tests."""
+    year.pass_(1)
+    assert year.day("a first day", year.frames())
+    year.pass_(25)
+    assert year.told() == [("not-calibrated", None, "began")]
+    others = year.frames() | {"right": paint_frame(OTHER_PITCH, year.truth()[1])}
+    assert not year.day("a frame of another pitch", others)
+    year.pass_(1)
+    frames = year.frames()
+    assert not year.day("swapped cables", {"left": frames["right"], "right": frames["left"]})
+    # Of the first of the two days the left pose was taken.
+    assert year.told().pop() == ("rejected-in-a-row", "right", "began")
+    year.pass_(1)
+    assert year.day("cables put right", year.frames())
+    # The right camera waited longer than the venue.
+    assert sorted(year.told(), key=str) == [
+        ("not-calibrated", "right", "began"),
+        ("not-calibrated", "right", "ended"),
+        ("not-calibrated", None, "began"),
+        ("not-calibrated", None, "ended"),
+        ("rejected-in-a-row", "right", "began"),
+        ("rejected-in-a-row", "right", "ended"),
+    ]
 
 
 @pytest.mark.long

@@ -7,6 +7,8 @@ from service.schemas.health import Alarms as Rules
 from tests.worker.duties.year import VENUE, Year, cameras, fast_motion, frames_of
 from tests.worker.stock import anyway
 
+pytestmark = pytest.mark.slow
+
 
 def errors(year):
     """How far (m) each stored camera is from where it really is."""

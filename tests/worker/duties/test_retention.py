@@ -16,7 +16,7 @@ from tests.homes import in_both_homes
 from tests.worker.stock import Stock, anyway
 from worker.duties.retention import AT_ONCE, FOLDERS_OF_A_JOB, TRY_AGAIN_AFTER, Retention
 
-pytestmark = in_both_homes
+pytestmark = [pytest.mark.slow, in_both_homes]
 NOW = datetime(2026, 11, 21, 10, tzinfo=UTC)
 
 

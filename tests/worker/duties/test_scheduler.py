@@ -25,6 +25,8 @@ from tests.homes import in_both_homes
 from worker.duties import scheduler
 from worker.duties.scheduler import DEFER, Scheduler
 
+pytestmark = pytest.mark.slow
+
 LIMIT, VENUES = 3, 8
 
 

@@ -22,6 +22,8 @@ from tests.worker.stock import Stock, anyway
 from worker.duties import outbound_guard, webhook_request
 from worker.duties.webhook_delivery import AT_ONCE, ATTEMPT, WebhookDelivery
 
+pytestmark = pytest.mark.slow
+
 SECRET, OTHER_SECRET = ("whsec_" + b64encode(bytes([n]) * 32).decode() for n in (7, 8))
 LOCAL = {"webhook_secret": SECRET, "callback_allow_http": True, "callback_allow_private": True}
 

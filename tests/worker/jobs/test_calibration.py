@@ -32,6 +32,8 @@ from worker.jobs import calibration, from_schemas, pictures, to_schemas
 from worker.jobs.calibration import NightHistory
 from worker.protocol import ComputeResources, Message
 
+pytestmark = pytest.mark.slow
+
 SIZE = (320, 180)
 FIGURES = ViewFigures(120.0, 1.5, 60.0, 0.8, 0.7, 0.0, 0.0, 0.0, 0.0, 0.1)
 UP_LEFT = [1.675, 0.372, -0.462]

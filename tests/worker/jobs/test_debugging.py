@@ -12,6 +12,8 @@ from worker.jobs import calibration
 from worker.jobs.debugging import DebugRecorder
 from worker.protocol import ComputeResources
 
+pytestmark = pytest.mark.slow
+
 DEMO = ROOT / "tests/demo"
 SHRUNK = 4
 OF_CAMERA = ("view.json", "response.png", "lines.json", "lines.jpg", "residuals.jpg", "ground.jpg")

@@ -14,6 +14,8 @@ from worker.jobs.from_schemas import JobFailedError
 from worker.jobs.locate_all import locate_all
 from worker.jobs.to_schemas import pose_to_schema
 
+pytestmark = pytest.mark.slow
+
 FIELD = FieldOfPlay(length_m=105, width_m=68, ridge=[[-18.5, 0, 0.3], [18.5, 0, 0.3]])
 LEFT = Pose.looking_at([-3.0, -50.0, 11.0], [-16.0, -6.0, 0.0], roll_deg=1.0)
 RIGHT = Pose.looking_at([3.0, -50.0, 11.0], [16.0, -6.0, 0.0], roll_deg=-1.0)

@@ -18,6 +18,8 @@ from tests.worker.certificates import certificate
 from tests.worker.sources.streaming_camera import ASKS, SIZE, StreamingCamera
 from worker.sources.rtsp_relay import Relay
 
+pytestmark = pytest.mark.slow
+
 RIGHT = "user:pass%20word"
 
 

@@ -29,6 +29,8 @@ from worker.jobs.to_schemas import lens_to_schema, pose_to_schema
 from worker.programs.stitch.__main__ import stitched
 from worker.programs.stitch.package import package
 
+pytestmark = pytest.mark.slow
+
 DEMO = Path(demo.__file__).parent
 FIELD = FieldOfPlay(length_m=PITCH.length, width_m=PITCH.width)
 LONG_S = 60

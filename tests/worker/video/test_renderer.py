@@ -15,6 +15,8 @@ from worker.calibration.stitching.views import ViewChoice, chosen_view
 from worker.video.renderer import Renderer
 from worker.video.yuv_planes import EXACT, Picture, picture_of, planes_of
 
+pytestmark = pytest.mark.slow
+
 LIGHTS = {
     "left": Light((1.15, 1.0, 0.9), 0.1, 0.2),
     "right": Light((0.9, 1.0, 1.12), -0.08, -0.15),

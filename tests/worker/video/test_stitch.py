@@ -23,6 +23,8 @@ from worker.video.encoding import Encoding
 from worker.video.errors import VideoError
 from worker.video.stitch import Offset, Plan, StaticGeometry, StitchScene, stitch
 
+pytestmark = pytest.mark.slow
+
 CHOICE = ViewChoice(width=480)
 SCENE = StitchScene(PITCH, cameras, CHOICE, {one.id: NEUTRAL for one in cameras})
 VIEW = chosen_view(PITCH, cameras, CHOICE)

@@ -7,6 +7,8 @@ from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
 from worker.video.clips import Clip
 from worker.video.synchronisation import CoarseView, chain_offsets, estimate_offset
 
+pytestmark = pytest.mark.slow
+
 PLACES = CoarseView(PITCH, cameras)
 # Encoders refresh whole frames in rhythms of their own.
 COARSE = {"crf": "30"}

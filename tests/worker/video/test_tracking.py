@@ -16,6 +16,8 @@ from worker.video.errors import VideoError
 from worker.video.stitch import Offset, Plan, StaticGeometry, StitchScene, stitch
 from worker.video.tracking import TrackedGeometryFactory
 
+pytestmark = pytest.mark.slow
+
 STORED = [moved(camera, (0.0008, -0.0005, 0.0003), (0.005, 0.004, -0.005)) for camera in pair()]
 SCENE = StitchScene(CROWNED, STORED, ViewChoice(width=640), {camera.id: NEUTRAL for camera in STORED})
 TOGETHER = {"right": Offset(0)}

@@ -12,6 +12,8 @@ from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.frame_fusion import Sway
 from worker.calibration.detection.line_measurement import measure_lines
 
+pytestmark = pytest.mark.slow
+
 WOOD, TURF, ICE = (60, 110, 170), (40, 120, 70), (235, 230, 225)
 PAINTS = {
     "white": (235, 235, 235),

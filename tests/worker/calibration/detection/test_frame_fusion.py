@@ -13,6 +13,8 @@ from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.lens import Fisheye
 
+pytestmark = pytest.mark.slow
+
 ON_A_MAST = camera("mast", (0.0, -48.0, 12.0), (0.0, 0.0), distortion=BARREL)
 # By how much the camera turns from frame to frame, in pixels of the picture.
 TURNS_PX = np.array([[0.0, 0.0, 0.0], [1.5, -2.0, 0.5], [-2.0, 1.0, 1.0], [0.5, 2.0, -1.5], [-1.0, -1.0, 0.3]])

@@ -19,6 +19,8 @@ from worker.calibration.detection.segmentation import (
     whole_frame,
 )
 
+pytestmark = pytest.mark.slow
+
 WIDE = camera("left", (-1.0, -48.0, 12.0), (-20.0, 0.0), focal=1200, size=(1920, 1080))
 
 

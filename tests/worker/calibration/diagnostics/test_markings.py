@@ -12,6 +12,8 @@ from worker.calibration.diagnostics.markings import MarkingReport, direction_of,
 from worker.calibration.geometry.field import FOOTBALL, Field
 from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
 
+pytestmark = pytest.mark.slow
+
 CORNER = camera("corner", (-20.0, -52.0, 14.0), (-30.0, -12.0), focal=900.0, size=(1280, 720))
 
 

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fields.template import load
+from tests.scenes import apart, narrow_overlap
 from tests.worker.calibration.synthetic import CROWNED, PITCH, camera, moved, paint_markings, pair
 from worker.calibration.diagnostics.registration import (
     PIXEL_M,
@@ -24,6 +25,8 @@ from worker.calibration.diagnostics.registration import (
 from worker.calibration.geometry.camera import Array, Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
+
+pytestmark = pytest.mark.slow
 
 LEFT, RIGHT = pair()
 FACING = camera("facing", (0.0, 48.0, 10.0), (0.0, 0.0))
@@ -114,7 +117,7 @@ def test_cameras_on_one_side_hide_a_crown_and_cameras_on_two_sides_show_it() -> 
 
 def test_along_a_lone_halfway_line_nothing_is_told() -> None:
     # Neither the touchline nor the circle: only the line between.
-    near = [camera(name, (x, -48.0, 10.0), (0.0, -23.0), focal=2400.0) for name, x in (("left", -3.0), ("right", 3.0))]
+    near = narrow_overlap()
     masks = [paint_markings(PITCH, one) for one in near]
     believed = moved(near[1], by=(0.1, 0.5, 0.0))
     found = register_pair(PITCH, near[0], believed, *masks)
@@ -138,9 +141,8 @@ def test_players_do_not_pull() -> None:
 
 
 def test_cameras_that_share_no_marking_cannot_be_compared() -> None:
-    ends = [camera(name, (x, -48.0, 10.0), (x, 0.0), focal=1400.0) for name, x in (("a", -40.0), ("b", 40.0))]
-    assert register_pair(PITCH, *ends, *(paint_markings(PITCH, one) for one in ends)) is None
-    assert pairs_in_common(PITCH, ends) == []
+    assert register_pair(PITCH, *apart(), *(paint_markings(PITCH, one) for one in apart())) is None
+    assert pairs_in_common(PITCH, apart()) == []
 
 
 def test_a_camera_that_sees_no_marking_cannot_be_compared() -> None:

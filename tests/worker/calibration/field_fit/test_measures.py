@@ -23,7 +23,7 @@ from worker.calibration.field_fit.measures import fit_field, fit_measures
 from worker.calibration.geometry.field import Field
 from worker.calibration.refinement.refine import Observations
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 def fitted(truth, cameras, given):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.scenes import unposed
 from tests.worker.calibration.gate.test_quality import good
 from tests.worker.calibration.synthetic import BARREL, PITCH, camera
 from worker.calibration.gate.displacement import farthest_place, measure_displacement, sight_axes
@@ -31,8 +32,7 @@ def test_the_farthest_place_lies_on_the_far_touchline_and_in_the_picture():
 
 
 def test_a_camera_that_sees_no_marking_has_no_farthest_place():
-    away = camera("left", (0.0, -44.0, 10.0), (0.0, -90.0), focal=900.0)
-    assert farthest_place(PITCH, away) is None
+    assert farthest_place(PITCH, unposed(ANCHOR)) is None
 
 
 def test_a_camera_at_its_anchor_has_not_moved():

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from tests.scenes import row
 from tests.worker.calibration import synthetic
-from tests.worker.calibration.synthetic import PITCH, camera, moved, paint_markings
+from tests.worker.calibration.synthetic import PITCH, moved, paint_markings
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import CameraResponse, Pair, compare_pairs, find_contradictions, stitch_error_px
@@ -80,13 +81,12 @@ def test_two_that_others_hold_and_that_share_little_have_no_say_in_the_stitch_er
 
 
 def test_of_three_in_a_row_the_neighbours_are_compared() -> None:
-    row = [camera(name, (x, -48.0, 10.0), (x * 1.5, 0.0), focal=750.0) for name, x in (("a", -28), ("b", 0), ("c", 28))]
-    masks = [paint_markings(PITCH, one) for one in row]
-    agreeing = compare_pairs(PITCH, [seeing(*each) for each in zip(row, masks, strict=True)])
+    masks = [paint_markings(PITCH, one) for one in row()]
+    agreeing = compare_pairs(PITCH, [seeing(*each) for each in zip(row(), masks, strict=True)])
     assert [one.cameras for one in agreeing] == [("a", "b"), ("b", "c")]
     # Over the sides of the pictures, where a pixel is half a metre long.
     assert max(one.error_px or 0.0 for one in agreeing) < 0.3
-    apart = [*row[:2], moved(row[2], by=(0.2, 0.0, 0.0))]
+    apart = [*row()[:2], moved(row()[2], by=(0.2, 0.0, 0.0))]
     disagreeing = compare_pairs(PITCH, [seeing(*each) for each in zip(apart, masks, strict=True)])
     assert stitch_error_px(disagreeing, GATE) == pytest.approx(2.0, abs=0.4)
 

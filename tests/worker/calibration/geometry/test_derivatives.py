@@ -13,6 +13,8 @@ from worker.calibration.geometry.derivatives import change_between, ground_slope
 from worker.calibration.geometry.lens import Fisheye, Intrinsics
 from worker.calibration.geometry.parameters import with_lens_changed
 
+pytestmark = pytest.mark.slow
+
 SIZE = (1920, 1080)
 MATRIX = np.array([[1250.0, 2.0, 970], [0, 1240, 530], [0, 0, 1]])
 LENSES = {

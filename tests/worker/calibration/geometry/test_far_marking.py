@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.scenes import unposed
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.far_marking import far_marking_shift_m
 from worker.calibration.geometry.field import Field
@@ -39,8 +40,7 @@ def test_a_focal_length_that_is_a_little_longer_says_how_much_that_is_on_the_gro
 
 
 def test_a_camera_that_sees_no_marking_puts_nothing_anywhere():
-    away = CAMERA.with_pose(Pose.looking_at([0.0, -50.0, 10.0], [0.0, -150.0, 0.0]))
-    assert far_marking_shift_m(PITCH, away, away) is None
+    assert far_marking_shift_m(PITCH, unposed(CAMERA), unposed(CAMERA)) is None
 
 
 def test_pixels_that_the_other_camera_sees_above_the_horizon_are_nowhere():

@@ -9,6 +9,8 @@ from fields.template import Template, load
 from tests.worker.calibration.synthetic import CROWNED, PITCH
 from worker.calibration.geometry.field import Field, resample
 
+pytestmark = pytest.mark.slow
+
 lengths, widths = st.floats(90, 120), st.floats(45, 90)
 
 

@@ -6,6 +6,8 @@ import pytest
 from tests.worker.calibration.memory.nights import nights_of
 from worker.calibration.memory.camera_memory import ANCHOR_JOBS
 
+pytestmark = pytest.mark.slow
+
 FARTHEST_M, SIGMAS = 0.3, 3.0
 
 

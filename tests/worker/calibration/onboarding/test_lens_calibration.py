@@ -17,6 +17,8 @@ from worker.calibration.onboarding.lens_calibration import (
 )
 from worker.calibration.rendering.inspection import BARE, COVERED, WIDTH_PX, coverage_picture
 
+pytestmark = pytest.mark.slow
+
 SIZE = (1280, 960)
 BOARD = Board(9, 6, 0.03)
 CHARUCO = Board(9, 6, 0.03, Charuco("4X4_50", 0.022))

@@ -10,6 +10,8 @@ from tests.worker.calibration.test_calibrate import frames, outdated, white_on_g
 from worker.calibration.paper.calibrate import PRESETS, calibrate_by_paper
 from worker.calibration.records import Options, Recorder
 
+pytestmark = pytest.mark.slow
+
 FEW = Options(seed=3, generations=3, parents=4, offspring=4)
 
 

@@ -13,6 +13,8 @@ from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.refinement.refine import refine
 
+pytestmark = pytest.mark.slow
+
 NIGHTS = 12
 HALL = Field(40.0, 20.0, 0.05, None, load("handball"))
 SIZE = (1920, 1080)

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.scenes import lone_line
 from tests.worker.calibration.synthetic import (
     BARREL,
     CROWNED,
-    camera,
     ground_behind,
     moved,
     paint_frame,
@@ -28,6 +28,8 @@ from worker.calibration.geometry.parameters import free_focal_lengths, free_ridg
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
 from worker.calibration.robust import huber_weights, tukey_weights
+
+pytestmark = pytest.mark.slow
 
 SMALL_TURN = (0.0008, -0.0006, 0.0005)
 SMALL_SHIFT = (0.02, -0.03, 0.02)
@@ -201,7 +203,7 @@ def test_an_outlier_has_no_weight_and_the_rest_have_theirs():
 
 @pytest.mark.parametrize("distortion", [(), BARREL])
 def test_a_lone_touchline_neither_lets_a_camera_run_away_nor_makes_it_sure(distortion):
-    one = camera("left", (-30.0, -48.0, 10.0), (-30.0, -34.0), focal=900, distortion=distortion, size=(960, 240))
+    one = lone_line(distortion)
     sight = Observations([Channels([paint_frame(CROWNED, one)])], [paint_markings(CROWNED, one)])
     refined = refine(CROWNED, [moved(one, by=(0.2, 0.0, 0.0))], sight, 0.5)
     assert refined.each[0].residual_px is not None

@@ -18,6 +18,8 @@ from worker.calibration.refinement.uncertainty import estimate_uncertainty
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.robust import tukey_weights
 
+pytestmark = pytest.mark.slow
+
 MISFIT_PX = 2.0
 EVEN_M = 1e-4
 TRIALS = 100

@@ -17,6 +17,8 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import Candidate, explains_nearly_as_well, relocalise, twin
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens, unknown_lenses
 
+pytestmark = pytest.mark.slow
+
 GREEN = np.full((540, 960, 3), (60, 130, 70), np.uint8)
 SIDELINE = camera("one", (-12.0, -50.0, 11.0), (-28.0, -4.0), distortion=BARREL)
 BEHIND_A_GOAL = camera("one", (-70.0, 9.0, 13.0), (-20.0, 0.0))

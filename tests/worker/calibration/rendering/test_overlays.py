@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.scenes import unposed
 from tests.worker.calibration.synthetic import (
     BARREL,
     CROWNED,
@@ -51,7 +52,7 @@ def test_the_overlay_draws_both_poses_and_leaves_the_frame_alone() -> None:
 
 def test_an_overlay_of_a_pose_that_sees_no_pitch_is_the_frame_with_a_legend() -> None:
     frame = pair_frames()[0]
-    up = camera("left", (0.0, -48.0, 10.0), (0.0, -90.0))
+    up = unposed(LEFT)
     drawn = overlay((PITCH, up), (PITCH, up), frame)
     assert (drawn[:400] == frame[:400]).all()
     assert (drawn[-80:] != frame[-80:]).any()

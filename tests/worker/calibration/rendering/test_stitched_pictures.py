@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.scenes import row, unposed
 from tests.worker.calibration.synthetic import (
     CROWNED,
     GRASS,
@@ -22,6 +23,8 @@ from worker.calibration.rendering.stitched_pictures import birdseye, stitched
 from worker.calibration.stitching.panorama import BACKDROP, panorama, seam_weights
 from worker.calibration.stitching.photometric_alignment import LARGEST_GAIN, evened_out
 from worker.calibration.stitching.views import View, ViewChoice, chosen_view
+
+pytestmark = pytest.mark.slow
 
 CAMERAS = pair()
 FRAME_SIZE = (960, 540)
@@ -133,16 +136,13 @@ def test_the_geometry_of_the_preview_is_exact_to_a_twentieth_of_a_pixel() -> Non
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_any_number_of_cameras_in_a_row(count: int) -> None:
-    row = [
-        camera(f"c{i}", (x, -48.0, 10.0), (1.5 * x, 0.0), focal=700.0)
-        for i, x in enumerate(np.linspace(-25.0, 25.0, count) if count > 1 else [0.0])
-    ]
-    pictures = {one.id: paint_frame(CROWNED, one) for one in row}
-    picture = preview(CROWNED, row, pictures, 960)
+    cameras = row() if count == 3 else row()[1:2]
+    pictures = {one.id: paint_frame(CROWNED, one) for one in cameras}
+    picture = preview(CROWNED, cameras, pictures, 960)
     assert picture.shape[1] == 960
     assert 1.2 < picture.shape[1] / picture.shape[0] < 8
     assert (picture == BACKDROP).all(axis=-1).mean() < 0.05
-    assert birdseye(CROWNED, row, pictures).shape == (741, 1111, 3)
+    assert birdseye(CROWNED, cameras, pictures).shape == (741, 1111, 3)
 
 
 def test_cameras_that_face_each_other_are_seen_from_outside() -> None:
@@ -162,8 +162,8 @@ def test_cameras_that_face_each_other_are_seen_from_outside() -> None:
 
 
 def test_cameras_that_see_no_pitch_still_get_a_picture() -> None:
-    sky = [camera("up", (0.0, -48.0, 10.0), (0.0, -60.0))]
-    pictures = {"up": np.full((540, 960, 3), 200, np.uint8)}
+    sky = [unposed(CAMERAS[0])]
+    pictures = {"left": np.full((540, 960, 3), 200, np.uint8)}
     assert preview(PITCH, sky, pictures, 640).shape[1] == 640
     assert (birdseye(PITCH, sky, pictures)[370:, 555] == BACKDROP).any()
 

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair, pair_markings
+from tests.scenes import apart
+from tests.worker.calibration.synthetic import CROWNED, moved, paint_markings, pair, pair_markings
 from worker.calibration.detection.line_profile import blurred_line
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.objective import BlurredResponse, Objective
+
+pytestmark = pytest.mark.slow
 
 
 def scene():
@@ -65,11 +68,7 @@ def test_a_single_camera_has_no_stitch_term():
 
 
 def test_cameras_without_overlap_have_no_stitch_term():
-    apart = [
-        camera("left", (-30, -48, 10), (-45, 0), focal=1500),
-        camera("right", (30, -48, 10), (45, 0), focal=1500),
-    ]
-    objective = Objective(CROWNED, apart, [paint_markings(CROWNED, c) for c in apart], 0.5, blur_px=6)
+    objective = Objective(CROWNED, apart(), [paint_markings(CROWNED, c) for c in apart()], 0.5, blur_px=6)
     assert objective.pairs == []
 
 

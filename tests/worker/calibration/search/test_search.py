@@ -1,11 +1,14 @@
 """The levels of a search: who hands over to whom, and when."""
 
 import numpy as np
+import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_markings
 from worker.calibration.search.search import COARSE_TO_FINE, PATIENCE, Strategy, search
 
 LEVELS = len(COARSE_TO_FINE)
+
+pytestmark = pytest.mark.slow
 
 
 def searched(responses, generations):

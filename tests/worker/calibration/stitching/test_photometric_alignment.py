@@ -9,6 +9,8 @@ from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import NEUTRAL, Light, squared_radius
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 
+pytestmark = pytest.mark.slow
+
 CAMERAS = pair()
 SIZE = CAMERAS[0].intrinsics.size
 

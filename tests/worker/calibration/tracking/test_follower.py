@@ -14,6 +14,8 @@ from worker.calibration.geometry.camera import inside
 from worker.calibration.records import CalibrationError
 from worker.calibration.tracking.follower import CameraTracker, Moment
 
+pytestmark = pytest.mark.slow
+
 FRAMES_PER_SECOND = 25.0
 COUNT = 40
 LEFT = pair()[0]
