@@ -7,7 +7,7 @@ again, it stays by itself, and the others are refined without it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -136,10 +136,6 @@ def joined_deviations(together: RefinedPoses, apart: Sequence[RefinedPoses]) -> 
     return [deviation for deviation in together.deviations if deviation.camera not in apart_ids] + of_lenses
 
 
-Finish = Callable[[Problem, Sequence[Camera], ProgressReporter], RefinedPoses]
-"""From a problem and the poses where a search of it ended to poses with all that the lines say of them."""
-
-
 @dataclass(frozen=True)
 class Attempt:
     """A camera that was refined by itself, from the pose `begun`."""
@@ -247,18 +243,14 @@ def refine_poses(problem: Problem, begun: Sequence[Camera], progress: ProgressRe
 
 
 def refine_without(
-    excluded: Collection[int],
-    problem: Problem,
-    solution: PoseSolution,
-    progress: ProgressReporter,
-    finish: Finish = refine_poses,
+    excluded: Collection[int], problem: Problem, solution: PoseSolution, progress: ProgressReporter
 ) -> PoseSolution:
     """Refine the other cameras without those `excluded` ones that were refined with them; these stay as they are."""
     together = [n for n in solution.together if n not in excluded]
     if len(together) in (0, len(solution.together)):
         return replace(solution, together=together)
     group = problem.of(together)
-    refined = finish(group, [solution.begun[n] for n in together], progress)
+    refined = refine_poses(group, [solution.begun[n] for n in together], progress)
     results = dict(enumerate(solution.results)) | dict(zip(together, judge_each(group, refined, progress), strict=True))
     ids = {problem.cameras[n].id for n in together}
     of_others = [d for d in solution.deviations if d.camera is not None and d.camera not in ids]

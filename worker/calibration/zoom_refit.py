@@ -14,7 +14,6 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.diagnosis import is_sure
 from worker.calibration.solve import (
-    Finish,
     PoseSolution,
     Problem,
     judge_each,
@@ -34,18 +33,15 @@ WHAT_TO_DO = (
 )
 
 
-def refit_zoomed(
-    problem: Problem, solution: PoseSolution, progress: ProgressReporter, finish: Finish = refine_poses
-) -> PoseSolution:
+def refit_zoomed(problem: Problem, solution: PoseSolution, progress: ProgressReporter) -> PoseSolution:
     """Return the solution in which each camera that zoomed has the focal length and pose that its lines say.
 
     What such a camera says of its neighbours with the old focal length is wrong: the others are refined without it.
-    `finish`: how poses end that are found with another lens, or without others.
     """
     zoomed = [n for n, result in enumerate(solution.results) if _needs_refit(problem, result)]
-    attempts = {n: _refitted(problem, n, solution.results[n], progress, finish) for n in zoomed}
+    attempts = {n: _refitted(problem, n, solution.results[n], progress) for n in zoomed}
     refitted = {n: result for n, result in attempts.items() if result is not None}
-    solution = refine_without(refitted, problem, solution, progress, finish)
+    solution = refine_without(refitted, problem, solution, progress)
     return replace(solution, results=[refitted.get(n, result) for n, result in enumerate(solution.results)])
 
 
@@ -56,9 +52,7 @@ def _needs_refit(problem: Problem, result: CameraResult) -> bool:
     return zoomed_beyond_doubt(result, problem.gate)
 
 
-def _refitted(
-    problem: Problem, number: int, result: CameraResult, progress: ProgressReporter, finish: Finish
-) -> CameraResult | None:
+def _refitted(problem: Problem, number: int, result: CameraResult, progress: ProgressReporter) -> CameraResult | None:
     """Refit a camera by itself with the focal length that its lines say; None if even that fails the gate."""
     stored, found = problem.cameras[number], result
     for _ in range(MOST_ROUNDS):
@@ -68,9 +62,9 @@ def _refitted(
         changed_px = likelier.intrinsics.focal_length_px - stored.intrinsics.focal_length_px
         if abs(zoom.value) >= CONVERGED_SIGMAS * zoom.sigma:
             # Until it has converged it may be off by all that it has changed.
-            found = _refined_with_lens(problem, number, likelier, abs(changed_px), progress, finish)
+            found = _refined_with_lens(problem, number, likelier, abs(changed_px), progress)
             continue
-        found = _refined_with_lens(problem, number, likelier, zoom.sigma, progress, finish)
+        found = _refined_with_lens(problem, number, likelier, zoom.sigma, progress)
         if abs(changed_px) < LEAST_SIGMAS * zoom.sigma:
             # With another focal length the lines say less of it than they did before.
             return None
@@ -82,11 +76,11 @@ def _refitted(
 
 
 def _refined_with_lens(
-    problem: Problem, number: int, begun: Camera, sigma_px: float, progress: ProgressReporter, finish: Finish
+    problem: Problem, number: int, begun: Camera, sigma_px: float, progress: ProgressReporter
 ) -> CameraResult:
     """Refine a camera by itself from `begun` and with its lens, whose focal length is known to `sigma_px`."""
     stored = problem.cameras[number]
     lens = replace(begun.intrinsics, sigma={**stored.intrinsics.sigma, "fx": sigma_px})
     alone = replace(single_camera_problem(problem, number), cameras=[replace(stored, intrinsics=lens)])
-    refined = finish(alone, [replace(begun, intrinsics=lens)], progress)
+    refined = refine_poses(alone, [replace(begun, intrinsics=lens)], progress)
     return judge_each(alone, refined, progress)[0]

@@ -38,7 +38,6 @@ from worker.calibration.refinement.uncertainty import RefinedPoses
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.search import Found, Strategy
 from worker.calibration.solve import PoseSolution, Problem, assess_stored, joined_deviations, judge_each, of_use_at
-from worker.calibration.zoom_refit import refit_zoomed
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,6 @@ def calibrate_by_paper(
 
     # Search, and judge the poses as the search leaves them.
     solution = _solve(problem, preset.levels, progress)
-    solution = refit_zoomed(problem, solution, progress, finish=_evaluate)
     judged = judge_together(solution.pitch, solution.results, observed.observations, progress)
     recorder.judged(judged.pitch, cameras, judged.cameras)
 
