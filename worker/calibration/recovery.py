@@ -75,16 +75,17 @@ def recover_knocked(
     _, judged, _ = solved
     sought = [n for n, result in enumerate(judged.cameras) if _is_sought(problem, result)]
     with progress.timed("evolution"):
-        found = {n: again for n in sought if (again := _search(problem, judged.cameras, n, frames, segment, progress))}
+        searched = {n: _search(problem, judged.cameras[n], n, frames, segment, progress) for n in sought}
+    found = {n: one for n, one in searched.items() if one is not None}
     while found:
         begun = _begun_there(problem, found)
-        again = solve(begun, progress.muted())
-        held = {n: one for n, one in found.items() if again[1].cameras[n].accepted}
+        anew = solve(begun, progress.muted())
+        held = {n: one for n, one in found.items() if anew[1].cameras[n].accepted}
         harmed = any(
-            one.accepted and not two.accepted for one, two in zip(judged.cameras, again[1].cameras, strict=True)
+            one.accepted and not two.accepted for one, two in zip(judged.cameras, anew[1].cameras, strict=True)
         )
         if held.keys() == found.keys() and not harmed:
-            return replace(begun, cameras=problem.cameras), _joined(problem, solved, again, found)
+            return replace(begun, cameras=problem.cameras), _joined(problem, solved, anew, found)
         found = {} if harmed and held.keys() == found.keys() else held
     return problem, solved
 
