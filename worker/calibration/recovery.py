@@ -32,6 +32,8 @@ from worker.calibration.solve import ObservedCameras, PoseSolution, Problem
 
 LOST = frozenset({"lines", "few-lines", "moved"})
 """Reasons for a refusal that a knocked camera may have."""
+UNFIT = frozenset({"residual", "zoomed", "undetermined"})
+"""Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
 LEAST_PAINT, LEAST_UNEXPLAINED = 200, 0.4
 """Lines are clearly seen elsewhere when so many of the places on the middles of paint are there, and this share of them
 lies on no line by any pose that was found."""
@@ -80,13 +82,13 @@ def recover_knocked(
     while found:
         begun = _begun_there(problem, found)
         anew = solve(begun, progress.muted())
-        held = {n: one for n, one in found.items() if anew[1].cameras[n].accepted}
+        confirmed = {n: one for n, one in found.items() if _is_there(anew[1].cameras[n])}
         harmed = any(
             one.accepted and not two.accepted for one, two in zip(judged.cameras, anew[1].cameras, strict=True)
         )
-        if held.keys() == found.keys() and not harmed:
+        if confirmed.keys() == found.keys() and not harmed:
             return replace(begun, cameras=problem.cameras), _joined(problem, solved, anew, found)
-        found = {} if harmed and held.keys() == found.keys() else held
+        found = {} if harmed and confirmed.keys() == found.keys() else confirmed
     return problem, solved
 
 
@@ -97,6 +99,11 @@ def _is_sought(problem: Problem, result: CameraResult) -> bool:
     if problem.options.search == "anywhere":
         return result.view.cause != "other-camera"
     return result.refusal is not None and result.refusal.reason in LOST
+
+
+def _is_there(result: CameraResult) -> bool:
+    """Whether a camera stands where it was found: the gate has nothing against it, or but its lens and its sigma."""
+    return result.refusal is None or result.refusal.reason in UNFIT
 
 
 def _search(
@@ -220,16 +227,21 @@ def _beside_stored(problem: Problem, number: int, result: CameraResult, before: 
     result = replace(result, moved=moved, evidence_before=before.evidence_before)
     if not moved.beyond(problem.gate):
         return result
-    refusal = None if problem.options.recover == "accept" else Refusal("knocked", _words(result))
+    if result.refusal is not None:
+        words = f"{_turned_and_moved(moved)}, and found again there, but {result.refusal.words}"
+        return replace(result, knocked=True, refusal=replace(result.refusal, words=words))
+    refusal = None if problem.options.recover == "accept" else Refusal("knocked", _proposal(result))
     return replace(result, knocked=True, refusal=refusal)
 
 
-def _words(result: CameraResult) -> str:
-    moved = result.moved
+def _turned_and_moved(moved: Movement) -> str:
+    return f"turned by {moved.rotation_deg:.1f} degrees and moved by {moved.position_m:.2f} m"
+
+
+def _proposal(result: CameraResult) -> str:
     return (
-        f"turned by {moved.rotation_deg:.1f} degrees and moved by {moved.position_m:.2f} m, and found again: "
-        f"{result.evidence.share:.0%} of the lines are seen where the new pose puts them; look at its picture, then "
-        "accept the job by hand, or turn the camera back"
+        f"{_turned_and_moved(result.moved)}, and found again: {result.evidence.share:.0%} of the lines are seen where "
+        "the new pose puts them; look at its picture, then accept the job by hand, or turn the camera back"
     )
 
 

@@ -151,7 +151,7 @@ def camera_to_schema(
         light=light,
         markings=[_marking(one) for one in found.markings],
         knocked=found.knocked,
-        proposed=_proposal(found) if found.knocked and not found.accepted else None,
+        proposed=_proposal(found) if _is_proposed(found) else None,
         displacement=moved_from_anchor,
         cross_check=_cross_check(found.cross_checked()),
     )
@@ -159,6 +159,10 @@ def camera_to_schema(
 
 def _moved(found: quality.Movement) -> Moved:
     return Moved(rotation_deg=found.rotation_deg, position_m=found.position_m, pixels=finite_or_none(found.pixels))
+
+
+def _is_proposed(found: quality.CameraResult) -> bool:
+    return found.refusal is not None and found.refusal.reason == "knocked"
 
 
 def _proposal(found: quality.CameraResult) -> Proposal:
