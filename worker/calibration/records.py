@@ -24,7 +24,7 @@ from worker.calibration.stitching.photometry import Light
 
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
 Search = Literal["auto", "wide", "anywhere"]
-Recover = Literal["propose", "accept"]
+Recover = Literal["propose", "accept", "never"]
 Path = Literal["near", "wide", "anywhere"]
 Verdict = Literal["accepted", "partly", "rejected"]
 
@@ -46,9 +46,9 @@ class Options:
 
     `search`: `auto` tries the near path before it searches, and then searches anywhere for cameras whose lines are
     elsewhere; `wide` always searches around the stored poses, and nowhere else; `anywhere` searches anywhere for all.
-    `recover`: whether a camera that was knocked and found is proposed to a person or accepted. `fit_focal_length`:
-    solve for the focal length of each camera, which heat changes; `fit_ridge`: for the ridge's height;
-    `lens_may_drift`: whether a pose may be accepted with another focal length than the stored one.
+    `recover`: whether a camera that was knocked and found is proposed to a person or accepted; `never`: it is not
+    searched for. `fit_focal_length`: solve for the focal length of each camera, which heat changes; `fit_ridge`: for
+    the ridge's height; `lens_may_drift`: whether a pose may be accepted with another focal length than the stored one.
     """
 
     search: Search = "auto"

@@ -16,7 +16,7 @@ import numpy as np
 from worker.calibration.detection.exclusions import of_use
 from worker.calibration.detection.frame_fusion import median, sways
 from worker.calibration.detection.segmentation import whole_frame
-from worker.calibration.detection.view_condition import ViewCondition, look_at
+from worker.calibration.detection.view_condition import OF_THE_GROUND, ViewCondition, look_at
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import stitch_error_px
 from worker.calibration.gate.quality import CameraResult, Movement, Refusal, in_one_sentence
@@ -40,12 +40,14 @@ lies on no line by any pose that was found."""
 ON_ITS_MOUNT_M = 2.5
 """How far from its stored place a camera is searched for first."""
 LONGEST_S = 20.0
-"""Core-seconds after which the search for a camera is not begun anew."""
+"""Core-seconds after which the search for a camera is not begun anew: what a much slower machine finds less by."""
 CLEARLY_NEARER, MUCH_LESS_TURNED_DEG = 0.5, 60.0
 """Of a camera and its twin on a symmetric field the one is taken that is clearly nearer to the stored place: by less
 than this part of the other's distance; or else the one that is turned by so much less."""
 OWN_PLACE_M = 0.1
 """A camera that looks where another one of the venue looks stands in its own place if that is so much nearer."""
+HOPELESS = frozenset({"no-lines", "not-unique"})
+"""What a search where a camera stood ends with, and one anywhere would all the more."""
 UNSEEN_PX, SAME_PART = 1e4, 0.002
 """What a marking counts that only one of two cameras sees; and cameras are the same that put the markings apart by less
 than this part of the frame's width."""
@@ -75,7 +77,7 @@ def recover_knocked(
     `solve`: what has `solved` the problem. The cameras of the problem that is returned are at their stored poses.
     """
     _, judged, _ = solved
-    sought = [n for n, result in enumerate(judged.cameras) if _is_sought(problem, result)]
+    sought = [n for n in range(len(problem.cameras)) if _is_sought(problem, n, judged.cameras[n])]
     with progress.timed("evolution"):
         searched = {n: _search(problem, judged.cameras[n], n, frames, segment, progress) for n in sought}
     found = {n: one for n, one in searched.items() if one is not None}
@@ -92,12 +94,15 @@ def recover_knocked(
     return problem, solved
 
 
-def _is_sought(problem: Problem, result: CameraResult) -> bool:
+def _is_sought(problem: Problem, number: int, result: CameraResult) -> bool:
     """Whether a camera is to be searched for: whatever its result, or where that is one of a knocked camera."""
-    if problem.options.search == "wide":
+    if problem.options.search == "wide" or problem.options.recover == "never":
         return False
     if problem.options.search == "anywhere":
         return result.view.cause != "other-camera"
+    if result.view.cause in OF_THE_GROUND:
+        # Said of where the stored pose has the ground: lines that the network saw beside it contradict it.
+        return _has_lines_elsewhere(problem, result, problem.observed.observations.responses[number])
     return result.refusal is not None and result.refusal.reason in LOST
 
 
@@ -141,6 +146,8 @@ def _search(
                 return None
             view = look_at(frames[stored.id][0], problem.pitch, camera)
             return FoundAgain(camera, response, view) if view.usable else None
+        if found.refusal is not None and found.refusal.reason in HOPELESS:
+            break
     return None
 
 
