@@ -103,7 +103,10 @@ def _is_sought(problem: Problem, number: int, result: CameraResult) -> bool:
     if result.view.cause in OF_THE_GROUND:
         # Said of where the stored pose has the ground: lines that the network saw beside it contradict it.
         return _has_lines_elsewhere(problem, result, problem.observed.observations.responses[number])
-    return result.refusal is not None and result.refusal.reason in LOST
+    if result.refusal is None or result.refusal.reason not in LOST:
+        return False
+    # A mount that gave way over many nights stands where it was found last night.
+    return result.refusal.reason != "moved" or result.moved.beyond(problem.gate)
 
 
 def _is_there(result: CameraResult) -> bool:
@@ -164,7 +167,7 @@ def _has_lines_elsewhere(problem: Problem, result: CameraResult, response: Respo
     if len(paint.middles) < LEAST_PAINT:
         return False
     if result.refusal is not None and result.refusal.reason == "moved":
-        return result.moved.beyond(problem.gate)
+        return True
     return paint.explained_by(problem.pitch, result.camera) <= 1 - LEAST_UNEXPLAINED
 
 
