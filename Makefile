@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long check wheel bench bench-find bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long check wheel bench bench-find bench-knocked bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
 
 setup: $(VENV)/.installed
 
@@ -57,6 +57,10 @@ bench-fields: setup
 # One BLAS thread, as the worker sets it.
 bench-find: setup
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.find
+
+# One BLAS thread, as the worker sets it.
+bench-knocked: setup
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.knocked
 
 bench-segmentation: $(VENV)/.train
 	$(BIN)/python -m tests.benchmarks.segmentation

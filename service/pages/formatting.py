@@ -15,6 +15,7 @@ ALARMS: dict[AlarmRule, str] = {
     "rejected-in-a-row": "Rejected again",
     "not-calibrated": "Overdue",
     "trend": "Drifting",
+    "knocked": "Knocked",
 }
 STEPS = ((60.0, 1.0, "s"), (3600.0, 60.0, "min"), (86400.0, 3600.0, "h"), (float("inf"), 86400.0, "d"))
 

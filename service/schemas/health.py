@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 
 from service.schemas.actor import Attributed
 from service.schemas.addresses import CallbackUrl
-from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
+from service.schemas.base import OPEN_WORD, Flag, Id, Integer, Number, Schema
 from service.schemas.history import RevisionCamera
 from service.schemas.names import JobStatus, Verdict
 from service.schemas.schedule import ScheduleState
@@ -44,14 +44,17 @@ class Alarms(Schema):
         description="Over nights, a camera moves beyond what its own spread explains, and by at least so many metres "
         "at the far touchline, see `GET /venues/{id}/cameras/{camera}/trend`.",
     )
+    knocked: Flag = Field(
+        False, description="A calibration finds a camera elsewhere, and nobody has accepted its pose there yet."
+    )
     callback_url: CallbackUrl | None = Field(
         None, description="Told when an alarm begins and when it is over, signed (Standard Webhooks)."
     )
 
 
-AlarmRule = Literal["moved-since-last", "moved-since-first", "rejected-in-a-row", "not-calibrated", "trend"]
+AlarmRule = Literal["moved-since-last", "moved-since-first", "rejected-in-a-row", "not-calibrated", "trend", "knocked"]
 AlarmSetting = Literal[
-    "moved_since_last_px", "moved_since_first_px", "rejected_in_a_row", "not_calibrated_for_h", "trend_m"
+    "moved_since_last_px", "moved_since_first_px", "rejected_in_a_row", "not_calibrated_for_h", "trend_m", "knocked"
 ]
 SETTINGS: dict[AlarmRule, AlarmSetting] = {
     "moved-since-last": "moved_since_last_px",
@@ -59,6 +62,7 @@ SETTINGS: dict[AlarmRule, AlarmSetting] = {
     "rejected-in-a-row": "rejected_in_a_row",
     "not-calibrated": "not_calibrated_for_h",
     "trend": "trend_m",
+    "knocked": "knocked",
 }
 
 

@@ -27,10 +27,10 @@ class NumberChange(Schema):
     after: float
 
 
-# What brought a revision: a PUT, a calibration by itself, a result that was accepted by hand, an older revision, or, by
-# hand as well, the refined pose and lens of a camera or a number of the field as the lines have it, or cameras that a
-# job found from their frames alone.
-Cause = Literal["put", "calibrated", "accepted", "restored", "adopted", "found"]
+# What brought a revision: a PUT, a calibration by itself, one that found a knocked camera again, a result that was
+# accepted by hand, an older revision, or, by hand as well, the refined pose and lens of a camera or a number of the
+# field as the lines have it, or cameras that a job found from their frames alone.
+Cause = Literal["put", "calibrated", "recovered", "accepted", "restored", "adopted", "found"]
 
 
 class Revision(Schema):

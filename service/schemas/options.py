@@ -28,10 +28,11 @@ class Options(Handling):
     model_config = ConfigDict(json_schema_extra={"examples": [{"preset": "esc", "seed": 7, "dry_run": True}]})
 
     preset: Annotated[Literal["esc", "paper", "scpr"], OPEN_WORD] = "esc"
-    search: Annotated[Literal["auto", "wide"], OPEN_WORD] = Field(
+    search: Annotated[Literal["auto", "wide", "anywhere"], OPEN_WORD] = Field(
         "auto",
-        description="auto looks first whether the cameras stand almost where they stood, which takes no search; wide "
-        "searches in any case.",
+        description="auto looks first whether the cameras stand almost where they stood, which takes no search, then "
+        "searches around their stored poses, and last anywhere for a camera whose lines are clearly seen elsewhere; "
+        "wide searches around the stored poses in any case, and nowhere else; anywhere searches anywhere for each.",
     )
     seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
     generations: Annotated[Integer, Field(ge=1, le=2000)] = Field(100, description="G of the paper.")

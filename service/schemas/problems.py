@@ -194,6 +194,13 @@ REFUSAL_REASONS: dict[str, RefusalReason] = {
         "Accept the pose by hand where the drawing is right; else store a first pose that is nearer.",
         "the-pose",
     ),
+    "knocked": RefusalReason(
+        "The camera was knocked, and found again elsewhere",
+        "Blue on the lines and orange far beside them.",
+        "Where the new pose lies on the lines, accept the job, which stores it. Else turn the camera back, or store a "
+        "first pose. A venue whose recover is accept stores such poses at once.",
+        "the-pose",
+    ),
     "stored-better": RefusalReason(
         "The stored pose fits the frame better",
         "Orange on the lines and blue beside them.",

@@ -111,6 +111,15 @@ class LensChange(Schema):
     )
 
 
+class Proposal(Schema):
+    """Where a camera that was knocked was found again, for a person to accept: `POST /jobs/{id}/accept`."""
+
+    pose: Pose
+    sigma: Sigma | None
+    moved: Moved = Field(description="From the stored pose.")
+    found: float | None = Field(description="Share 0..1 of the visible markings' length that is seen there.")
+
+
 class CrossCheck(Schema):
     """Pose and lens by every second ten metres of the lines, beside pose and lens by the other ones.
 
@@ -169,6 +178,13 @@ class CameraResult(Schema):
         0, description="Accepted jobs in the camera's memory, this one too where it is accepted and no dry run."
     )
     markings: list[MarkingResult] = Field([], description="What was seen of each marking that should be in view.")
+    knocked: bool = Field(
+        False,
+        description="Whether it was lost and found again, farther from its stored pose than a camera moves by itself.",
+    )
+    proposed: Proposal | None = Field(
+        None, description="Of a knocked camera that is not accepted: the pose that accepting the job stores."
+    )
     displacement: Displacement | None = Field(
         None, description="From the camera's anchor, see `GET /venues/{id}/cameras/{camera}/trend`."
     )
@@ -265,12 +281,19 @@ class Result(Schema):
     pairs: list[PairResult] = Field([], description="The cameras that were compared, two by two.")
     loss: float | None = Field(description="Of the poses that are answered, by the middle level of the search.")
     generations: int
-    path: Annotated[Literal["near", "wide"], OPEN_WORD] = Field(
-        "wide", description="Whether the poses were found near the stored ones, or by a search."
+    path: Annotated[Literal["near", "wide", "anywhere"], OPEN_WORD] = Field(
+        "wide",
+        description="Whether the poses were found near the stored ones, by a search around these, or that of some "
+        "camera by a search anywhere.",
     )
     timings_s: dict[str, float]
     cpu_s: dict[str, float] = CPU_S
     provenance: Provenance
+
+    @property
+    def recovered_cameras(self) -> list[str]:
+        """Those that were knocked and whose new poses may replace the stored ones."""
+        return [camera.id for camera in self.cameras if camera.accepted and camera.knocked]
 
     @property
     def accepted_cameras(self) -> list[str]:

@@ -33,6 +33,14 @@ Lens = Annotated[
         "focal length that was found."
     ),
 ]
+Recover = Annotated[
+    Literal["propose", "accept"],
+    OPEN_WORD,
+    Field(
+        description="Of a camera that was knocked by more than 8 degrees or 1.5 m and found again: `propose` rejects "
+        "the pose until somebody accepts the job, `accept` stores it at once."
+    ),
+]
 
 Webhooks = Annotated[
     list[Webhook], Field(max_length=8, description="Told of what happens to the venue, and of new poses with them.")
@@ -167,6 +175,7 @@ class VenueIn(NamedField):
     cameras: Annotated[list[CameraIn], Field(min_length=1, max_length=32)]
     accept: Accept = "each"
     lens: Lens = "fixed"
+    recover: Recover = "propose"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
     webhooks: Webhooks = Field([])
@@ -208,6 +217,7 @@ class Venue(NamedField):
     cameras: list[Camera]
     accept: Accept = "each"
     lens: Lens = "fixed"
+    recover: Recover = "propose"
     alarms: Alarms | None = None
     schedule: Schedule | None = None
     webhooks: Webhooks = Field([])

@@ -109,7 +109,7 @@ def _active_rules(
     known = quality.row
     courses = {camera.id: known.courses.get(camera.id, CameraHistory()) for camera in newest.cameras}
     overdue, due_at = _overdue(connection, venue, newest, quality, courses)
-    moved = _moved(venue.alarms, newest) | _drifting(connection, venue)
+    moved = _moved(venue.alarms, newest) | _drifting(connection, venue) | _knocked(connection, venue, quality, newest)
     return moved | _rejected(venue.alarms, known, courses) | overdue, due_at
 
 
@@ -120,6 +120,19 @@ def _drifting(connection: sa.Connection, venue: Venue) -> dict[AlarmKey, str]:
         return {}
     trends = trends_of(connection, venue.id)
     return {("trend", camera): trend.words for camera, trend in trends.items() if trend.state(limit_m) == "alarm"}
+
+
+def _knocked(connection: sa.Connection, venue: Venue, quality: VenueQuality, newest: Revision) -> dict[AlarmKey, str]:
+    """The cameras that the last calibration found elsewhere, as long as the poses are those from before it."""
+    if venue.alarms is None or not venue.alarms.knocked:
+        return {}
+    if quality.knocked is not None:
+        return {("knocked", camera): f"Camera {camera} was {why}." for camera, why in quality.knocked.items()}
+    return {
+        ("knocked", alarm.camera or ""): alarm.why
+        for alarm in alarms_of(connection, venue.id)
+        if alarm.rule == "knocked" and newest.at <= alarm.since
+    }
 
 
 def _rejected(rules: Alarms, known: QualityRow, courses: Mapping[str, CameraHistory]) -> dict[AlarmKey, str]:
@@ -166,7 +179,9 @@ def _moved(rules: Alarms, newest: Revision) -> dict[AlarmKey, str]:
     for camera in newest.cameras:
         # What somebody put or put back is where they want it.
         if newest.cause in CALIBRATION_CAUSES and _exceeds(camera.moved, rules.moved_since_last_px):
-            rings["moved-since-last", camera.id] = f"Camera {camera.id} moved {_movement_in_words(camera, 'moved')}."
+            found = " and was found again" if newest.cause == "recovered" else ""
+            moved = _movement_in_words(camera, "moved")
+            rings["moved-since-last", camera.id] = f"Camera {camera.id} moved {moved}{found}."
         if _exceeds(camera.drift, rules.moved_since_first_px):
             since = f"since revision {camera.drift_since}"
             rings["moved-since-first", camera.id] = (

@@ -31,14 +31,14 @@ class Added:
 
 
 TO_VENUES = Added(
-    own=["view"],
-    of_parts={"alarms": ["trend_m"], "schedule": ["frames", "spacing_s"], "field": ["uneven_m"]},
+    own=["view", "recover"],
+    of_parts={"alarms": ["trend_m", "knocked"], "schedule": ["frames", "spacing_s"], "field": ["uneven_m"]},
     of_cameras=["light"],
 )
 TO_RESULTS = Added(
     own=["warnings", "adoptable"],
     of_parts={},
-    of_cameras=["light", "refined", "lens_change", "nights", "displacement", "cross_check"],
+    of_cameras=["light", "refined", "lens_change", "nights", "displacement", "cross_check", "knocked", "proposed"],
 )
 
 

@@ -30,7 +30,7 @@ from service.store.trends import begin_anchors, go_back
 
 r = tables.revisions.c
 # Whose poses hold, or held.
-CALIBRATION_CAUSES: tuple[Cause, ...] = ("calibrated", "accepted")
+CALIBRATION_CAUSES: tuple[Cause, ...] = ("calibrated", "recovered", "accepted")
 JOB_CAUSES: tuple[Cause, ...] = (*CALIBRATION_CAUSES, "found")
 # By which cameras stand anew, whatever they did before.
 PLACED_CAUSES: tuple[Cause, ...] = ("put", "found")

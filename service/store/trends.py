@@ -126,7 +126,7 @@ def note_night(
     """Keep how far the cameras of an accepted result are from their anchors, inside the caller's transaction.
 
     `venue`: as it is with them; `revision`: what it became by them, `at` now. What a person accepted `by_hand` is right
-    by that person's word: it is the new anchor.
+    by that person's word: it is the new anchor. So is where a knocked camera was found.
     """
     posed = {camera.id: camera.posed for camera in venue.cameras}
     anchors = _newest_anchors(connection, venue.id)
@@ -134,7 +134,7 @@ def note_night(
     rows: list[dict[str, Any]] = []
     for result in results:
         moved, anchor = result.displacement, anchors.get(result.id)
-        anew = by_hand and anchor is not None and anchor.revision != revision
+        anew = (by_hand or result.knocked) and anchor is not None and anchor.revision != revision
         if moved is None:
             if anew:
                 _add_anchor(connection, venue.id, result.id, revision)

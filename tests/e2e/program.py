@@ -91,7 +91,7 @@ def main() -> None:
     pictures = ["preview", "birdseye", *(f"overlay_{camera['id']}" for camera in cameras)]
     if behaviour == "reject":
         pictures.remove("preview")
-    good = {"reject": 0, "partly": 1}.get(behaviour, len(cameras))
+    good = {"reject": 0, "partly": 1, "knock": 1}.get(behaviour, len(cameras))
     everyone = good == len(cameras)
     common = {
         "accepted": everyone,
@@ -99,6 +99,7 @@ def main() -> None:
         "cameras": [
             found(camera, task.get("anchors", {}).get(camera["id"]), accepted=number < good)
             | (refined(camera, memories) if behaviour == "refine" else {})
+            | (knocked(camera) if behaviour == "knock" and number >= good else {})
             for number, camera in enumerate(cameras)
         ],
         "stitch_error_px": 0.2,
@@ -177,6 +178,19 @@ def remembered(task: dict, cameras: list[str]) -> dict:
     return {
         camera: {"jobs": task["memories"].get(camera, {"jobs": 0})["jobs"] + 1, "last": task["taken_at"]}
         for camera in cameras
+    }
+
+
+def knocked(camera: dict) -> dict:
+    """A camera that was found elsewhere and is proposed there."""
+    moved = {"rotation_deg": 11.2, "position_m": 0.3, "pixels": 400.0}
+    pose = found(camera, None, accepted=False)["pose"]
+    return {
+        "knocked": True,
+        "moved": moved,
+        "proposed": {"pose": pose, "sigma": None, "moved": moved, "found": 0.97},
+        "rejected_because": "turned by 11.2 degrees and moved by 0.30 m, and found again",
+        "refusal": "/refusals/knocked",
     }
 
 

@@ -122,3 +122,19 @@ def test_a_stitch_error_that_nobody_could_measure_has_no_length(stub, visit, pat
     page = visit(stub.url, path.format(job=job))
     expect(page.locator(".keys").get_by_text("not measured")).to_have_count(2)
     expect(page.locator(".keys").get_by_text("–on the pitch")).to_have_count(0)
+
+
+def test_a_knocked_camera_is_accepted_where_it_was_found_by_one_click(stub, visit):
+    name = stub.venue("knocked-page", "knock")
+    job = stub.calibrated(name)["id"]
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    right = page.get_by_role("article", name="right")
+    expect(right.get_by_text("turned by 11.2 degrees and moved by 0.30 m")).to_be_visible()
+    expect(right.get_by_role("link", name="The camera was knocked")).to_be_visible()
+    asked = []
+    page.on("dialog", lambda dialog: asked.append(dialog.message))
+    right.get_by_role("button", name="Accept right where it was found").click()
+    expect(page.get_by_role("button", name="Accept")).to_have_count(0)
+    assert asked == ["Is camera right to stand where it was found?"]
+    page.goto(f"{stub.url}/ui/venues/{name}")
+    expect(page.get_by_role("link", name="accepted by hand")).to_be_visible()

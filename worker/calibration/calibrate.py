@@ -43,6 +43,7 @@ from worker.calibration.records import (
     Recorder,
     Segment,
 )
+from worker.calibration.recovery import recover_knocked
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.refinement.refine import Observations
 from worker.calibration.solve import (
@@ -101,6 +102,11 @@ def calibrate(
 
     # Solve and judge: by the near path if all usable cameras pass there, else by search and refinement.
     solution, judged, path = _solve(problem, progress)
+
+    # Recover: search anywhere for cameras that do not stand where they stood.
+    problem, (solution, judged, path) = recover_knocked(
+        problem, (solution, judged, path), frames, segment, _solve, progress
+    )
     recorder.judged(judged.pitch, cameras, judged.cameras)
 
     # Diagnose, and remember.
@@ -307,7 +313,10 @@ def remember(
     memories: Mapping[str, CameraMemory],
     taken_at: datetime | None,
 ) -> dict[str, CameraMemory]:
-    """Return the memories of the cameras whose poses are accepted, with this job in them, which may be their first."""
+    """Return the memories of the cameras whose poses are accepted, with this job in them, which may be their first.
+
+    That of a camera that was knocked begins anew, where it was found.
+    """
     lines = judged.pitch.line_points()
     after = {}
     for before, result in zip(stored, judged.cameras, strict=True):
@@ -317,6 +326,7 @@ def remember(
         job = AcceptedJob(
             result.camera, result.measured, lines, taken_at, result.repainted_markings, seen, zoomed=result.lens_changed
         )
-        (memory,) = memories_of_field([memories.get(before.id)], lines)
-        after[before.id] = CameraMemory.from_first_job(before, job) if memory is None else memory.after(job)
+        (memory,) = memories_of_field([None if result.knocked else memories.get(before.id)], lines)
+        begun = result.camera if result.knocked else before
+        after[before.id] = CameraMemory.from_first_job(begun, job) if memory is None else memory.after(job)
     return after

@@ -104,7 +104,9 @@ def find_cameras(
         )
         beside = [camera for camera in known if camera.id in frames]
         with progress.timed("calibration"):
-            calibrated = calibrate(pitch, [*found, *beside], frames, remembered, Options(seed=seed), stop=stop)
+            calibrated = calibrate(
+                pitch, [*found, *beside], frames, remembered, Options(seed=seed, recover="never"), stop=stop
+            )
     return FoundCameras(
         [_judged(camera, placed[camera.id], calibrated) for camera in sought],
         None if calibrated is None else calibrated.stitch_error_px,

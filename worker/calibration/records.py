@@ -23,8 +23,9 @@ from worker.calibration.refinement.diagnosis import Suspicion
 from worker.calibration.stitching.photometry import Light
 
 Stage = Literal["segmentation", "evolution", "refinement", "preview"]
-Search = Literal["auto", "wide"]
-Path = Literal["near", "wide"]
+Search = Literal["auto", "wide", "anywhere"]
+Recover = Literal["propose", "accept", "never"]
+Path = Literal["near", "wide", "anywhere"]
 Verdict = Literal["accepted", "partly", "rejected"]
 
 SHARE_OF_JOB = {"segmentation": (0.0, 0.65), "evolution": (0.65, 0.85), "refinement": (0.85, 0.92)}
@@ -43,10 +44,11 @@ class Options:
     """Options of a calibration; `parents`, `offspring`, `generations` and `stitch_weight` are mu, lambda, G and the
     trade-off lambda of section III of the paper.
 
-    `search`: `auto` tries the near path before it searches, `wide` always searches. `fit_focal_length`: solve for the
-    focal length of each camera, which heat changes; `fit_ridge`: for the ridge's height; `lens_may_drift`: whether a
-    pose may be accepted with another focal length than the stored one. The first three are
-    for ESC's own method alone.
+    `search`: `auto` tries the near path before it searches, and then searches anywhere for cameras whose lines are
+    elsewhere; `wide` always searches around the stored poses, and nowhere else; `anywhere` searches anywhere for all.
+    `recover`: whether a camera that was knocked and found is proposed to a person or accepted; `never`: it is not
+    searched for. `fit_focal_length`: solve for the focal length of each camera, which heat changes; `fit_ridge`: for
+    the ridge's height; `lens_may_drift`: whether a pose may be accepted with another focal length than the stored one.
     """
 
     search: Search = "auto"
@@ -59,6 +61,7 @@ class Options:
     fit_focal_length: bool = False
     fit_ridge: bool = False
     lens_may_drift: bool = False
+    recover: Recover = "propose"
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,8 @@ class EngineResult:
 class Calibration(EngineResult):
     """New poses from frames. `suspicions`: given numbers of lenses and field that the lines contradict.
 
-    `path`: whether they were found `near` their stored poses, or by a search (`wide`). `lights`: of accepted cameras
+    `path`: whether they were found `near` their stored poses, by a search around these (`wide`), or one of them by a
+    search `anywhere`. `lights`: of accepted cameras
     that overlap, by camera. `memories`: of cameras whose poses are accepted, with this job in them, by camera.
     """
 

@@ -132,7 +132,9 @@ def _method(options: Options) -> Callable[..., engine.Calibration]:
 def _engine_options(venue: Venue, options: Options) -> engine.Options:
     asked = {field.name for field in fields(engine.Options)}
     return engine.Options(
-        **options.model_dump(include=asked, exclude_none=True), lens_may_drift=venue.lens == "may-drift"
+        **options.model_dump(include=asked, exclude_none=True),
+        lens_may_drift=venue.lens == "may-drift",
+        recover=venue.recover,
     )
 
 

@@ -30,7 +30,8 @@ Frames = Mapping[str, Sequence[Picture]]
 class RecordingSegmenter:
     """A network that remembers what it said of the first frame of each camera.
 
-    When it has seen all frames it is released: search, judgement and pictures come after, and need as much memory.
+    When it has seen all frames it is released, and whenever it has seen one again: search, judgement and pictures come
+    after, and need as much memory.
     """
 
     def __init__(self, segmenter: Segmenter, frames: Frames) -> None:
@@ -43,7 +44,7 @@ class RecordingSegmenter:
         """As the network that is asked."""
         response = self._segmenter(frame, regions)
         self._unseen -= 1
-        if self._unseen == 0:
+        if self._unseen <= 0:
             self._segmenter.release()
         if id(frame) in self._cameras:
             self.responses[self._cameras[id(frame)]] = response

@@ -18,6 +18,7 @@ from service.schemas.results import (
     CrossCheck,
     MarkingResult,
     PairResult,
+    Proposal,
     Provenance,
     SeamPlace,
     Sigma,
@@ -139,11 +140,7 @@ def camera_to_schema(
         intrinsics=lens,
         sigma=sigma_to_schema(found.sigma),
         repeatability=sigma_to_schema(found.repeatability),
-        moved=Moved(
-            rotation_deg=found.moved.rotation_deg,
-            position_m=found.moved.position_m,
-            pixels=finite_or_none(found.moved.pixels),
-        ),
+        moved=_moved(found.moved),
         iou=finite_or_none(found.overlap.iou),
         expected_found=finite_or_none(found.overlap.found),
         unexpected=finite_or_none(found.overlap.unexpected),
@@ -153,8 +150,27 @@ def camera_to_schema(
         residual_px=finite_or_none(found.residual_px),
         light=light,
         markings=[_marking(one) for one in found.markings],
+        knocked=found.knocked,
+        proposed=_proposal(found) if _is_proposed(found) else None,
         displacement=moved_from_anchor,
         cross_check=_cross_check(found.cross_checked()),
+    )
+
+
+def _moved(found: quality.Movement) -> Moved:
+    return Moved(rotation_deg=found.rotation_deg, position_m=found.position_m, pixels=finite_or_none(found.pixels))
+
+
+def _is_proposed(found: quality.CameraResult) -> bool:
+    return found.refusal is not None and found.refusal.reason == "knocked"
+
+
+def _proposal(found: quality.CameraResult) -> Proposal:
+    return Proposal(
+        pose=pose_to_schema(found.camera.pose),
+        sigma=sigma_to_schema(found.sigma),
+        moved=_moved(found.moved),
+        found=finite_or_none(found.evidence.share),
     )
 
 

@@ -29,10 +29,11 @@ async function change(patch) {
 
 const alarms = document.getElementById("alarms");
 onSubmit(alarms, () => {
-  const typed = [...alarms.querySelectorAll("input")].map(({name, value}) => [name, value.trim()]);
+  const typed = [...alarms.querySelectorAll("input:not([type=checkbox])")].map(({name, value}) => [name, value.trim()]);
   const rules = typed.map(([name, value]) => [name, value === "" ? null : name === "callback_url" ? value : Number(value.replace(",", "."))]);
   const unreadable = rules.find(([, value]) => Number.isNaN(value));
   if (unreadable) throw new Error(`“${alarms.elements[unreadable[0]].value}” is not a number.`);
+  rules.push(["knocked", alarms.elements.knocked.checked || null]);
   return change({alarms: rules.some(([, value]) => value !== null) ? Object.fromEntries(rules) : null});
 });
 

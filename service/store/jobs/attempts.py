@@ -15,6 +15,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from service.schemas.history import Cause
 from service.schemas.job import JobError, Progress
 from service.schemas.names import JobKind
 from service.schemas.options import Options
@@ -237,7 +238,8 @@ def _move_poses(
         quality.missed(stored.venue.poses.keys() - held)
         with_this_job = {camera: memory for camera, memory in memories.items() if camera in held}
         known = {**newest_memories(connection, task.venue.id), **with_this_job}
-        apply_result(connection, quality, stored, result, held, "calibrated", task.job_id, known, task.origin.actor)
+        cause: Cause = "recovered" if result.recovered_cameras else "calibrated"
+        apply_result(connection, quality, stored, result, held, cause, task.job_id, known, task.origin.actor)
     elif not task.options.dry_run:
         _miss(connection, quality, stored.venue)
     return result

@@ -58,7 +58,8 @@ class QualityRow:
 class VenueQuality:
     """The quality of a venue at one moment, `now`; `row` is changed by whatever happens to the venue.
 
-    `newest_revision`: the row of its newest revision, once that was read or written; None before.
+    `newest_revision`: the row of its newest revision, once that was read or written; None before. `knocked`: by camera
+    why the calibration that has just ended proposes its pose; None: none has just ended.
     """
 
     def __init__(self, venue_id: str, row: QualityRow, now: datetime) -> None:
@@ -66,12 +67,16 @@ class VenueQuality:
         self.row = row
         self.now = now
         self.newest_revision: Any = None
+        self.knocked: dict[str, str] | None = None
 
     def calibrated(self, result: Result, *, moved: bool) -> None:
         """A calibration has ended with a result; `moved`: poses of it hold from now on."""
         shifts = [camera.moved.pixels for camera in result.cameras if camera.moved.pixels is not None]
         self.row.stitch_error_px = result.stitch_error_px if moved else result.stitch_error_before_px
         self.row.moved_px = max(shifts, default=None)
+        self.knocked = {
+            camera.id: camera.rejected_because or "" for camera in result.cameras if camera.proposed is not None
+        }
 
     def missed(self, cameras: Collection[str]) -> None:
         """A calibration brought no pose for some cameras."""
@@ -91,6 +96,7 @@ class VenueQuality:
             view = usable.get(camera) or courses.get(camera, CameraHistory()).view
             courses[camera] = CameraHistory(accepted_at=self.now, view=view)
         self.row.accepted_at, self.row.rejected_in_a_row = self.now, 0
+        self.knocked = {camera: why for camera, why in (self.knocked or {}).items() if camera not in cameras}
 
     def ended(self, status: JobStatus, result: AnyResult | None, *, dry_run: bool) -> None:
         """A calibration has ended, however: for the list of all venues."""

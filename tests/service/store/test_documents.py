@@ -10,9 +10,9 @@ import sqlalchemy as sa
 from pydantic import ValidationError
 
 from service.schemas.base import TOLERANTLY
-from service.schemas.geometry import Light
+from service.schemas.geometry import Light, Moved
 from service.schemas.job import Job, JobError
-from service.schemas.results import AdoptableNumber, CrossCheck, LensChange, Refined
+from service.schemas.results import AdoptableNumber, CrossCheck, LensChange, Proposal, Refined
 from service.schemas.trend import Displacement
 from service.schemas.venue import Venue, VenueIn
 from service.store import tables
@@ -38,7 +38,8 @@ def refuse_unknown(schema_of, document):
 def everything():
     put = venue("main") | {
         "view": {},
-        "alarms": {"trend_m": 0.2},
+        "recover": "accept",
+        "alarms": {"trend_m": 0.2, "knocked": True},
         "schedule": {"cron": "0 3 * * *", "frames": 4, "options": {"seed": 3}},
         "webhooks": [{"url": "https://example.com/"}],
     }
@@ -58,6 +59,10 @@ def whole_result(of):
         "refined": refined,
         "lens_change": change,
         "nights": 3,
+        "knocked": True,
+        "proposed": Proposal(
+            pose=pose, sigma=None, moved=Moved(rotation_deg=11.2, position_m=0.3, pixels=None), found=0.97
+        ),
         "cross_check": CrossCheck(apart_m=0.01, expected_m=0.01),
         "displacement": Displacement(anchor=1, **DISPLACEMENT),
     }
@@ -71,8 +76,12 @@ def test_0_1_0_can_read_the_document_of_a_venue_and_nothing_of_it_is_lost():
     document, additions = venue_columns(of)
     refuse_unknown("Venue", document)
     assert additions == {
-        "own": {"view": {}},
-        "of_parts": {"alarms": {"trend_m": 0.2}, "schedule": {"frames": 4}, "field": {"uneven_m": 0.004}},
+        "own": {"view": {}, "recover": "accept"},
+        "of_parts": {
+            "alarms": {"trend_m": 0.2, "knocked": True},
+            "schedule": {"frames": 4},
+            "field": {"uneven_m": 0.004},
+        },
         "of_cameras": {"left": {"light": {"gain": [1.1, 1.0, 0.9]}}},
     }
     assert stored_venue(document, additions) == of

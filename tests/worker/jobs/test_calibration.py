@@ -91,7 +91,10 @@ def asked(monkeypatch):
                 overlap=Overlap(0.9, 0.95, 0.05),
                 evidence_before=seen,
                 moved=Movement(0.0, 0.05, float("nan")),
-                refusal=Refusal("view", asked["against"][camera.id]) if camera.id in asked["against"] else None,
+                refusal=Refusal(asked.get("reason", "view"), asked["against"][camera.id])
+                if camera.id in asked["against"]
+                else None,
+                knocked=asked.get("reason") == "knocked" and camera.id in asked["against"],
                 markings=asked.get("markings", ()),
             )
             for camera in cameras
@@ -267,6 +270,21 @@ def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue,
     assert fitted.cameras[0].intrinsics.matrix == venue.cameras[0].intrinsics.matrix
     assert fitted.ridge == venue.field.ridge
     assert asked["options"] == engine.Options(fit_focal_length=True, fit_ridge=True)
+
+
+def test_a_venue_says_whether_a_knocked_camera_is_proposed_or_accepted(venue, files, asked, means):
+    for recover in ("propose", "accept"):
+        found = venue.model_copy(update={"recover": recover})
+        calibration.solve(found, files, Options(seed=7), means, lambda _: None)
+        assert asked["options"].recover == recover
+
+
+def test_where_a_knocked_camera_was_found_is_in_the_answer_as_a_proposal(venue, files, asked, means):
+    asked |= {"against": {"left": "turned by 11.2 degrees"}, "reason": "knocked"}
+    left, right = calibration.solve(venue, files, Options(seed=7), means, lambda _: None).result.cameras
+    assert (left.knocked, left.refusal) == (True, "/refusals/knocked")
+    assert (left.proposed.pose, left.proposed.moved, left.proposed.sigma) == (left.pose, left.moved, left.sigma)
+    assert (right.knocked, right.proposed) == (False, None)
 
 
 def test_a_venue_whose_lens_may_drift_is_calibrated_so(venue, files, asked, means):

@@ -61,6 +61,7 @@ Reason = Literal[
     "zoomed",
     "undetermined",
     "moved",
+    "knocked",
     "stored-better",
     "not-together",
     "disagree",
@@ -116,7 +117,8 @@ class CameraResult(RefinedPose):
     `view`: whether its frame could be used, and what is wrong with it if not; `overlap`: of expected lines and the
     segmentation; `refusal`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
     camera's lens is not the stored one but what the lines say; `markings`: what is seen of each; `moved_in_all`: since
-    its memory began, None without one.
+    its memory began, None without one; `knocked`: whether it was found again farther from its stored pose than the gate
+    allows, by a search anywhere.
     """
 
     view: ViewCondition
@@ -127,6 +129,7 @@ class CameraResult(RefinedPose):
     lens_found: bool = False
     markings: Sequence[MarkingReport] = field(default=(), kw_only=True)
     moved_in_all: Movement | None = field(default=None, kw_only=True)
+    knocked: bool = field(default=False, kw_only=True)
 
     @property
     def accepted(self) -> bool:

@@ -12,7 +12,7 @@ from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.rotation import rotation_vectors
 from worker.calibration.relocalisation.agreement import agreement
 from worker.calibration.relocalisation.climbing import climb
-from worker.calibration.relocalisation.drawing import draw
+from worker.calibration.relocalisation.drawing import draw, draw_at
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import HALF_TURN, Hypotheses
 from worker.calibration.relocalisation.line_assignment import positions
@@ -27,7 +27,7 @@ FIRST_TOLERANCE_PX, DRAWN_TOLERANCE_PX = 8.0, 10.0
 CLIMBING_KNOWN, CLIMBING_UNKNOWN = 60, 160
 CLEARLY_FOUND = 0.45
 """Agreement from which nothing is drawn at random: what was found from lines is better than any draw."""
-DRAWN, CLIMBING_DRAWN = 20000, 120
+DRAWN, DRAWN_AT_PLACE, CLIMBING_DRAWN = 20000, 6000, 120
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def _through(
     start = _best(field, view, by_lines, FIRST_TOLERANCE_PX, CLIMBING_KNOWN if known else CLIMBING_UNKNOWN)
     found, scores = climb(field, view, start, not known, rng)
     if scores.max(initial=0.0) < CLEARLY_FOUND:
-        drawn = _at(place, field, draw(field, focal, DRAWN, rng))
+        drawn = _drawn(field, focal, place, rng)
         by_draws = _best(field, view, drawn, DRAWN_TOLERANCE_PX, CLIMBING_DRAWN)
         found, scores = climb(field, view, Hypotheses.joined([by_draws, found]), not known, rng)
     return [
@@ -75,6 +75,13 @@ def _through(
             found.rotations, found.positions, found.focal_px, scores, strict=True
         )
     ]
+
+
+def _drawn(field: FieldMap, focal: Array, place: Place, rng: np.random.Generator) -> Hypotheses:
+    """Cameras drawn at random: where they are known to stand, or else from where fields are filmed."""
+    if place.position is not None:
+        return _at(place, field, draw_at(field, focal, place.position, place.radius_m, DRAWN_AT_PLACE, rng))
+    return _at(place, field, draw(field, focal, DRAWN, rng))
 
 
 def _with_neighbours(directions: list[Direction], rng: np.random.Generator) -> list[Direction]:

@@ -6,7 +6,7 @@ clearly different pose explains the frame nearly as well.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -98,21 +98,28 @@ class Relocalisation:
 
 
 def relocalise(
-    field: Field, markings: FieldMap, sought: SoughtCamera, channels: Channels, response: Response, seed: int
+    field: Field,
+    markings: FieldMap,
+    sought: SoughtCamera,
+    channels: Channels,
+    response: Response,
+    seed: int,
+    pulse: Callable[[], None] = lambda: None,
 ) -> Relocalisation:
     """Find the camera that took a frame; `response` (height, width) in 0..1 of the network; `markings`: of the field.
 
-    Where its focal length is not known, k1, k2 and principal point are found with it and the pose.
+    Where its focal length is not known, k1, k2 and principal point are found with it and the pose. `pulse` is called
+    every second or so, and may raise to end the search.
     """
     small = np.rint(response * 255).astype(np.uint8)
     sight = _Sight(field, Observations([channels], [response]), Paint.of(small))
     candidates = list[Candidate]()
     for attempt in range(ATTEMPTS):
+        pulse()
         proposals = propose(markings, small, sought, seed + attempt)
-        candidates += [
-            sight.with_lens_and_pose(camera) if sought.is_lens_sought else sight.with_pose(camera)
-            for camera in _distinct(field, markings, sought, proposals)
-        ]
+        for camera in _distinct(field, markings, sought, proposals):
+            pulse()
+            candidates.append(sight.with_lens_and_pose(camera) if sought.is_lens_sought else sight.with_pose(camera))
         candidates.sort(key=lambda one: -one.agreement)
         found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, candidates))
         if not candidates or found.refusal is None or found.refusal.reason != "lines":

@@ -1,0 +1,180 @@
+"""Cameras that were knocked find themselves, and nothing else is taken for a knock."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.worker.calibration.synthetic import CROWNED, camera, pair
+from tests.worker.calibration.test_calibrate import frames, outdated, white_on_green
+from worker.calibration import recovery
+from worker.calibration.calibrate import calibrate
+from worker.calibration.geometry.camera import Pose
+from worker.calibration.geometry.rotation import rotation_angles_deg, rotation_matrices, rotation_vectors
+from worker.calibration.records import Options, Stopped
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.relocalise import Candidate, NotFound, Relocalisation, twin
+from worker.calibration.relocalisation.sought import ANYWHERE
+
+TURNED_DEG = 14.0
+UPRIGHT = np.array([0.0, 0.0, 1.0])
+
+
+def turned(one, degrees):
+    about_the_pole = rotation_matrices(np.radians(degrees) * UPRIGHT)
+    return one.with_pose(Pose(rotation_vectors(one.pose.matrix @ about_the_pole), one.pose.position))
+
+
+def knocked_venue():
+    """The right camera is where it was put, but for the wind; the left one was turned on its pole since."""
+    left, right = outdated()
+    return [turned(left, TURNED_DEG), right]
+
+
+class CountingNetwork:
+    """The network of the painted frames, and how many of them it saw in whole."""
+
+    def __init__(self):
+        self.whole = 0
+
+    def __call__(self, frame, regions):
+        area = sum((one.right - one.left) * (one.bottom - one.top) for one in regions)
+        self.whole += area >= frame.shape[0] * frame.shape[1]
+        return white_on_green(frame, regions)
+
+
+def run(cameras, pictures=None, network=white_on_green, **options):
+    return calibrate(CROWNED, cameras, pictures or frames(), network, Options(**options))
+
+
+@cache
+def proposed():
+    return run(knocked_venue(), seed=3)
+
+
+@cache
+def accepted():
+    return run(knocked_venue(), seed=3, recover="accept")
+
+
+def test_a_camera_that_was_turned_on_its_pole_is_found_and_proposed_with_how_far_it_turned():
+    left, _ = proposed().cameras
+    truth, _ = pair()
+    assert left.refusal.reason == "knocked"
+    assert f"turned by {left.moved.rotation_deg:.1f} degrees" in left.rejected_because
+    assert left.moved.rotation_deg == pytest.approx(TURNED_DEG, abs=1.0)
+    assert np.linalg.norm(left.camera.pose.position - truth.pose.position) < 0.05
+    assert rotation_angles_deg(left.camera.pose.rotation, truth.pose.rotation) < 0.05
+    assert proposed().path == "anywhere"
+
+
+def test_a_proposal_moves_no_other_camera_and_leaves_nothing_to_remember():
+    _, right = proposed().cameras
+    assert right.accepted
+    assert set(proposed().memories) == {"right"}
+    alone = run([outdated()[1]], {"right": frames()["right"]}, seed=3)
+    apart_m = np.linalg.norm(right.camera.pose.position - alone.cameras[0].camera.pose.position)
+    assert apart_m < 0.01
+
+
+def test_where_the_venue_accepts_it_the_pose_holds_and_its_memory_begins_there():
+    left, right = accepted().cameras
+    assert left.accepted
+    assert right.accepted
+    assert left.knocked
+    assert not right.knocked
+    np.testing.assert_array_equal(accepted().memories["left"].origin.pose.rotation, left.camera.pose.rotation)
+    assert accepted().stitch_error_px < 0.2
+
+
+def test_the_memory_of_a_camera_from_before_a_knock_is_forgotten():
+    truth = pair()
+    before = run(outdated(), seed=3).memories
+    again = calibrate(
+        CROWNED,
+        [turned(truth[0], TURNED_DEG), truth[1]],
+        frames(),
+        white_on_green,
+        Options(seed=3, recover="accept"),
+        memories={"left": replace(before["left"], frames="of another night"), "right": before["right"]},
+    )
+    assert again.cameras[0].accepted, again.cameras[0].rejected_because
+    assert again.memories["left"].jobs == 1
+
+
+def test_a_search_around_the_stored_poses_alone_can_be_asked_for():
+    left, right = run(knocked_venue(), seed=3, search="wide").cameras
+    assert left.refusal.reason == "lines"
+    assert right.accepted
+
+
+def test_a_good_job_and_a_dark_frame_cost_no_search():
+    network = CountingNetwork()
+    assert run(outdated(), network=network, seed=3).accepted
+    assert network.whole == 0
+    dark = {**frames(), "left": (np.zeros_like(frames()["left"][0]),)}
+    assert run(outdated(), dark, network=network, seed=3).cameras[0].refusal.reason == "view"
+    assert network.whole == 0
+
+
+def test_a_frame_without_lines_is_looked_at_once_more_and_not_searched(monkeypatch):
+    def never(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(recovery, "relocalise", never)
+    rng = np.random.default_rng(1)
+    grass = np.clip(rng.normal((60, 130, 70), 6, frames()["left"][0].shape), 0, 255).astype(np.uint8)
+    (found,) = run([outdated()[0]], {"left": (grass,)}, seed=3).cameras
+    assert not found.accepted
+
+
+def test_a_request_to_stop_ends_a_search_anywhere(monkeypatch):
+    asked = []
+
+    def searching(*given):
+        asked.append(given)
+        (*_, pulse) = given
+        pulse()
+        raise AssertionError
+
+    monkeypatch.setattr(recovery, "relocalise", searching)
+    with pytest.raises(Stopped):
+        calibrate(CROWNED, knocked_venue(), frames(), white_on_green, Options(seed=3), stop=lambda: bool(asked))
+    assert len(asked) == 1
+
+
+def test_exchanged_frames_are_no_knock():
+    swapped = {"left": frames()["right"], "right": frames()["left"]}
+    found = run(outdated(), swapped, seed=3)
+    assert [one.refusal.reason for one in found.cameras] == ["other-camera"] * 2
+    assert not any(one.knocked for one in found.cameras)
+
+
+def found_as(one):
+    return Relocalisation([Candidate(one, 0.9, 0.9, None, None, 1.0, None)], None)
+
+
+def on_its_side(stored, found):
+    return recovery._on_its_side(FieldMap.of(CROWNED), stored, found_as(found), ANYWHERE)
+
+
+def test_of_a_camera_and_its_twin_the_one_is_taken_that_stands_where_it_stood():
+    left, _ = pair()
+    moved = turned(left, 40.0)
+    for found in (moved, twin(moved)):
+        np.testing.assert_allclose(on_its_side(left, found).pose.position, left.pose.position)
+
+
+def test_above_the_middle_of_a_field_the_twin_is_told_by_how_far_it_turned():
+    above = camera("left", (0.5, -1.0, 25.0), (10.0, 3.0))
+    here = camera("left", (0.1, 0.0, 25.0), (9.6, 4.0))
+    for found in (turned(here, 20.0), twin(turned(here, 20.0))):
+        assert rotation_angles_deg(on_its_side(above, found).pose.rotation, above.pose.rotation) < 30.0
+    assert on_its_side(above, turned(here, 88.0)) is None
+
+
+def test_what_was_not_surely_found_is_not_taken():
+    left, _ = pair()
+    unsure = replace(found_as(left), refusal=NotFound("not-unique", "two poses explain the lines"))
+    assert recovery._on_its_side(FieldMap.of(CROWNED), left, unsure, ANYWHERE) is None

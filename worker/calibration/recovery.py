@@ -1,0 +1,269 @@
+"""Recovery of knocked cameras: those whose lines are clearly seen, and not where the stored poses expect them.
+
+Such a camera is searched for where it stood, turned on its mount by any angle; and if that finds nothing, anywhere.
+What is found is refined and judged with the other cameras, as if it had been stored, and holds only if none of them is
+refused for it. Beyond the gate's limits of movement it is proposed to a person, or accepted where the venue says so.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from worker.calibration.detection.exclusions import of_use
+from worker.calibration.detection.frame_fusion import median, sways
+from worker.calibration.detection.segmentation import whole_frame
+from worker.calibration.detection.view_condition import OF_THE_GROUND, ViewCondition, look_at
+from worker.calibration.diagnostics.registration import Response
+from worker.calibration.gate.pairs import stitch_error_px
+from worker.calibration.gate.quality import CameraResult, Movement, Refusal, in_one_sentence
+from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.records import EngineResult, Path, ProgressReporter, Segment
+from worker.calibration.refinement.refine import Observations
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.paint import Paint
+from worker.calibration.relocalisation.relocalise import Relocalisation, mean_shift_px, relocalise, twin
+from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
+from worker.calibration.solve import ObservedCameras, PoseSolution, Problem
+
+LOST = frozenset({"lines", "few-lines", "moved"})
+"""Reasons for a refusal that a knocked camera may have."""
+UNFIT = frozenset({"residual", "zoomed", "undetermined"})
+"""Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
+LEAST_PAINT, LEAST_UNEXPLAINED = 200, 0.4
+"""Lines are clearly seen elsewhere when so many of the places on the middles of paint are there, and this share of them
+lies on no line by any pose that was found."""
+ON_ITS_MOUNT_M = 2.5
+"""How far from its stored place a camera is searched for first."""
+LONGEST_S = 20.0
+"""Core-seconds after which the search for a camera is not begun anew: what a much slower machine finds less by."""
+CLEARLY_NEARER, MUCH_LESS_TURNED_DEG = 0.5, 60.0
+"""Of a camera and its twin on a symmetric field the one is taken that is clearly nearer to the stored place: by less
+than this part of the other's distance; or else the one that is turned by so much less."""
+OWN_PLACE_M = 0.1
+"""A camera that looks where another one of the venue looks stands in its own place if that is so much nearer."""
+HOPELESS = frozenset({"no-lines", "not-unique"})
+"""What a search where a camera stood ends with, and one anywhere would all the more."""
+UNSEEN_PX, SAME_PART = 1e4, 0.002
+"""What a marking counts that only one of two cameras sees; and cameras are the same that put the markings apart by less
+than this part of the frame's width."""
+
+Solved = tuple[PoseSolution, EngineResult, Path]
+
+
+@dataclass(frozen=True)
+class FoundAgain:
+    """A camera at the pose where it was found, what is seen in all of its frame, and the view condition there."""
+
+    camera: Camera
+    response: Response
+    view: ViewCondition
+
+
+def recover_knocked(
+    problem: Problem,
+    solved: Solved,
+    frames: Mapping[str, Sequence[Frame]],
+    segment: Segment,
+    solve: Callable[[Problem, ProgressReporter], Solved],
+    progress: ProgressReporter,
+) -> tuple[Problem, Solved]:
+    """Return the problem and its solution with those cameras in it that were searched for and found again.
+
+    `solve`: what has `solved` the problem. The cameras of the problem that is returned are at their stored poses.
+    """
+    _, judged, _ = solved
+    sought = [n for n in range(len(problem.cameras)) if _is_sought(problem, n, judged.cameras[n])]
+    with progress.timed("evolution"):
+        searched = {n: _search(problem, judged.cameras[n], n, frames, segment, progress) for n in sought}
+    found = {n: one for n, one in searched.items() if one is not None}
+    while found:
+        begun = _begun_there(problem, found)
+        anew = solve(begun, progress.muted())
+        confirmed = {n: one for n, one in found.items() if _is_there(anew[1].cameras[n])}
+        harmed = any(
+            one.accepted and not two.accepted for one, two in zip(judged.cameras, anew[1].cameras, strict=True)
+        )
+        if confirmed.keys() == found.keys() and not harmed:
+            return replace(begun, cameras=problem.cameras), _joined(problem, solved, anew, found)
+        found = {} if harmed and confirmed.keys() == found.keys() else confirmed
+    return problem, solved
+
+
+def _is_sought(problem: Problem, number: int, result: CameraResult) -> bool:
+    """Whether a camera is to be searched for: whatever its result, or where that is one of a knocked camera."""
+    if problem.options.search == "wide" or problem.options.recover == "never":
+        return False
+    if problem.options.search == "anywhere":
+        return result.view.cause != "other-camera"
+    if result.view.cause in OF_THE_GROUND:
+        # Said of where the stored pose has the ground: lines that the network saw beside it contradict it.
+        return _has_lines_elsewhere(problem, result, problem.observed.observations.responses[number])
+    if result.refusal is None or result.refusal.reason not in LOST:
+        return False
+    # A mount that gave way over many nights stands where it was found last night.
+    return result.refusal.reason != "moved" or result.moved.beyond(problem.gate)
+
+
+def _is_there(result: CameraResult) -> bool:
+    """Whether a camera stands where it was found: the gate has nothing against it, or but its lens and its sigma."""
+    return result.refusal is None or result.refusal.reason in UNFIT
+
+
+def _search(
+    problem: Problem,
+    result: CameraResult,
+    number: int,
+    frames: Mapping[str, Sequence[Frame]],
+    segment: Segment,
+    progress: ProgressReporter,
+) -> FoundAgain | None:
+    """Search for a camera at its stored place, and then anywhere; None where it is not surely found."""
+    stored = problem.cameras[number]
+    progress.at("evolution", 0.0)
+    response = _response_everywhere(stored, frames[stored.id], segment)
+    if problem.options.search == "auto" and not _has_lines_elsewhere(problem, result, response):
+        return None
+    markings = FieldMap.of(problem.pitch)
+    begun = time.process_time()
+    for place in (Place(position=stored.pose.position, radius_m=ON_ITS_MOUNT_M), ANYWHERE):
+        if time.process_time() - begun > LONGEST_S:
+            break
+        found = relocalise(
+            problem.pitch,
+            markings,
+            SoughtCamera(stored.id, [SoughtLens.known(stored.intrinsics)], place, stored.ignored),
+            problem.observed.observations.channels[number],
+            response,
+            problem.options.seed,
+            lambda: progress.at("evolution", 0.5),
+        )
+        camera = _on_its_side(markings, stored, found, place)
+        if camera is not None and not _is_anothers(problem, number, camera):
+            camera = stored.with_pose(camera.pose)
+            if result.accepted and _is_same(problem, markings, result.camera, camera):
+                return None
+            view = look_at(frames[stored.id][0], problem.pitch, camera)
+            return FoundAgain(camera, response, view) if view.usable else None
+        if found.refusal is not None and found.refusal.reason in HOPELESS:
+            break
+    return None
+
+
+def _response_everywhere(camera: Camera, frames: Sequence[Frame], segment: Segment) -> Response:
+    """The fused response (H, W) of the network to all of the frames, and not only where the stored pose has lines."""
+    swayed = sways(frames, camera.intrinsics)
+    regions = whole_frame(camera.intrinsics.size)
+    return of_use(camera.ignored, median([segment(frame, regions) for frame in frames], swayed) / np.float32(255))
+
+
+def _has_lines_elsewhere(problem: Problem, result: CameraResult, response: Response) -> bool:
+    """Whether lines are clearly seen that neither the stored nor the best pose explains; of one that moved, any."""
+    paint = Paint.of(np.rint(response * 255).astype(np.uint8))
+    if len(paint.middles) < LEAST_PAINT:
+        return False
+    if result.refusal is not None and result.refusal.reason == "moved":
+        return True
+    return paint.explained_by(problem.pitch, result.camera) <= 1 - LEAST_UNEXPLAINED
+
+
+def _on_its_side(markings: FieldMap, stored: Camera, found: Relocalisation, place: Place) -> Camera | None:
+    """The camera that was found, of a symmetric field the one of both that stands where it stood; None if unclear."""
+    if found.refusal is not None:
+        return None
+    camera = found.candidates[0].camera
+    if not place.is_anywhere:
+        return camera if place.allows(camera.pose.position[None])[0] else None
+    if not markings.is_symmetric:
+        return camera
+    near, far = sorted((camera, twin(camera)), key=lambda one: _away_m(stored, one))
+    if _away_m(stored, near) < CLEARLY_NEARER * _away_m(stored, far):
+        return near
+    less, more = sorted((camera, twin(camera)), key=lambda one: _turned_deg(stored, one))
+    return less if _turned_deg(stored, less) < _turned_deg(stored, more) - MUCH_LESS_TURNED_DEG else None
+
+
+def _is_anothers(problem: Problem, number: int, found: Camera) -> bool:
+    """Whether the frame is rather another camera's: cables are exchanged more often than cameras."""
+    return any(
+        n != number
+        and other.intrinsics.size == found.intrinsics.size
+        and not Movement.between(problem.pitch, other, found).beyond(problem.gate)
+        and _away_m(other, found) < _away_m(problem.cameras[number], found) + OWN_PLACE_M
+        for n, other in enumerate(problem.cameras)
+    )
+
+
+def _begun_there(problem: Problem, found: Mapping[int, FoundAgain]) -> Problem:
+    """The problem as if cameras had been stored where they were found; one that was knocked remembers nothing."""
+    cameras, memories, views = list(problem.cameras), list(problem.memories), list(problem.observed.views)
+    responses = list(problem.observed.observations.responses)
+    for n, one in found.items():
+        if Movement.between(problem.pitch, problem.cameras[n], one.camera).beyond(problem.gate):
+            memories[n] = None
+        cameras[n], views[n], responses[n] = one.camera, one.view, one.response
+    observed = ObservedCameras(views, Observations(problem.observed.observations.channels, responses))
+    # Whatever was asked for, from there they are near.
+    options = replace(problem.options, search="auto")
+    return replace(problem, cameras=cameras, memories=memories, observed=observed, options=options)
+
+
+def _joined(problem: Problem, before: Solved, again: Solved, found: Mapping[int, FoundAgain]) -> Solved:
+    """The solution with the cameras that were found, beside their stored poses; a proposed one moves no other."""
+    _, judged, _ = again
+    back = {n: _beside_stored(problem, n, judged.cameras[n], before[1].cameras[n]) for n in found}
+    solution, base, _ = before if all(result.refusal is not None for result in back.values()) else again
+    results = [back.get(n, result) for n, result in enumerate(base.cameras)]
+    accepted = {result.camera.id for result in results if result.accepted}
+    pairs = [pair for pair, _ in judged.pairs if not accepted or accepted.issuperset(pair.cameras)]
+    reasons = [f"camera {one.camera.id}: {one.rejected_because}" for one in results if one.rejected_because]
+    told = replace(
+        base,
+        cameras=results,
+        rejected_because=in_one_sentence(reasons) or None,
+        stitch_error_px=stitch_error_px(pairs, problem.gate),
+        pairs=judged.pairs,
+    )
+    return solution, told, "anywhere"
+
+
+def _beside_stored(problem: Problem, number: int, result: CameraResult, before: CameraResult) -> CameraResult:
+    """The result of a camera that was found, as seen from its stored pose; refused where a person is to be asked."""
+    moved = Movement.between(problem.pitch, problem.cameras[number], result.camera)
+    result = replace(result, moved=moved, evidence_before=before.evidence_before)
+    if not moved.beyond(problem.gate):
+        return result
+    if result.refusal is not None:
+        words = f"{_turned_and_moved(moved)}, and found again there, but {result.refusal.words}"
+        return replace(result, knocked=True, refusal=replace(result.refusal, words=words))
+    refusal = None if problem.options.recover == "accept" else Refusal("knocked", _proposal(result))
+    return replace(result, knocked=True, refusal=refusal)
+
+
+def _turned_and_moved(moved: Movement) -> str:
+    return f"turned by {moved.rotation_deg:.1f} degrees and moved by {moved.position_m:.2f} m"
+
+
+def _proposal(result: CameraResult) -> str:
+    return (
+        f"{_turned_and_moved(result.moved)}, and found again: {result.evidence.share:.0%} of the lines are seen where "
+        "the new pose puts them; look at its picture, then accept the job by hand, or turn the camera back"
+    )
+
+
+def _is_same(problem: Problem, markings: FieldMap, one: Camera, other: Camera) -> bool:
+    """Whether two cameras put the markings that the one sees in the same places."""
+    shift_px = mean_shift_px(problem.pitch, markings, one, other, UNSEEN_PX)
+    return shift_px < SAME_PART * one.intrinsics.size[0]
+
+
+def _away_m(stored: Camera, camera: Camera) -> float:
+    return float(np.linalg.norm(camera.pose.position - stored.pose.position))
+
+
+def _turned_deg(stored: Camera, camera: Camera) -> float:
+    return float(rotation_angles_deg(stored.pose.rotation, camera.pose.rotation))
