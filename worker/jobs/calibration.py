@@ -112,7 +112,7 @@ def _drawn(venue: Venue, given: EngineInputs, found: engine.Calibration, options
         {result.camera.id: result.markings for result in found.cameras},
         _steadied(venue, found),
     )
-    seen = masks(given.cameras, given.network.responses)
+    seen = masks(given.cameras, found.responses)
     if found.accepted and not options.pictures:
         return JobPictures(seen, scene.names)
     return JobPictures(draw(scene, scene.names) | seen)
@@ -163,6 +163,7 @@ def _result(
                     "refined": refined_to_schema(found.pitch, camera),
                     "lens_change": lens_change_to_schema(camera, nights.taken_at),
                     "nights": _nights(found.pitch, remembered.get(camera.camera.id)),
+                    "seen_by_network": "full" if camera.camera.id in found.in_full else "overview",
                 }
             )
             for camera in found.cameras

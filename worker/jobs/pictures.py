@@ -66,12 +66,11 @@ def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
     return pictures
 
 
-def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.uint8]]) -> dict[str, bytes]:
-    """What the network saw (H, W), in 0..255, to be laid over the frames; nothing else can tell it later."""
+def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.float32]]) -> dict[str, bytes]:
+    """What the network saw (h, w), in 0..1, to be laid over the frames; nothing else can tell it later."""
     return {
-        f"mask_{camera.id}": encode_png(layers.mask_layer(responses[camera.id], _smaller(camera)))
+        f"mask_{camera.id}": encode_png(layers.mask_layer(_in_bytes(responses[camera.id]), _smaller(camera)))
         for camera in cameras
-        if camera.id in responses
     }
 
 
@@ -107,6 +106,11 @@ def _of_camera(scene: PictureInputs, number: int) -> dict[str, bytes]:
         f"stored_{camera}": encode_png(layers.stored_layer(*stored, size)),
         f"new_{camera}": encode_png(layers.new_layer(*new, size)),
     }
+
+
+def _in_bytes(response: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """A response (h, w) in 0..1 as 0..255."""
+    return np.rint(255 * response).astype(np.uint8)
 
 
 def _smaller(camera: Camera) -> tuple[int, int]:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.diagnostics.line_registration import MeasuredLines, register_lines
 from worker.calibration.diagnostics.registration import (
     Registration,
     Response,
@@ -26,11 +28,16 @@ MOST = 0.6
 
 @dataclass(frozen=True)
 class CameraResponse:
-    """A camera, the segmentation (H, W) of its frame in 0..1, and how much of the lines is seen where it puts them."""
+    """A camera, the segmentation (H, W) of its frame in 0..1, and how much of the lines is seen where it puts them.
+
+    `response` None: the network has not looked at the frame in full, and the lines `measured` in it say how it lies
+    beside others.
+    """
 
     camera: Camera
-    response: Response
+    response: Response | None
     evidence: Evidence
+    measured: Measurements | None = None
 
 
 @dataclass(frozen=True)
@@ -99,11 +106,22 @@ def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]
     found = []
     for pair in pairs_in_common(pitch, [one.camera for one in cameras]):
         first, second = (by_id[camera.id] for camera in pair)
-        registered = register_pair(pitch, *pair, first.response, second.response)
+        registered = _register(pitch, first, second)
         error_px = None if registered is None else registered.error_px
         confirmed = _both_see(first.evidence, second.evidence)
         found.append(Pair(pair[0].id, pair[1].id, error_px, shares_plenty(pitch, *pair), confirmed, registered))
     return found
+
+
+def _register(pitch: Field, first: CameraResponse, second: CameraResponse) -> Registration | None:
+    """Register two cameras by their responses, or by their measured lines unless both have one."""
+    if first.response is not None and second.response is not None:
+        return register_pair(pitch, first.camera, second.camera, first.response, second.response)
+    if first.measured is None or second.measured is None:
+        return None
+    return register_lines(
+        pitch, MeasuredLines(first.camera, first.measured), MeasuredLines(second.camera, second.measured)
+    )
 
 
 def compare_pairs_before(

@@ -90,6 +90,11 @@ class Camera:
         """Another lens in the same place."""
         return Camera(self.id, intrinsics, self.pose, self.ignored)
 
+    def resized(self, width_px: int) -> Camera:
+        """Return the camera of its picture resized to a width."""
+        lens = self.intrinsics.scaled(width_px / self.intrinsics.size[0])
+        return Camera(self.id, lens, self.pose, None if self.ignored is None else self.ignored.resized(lens.size))
+
     def sees(self, pixels: Array) -> NDArray[np.bool_]:
         """Which pixels (..., 2) lie in the picture where it is of use."""
         within = inside(pixels, self.intrinsics.size)
