@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from types import MappingProxyType
 
 from worker.calibration.detection.evidence import Evidence
@@ -183,7 +184,9 @@ def _compared(problem: Problem, pitch: Field, results: Sequence[CameraResult]) -
     By ridges if these do not register what should be.
     """
     chosen = _comparable(results)
-    seeing = [_response_of(problem, n, results[n].camera, results[n].evidence, results[n]) for n in chosen]
+    seeing = [
+        _response_of(problem, n, results[n].camera, partial(_evidence_of, results[n]), results[n]) for n in chosen
+    ]
     pairs = compare_pairs(pitch, seeing)
     nothing = all(pair.error_px is None for pair in pairs)
     if not pairs or not (nothing or any(pair.missed for pair in pairs)):
@@ -194,8 +197,12 @@ def _compared(problem: Problem, pitch: Field, results: Sequence[CameraResult]) -
     return [again if pair.error_px is None else pair for pair, again in zip(pairs, by_ridges, strict=True)]
 
 
+def _evidence_of(result: CameraResult) -> Evidence:
+    return result.evidence
+
+
 def _response_of(
-    problem: Problem, number: int, camera: Camera, evidence: Evidence, result: CameraResult
+    problem: Problem, number: int, camera: Camera, evidence: Callable[[], Evidence], result: CameraResult
 ) -> CameraResponse:
     """What is compared of camera `number`, standing as `camera` does."""
     response = problem.observed.observations.responses[number] if number in problem.observed.in_full else None

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from types import MappingProxyType
 
 import cv2
 import numpy as np
 
 from worker.calibration.detection.contrast import Channels
-from worker.calibration.detection.evidence import evidence_of
+from worker.calibration.detection.evidence import Evidence, evidence_of
 from worker.calibration.detection.exclusions import left_out, of_use
 from worker.calibration.detection.ridge_response import ridge_response
 from worker.calibration.detection.view_condition import ViewCondition
@@ -24,7 +25,7 @@ from worker.calibration.diagnostics.overlap import overlap_of
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection
 from worker.calibration.geometry.camera import Camera
-from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
@@ -319,7 +320,7 @@ def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReport
                 uneven_m=after.uneven_m,
                 view=view,
                 overlap=overlap_of(refined.pitch, after.camera.resized(seen.shape[1]), seen),
-                evidence_before=evidence_of(lines, before, channels, response, left_out(pitch, before)),
+                evidence_before=cache(partial(_evidence_at_stored, lines, pitch, before, channels, response)),
                 moved=Movement.between(pitch, before, after.camera),
                 markings=report_markings(refined.pitch, after, channels, response),
                 moved_in_all=None if memory is None else Movement.between(pitch, memory.origin, after.camera),
@@ -336,6 +337,12 @@ def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReport
             )
         ]
         return [replace(result, refusal=alone_rejection(result, problem.gate)) for result in results]
+
+
+def _evidence_at_stored(
+    lines: LinePoints, pitch: Field, stored: Camera, channels: Channels, response: Response
+) -> Evidence:
+    return evidence_of(lines, stored, channels, response, left_out(pitch, stored))
 
 
 def loss_of(problem: Problem, pitch: Field, answered: Sequence[Camera]) -> float:

@@ -84,7 +84,7 @@ def asked(monkeypatch):
                 with_fitted_zoom=None,
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
                 overlap=Overlap(0.9, 0.95, 0.05),
-                evidence_before=evidence,
+                evidence_before=lambda: evidence,
                 moved=Movement(0.0, 0.05, float("nan")),
                 refusal=Refusal("view", asked["against"][camera.id]) if camera.id in asked["against"] else None,
                 markings=asked.get("markings", ()),

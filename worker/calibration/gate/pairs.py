@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,13 +30,14 @@ MOST = 0.6
 class CameraResponse:
     """A camera, the segmentation (H, W) of its frame in 0..1, and how much of the lines is seen where it puts them.
 
+    `evidence`: computes that, and is asked only where two cameras cannot be registered.
     `response` None: the network has not looked at the frame in full, and the lines `measured` in it say how it lies
     beside others.
     """
 
     camera: Camera
     response: Response | None
-    evidence: Evidence
+    evidence: Callable[[], Evidence]
     measured: Measurements | None = None
 
 
@@ -45,8 +46,8 @@ class Pair:
     """Two cameras, by their ids, that should show some of the same markings.
 
     `error_px`: how far apart they put them, 1 px = 10 cm; None where their views cannot be brought together, and then
-    there is no `registration`. `plenty`: they share so much that this tells something; `confirmed`: whether it
-    registers or not, both see what they share where their poses put it.
+    there is no `registration`. `plenty`: they share so much that this tells something; `confirmed`: they
+    register, or both see what they share where their poses put it.
     """
 
     first: str
@@ -108,7 +109,7 @@ def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]
         first, second = (by_id[camera.id] for camera in pair)
         registered = _register(pitch, first, second)
         error_px = None if registered is None else registered.error_px
-        confirmed = _both_see(first.evidence, second.evidence)
+        confirmed = registered is not None or _both_see(first.evidence(), second.evidence())
         found.append(Pair(pair[0].id, pair[1].id, error_px, shares_plenty(pitch, *pair), confirmed, registered))
     return found
 
@@ -136,8 +137,7 @@ def compare_pairs_before(
         else:
             now = (found[pair.first], found[pair.second])
             error_px = pair_error_px(pitch, pair.registration, now, (seeing[0].camera, seeing[1].camera))
-            confirmed = _both_see(seeing[0].evidence, seeing[1].evidence)
-            before.append(Pair(pair.first, pair.second, error_px, pair.plenty, confirmed))
+            before.append(Pair(pair.first, pair.second, error_px, pair.plenty, confirmed=True))
     return before
 
 

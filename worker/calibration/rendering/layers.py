@@ -47,8 +47,7 @@ def mask_layer(response: NDArray[np.uint8], size: tuple[int, int]) -> Layer:
     # Lines are thinner than what is left of them in a smaller picture: the strongest stays, not the mean.
     reach = max(1, round(response.shape[1] / size[0]))
     strongest = cv2.dilate(response, np.ones((reach, reach), np.uint8))
-    shrinks = response.shape[1] > size[0]
-    alpha = cv2.resize(strongest, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    alpha = cv2.resize(strongest, size, interpolation=cv2.INTER_AREA)
     stepped = np.floor(alpha / 256 * MASK_STEPS) / (MASK_STEPS - 1)
     return _of(MASK_COLOUR, np.rint(255 * MASK_OPACITY * stepped).astype(np.uint8))
 
