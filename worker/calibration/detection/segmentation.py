@@ -88,6 +88,13 @@ class Segmenter:
 
     def _response(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
         response = np.zeros(frame.shape[:2], dtype=np.uint8)
+        if frame.shape[1] <= OVERVIEW_WIDTH_PX:
+            # The halos of its regions would be more than all of it.
+            everything = self._all_of(frame)
+            for region in regions:
+                there = np.s_[region.top : region.bottom, region.left : region.right]
+                response[there] = everything[there]
+            return response
         beyond = HALO_PX + GRID_PX
         padded = np.pad(frame, ((HALO_PX, beyond), (HALO_PX, beyond), (0, 0)), mode="reflect")
         for region in regions:
@@ -96,6 +103,12 @@ class Segmenter:
             there = response[region.top : region.bottom, region.left : region.right]
             there[...] = np.rint(inner[: there.shape[0], : there.shape[1]] * 255)
         return response
+
+    def _all_of(self, frame: Frame) -> NDArray[np.uint8]:
+        """Probabilities (H, W) in 0..255 of a small frame, seen at once."""
+        height, width = frame.shape[:2]
+        padded = np.pad(frame, ((0, -height % GRID_PX), (0, -width % GRID_PX), (0, 0)), mode="reflect")
+        return np.rint(self._probabilities(padded)[:height, :width] * 255).astype(np.uint8)
 
     def _probabilities(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
         rgb = picture[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
