@@ -194,7 +194,8 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
 
     None where a venue with a ridge was calibrated as if it were flat: they are numbers of another field.
     """
-    if found.pitch.ridge is None and venue.field.ridge is not None:
+    of_field = [one for one in found.suspicions if one.camera is None]
+    if not of_field or (found.pitch.ridge is None and venue.field.ridge is not None):
         return []
     accepted = {camera.camera.id for camera in found.cameras if camera.accepted}
     given = {parameter.name: parameter.read(found.pitch) for parameter in field_parameters(found.pitch)}
@@ -206,8 +207,7 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
             sigma=one.sigma,
             moves_m={camera: round(by, MILLIMETRE) for camera, by in one.moves_m.items() if camera in accepted},
         )
-        for one in found.suspicions
-        if one.camera is None
+        for one in of_field
     ]
 
 
