@@ -92,8 +92,8 @@ class Segmenter:
             # The halos of its regions would be more than all of it.
             everything = self._all_of(frame)
             for region in regions:
-                there = np.s_[region.top : region.bottom, region.left : region.right]
-                response[there] = everything[there]
+                rows, columns = slice(region.top, region.bottom), slice(region.left, region.right)
+                response[rows, columns] = everything[rows, columns]
             return response
         beyond = HALO_PX + GRID_PX
         padded = np.pad(frame, ((HALO_PX, beyond), (HALO_PX, beyond), (0, 0)), mode="reflect")
