@@ -150,6 +150,11 @@ class CameraResult(Schema):
     )
     moved: Moved
     iou: float | None = Field(description="Of the expected markings and the network's mask of the pitch, as lengths.")
+    seen_by_network: Annotated[Literal["full", "overview"], OPEN_WORD] | None = Field(
+        None,
+        description="Whether the network looked at the frame in full, or at an overview, because lines that were "
+        "measured in the frame sufficed; iou, expected_found and unexpected are of what it saw.",
+    )
     expected_found: float | None = Field(
         None, description="One side of the IoU: share 0..1 of the expected markings that the network's mask covers."
     )

@@ -34,10 +34,10 @@ from tests.benchmarks.find import NEAR, UNSEEN_PX
 from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER as RUNS
 from tests.benchmarks.scenes import scene
-from worker.calibration.calibrate import cameras_without_markings
 from worker.calibration.geometry.camera import Camera, Frame, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.rotation import rotation_matrices, rotation_vectors
+from worker.calibration.observe import cameras_without_markings
 from worker.calibration.records import CalibrationError
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import mean_shift_px

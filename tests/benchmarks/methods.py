@@ -49,7 +49,9 @@ class Seen:
         return self.responses[id(self.scene.frames[camera.id][0])].astype(np.float32) / 255
 
     def segment(self, frame: Frame, regions: Sequence[Region]) -> np.ndarray:
-        """What the network said, where it would have been asked."""
+        """What the network said, where it would have been asked; of an overview it is asked now."""
+        if id(frame) not in self.responses:
+            return self.segmenter(frame, regions)
         response = np.zeros_like(self.responses[id(frame)])
         for region in regions:
             part = np.s_[region.top : region.bottom, region.left : region.right]

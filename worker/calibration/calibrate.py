@@ -5,16 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from types import MappingProxyType
 
-import numpy as np
-
-from worker.calibration.detection.contrast import Channels
-from worker.calibration.detection.exclusions import of_use
-from worker.calibration.detection.frame_fusion import Sway, median, sways
-from worker.calibration.detection.segmentation import reachable_regions
-from worker.calibration.detection.view_condition import UsualView, ViewCondition, look_at
-from worker.calibration.diagnostics.registration import Response
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.view_condition import UsualView
 from worker.calibration.diagnostics.seam import measure_seam
 from worker.calibration.gate.pairs import (
     CameraResponse,
@@ -28,13 +23,12 @@ from worker.calibration.gate.pairs import (
 from worker.calibration.gate.quality import CameraResult, Gate, credible_deviations, in_one_sentence, ridge_rejection
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory, fingerprint_of_frames, memories_of_field
-from worker.calibration.near_path import refine_near_stored, with_unusable_cameras
+from worker.calibration.near_path import NearSolution, refine_by_lines, refine_with_network, with_unusable_cameras
+from worker.calibration.observe import NOTHING_USUAL, FrameObserver
 from worker.calibration.records import (
     NOT_RECORDED,
     Calibration,
-    CalibrationError,
     EngineResult,
     Options,
     Path,
@@ -43,13 +37,10 @@ from worker.calibration.records import (
     Recorder,
     Segment,
 )
-from worker.calibration.recovery import recover_knocked
+from worker.calibration.recovery import Solved, recover_knocked
 from worker.calibration.refinement.diagnosis import find_suspicions
-from worker.calibration.refinement.refine import Observations
 from worker.calibration.solve import (
-    CAPTURE_RAD,
     NO_CAMERAS,
-    ObservedCameras,
     PoseSolution,
     Problem,
     loss_of,
@@ -61,9 +52,6 @@ from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.swapped_cameras import mark_swapped_frames
 from worker.calibration.zoom_refit import refit_zoomed
 
-FEWEST_VISIBLE_POINTS = 60
-"""Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""
-NOTHING_USUAL: Mapping[str, UsualView] = MappingProxyType({})
 NO_MEMORIES: Mapping[str, CameraMemory] = MappingProxyType({})
 
 
@@ -94,19 +82,18 @@ def calibrate(
     progress = ProgressReporter(report, stop)
 
     # Observe.
-    observed = observe(pitch, cameras, frames, segment, progress, usual)
+    observer = FrameObserver.of(pitch, cameras, frames, segment)
+    observed = observer.observe(progress, usual)
     known = [memories.get(camera.id) for camera in cameras]
     problem = Problem(pitch, cameras, observed, options, known, recorder=recorder)
-    problem = replace(problem, observed=mark_swapped_frames(problem, frames, progress))
-    recorder.observed(cameras, frames, problem.observed.views, problem.observed.observations.responses)
 
     # Solve and judge: by the near path if all usable cameras pass there, else by search and refinement.
-    solution, judged, path = _solve(problem, progress)
+    solved = _solve(problem, observer, progress)
 
     # Recover: search anywhere for cameras that do not stand where they stood.
-    problem, (solution, judged, path) = recover_knocked(
-        problem, (solution, judged, path), frames, segment, _solve, progress
-    )
+    problem, solution, judged, path = recover_knocked(solved, observer, _solve, progress)
+    seen = [problem.observed.seen_by_network(n) for n in range(len(cameras))]
+    recorder.observed(cameras, frames, problem.observed.views, seen)
     recorder.judged(judged.pitch, cameras, judged.cameras)
 
     # Diagnose, and remember.
@@ -116,64 +103,61 @@ def calibrate(
     return found if flattened else replace(found, memories=remember(judged, cameras, frames, memories, taken_at))
 
 
-def _solve(problem: Problem, progress: ProgressReporter) -> tuple[PoseSolution, EngineResult, Path]:
-    """Solve for the poses and judge them. Only cameras that are not near their stored poses are searched for."""
-    near = None
-    if problem.options.search == "auto":
-        near = refine_near_stored(problem, progress.muted())
-    if near is not None and near.numbers == problem.usable:
-        solution = with_unusable_cameras(near, problem, progress)
-        judged = judge_together(solution.pitch, solution.results, problem.observed.observations, progress)
-        if all(judged.cameras[n].accepted for n in near.numbers):
-            return solution, judged, "near"
-        # They contradict each other, so one of them is not where it seems to be.
-        near = None
+def _solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> Solved:
+    """Solve for the poses and judge them; return the problem with all that the network was asked for on the way.
 
-    solution = search_and_refine(problem, progress, NO_CAMERAS if near is None else near.cameras)
+    Lines are asked first, and the network looks in full where they do not suffice. Only cameras that are not near their
+    stored poses are searched for.
+    """
+    everyone = range(len(problem.cameras))
+    tries_near = problem.options.search == "auto"
+    near = None
+    if tries_near:
+        problem, near = refine_by_lines(problem, observer, progress)
+    problem = observer.look_in_full(problem, [n for n in everyone if near is None or n not in near.numbers], progress)
+    problem = replace(problem, observed=mark_swapped_frames(problem, observer.frames, progress))
+
+    solved = _judged_near(problem, near, progress)
+    if solved is None and tries_near:
+        if near is not None and near.numbers == problem.usable:
+            problem, near = observer.look_in_full(problem, everyone, progress), None
+        near = refine_with_network(problem, near, progress)
+        solved = _judged_near(problem, near, progress)
+    if solved is not None:
+        return problem, *solved, "near"
+
+    # Cameras that are all near and contradict each other: one of them is not where it seems to be.
+    apart = near is not None and near.numbers != problem.usable
+    solution = search_and_refine(problem, progress, near.cameras if near is not None and apart else NO_CAMERAS)
     solution = refit_zoomed(problem, solution, progress)
     while True:
-        judged = judge_together(solution.pitch, solution.results, problem.observed.observations, progress)
+        judged = judge_together(problem, solution.pitch, solution.results, progress)
         contradicted = [n for n in solution.together if not judged.cameras[n].accepted]
         if len(contradicted) in (0, len(solution.together)):
-            return solution, judged, "wide"
+            return problem, solution, judged, "wide"
         # A camera that the others contradict must not have pulled at them.
         solution = refine_without(contradicted, problem, solution, progress)
 
 
-def observe(
-    pitch: Field,
-    cameras: Sequence[Camera],
-    frames: Mapping[str, Sequence[Frame]],
-    segment: Segment,
-    progress: ProgressReporter,
-    usual: Mapping[str, UsualView] = NOTHING_USUAL,
-) -> ObservedCameras:
-    """Measure the view conditions of the frames, and segment the markings in them. Raises `CalibrationError`."""
-    blind = cameras_without_markings(pitch, cameras)
-    with progress.timed("view"):
-        views = [
-            replace(view, usable=False, cause="no-markings-in-view", where=None, words=blind[camera.id])
-            if camera.id in blind
-            else view
-            for camera in cameras
-            for view in [view_of(frames[camera.id], pitch, camera, usual.get(camera.id))]
-        ]
-        swayed = {camera.id: sways(frames[camera.id], camera.intrinsics) for camera in cameras}
-    with progress.timed("segmentation"):
-        responses = segment_all(pitch, cameras, frames, swayed, segment, progress)
-    return ObservedCameras(
-        views, Observations([Channels(frames[camera.id], swayed[camera.id]) for camera in cameras], responses)
-    )
+def _judged_near(
+    problem: Problem, near: NearSolution | None, progress: ProgressReporter
+) -> tuple[PoseSolution, EngineResult] | None:
+    """Judge the near solution; None unless all usable cameras are in it and are accepted together."""
+    if near is None or near.numbers != problem.usable:
+        return None
+    solution = with_unusable_cameras(near, problem, progress)
+    judged = judge_together(problem, solution.pitch, solution.results, progress)
+    return (solution, judged) if all(judged.cameras[n].accepted for n in near.numbers) else None
 
 
 def judge_together(
-    pitch: Field, results: Sequence[CameraResult], observations: Observations, progress: ProgressReporter
+    problem: Problem, pitch: Field, results: Sequence[CameraResult], progress: ProgressReporter
 ) -> EngineResult:
     """Judge against each other cameras that were judged by themselves, on the `pitch` they were refined with."""
     gate = Gate()
     with progress.timed("quality"):
         progress.at("refinement", 0.6)
-        pairs = _compared(pitch, results, observations)
+        pairs = _compared(problem, pitch, results)
     against = find_contradictions(pairs, gate) if any(result.accepted for result in results) else []
     ridge = ridge_rejection(pitch, gate)
     reasons = [f"camera {one.camera.id}: {one.rejected_because}" for one in results if one.rejected_because]
@@ -196,25 +180,43 @@ def _comparable(results: Sequence[CameraResult]) -> list[int]:
     return accepted or [n for n, result in enumerate(results) if result.view.usable]
 
 
-def _compared(pitch: Field, results: Sequence[CameraResult], observations: Observations) -> list[Pair]:
-    """Compare pairs of cameras by the network's responses, or by ridges if these do not register what should be."""
+def _compared(problem: Problem, pitch: Field, results: Sequence[CameraResult]) -> list[Pair]:
+    """Compare pairs of cameras by the network's responses or, where it has not looked in full, by measured lines.
+
+    By ridges if these do not register what should be.
+    """
     chosen = _comparable(results)
-    seeing = [CameraResponse(results[n].camera, observations.responses[n], results[n].evidence) for n in chosen]
+    seeing = [
+        _response_of(problem, n, results[n].camera, partial(_evidence_of, results[n]), results[n]) for n in chosen
+    ]
     pairs = compare_pairs(pitch, seeing)
     nothing = all(pair.error_px is None for pair in pairs)
     if not pairs or not (nothing or any(pair.missed for pair in pairs)):
         return pairs
-    ridges = [ridges_of(pitch, results[n].camera, observations.channels[n]) for n in chosen]
+    channels = problem.observed.observations.channels
+    ridges = [ridges_of(pitch, results[n].camera, channels[n]) for n in chosen]
     by_ridges = compare_pairs(pitch, [replace(one, response=its) for one, its in zip(seeing, ridges, strict=True)])
     return [again if pair.error_px is None else pair for pair, again in zip(pairs, by_ridges, strict=True)]
 
 
+def _evidence_of(result: CameraResult) -> Evidence:
+    return result.evidence
+
+
+def _response_of(
+    problem: Problem, number: int, camera: Camera, evidence: Callable[[], Evidence], result: CameraResult
+) -> CameraResponse:
+    """What is compared of camera `number`, standing as `camera` does."""
+    response = problem.observed.observations.responses[number] if number in problem.observed.in_full else None
+    return CameraResponse(camera, response, evidence, result.measured)
+
+
 def _compared_before(problem: Problem, judged: EngineResult) -> list[Pair]:
     """Compare pairs by their stored poses: of accepted poses, as seen from where those put the views."""
-    cameras, responses = problem.cameras, problem.observed.observations.responses
+    cameras = problem.cameras
     stored = {
-        camera.id: CameraResponse(camera, response, result.evidence_before)
-        for camera, response, result in zip(cameras, responses, judged.cameras, strict=True)
+        camera.id: _response_of(problem, n, camera, result.evidence_before, result)
+        for n, (camera, result) in enumerate(zip(cameras, judged.cameras, strict=True))
     }
     if any(result.accepted for result in judged.cameras):
         found = {result.camera.id: result.camera for result in judged.cameras}
@@ -254,56 +256,9 @@ def diagnose(
         path=path,
         lights=lights,
         memories={},
+        responses={camera.id: problem.observed.seen_by_network(n) for n, camera in enumerate(problem.cameras)},
+        in_full=[problem.cameras[n].id for n in sorted(problem.observed.in_full)],
     )
-
-
-def cameras_without_markings(pitch: Field, cameras: Sequence[Camera]) -> dict[str, str]:
-    """Return what to say of each camera whose stored pose sees no pitch: nothing that follows could find it.
-
-    Raises `CalibrationError` where that is so of all of them.
-    """
-    lines = pitch.line_points()
-    blind = {}
-    for camera in cameras:
-        visible = len(VisibleLines.from_camera(lines, camera))
-        if visible < FEWEST_VISIBLE_POINTS:
-            blind[camera.id] = (
-                f"the stored pose of camera {camera.id} sees {visible * lines.spacing:.0f} m of markings, at least "
-                f"{FEWEST_VISIBLE_POINTS * lines.spacing:.0f} m are needed; store a first pose that looks at the pitch"
-            )
-    if len(blind) == len(cameras):
-        raise CalibrationError(next(iter(blind)), "no-markings-in-view", in_one_sentence(list(blind.values())))
-    return blind
-
-
-def segment_all(
-    pitch: Field,
-    cameras: Sequence[Camera],
-    frames: Mapping[str, Sequence[Frame]],
-    swayed: Mapping[str, Sequence[Sway]],
-    segment: Segment,
-    progress: ProgressReporter,
-) -> list[Response]:
-    """Return the fused segmentation (H, W) of each camera, where markings can be; `swayed`: shifts of its frames."""
-    total = sum(len(frames[camera.id]) for camera in cameras)
-    done = 0
-    responses = []
-    for camera in cameras:
-        regions = reachable_regions(pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
-        seen = []
-        for frame in frames[camera.id]:
-            progress.at("segmentation", done / total)
-            seen.append(segment(frame, regions))
-            done += 1
-        responses.append(of_use(camera.ignored, median(seen, swayed[camera.id]) / np.float32(255)))
-    return responses
-
-
-def view_of(frames: Sequence[Frame], pitch: Field, camera: Camera, usual: UsualView | None) -> ViewCondition:
-    """Return the view condition of the first usable frame, or that of the first frame if none is."""
-    first = look_at(frames[0], pitch, camera, usual)
-    later = (look_at(frame, pitch, camera, usual) for frame in frames[1:])
-    return first if first.usable else next((view for view in later if view.usable), first)
 
 
 def remember(

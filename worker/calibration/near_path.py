@@ -7,14 +7,16 @@ one that is fogged is left, and the others need not be.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from worker.calibration.detection.line_measurement import Measurements
-from worker.calibration.gate.quality import CameraResult
+from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.observe import FrameObserver
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.diagnosis import is_sure
 from worker.calibration.refinement.refine import SEARCH_PX, LineReader, refine
@@ -42,10 +44,37 @@ class NearSolution:
         return {n: result.camera for n, result in zip(self.numbers, self.results, strict=True)}
 
 
-def refine_near_stored(problem: Problem, progress: ProgressReporter) -> NearSolution | None:
-    """Refine the cameras that stand almost at their stored poses; None if there are none."""
+def refine_by_lines(
+    problem: Problem, observer: FrameObserver, progress: ProgressReporter
+) -> tuple[Problem, NearSolution | None]:
+    """Refine the cameras that stand almost at their stored poses by their lines alone.
+
+    The network is asked for an overview of their frames, which the problem comes back with.
+    """
     reader = problem.observed.observations.reader()
-    numbers = _cameras_with_lines_near(problem, reader)
+    numbers = _cameras_with_lines_near(problem, problem.usable, reader)
+    problem = observer.with_overviews(problem, numbers, progress)
+    return problem, _refine_near_stored(problem, numbers, reader, progress.muted())
+
+
+def refine_with_network(
+    problem: Problem, by_lines: NearSolution | None, progress: ProgressReporter
+) -> NearSolution | None:
+    """Refine the cameras near their stored poses, now that the network has looked in full at those that lines alone
+    did not suffice for."""
+    found = [] if by_lines is None else [n for n in by_lines.numbers if n in problem.usable]
+    reader = problem.observed.observations.reader()
+    others = [n for n in problem.usable if n not in found]
+    more = _cameras_with_lines_near(problem, others, reader)
+    if not more:
+        return by_lines
+    return _refine_near_stored(problem, sorted([*found, *more]), reader, progress.muted())
+
+
+def _refine_near_stored(
+    problem: Problem, numbers: list[int], reader: LineReader, progress: ProgressReporter
+) -> NearSolution | None:
+    """Refine the cameras that stand almost at their stored poses, out of those of these `numbers`; None if none do."""
     while numbers:
         group = problem.of(numbers)
         with progress.timed("refinement"):
@@ -60,7 +89,12 @@ def refine_near_stored(problem: Problem, progress: ProgressReporter) -> NearSolu
                 reader=reader.of(numbers),
             )
         results = judge_each(group, refined, progress)
-        near = [n for n, result in zip(numbers, results, strict=True) if _is_near(result, group.options.lens_may_drift)]
+        near = [
+            n
+            for n, result in zip(numbers, results, strict=True)
+            if _is_near(result, group.options.lens_may_drift)
+            and (n in problem.observed.in_full or _is_confirmed_by_overview(result))
+        ]
         if near == numbers:
             return NearSolution(numbers, refined, results)
         # The cameras that were not near may have pulled at the others, which are refined once more without them.
@@ -79,15 +113,14 @@ def with_unusable_cameras(near: NearSolution, problem: Problem, progress: Progre
     return PoseSolution(refined.pitch, list(problem.cameras), in_order, near.numbers, refined.deviations, generations=0)
 
 
-def _cameras_with_lines_near(problem: Problem, reader: LineReader) -> list[int]:
-    """Return the usable cameras that see most of their lines near enough to where their stored poses expect them."""
+def _cameras_with_lines_near(problem: Problem, numbers: Sequence[int], reader: LineReader) -> list[int]:
+    """Return those of some cameras that see most of their lines near to where their stored poses expect them."""
     lines = problem.pitch.line_points()
-    usable = problem.usable
-    cameras = [problem.cameras[n] for n in usable]
-    measured = reader.of(usable).measure(lines, cameras, SEARCH_PX[0])
+    cameras = [problem.cameras[n] for n in numbers]
+    measured = reader.of(numbers).measure(lines, cameras, SEARCH_PX[0])
     return [
         n
-        for n, camera, found in zip(usable, cameras, measured, strict=True)
+        for n, camera, found in zip(numbers, cameras, measured, strict=True)
         if _measured_share(VisibleLines.from_camera(lines, camera), found) >= LEAST_CAUGHT
     ]
 
@@ -96,6 +129,11 @@ def _measured_share(expected: VisibleLines, found: Measurements) -> float:
     """Return the share 0..1 of the expected length that was measured; lines below a pixel count by their width."""
     weight = expected.length_px * np.minimum(expected.width_px, 1.0)
     return float(np.sum(weight[np.isin(expected.index, found.index)]) / max(np.sum(weight), 1e-12))
+
+
+def _is_confirmed_by_overview(result: CameraResult) -> bool:
+    """True unless most of the lines that the network sees on the pitch lie where the camera expects none."""
+    return result.overlap.unexpected < MUCH_UNEXPECTED
 
 
 def _is_near(result: CameraResult, lens_may_drift: bool) -> bool:

@@ -134,6 +134,8 @@ class Calibration(EngineResult):
     `path`: whether they were found `near` their stored poses, by a search around these (`wide`), or one of them by a
     search `anywhere`. `lights`: of accepted cameras
     that overlap, by camera. `memories`: of cameras whose poses are accepted, with this job in them, by camera.
+    `responses`: what the network saw of each frame, (h, w) in 0..1, by camera; `in_full`: the cameras at whose frames
+    it looked in full, and not only at an overview.
     """
 
     stitch_error_before_px: float | None
@@ -143,6 +145,8 @@ class Calibration(EngineResult):
     path: Path
     lights: Mapping[str, Light]
     memories: Mapping[str, CameraMemory]
+    responses: Mapping[str, NDArray[np.float32]]
+    in_full: Sequence[str]
 
 
 class Recorder:

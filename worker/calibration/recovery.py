@@ -8,27 +8,24 @@ refused for it. Beyond the gate's limits of movement it is proposed to a person,
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from worker.calibration.detection.exclusions import of_use
-from worker.calibration.detection.frame_fusion import median, sways
-from worker.calibration.detection.segmentation import whole_frame
 from worker.calibration.detection.view_condition import OF_THE_GROUND, ViewCondition, look_at
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import stitch_error_px
 from worker.calibration.gate.quality import CameraResult, Movement, Refusal, in_one_sentence
-from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
-from worker.calibration.records import EngineResult, Path, ProgressReporter, Segment
-from worker.calibration.refinement.refine import Observations
+from worker.calibration.observe import FrameObserver
+from worker.calibration.records import EngineResult, Path, ProgressReporter
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.relocalise import Relocalisation, mean_shift_px, relocalise, twin
 from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
-from worker.calibration.solve import ObservedCameras, PoseSolution, Problem
+from worker.calibration.solve import PoseSolution, Problem
 
 LOST = frozenset({"lines", "few-lines", "moved"})
 """Reasons for a refusal that a knocked camera may have."""
@@ -52,7 +49,8 @@ UNSEEN_PX, SAME_PART = 1e4, 0.002
 """What a marking counts that only one of two cameras sees; and cameras are the same that put the markings apart by less
 than this part of the frame's width."""
 
-Solved = tuple[PoseSolution, EngineResult, Path]
+Solved = tuple[Problem, PoseSolution, EngineResult, Path]
+"""A problem with all that was observed for its solution, the solution, its judgement, and the path that led there."""
 
 
 @dataclass(frozen=True)
@@ -65,33 +63,30 @@ class FoundAgain:
 
 
 def recover_knocked(
-    problem: Problem,
     solved: Solved,
-    frames: Mapping[str, Sequence[Frame]],
-    segment: Segment,
-    solve: Callable[[Problem, ProgressReporter], Solved],
+    observer: FrameObserver,
+    solve: Callable[[Problem, FrameObserver, ProgressReporter], Solved],
     progress: ProgressReporter,
-) -> tuple[Problem, Solved]:
-    """Return the problem and its solution with those cameras in it that were searched for and found again.
+) -> Solved:
+    """Return the solution with those cameras in it that were searched for and found again.
 
     `solve`: what has `solved` the problem. The cameras of the problem that is returned are at their stored poses.
     """
-    _, judged, _ = solved
+    problem, _, judged, _ = solved
     sought = [n for n in range(len(problem.cameras)) if _is_sought(problem, n, judged.cameras[n])]
     with progress.timed("evolution"):
-        searched = {n: _search(problem, judged.cameras[n], n, frames, segment, progress) for n in sought}
+        searched = {n: _search(problem, judged.cameras[n], n, observer, progress) for n in sought}
     found = {n: one for n, one in searched.items() if one is not None}
     while found:
         begun = _begun_there(problem, found)
-        anew = solve(begun, progress.muted())
-        confirmed = {n: one for n, one in found.items() if _is_there(anew[1].cameras[n])}
-        harmed = any(
-            one.accepted and not two.accepted for one, two in zip(judged.cameras, anew[1].cameras, strict=True)
-        )
+        anew = solve(begun, replace(observer, cameras=begun.cameras), progress.muted())
+        _, _, again, _ = anew
+        confirmed = {n: one for n, one in found.items() if _is_there(again.cameras[n])}
+        harmed = any(one.accepted and not two.accepted for one, two in zip(judged.cameras, again.cameras, strict=True))
         if confirmed.keys() == found.keys() and not harmed:
-            return replace(begun, cameras=problem.cameras), _joined(problem, solved, anew, found)
+            return _joined(solved, anew, found)
         found = {} if harmed and confirmed.keys() == found.keys() else confirmed
-    return problem, solved
+    return solved
 
 
 def _is_sought(problem: Problem, number: int, result: CameraResult) -> bool:
@@ -118,14 +113,13 @@ def _search(
     problem: Problem,
     result: CameraResult,
     number: int,
-    frames: Mapping[str, Sequence[Frame]],
-    segment: Segment,
+    observer: FrameObserver,
     progress: ProgressReporter,
 ) -> FoundAgain | None:
     """Search for a camera at its stored place, and then anywhere; None where it is not surely found."""
     stored = problem.cameras[number]
     progress.at("evolution", 0.0)
-    response = _response_everywhere(stored, frames[stored.id], segment)
+    response = observer.response_everywhere(stored)
     if problem.options.search == "auto" and not _has_lines_elsewhere(problem, result, response):
         return None
     markings = FieldMap.of(problem.pitch)
@@ -147,18 +141,11 @@ def _search(
             camera = stored.with_pose(camera.pose)
             if result.accepted and _is_same(problem, markings, result.camera, camera):
                 return None
-            view = look_at(frames[stored.id][0], problem.pitch, camera)
+            view = look_at(observer.frames[stored.id][0], problem.pitch, camera)
             return FoundAgain(camera, response, view) if view.usable else None
         if found.refusal is not None and found.refusal.reason in HOPELESS:
             break
     return None
-
-
-def _response_everywhere(camera: Camera, frames: Sequence[Frame], segment: Segment) -> Response:
-    """The fused response (H, W) of the network to all of the frames, and not only where the stored pose has lines."""
-    swayed = sways(frames, camera.intrinsics)
-    regions = whole_frame(camera.intrinsics.size)
-    return of_use(camera.ignored, median([segment(frame, regions) for frame in frames], swayed) / np.float32(255))
 
 
 def _has_lines_elsewhere(problem: Problem, result: CameraResult, response: Response) -> bool:
@@ -206,17 +193,20 @@ def _begun_there(problem: Problem, found: Mapping[int, FoundAgain]) -> Problem:
         if Movement.between(problem.pitch, problem.cameras[n], one.camera).beyond(problem.gate):
             memories[n] = None
         cameras[n], views[n], responses[n] = one.camera, one.view, one.response
-    observed = ObservedCameras(views, Observations(problem.observed.observations.channels, responses))
+    observations = replace(problem.observed.observations, responses=responses)
+    in_full = frozenset([*problem.observed.in_full, *found])
+    observed = replace(problem.observed, views=views, observations=observations, in_full=in_full)
     # Whatever was asked for, from there they are near.
     options = replace(problem.options, search="auto")
     return replace(problem, cameras=cameras, memories=memories, observed=observed, options=options)
 
 
-def _joined(problem: Problem, before: Solved, again: Solved, found: Mapping[int, FoundAgain]) -> Solved:
+def _joined(before: Solved, again: Solved, found: Mapping[int, FoundAgain]) -> Solved:
     """The solution with the cameras that were found, beside their stored poses; a proposed one moves no other."""
-    _, judged, _ = again
-    back = {n: _beside_stored(problem, n, judged.cameras[n], before[1].cameras[n]) for n in found}
-    solution, base, _ = before if all(result.refusal is not None for result in back.values()) else again
+    problem, _, judged_before, _ = before
+    observed, _, judged, _ = again
+    back = {n: _beside_stored(problem, n, judged.cameras[n], judged_before.cameras[n]) for n in found}
+    _, solution, base, _ = before if all(result.refusal is not None for result in back.values()) else again
     results = [back.get(n, result) for n, result in enumerate(base.cameras)]
     accepted = {result.camera.id for result in results if result.accepted}
     pairs = [pair for pair, _ in judged.pairs if not accepted or accepted.issuperset(pair.cameras)]
@@ -228,7 +218,7 @@ def _joined(problem: Problem, before: Solved, again: Solved, found: Mapping[int,
         stitch_error_px=stitch_error_px(pairs, problem.gate),
         pairs=judged.pairs,
     )
-    return solution, told, "anywhere"
+    return replace(observed, cameras=problem.cameras), solution, told, "anywhere"
 
 
 def _beside_stored(problem: Problem, number: int, result: CameraResult, before: CameraResult) -> CameraResult:

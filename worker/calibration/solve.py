@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from types import MappingProxyType
 
 import cv2
 import numpy as np
 
 from worker.calibration.detection.contrast import Channels
-from worker.calibration.detection.evidence import evidence_of
+from worker.calibration.detection.evidence import Evidence, evidence_of
 from worker.calibration.detection.exclusions import left_out, of_use
 from worker.calibration.detection.ridge_response import ridge_response
 from worker.calibration.detection.view_condition import ViewCondition
@@ -24,7 +25,7 @@ from worker.calibration.diagnostics.overlap import overlap_of
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection
 from worker.calibration.geometry.camera import Camera
-from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
@@ -44,14 +45,30 @@ NO_CAMERAS: Mapping[int, Camera] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class ObservedCameras:
-    """The condition of each camera's view (`views`), and its frames and network response (`observations`)."""
+    """The condition of each camera's view (`views`), and its frames and network response (`observations`).
+
+    `in_full`: numbers of the cameras that the network has looked at in full; of the others it has an empty response,
+    and where it was asked for one, `overviews`: its response (h, w) in 0..1 to a reduced frame.
+    """
 
     views: Sequence[ViewCondition]
     observations: Observations
+    overviews: Sequence[Response | None]
+    in_full: Collection[int]
 
     def of(self, numbers: Sequence[int]) -> ObservedCameras:
         """Return the observations of some of the cameras."""
-        return ObservedCameras([self.views[n] for n in numbers], self.observations.of(numbers))
+        return ObservedCameras(
+            [self.views[n] for n in numbers],
+            self.observations.of(numbers),
+            [self.overviews[n] for n in numbers],
+            [at for at, n in enumerate(numbers) if n in self.in_full],
+        )
+
+    def seen_by_network(self, number: int) -> Response:
+        """What the network sees of a camera: its response to the frame, or else to the overview."""
+        overview = self.overviews[number]
+        return self.observations.responses[number] if overview is None or number in self.in_full else overview
 
 
 @dataclass(frozen=True)
@@ -211,7 +228,11 @@ def search_poses(problem: Problem, responses: Sequence[Response], progress: Prog
 
 def network_responses(problem: Problem) -> list[Response]:
     """Return the network's responses (H, W) in 0..1 as the search uses them, raised to `SEARCHED_POWER`."""
-    responses = problem.observed.observations.responses
+    return raised(problem.observed.observations.responses)
+
+
+def raised(responses: Sequence[Response]) -> list[Response]:
+    """Return responses (H, W) raised to `SEARCHED_POWER`."""
     return [np.asarray(cv2.pow(response, SEARCHED_POWER), dtype=np.float32) for response in responses]
 
 
@@ -290,23 +311,30 @@ def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReport
                 repainted_markings=after.repainted_markings,
                 uneven_m=after.uneven_m,
                 view=view,
-                overlap=overlap_of(refined.pitch, after.camera, response),
-                evidence_before=evidence_of(lines, before, channels, response, left_out(pitch, before)),
+                overlap=overlap_of(refined.pitch, after.camera.resized(seen.shape[1]), seen),
+                evidence_before=cache(partial(_evidence_at_stored, lines, pitch, before, channels, response)),
                 moved=Movement.between(pitch, before, after.camera),
                 markings=report_markings(refined.pitch, after, channels, response),
                 moved_in_all=None if memory is None else Movement.between(pitch, memory.origin, after.camera),
             )
-            for before, memory, after, view, channels, response in zip(
+            for before, memory, after, view, channels, response, seen in zip(
                 problem.cameras,
                 problem.memories,
                 refined.each,
                 problem.observed.views,
                 observations.channels,
                 observations.responses,
+                map(problem.observed.seen_by_network, range(len(problem.cameras))),
                 strict=True,
             )
         ]
         return [replace(result, refusal=alone_rejection(result, problem.gate)) for result in results]
+
+
+def _evidence_at_stored(
+    lines: LinePoints, pitch: Field, stored: Camera, channels: Channels, response: Response
+) -> Evidence:
+    return evidence_of(lines, stored, channels, response, left_out(pitch, stored))
 
 
 def loss_of(problem: Problem, pitch: Field, answered: Sequence[Camera]) -> float:
@@ -317,8 +345,9 @@ def loss_of(problem: Problem, pitch: Field, answered: Sequence[Camera]) -> float
     group = problem.usable
     if not group:
         return float("inf")
-    cameras = [answered[n] for n in group]
-    responses = of_use_at(cameras, network_responses(problem.of(group)), pitch)
+    seen = [problem.observed.seen_by_network(n) for n in group]
+    cameras = [answered[n].resized(response.shape[1]) for n, response in zip(group, seen, strict=True)]
+    responses = of_use_at(cameras, raised(seen), pitch)
     blur_px = COARSE_TO_FINE[1].blur_px
     objective = Objective(pitch, cameras, responses, stitch_weight=0.0, blur_px=blur_px)
     return float(objective.losses(genome_of(cameras)[None])[0])

@@ -38,7 +38,9 @@ def mark_swapped_frames(
 
     `frames[camera.id]`: the frames of the problem's observations.
     """
-    shown = {n: of for n in range(len(problem.cameras)) if (of := _shown_in(problem, frames, n, progress)) is not None}
+    # What lines found at its own pose needs no other.
+    asked = sorted(problem.observed.in_full)
+    shown = {n: of for n in asked if (of := _shown_in(problem, frames, n, progress)) is not None}
     views = list(problem.observed.views)
     for n, of in shown.items():
         mutual = of.number in shown and shown[of.number].number == n

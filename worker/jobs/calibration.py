@@ -112,7 +112,7 @@ def _drawn(venue: Venue, given: EngineInputs, found: engine.Calibration, options
         {result.camera.id: result.markings for result in found.cameras},
         _steadied(venue, found),
     )
-    seen = masks(given.cameras, given.network.responses)
+    seen = masks(given.cameras, found.responses)
     if found.accepted and not options.pictures:
         return JobPictures(seen, scene.names)
     return JobPictures(draw(scene, scene.names) | seen)
@@ -165,6 +165,7 @@ def _result(
                     "refined": refined_to_schema(found.pitch, camera),
                     "lens_change": lens_change_to_schema(camera, nights.taken_at),
                     "nights": _nights(found.pitch, remembered.get(camera.camera.id)),
+                    "seen_by_network": "full" if camera.camera.id in found.in_full else "overview",
                 }
             )
             for camera in found.cameras
@@ -195,7 +196,8 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
 
     None where a venue with a ridge was calibrated as if it were flat: they are numbers of another field.
     """
-    if found.pitch.ridge is None and venue.field.ridge is not None:
+    of_field = [one for one in found.suspicions if one.camera is None]
+    if not of_field or (found.pitch.ridge is None and venue.field.ridge is not None):
         return []
     accepted = {camera.camera.id for camera in found.cameras if camera.accepted}
     given = {parameter.name: parameter.read(found.pitch) for parameter in field_parameters(found.pitch)}
@@ -207,8 +209,7 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
             sigma=one.sigma,
             moves_m={camera: round(by, MILLIMETRE) for camera, by in one.moves_m.items() if camera in accepted},
         )
-        for one in found.suspicions
-        if one.camera is None
+        for one in of_field
     ]
 
 

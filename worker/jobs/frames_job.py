@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
 from service.schemas.job import Progress
 from service.schemas.options import FieldOptions, Options
 from service.schemas.results import Provenance
 from service.schemas.venue import Venue
 from worker.calibration import records
-from worker.calibration.detection.segmentation import Region, Segmenter
+from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import CalibrationError, EngineResult, StageTimings
@@ -27,30 +25,6 @@ A = TypeVar("A", bound=EngineResult)
 Frames = Mapping[str, Sequence[Picture]]
 
 
-class RecordingSegmenter:
-    """A network that remembers what it said of the first frame of each camera.
-
-    When it has seen all frames it is released, and whenever it has seen one again: search, judgement and pictures come
-    after, and need as much memory.
-    """
-
-    def __init__(self, segmenter: Segmenter, frames: Frames) -> None:
-        self._segmenter = segmenter
-        self._unseen = sum(len(several) for several in frames.values())
-        self._cameras = {id(several[0]): camera for camera, several in frames.items()}
-        self.responses: dict[str, NDArray[np.uint8]] = {}
-
-    def __call__(self, frame: Picture, regions: Sequence[Region]) -> NDArray[np.uint8]:
-        """As the network that is asked."""
-        response = self._segmenter(frame, regions)
-        self._unseen -= 1
-        if self._unseen <= 0:
-            self._segmenter.release()
-        if id(frame) in self._cameras:
-            self.responses[self._cameras[id(frame)]] = response
-        return response
-
-
 @dataclass(frozen=True)
 class EngineInputs:
     """What the engine is given: the pitch, the cameras at their stored poses, their decoded frames, and the network."""
@@ -58,7 +32,7 @@ class EngineInputs:
     pitch: Field
     cameras: Sequence[Camera]
     frames: Frames
-    network: RecordingSegmenter
+    network: Segmenter
 
 
 @dataclass(frozen=True)
@@ -90,7 +64,7 @@ def solve(
     with spent.timed("decode"):
         frames = {c.id: [decode_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
     cameras = [camera_with_ignored_areas(camera, camera.ignore) for camera in venue.cameras]
-    given = EngineInputs(pitch_of(venue.field), cameras, frames, RecordingSegmenter(segmenter, frames))
+    given = EngineInputs(pitch_of(venue.field), cameras, frames, segmenter)
     try:
         answer = engine(given, lambda step: report(progress_to_schema(step)))
     except CalibrationError as error:

@@ -66,12 +66,12 @@ def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
     return pictures
 
 
-def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.uint8]]) -> dict[str, bytes]:
-    """What the network saw (H, W), in 0..255, to be laid over the frames; nothing else can tell it later."""
+def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.float32]]) -> dict[str, bytes]:
+    """What the network saw (h, w), in 0..1, to be laid over the frames; nothing else can tell it later."""
     return {
-        f"mask_{camera.id}": encode_png(layers.mask_layer(responses[camera.id], _smaller(camera)))
+        f"mask_{camera.id}": encode_png(layers.mask_layer(_in_bytes(response), _smaller(camera, response.shape[1])))
         for camera in cameras
-        if camera.id in responses
+        for response in [responses[camera.id]]
     }
 
 
@@ -109,7 +109,13 @@ def _of_camera(scene: PictureInputs, number: int) -> dict[str, bytes]:
     }
 
 
-def _smaller(camera: Camera) -> tuple[int, int]:
-    """Width and height of a frame as it is shown."""
+def _in_bytes(response: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """A response (h, w) in 0..1 as 0..255."""
+    return np.rint(255 * response).astype(np.uint8)
+
+
+def _smaller(camera: Camera, largest: int = FRAME_WIDTH) -> tuple[int, int]:
+    """Width and height of a frame as it is shown, at most as wide as the `largest` picture of it."""
     width, height = camera.intrinsics.size
-    return min(width, FRAME_WIDTH), round(height * min(1.0, FRAME_WIDTH / width))
+    shown = min(width, largest, FRAME_WIDTH)
+    return shown, round(height * shown / width)

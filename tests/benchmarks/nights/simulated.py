@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -161,7 +162,7 @@ class Installation:
                 **vars(after),
                 view=USABLE,
                 overlap=Overlap(1.0, 1.0, 0.0),
-                evidence_before=was,
+                evidence_before=partial(replace, was),
                 moved=Movement.between(self.pitch, stored, after.camera),
                 moved_in_all=memory and Movement.between(self.pitch, memory.origin, after.camera),
             )

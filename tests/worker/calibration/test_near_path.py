@@ -5,10 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, moved, paint_frame, pair, pair_frames
+from tests.worker.calibration.synthetic import CROWNED, GRASS, moved, paint_frame, pair, pair_frames
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration import solve as settling
 from worker.calibration.calibrate import calibrate
+from worker.calibration.detection.segmentation import OVERVIEW_WIDTH_PX
+from worker.calibration.gate.quality import MUCH_UNEXPECTED
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Calibration, Options
@@ -88,6 +90,46 @@ def test_only_the_camera_that_was_turned_is_searched_for():
     assert searched == ["right"]
     assert (found.path, found.verdict) == ("wide", "accepted")
     assert off_m(found) < 0.02
+
+
+def asked_of_network(frames, **options) -> tuple[Calibration, list[tuple[int, int]]]:
+    """A calibration of cameras in the wind, and the sizes (width, height) of the pictures that the network is shown."""
+    shown = []
+
+    def watched(frame, regions):
+        shown.append((frame.shape[1], frame.shape[0]))
+        return white_on_green(frame, regions)
+
+    stored = [moved(one, *WIND) for one in pair()]
+    by_id = {one.id: [frame] for one, frame in zip(pair(), frames, strict=True)}
+    return calibrate(CROWNED, stored, by_id, watched, Options(seed=5, **options)), shown
+
+
+def test_the_network_sees_no_more_than_overviews_where_lines_suffice():
+    found, shown = asked_of_network(pair_frames())
+    assert (found.path, found.verdict, found.in_full) == ("near", "accepted", [])
+    assert [width for width, _ in shown] == [OVERVIEW_WIDTH_PX] * 2
+    assert [found.responses[one.id].shape[1] for one in pair()] == [OVERVIEW_WIDTH_PX] * 2
+
+
+def test_the_network_looks_in_full_at_a_camera_whose_lines_do_not_suffice():
+    left, right = pair_frames()
+    hidden = right.copy()
+    hidden[:, : right.shape[1] * 3 // 4] = GRASS
+    found, shown = asked_of_network([left, hidden], generations=10)
+    assert found.in_full == ["right"]
+    assert (hidden.shape[1], hidden.shape[0]) in shown
+    assert found.cameras[0].accepted
+
+
+def test_the_network_looks_in_full_where_an_overview_shows_most_lines_elsewhere():
+    striped = [frame.copy() for frame in pair_frames()]
+    # White as the venue's lines: what is measured on those says nothing of it.
+    for frame in striped:
+        frame[frame.shape[0] // 2 :: 24] = 255
+    found, _ = asked_of_network(striped)
+    assert all(one.overlap.unexpected >= MUCH_UNEXPECTED for one in found.cameras)
+    assert found.in_full == ["left", "right"]
 
 
 def test_nobody_is_told_of_looking_nearby_in_vain():

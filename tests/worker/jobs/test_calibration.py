@@ -73,15 +73,12 @@ def asked(monkeypatch):
     def calibrate(pitch, cameras, frames, segment, options, report, usual, memories, taken_at, recorder):
         asked.update(pitch=pitch, cameras=cameras, frames=frames, options=options, usual=usual)
         asked.update(memories=memories, taken_at=taken_at)
-        for several in frames.values():
-            for frame in several:
-                segment(frame, [])
         report(engine.Progress("evolution", 1.5, 3, float("inf")))
-        seen = Evidence(np.array([0]), np.array([0]), np.ones(1), np.ones(1, bool), np.full(1, 0.1))
+        evidence = Evidence(np.array([0]), np.array([0]), np.ones(1), np.ones(1, bool), np.full(1, 0.1))
         results = [
             CameraResult(
                 camera=camera.with_pose(Pose(camera.pose.rotation, camera.pose.position + [0.05, 0, 0])),
-                evidence=seen,
+                evidence=evidence,
                 residual_px=None,
                 covariance=np.diag([np.inf] * 3 + [0.1] * 3),
                 repeatability=Sigma(0.01, 0.02),
@@ -89,7 +86,7 @@ def asked(monkeypatch):
                 with_fitted_zoom=None,
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
                 overlap=Overlap(0.9, 0.95, 0.05),
-                evidence_before=seen,
+                evidence_before=lambda: evidence,
                 moved=Movement(0.0, 0.05, float("nan")),
                 refusal=Refusal(asked.get("reason", "view"), asked["against"][camera.id])
                 if camera.id in asked["against"]
@@ -109,21 +106,16 @@ def asked(monkeypatch):
         against = "; ".join(f"camera {camera}: {why}" for camera, why in asked["against"].items()) or None
         found = pitch.flat() if options.flat else pitch.raised(asked.get("raised", 0.0))
         lights, after = asked.get("lights", {}), asked.get("after", {})
-        return engine.Calibration(found, results, against, 0.2, spent, None, 0.1, 3, doubts, "near", lights, after)
+        seen = {camera: np.ones((90, 160), np.float32) for camera in frames}
+        return engine.Calibration(
+            found, results, against, 0.2, spent, None, 0.1, 3, doubts, "near", lights, after, seen, ["right"]
+        )
 
     class Segmenter:
         sha256 = "f" * 64
 
         def __init__(self, model, threads, provider):
             assert provider == "CPUExecutionProvider"
-            asked.pop("released", None)
-
-        def __call__(self, frame, regions):
-            assert "released" not in asked
-            return np.full(frame.shape[:2], 255, np.uint8)
-
-        def release(self):
-            asked["released"] = True
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
     monkeypatch.setattr(to_schemas, "Segmenter", Segmenter)
@@ -214,7 +206,7 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
     assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
     assert set(result.timings_s) == set(result.cpu_s) == {"decode", "evolution", "preview"}
     assert [step.stage for step in steps] == ["evolution", "preview"]
-    assert asked["released"]
+    assert [camera.seen_by_network for camera in result.cameras] == ["overview", "full"]
     assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
     begins = {".jpg": b"\xff\xd8", ".png": b"\x89PNG"}
     assert all(file.startswith(begins[picture_file(name)[-4:]]) for name, file in outcome.pictures.items())

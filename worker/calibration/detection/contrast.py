@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,8 +51,13 @@ class Channels:
     def __getitem__(self, channel: int) -> NDArray[np.float32]:
         """Brightness (H, W) 0..255 in one channel, read when it is first asked for."""
         if channel not in self._read:
-            self._read[channel] = median([frame[..., channel] for frame in self._frames], self._swayed)
+            self._read[channel] = median([_plane(frame, channel) for frame in self._frames], self._swayed)
         return self._read[channel]
+
+
+def _plane(frame: Frame, channel: int) -> NDArray[np.uint8]:
+    """One channel (H, W) of a frame, its pixels beside each other."""
+    return np.asarray(cv2.extractChannel(frame, channel), dtype=np.uint8)
 
 
 def possible_signs(colour: str, channel: int) -> tuple[int, ...]:

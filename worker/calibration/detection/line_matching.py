@@ -24,7 +24,7 @@ from worker.calibration.detection.contrast import (
     possible_signs,
 )
 from worker.calibration.detection.line_profile import blurred_line
-from worker.calibration.detection.sampling import bilinear_planes
+from worker.calibration.detection.sampling import read_planes
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.visibility import VisibleLines
 
@@ -252,11 +252,12 @@ def _profiles(image: NDArray[np.float32], seen: VisibleLines, bend: Array, offse
     """
     along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1)
     total = np.zeros(offsets.shape)
-    across = (offsets * seen.normal[:, :1], offsets * seen.normal[:, 1:])
+    # As exact as pictures are read: a float32 tells a 4000th of a pixel.
+    across = [(offsets * seen.normal[:, axis : axis + 1]).astype(np.float32) for axis in (0, 1)]
     for shift in ALONG_PX:
-        on_line = seen.pixel + shift * along + (bend * shift**2 / 2)[:, None] * seen.normal
+        on_line = (seen.pixel + shift * along + (bend * shift**2 / 2)[:, None] * seen.normal).astype(np.float32)
         column, row = (on_line[:, axis : axis + 1] + across[axis] for axis in (0, 1))
-        total += bilinear_planes(image, column, row, outside=np.nan)
+        total += read_planes(image, column, row, outside=np.nan)
     return total / len(ALONG_PX)
 
 

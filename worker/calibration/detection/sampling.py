@@ -27,14 +27,21 @@ def bilinear(image: NDArray[np.float32], pixels: Array, outside: float = 0.0) ->
 
 def bilinear_planes(image: NDArray[np.float32], column: Plane, row: Plane, outside: float = 0.0) -> NDArray[np.float32]:
     """The same for columns and rows (P, N) apart, N at most `MOST_ROWS`."""
-    if column.size == 0:
-        return np.empty(column.shape, dtype=np.float32)
     # fmax and fmin take the number where the other one is NaN.
     x, y = (
         np.fmin(np.fmax(plane, FAR_OUTSIDE), -FAR_OUTSIDE).astype(np.float32, copy=False) for plane in (column, row)
     )
+    return read_planes(image, x, y, outside)
+
+
+def read_planes(
+    image: NDArray[np.float32], column: NDArray[np.float32], row: NDArray[np.float32], outside: float = 0.0
+) -> NDArray[np.float32]:
+    """The same for columns and rows (P, N) that are all finite."""
+    if column.size == 0:
+        return np.empty(column.shape, dtype=np.float32)
     parts = [
-        cv2.remap(image, x[some], y[some], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=outside)
-        for some in (slice(first, first + MOST_ROWS) for first in range(0, len(x), MOST_ROWS))
+        cv2.remap(image, column[some], row[some], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=outside)
+        for some in (slice(first, first + MOST_ROWS) for first in range(0, len(column), MOST_ROWS))
     ]
     return np.asarray(parts[0] if len(parts) == 1 else np.concatenate(parts), dtype=np.float32)

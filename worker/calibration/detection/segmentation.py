@@ -12,7 +12,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import cv2
@@ -32,6 +31,8 @@ REGION_PX = 1920
 
 As large as memory allows, one after the other: small ones pay for their halos, and batches of them gain nothing.
 """
+OVERVIEW_WIDTH_PX = 768
+"""Width of an overview: a sixth of the pixels that the network sees of a 4K frame, and of what they cost."""
 WORKING_WIDTH_PX = 1920
 """About the width that the network sees frames at; the three lengths above are in pixels as it sees them."""
 
@@ -64,14 +65,13 @@ class Segmenter:
         options.inter_op_num_threads = 1
         # Regions differ in size: memory planned for one does not fit the next.
         options.enable_mem_pattern = False
-        self._begin = partial(ort.InferenceSession, model, options, providers=[provider])
-        self.session: ort.InferenceSession | None = self._begin()
+        self.session = ort.InferenceSession(model, options, providers=[provider])
         self.sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
         self.input_name = self.session.get_inputs()[0].name
-
-    def release(self) -> None:
-        """Give back what runs have taken, hundreds of megabytes; who asks again waits until the network is loaded."""
-        self.session = None
+        # A run takes hundreds of megabytes, which search, judgement and pictures need after it.
+        self.run_options = ort.RunOptions()
+        if provider == "CPUExecutionProvider":
+            self.run_options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
 
     def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
         """Probabilities of a BGR frame (H, W, 3) as (H, W) in 0..255; 0 outside the regions.
@@ -88,6 +88,13 @@ class Segmenter:
 
     def _response(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
         response = np.zeros(frame.shape[:2], dtype=np.uint8)
+        if frame.shape[1] <= OVERVIEW_WIDTH_PX:
+            # The halos of its regions would be more than all of it.
+            everything = self._all_of(frame)
+            for region in regions:
+                rows, columns = slice(region.top, region.bottom), slice(region.left, region.right)
+                response[rows, columns] = everything[rows, columns]
+            return response
         beyond = HALO_PX + GRID_PX
         padded = np.pad(frame, ((HALO_PX, beyond), (HALO_PX, beyond), (0, 0)), mode="reflect")
         for region in regions:
@@ -97,10 +104,15 @@ class Segmenter:
             there[...] = np.rint(inner[: there.shape[0], : there.shape[1]] * 255)
         return response
 
+    def _all_of(self, frame: Frame) -> NDArray[np.uint8]:
+        """Probabilities (H, W) in 0..255 of a small frame, seen at once."""
+        height, width = frame.shape[:2]
+        padded = np.pad(frame, ((0, -height % GRID_PX), (0, -width % GRID_PX), (0, 0)), mode="reflect")
+        return np.rint(self._probabilities(padded)[:height, :width] * 255).astype(np.uint8)
+
     def _probabilities(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
         rgb = picture[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
-        self.session = self.session or self._begin()
-        (answer,) = self.session.run(None, {self.input_name: rgb})
+        (answer,) = self.session.run(None, {self.input_name: rgb}, self.run_options)
         return np.asarray(answer, dtype=np.float32)[0, 0]
 
 
@@ -118,6 +130,14 @@ class ProviderMissing(Exception):  # noqa: N818
 def shrinking(size: tuple[int, int]) -> int:
     """How many pixels of a frame of `size` (width, height) become one, each way, before the network sees it."""
     return max(1, round(size[0] / WORKING_WIDTH_PX))
+
+
+def overview(frame: Frame) -> Frame:
+    """Return a frame (H, W, 3) reduced to the width of an overview, in which the network sees wide lines."""
+    height, width = frame.shape[:2]
+    if width <= OVERVIEW_WIDTH_PX:
+        return frame
+    return _resized(frame, (OVERVIEW_WIDTH_PX, round(height * OVERVIEW_WIDTH_PX / width)), cv2.INTER_AREA)
 
 
 def whole_frame(size: tuple[int, int]) -> list[Region]:

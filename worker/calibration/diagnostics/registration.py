@@ -97,15 +97,15 @@ def pairs_in_common(pitch: Field, cameras: Sequence[Camera]) -> list[tuple[Camer
     return [
         (first, second)
         for first, second in combinations(cameras, 2)
-        if (centre := _reference_point(pitch, first, second)) is not None
-        and _directions_in_common(pitch, first, second, centre) > 0
+        if (centre := reference_point(pitch, first, second)) is not None
+        and directions_in_common(pitch, first, second, centre) > 0
     ]
 
 
 def shares_plenty(pitch: Field, first: Camera, second: Camera) -> bool:
     """Whether two cameras, by their poses, see so many of the same markings that their views have to register."""
-    centre = _reference_point(pitch, first, second)
-    return centre is not None and _directions_in_common(pitch, first, second, centre) == 2
+    centre = reference_point(pitch, first, second)
+    return centre is not None and directions_in_common(pitch, first, second, centre) == 2
 
 
 def register_pair(
@@ -116,11 +116,11 @@ def register_pair(
     Responses: float32 (height, width), probability 0..1 of a marking in each pixel of the raw frame. None if the
     cameras show no markings in common, or show them too far apart.
     """
-    centre = _reference_point(pitch, first, second)
+    centre = reference_point(pitch, first, second)
     if centre is None:
         return None
     segmented = ((first, first_response), (second, second_response))
-    held = _directions_in_common(pitch, first, second, centre)
+    held = directions_in_common(pitch, first, second, centre)
     best = _best_fit(pitch, segmented, centre, held)
     if best is None or best.support < LEAST_SUPPORT_M or best.correlation < LEAST_CORRELATION:
         return None
@@ -155,7 +155,7 @@ def _put(pitch: Field, camera: Camera, pixel: Array) -> Array:
     return np.asarray(point)
 
 
-def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
+def reference_point(pitch: Field, first: Camera, second: Camera) -> Array | None:
     """The pitch centre (2,) if both cameras see it, else the middle of the common markings around the nearest one."""
     points = np.concatenate([pitch.lift(np.zeros((1, 2))), pitch.line_points(0.5).position])
     seen = np.all([camera.sees(camera.project(points)) for camera in (first, second)], axis=0)
@@ -168,7 +168,7 @@ def _reference_point(pitch: Field, first: Camera, second: Camera) -> Array | Non
     return np.asarray(common[np.linalg.norm(common - nearest, axis=1) < FINE_HALF_M].mean(axis=0))
 
 
-def _directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
+def directions_in_common(pitch: Field, first: Camera, second: Camera, centre: Array) -> int:
     """In how many directions, 0 to 2, the markings that both cameras should see around a point (2,) can hold a view.
 
     There must be enough line across a direction, and it must not be so far aside that a turn and a move of a camera
@@ -181,9 +181,9 @@ def _directions_in_common(pitch: Field, first: Camera, second: Camera, centre: A
     common = lines[seen & near]
     across = common.normal[:, :2]
     enough = np.linalg.eigvalsh(lines.spacing * across.T @ across) > HOLDING_M
-    slope = (across[:, :, None] * _forms_of_both(first, second, common.position)).sum(axis=1)
+    slope = (across[:, :, None] * forms_of_both(first, second, common.position)).sum(axis=1)
     information = lines.spacing / EXPECTED_NOISE_M**2 * slope.T @ slope
-    at_centre = _forms_of_both(first, second, pitch.lift(centre))
+    at_centre = forms_of_both(first, second, pitch.lift(centre))
     covariance = at_centre @ np.linalg.inv(information + np.eye(len(information))) @ at_centre.T
     held = np.linalg.eigvalsh(covariance) < LOOSE_M**2
     return int(min(np.count_nonzero(enough), np.count_nonzero(held)))
@@ -239,7 +239,7 @@ def _fit(pitch: Field, segmented: Sequence[Segmented], middle: Array, shift: Arr
     both, the second is mostly noise.
     """
     on_surface = pitch.lift(middle)
-    at_middle = _forms_of_both(segmented[0][0], segmented[1][0], on_surface)
+    at_middle = forms_of_both(segmented[0][0], segmented[1][0], on_surface)
     # The most likely turns and moves that make the shift.
     start = at_middle.T @ np.linalg.solve(at_middle @ at_middle.T, shift)
     grid = _square(middle, FINE_HALF_M, FINE_STEP_M)
@@ -307,7 +307,7 @@ def _forms(camera: Camera, points: Array) -> Array:
     return ground_slopes(camera, points) * EXPECTED
 
 
-def _forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
+def forms_of_both(first: Camera, second: Camera, points: Array) -> Array:
     """How points (..., 3) of the pitch move in the second view relative to the first, (..., 2, 12)."""
     return np.concatenate([-_forms(first, points), _forms(second, points)], axis=-1)
 

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.geometry.camera import Array, Camera
@@ -61,8 +60,8 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
         return Seam([])
     lines = pitch.line_points()
     index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
-    put_first, sigma_first = _put(lines, first.camera, first.measured, a)
-    put_second, sigma_second = _put(lines, second.camera, second.measured, b)
+    put_first, sigma_first = paint_offsets(lines, first.camera, first.measured[a])
+    put_second, sigma_second = paint_offsets(lines, second.camera, second.measured[b])
     apart, sigma = put_second - put_first, np.hypot(sigma_first, sigma_second)
     known = np.isfinite(apart) & (sigma < LARGEST_SIGMA_M)
     index, apart, sigma = index[known], apart[known], sigma[known]
@@ -83,11 +82,10 @@ def measure_seam(pitch: Field, first: RefinedPose, second: RefinedPose) -> Seam:
     return Seam(_in_order(places[:MOST_PLACES]))
 
 
-def _put(lines: LinePoints, camera: Camera, measured: Measurements, its: NDArray[np.intp]) -> tuple[Array, Array]:
+def paint_offsets(lines: LinePoints, camera: Camera, measured: Measurements) -> tuple[Array, Array]:
     """How far (M,) m along the normals of the lines a camera puts their paint beside them, and the error of that."""
-    chosen = measured[its]
-    offset = chosen.offset(camera, lines.position[chosen.index])
-    return offset / chosen.px_per_metre, chosen.noise_px / chosen.px_per_metre
+    offset = measured.offset(camera, lines.position[measured.index])
+    return offset / measured.px_per_metre, measured.noise_px / measured.px_per_metre
 
 
 def _in_order(places: Sequence[SeamPlace]) -> list[SeamPlace]:

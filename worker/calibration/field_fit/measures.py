@@ -12,11 +12,12 @@ from typing import Literal, cast
 
 import numpy as np
 
-from worker.calibration.calibrate import judge_together, observe
+from worker.calibration.calibrate import judge_together
 from worker.calibration.field_fit.ridge_length import TriedRidges, try_ridges
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import FieldParameter, LensParameter, Parameter, free_field
+from worker.calibration.observe import FrameObserver
 from worker.calibration.records import EngineResult, Options, Progress, ProgressReporter, Segment
 from worker.calibration.refinement.refine import SEARCH_PX, Observations, refine
 from worker.calibration.refinement.uncertainty import ParameterUncertainty, RefinedPoses
@@ -82,16 +83,18 @@ def fit_field(
     Arguments, errors and determinism as of `calibrate`. Where the pitch has no ridge, one with hips of 45° is tried.
     """
     options, progress = Options(seed=seed), ProgressReporter(report, stop)
-    observed = observe(pitch, cameras, frames, segment, progress)
-    problem = Problem(pitch, cameras, observed, options, [None] * len(cameras))
+    observer = FrameObserver.of(pitch, cameras, frames, segment)
+    problem = Problem(pitch, cameras, observer.observe(progress), options, [None] * len(cameras))
+    problem = observer.look_in_full(problem, range(len(cameras)), progress)
     solution = search_and_refine(problem, progress)
     if len(problem.usable) < len(cameras):
         fitted, results, measures = pitch, solution.results, leave_measures(pitch)
     else:
         with progress.timed("refinement"):
-            refined, measures = fit_measures(pitch, solution.begun, observed.observations, options.stitch_weight)
+            observations = problem.observed.observations
+            refined, measures = fit_measures(pitch, solution.begun, observations, options.stitch_weight)
         fitted, results = refined.pitch, judge_each(problem, refined, progress)
-    judged = judge_together(fitted, results, observed.observations, progress)
+    judged = judge_together(problem, fitted, results, progress)
     progress.at("refinement", 1.0)
     return FieldFit(
         pitch=judged.pitch,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from worker.calibration.detection.evidence import Evidence
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.diagnostics.line_registration import MeasuredLines, register_lines
 from worker.calibration.diagnostics.registration import (
     Registration,
     Response,
@@ -26,11 +28,17 @@ MOST = 0.6
 
 @dataclass(frozen=True)
 class CameraResponse:
-    """A camera, the segmentation (H, W) of its frame in 0..1, and how much of the lines is seen where it puts them."""
+    """A camera, the segmentation (H, W) of its frame in 0..1, and how much of the lines is seen where it puts them.
+
+    `evidence`: computes that, and is asked only where two cameras cannot be registered.
+    `response` None: the network has not looked at the frame in full, and the lines `measured` in it say how it lies
+    beside others.
+    """
 
     camera: Camera
-    response: Response
-    evidence: Evidence
+    response: Response | None
+    evidence: Callable[[], Evidence]
+    measured: Measurements | None = None
 
 
 @dataclass(frozen=True)
@@ -38,8 +46,8 @@ class Pair:
     """Two cameras, by their ids, that should show some of the same markings.
 
     `error_px`: how far apart they put them, 1 px = 10 cm; None where their views cannot be brought together, and then
-    there is no `registration`. `plenty`: they share so much that this tells something; `confirmed`: whether it
-    registers or not, both see what they share where their poses put it.
+    there is no `registration`. `plenty`: they share so much that this tells something; `confirmed`: they
+    register, or both see what they share where their poses put it.
     """
 
     first: str
@@ -99,11 +107,22 @@ def compare_pairs(pitch: Field, cameras: Sequence[CameraResponse]) -> list[Pair]
     found = []
     for pair in pairs_in_common(pitch, [one.camera for one in cameras]):
         first, second = (by_id[camera.id] for camera in pair)
-        registered = register_pair(pitch, *pair, first.response, second.response)
+        registered = _register(pitch, first, second)
         error_px = None if registered is None else registered.error_px
-        confirmed = _both_see(first.evidence, second.evidence)
+        confirmed = registered is not None or _both_see(first.evidence(), second.evidence())
         found.append(Pair(pair[0].id, pair[1].id, error_px, shares_plenty(pitch, *pair), confirmed, registered))
     return found
+
+
+def _register(pitch: Field, first: CameraResponse, second: CameraResponse) -> Registration | None:
+    """Register two cameras by their responses, or by their measured lines unless both have one."""
+    if first.response is not None and second.response is not None:
+        return register_pair(pitch, first.camera, second.camera, first.response, second.response)
+    if first.measured is None or second.measured is None:
+        return None
+    return register_lines(
+        pitch, MeasuredLines(first.camera, first.measured), MeasuredLines(second.camera, second.measured)
+    )
 
 
 def compare_pairs_before(
@@ -118,8 +137,7 @@ def compare_pairs_before(
         else:
             now = (found[pair.first], found[pair.second])
             error_px = pair_error_px(pitch, pair.registration, now, (seeing[0].camera, seeing[1].camera))
-            confirmed = _both_see(seeing[0].evidence, seeing[1].evidence)
-            before.append(Pair(pair.first, pair.second, error_px, pair.plenty, confirmed))
+            before.append(Pair(pair.first, pair.second, error_px, pair.plenty, confirmed=True))
     return before
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -115,15 +115,16 @@ class CameraResult(RefinedPose):
     """One camera's answer, which the gate looks at: what the finish found, and what it is worth beside the stored pose.
 
     `view`: whether its frame could be used, and what is wrong with it if not; `overlap`: of expected lines and the
-    segmentation; `refusal`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the
-    camera's lens is not the stored one but what the lines say; `markings`: what is seen of each; `moved_in_all`: since
-    its memory began, None without one; `knocked`: whether it was found again farther from its stored pose than the gate
-    allows, by a search anywhere.
+    segmentation; `evidence_before`: computes that at the stored pose, lazily, since a good answer needs none;
+    `refusal`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the camera's lens
+    is not the stored one but what the lines say; `markings`: what is seen of each; `moved_in_all`: since its memory
+    began, None without one; `knocked`: whether it was found again farther from its stored pose than the gate allows, by
+    a search anywhere.
     """
 
     view: ViewCondition
     overlap: Overlap
-    evidence_before: Evidence
+    evidence_before: Callable[[], Evidence]
     moved: Movement
     refusal: Refusal | None = None
     lens_found: bool = False
@@ -219,10 +220,11 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             f"{result.moved_in_all.words(gate)}, over all jobs since its pose was last stored by hand: its mount may "
             "be giving way; look at it, then store this pose, or accept the job by hand",
         )
-    if seen.agreement < result.evidence_before.agreement - gate.agreement_loss:
+    beaten_by_any = seen.agreement < 1 - gate.agreement_loss
+    if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - gate.agreement_loss:
         return Refusal(
             "stored-better",
-            f"the stored pose fits the frame better: {result.evidence_before.share:.0%} of the markings' length is "
+            f"the stored pose fits the frame better: {before.share:.0%} of the markings' length is "
             f"seen where it puts them, with the new pose {seen.share:.0%}",
         )
     return None

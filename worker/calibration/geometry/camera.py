@@ -73,9 +73,9 @@ class Camera:
 
     def project(self, points: Array) -> Array:
         """World points (..., 3) to pixels (..., 2); NaN behind the camera and outside what the lens model covers."""
-        in_a_row = points.reshape(-1, 3)
-        pixels = project(in_a_row, self.pose.rotation[None], self.pose.position[None], self.intrinsics)[0]
-        return pixels.reshape(*points.shape[:-1], 2)
+        in_a_row = points.reshape(-1, 3).T
+        planes = _turned_and_bent(in_a_row, self.pose.matrix[None], self.pose.position[None], self.intrinsics)
+        return np.stack(planes, axis=-1)[0].reshape(*points.shape[:-1], 2)
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Directions in the world (..., 3), not normalised (depth 1), through pixels (..., 2)."""
@@ -89,6 +89,11 @@ class Camera:
     def with_lens(self, intrinsics: Lens) -> Camera:
         """Another lens in the same place."""
         return Camera(self.id, intrinsics, self.pose, self.ignored)
+
+    def resized(self, width_px: int) -> Camera:
+        """Return the camera of its picture resized to a width."""
+        lens = self.intrinsics.scaled(width_px / self.intrinsics.size[0])
+        return Camera(self.id, lens, self.pose, None if self.ignored is None else self.ignored.resized(lens.size))
 
     def sees(self, pixels: Array) -> NDArray[np.bool_]:
         """Which pixels (..., 2) lie in the picture where it is of use."""
@@ -107,7 +112,11 @@ def project(points: Array, rotations: Array, positions: Array, intrinsics: Lens)
 
 def project_planes(points: Plane, rotations: Array, positions: Array, intrinsics: Lens) -> tuple[Plane, Plane]:
     """`project` for points (3, N), to columns and rows (P, N) apart, in the precision of the points."""
-    matrices = rotation_matrices(rotations)
+    return _turned_and_bent(points, rotation_matrices(rotations), positions, intrinsics)
+
+
+def _turned_and_bent(points: Plane, matrices: Array, positions: Array, intrinsics: Lens) -> tuple[Plane, Plane]:
+    """`project_planes` by rotation matrices (P, 3, 3)."""
     # R (X - C) as R X - R C: one product for the whole population.
     turned = matrices.astype(points.dtype) @ points
     x, y, depth = np.moveaxis(turned - (matrices @ positions[..., None]).astype(points.dtype), 1, 0)

@@ -26,6 +26,11 @@ class Ignored:
             cv2.fillPoly(area, [np.rint(polygon * 16).astype(np.int32)], 1, shift=4)
         return area > 0
 
+    def resized(self, size: tuple[int, int]) -> Ignored:
+        """Return the same areas of the picture resized to `size` (width, height)."""
+        ratio = np.array(size) / self.size
+        return Ignored([(polygon + 0.5) * ratio - 0.5 for polygon in self.polygons], size)
+
     def at(self, pixels: NDArray[np.floating], size: tuple[int, int]) -> NDArray[np.bool_]:
         """Which pixels (..., 2) of the picture, shown at `size`, are ignored; none outside it."""
         column, row = (

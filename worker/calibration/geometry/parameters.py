@@ -57,6 +57,7 @@ class FieldParameter:
     read: Callable[[Field], float]
     write: Callable[[Field, float], Field]
     shift: Array
+    lines: LinePoints | None = None
 
     @classmethod
     def of(
@@ -71,12 +72,14 @@ class FieldParameter:
         return cls(name, expected, read, write, np.empty((0, 3))).around(pitch, pitch.line_points())
 
     def around(self, pitch: Field, lines: LinePoints) -> FieldParameter:
-        """The same measure as it moves `lines` of a pitch that has been changed since."""
+        """The same measure as it moves `lines` of a pitch that may have been changed since."""
+        if lines is self.lines:
+            return self
         ahead, behind = (
             self.write(pitch, self.read(pitch) + step).same_line_points(lines).position
             for step in (FIELD_STEP_M, -FIELD_STEP_M)
         )
-        return replace(self, shift=(ahead - behind) / (2 * FIELD_STEP_M))
+        return replace(self, shift=(ahead - behind) / (2 * FIELD_STEP_M), lines=lines)
 
     def applied(self, cameras: Sequence[Camera], pitch: Field, by: float) -> tuple[list[Camera], Field]:
         """Cameras and pitch with this measure changed, as far as it can be."""

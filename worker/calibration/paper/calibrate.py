@@ -9,18 +9,12 @@ from typing import Literal
 
 import numpy as np
 
-from worker.calibration.calibrate import (
-    NO_MEMORIES,
-    NOTHING_USUAL,
-    diagnose,
-    judge_together,
-    observe,
-    remember,
-)
+from worker.calibration.calibrate import NO_MEMORIES, diagnose, judge_together, remember
 from worker.calibration.detection.view_condition import UsualView
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.memory.camera_memory import CameraMemory
+from worker.calibration.observe import NOTHING_USUAL, FrameObserver
 from worker.calibration.paper.ground_objective import NARROW, GroundObjective
 from worker.calibration.paper.search import ALONE_ON_THE_GROUND, ON_THE_GROUND, Level, search_on_ground
 from worker.calibration.records import (
@@ -75,14 +69,15 @@ def calibrate_by_paper(
     progress = ProgressReporter(report, stop)
 
     # Observe.
-    observed = observe(pitch, cameras, frames, segment, progress, usual)
+    observer = FrameObserver.of(pitch, cameras, frames, segment)
     known = [memories.get(camera.id) for camera in cameras]
-    problem = Problem(pitch, cameras, observed, options, known, recorder=recorder)
-    recorder.observed(cameras, frames, observed.views, observed.observations.responses)
+    problem = Problem(pitch, cameras, observer.observe(progress, usual), options, known, recorder=recorder)
+    problem = observer.look_in_full(problem, range(len(cameras)), progress)
+    recorder.observed(cameras, frames, problem.observed.views, problem.observed.observations.responses)
 
     # Search, and judge the poses as the search leaves them.
     solution = _solve(problem, preset.levels, progress)
-    judged = judge_together(solution.pitch, solution.results, observed.observations, progress)
+    judged = judge_together(problem, solution.pitch, solution.results, progress)
     recorder.judged(judged.pitch, cameras, judged.cameras)
 
     # Diagnose, and remember.

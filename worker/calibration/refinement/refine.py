@@ -35,8 +35,9 @@ SEARCH_PX = (14.0, 8.0, 5.0)
 LAST_SEARCH_PX = 5.0
 """In the last rounds, which go on until the cameras stand still. Wide enough that it is the robust weights which leave
 out a line point, and not the end of the search, which moves with the cameras."""
-SPARE_PX = 3.0
-"""So much farther than it is asked to look a reading of a frame reaches, so that it is good for more than one pose."""
+SPARE_PX = 4.0
+"""So much farther than it is asked to look a reading of a frame reaches, so that it is good for more than one pose, and
+that of the last round for the evaluation of where it led."""
 EVALUATION_SEARCH_PX = 8.0
 MOST_STEPS = 4
 """Of a coarse round."""
@@ -301,7 +302,6 @@ def _assessed(
     finish = finish.around(here)
     lines, reader = here.on_ground(finish.unknowns), finish.reader
     evidence = reader.evidence(here.pitch, lines, here.cameras)
-    reader.read_anew()
     everything = _of_seen(reader.measure(lines, here.cameras, EVALUATION_SEARCH_PX), evidence)
     measured = doubted(here, finish.but_anew(everything))
     # A field that is wrong looks like a ground that swells a lot: judged, it has to be an ordinary ground.

@@ -43,7 +43,7 @@ def new_layer(pitch: Field, camera: Camera, size: tuple[int, int]) -> Layer:
 
 
 def mask_layer(response: NDArray[np.uint8], size: tuple[int, int]) -> Layer:
-    """Where the network saw markings; `response` (H, W): its probability in 0..255."""
+    """Where the network saw markings; `response` (h, w), of the frame or of an overview: its probability in 0..255."""
     # Lines are thinner than what is left of them in a smaller picture: the strongest stays, not the mean.
     reach = max(1, round(response.shape[1] / size[0]))
     strongest = cv2.dilate(response, np.ones((reach, reach), np.uint8))

@@ -23,7 +23,8 @@ def seeing(one: Camera, response: Response, share: float = 1.0) -> CameraRespons
     """A camera that finds a share of its lines where its pose puts them."""
     index = np.flatnonzero(inside(one.project(PITCH.line_points().position), one.intrinsics.size))
     found = index % 10 < 10 * share
-    return CameraResponse(one, response, Evidence(index, index, np.ones(len(index)), found, np.zeros(len(index))))
+    evidence = Evidence(index, index, np.ones(len(index)), found, np.zeros(len(index)))
+    return CameraResponse(one, response, lambda: evidence)
 
 
 def blamed(*pairs: Pair) -> set[str]:

@@ -40,7 +40,7 @@ def good():
         with_fitted_zoom=None,
         view=IN_VIEW,
         overlap=Overlap(0.9, 0.95, 0.05),
-        evidence_before=seen(0.3),
+        evidence_before=lambda: seen(0.3),
         moved=Movement(0.5, 0.1, 12.0),
     )
 
@@ -68,7 +68,7 @@ def test_a_good_result_passes_the_gate():
         ),
         ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
         ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
-        ({"evidence": seen(0.8), "evidence_before": seen(0.95)}, "stored pose fits the frame better"),
+        ({"evidence": seen(0.8), "evidence_before": lambda: seen(0.95)}, "stored pose fits the frame better"),
     ],
 )
 def test_the_gate_names_the_cause(change, cause):

@@ -1,0 +1,98 @@
+"""How far apart two cameras put the same markings, by the line points that both have measured.
+
+The same registration as that of two pictures of responses (`registration`), of their line centres seen from above:
+small turns and moves of both cameras that bring the paint of the one onto that of the other. It costs a hundredth,
+and does without the network. Each point is the same piece of line in both views: what is nearer to another line than
+to its own cannot be registered, which is for the responses to do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from worker.calibration.detection.line_measurement import Measurements
+from worker.calibration.diagnostics.registration import (
+    FINE_HALF_M,
+    LEAST_SUPPORT_M,
+    LOOSE_M,
+    PIXEL_M,
+    Registration,
+    directions_in_common,
+    forms_of_both,
+    reference_point,
+)
+from worker.calibration.diagnostics.seam import paint_offsets
+from worker.calibration.geometry.camera import Array, Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.robust import huber_weights
+
+LEASTS = (1.0, 0.3, 0.1, 0.01)
+"""The part of the expected turns and moves that is expected at least, step by step (see `registration.FINE_STAGES`)."""
+ALIKE_M = 2.5
+"""Length of line over which two views are apart alike, by their lenses and by the ground: it counts as one point."""
+
+
+@dataclass(frozen=True)
+class MeasuredLines:
+    """A camera and the line points `measured` in its frame."""
+
+    camera: Camera
+    measured: Measurements
+
+
+def register_lines(pitch: Field, first: MeasuredLines, second: MeasuredLines) -> Registration | None:
+    """Register the lines of two cameras around the pitch centre, or the markings in common nearest to it.
+
+    None where both have measured too little of the same lines to hold the views in the directions that they should.
+    """
+    centre = reference_point(pitch, first.camera, second.camera)
+    if centre is None:
+        return None
+    lines = pitch.line_points()
+    index, a, b = np.intersect1d(first.measured.index, second.measured.index, return_indices=True)
+    near = np.abs(lines.position[index, :2] - centre).max(axis=1) < FINE_HALF_M
+    (put_first, sigma_first), (put_second, sigma_second) = (
+        paint_offsets(lines, one.camera, one.measured[its[near]]) for one, its in ((first, a), (second, b))
+    )
+    apart, sigma = put_second - put_first, np.hypot(sigma_first, sigma_second)
+    known = np.isfinite(apart) & np.isfinite(sigma)
+    index, apart, sigma = index[near][known], apart[known], sigma[known]
+    support_m = len(index) * lines.spacing
+    if support_m < LEAST_SUPPORT_M:
+        return None
+    points = lines[index]
+    forms = forms_of_both(first.camera, second.camera, points.position)
+    at_centre = forms_of_both(first.camera, second.camera, pitch.lift(centre))
+    moves, covariance = _moves(
+        np.einsum("md,mdj->mj", points.normal[:, :2], forms), apart, sigma, lines.spacing, at_centre
+    )
+
+    held = directions_in_common(pitch, first.camera, second.camera, centre)
+    variance, directions = np.linalg.eigh(at_centre @ covariance @ at_centre.T)
+    told = directions[:, variance < LOOSE_M**2][:, :held]
+    if told.shape[1] < held:
+        return None
+    dx, dy = told @ told.T @ at_centre @ moves / PIXEL_M
+    return Registration(float(dx), float(dy), support_m, (first.camera.id, second.camera.id), centre, told)
+
+
+def _moves(slopes: Array, apart: Array, sigma: Array, spacing_m: float, at_centre: Array) -> tuple[Array, Array]:
+    """The turns and moves (12,) of both cameras that put points as far (M,) m apart as they are, and their covariance.
+
+    `slopes` (M, 12) of that by the moves; `at_centre` (2, 12) of the displacement there. What is expected shrinks with
+    the displacement that is found, and the covariance is that of cameras of which no more is known than is expected.
+    """
+    expected = np.linalg.inv(at_centre @ at_centre.T)
+    alike = max(ALIKE_M / spacing_m, 1.0)
+    moves: Array = np.zeros(slopes.shape[1])
+    for least in LEASTS:
+        weight = huber_weights((apart - slopes @ moves) / sigma) / (sigma**2 * alike)
+        information = (slopes * weight[:, None]).T @ slopes
+        found = at_centre @ moves
+        prior = 1 / max(float(found @ expected @ found), least**2)
+        moves = np.asarray(
+            np.linalg.solve(information + prior * np.eye(len(moves)), slopes.T @ (weight * apart)), float
+        )
+    return moves, np.asarray(np.linalg.inv(information + np.eye(len(moves))), dtype=float)
