@@ -74,6 +74,8 @@ def recover_knocked(
     """
     problem, _, judged, _ = solved
     sought = [n for n in range(len(problem.cameras)) if _is_sought(problem, n, judged.cameras[n])]
+    if not sought:
+        return solved
     with progress.timed("evolution"):
         searched = {n: _search(problem, judged.cameras[n], n, observer, progress) for n in sought}
     found = {n: one for n, one in searched.items() if one is not None}
