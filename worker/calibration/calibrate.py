@@ -17,6 +17,7 @@ from worker.calibration.gate.pairs import (
     compare_pairs,
     compare_pairs_before,
     find_contradictions,
+    measured_by_lines,
     refusal_by_pairs,
     stitch_error_px,
 )
@@ -183,20 +184,20 @@ def _comparable(results: Sequence[CameraResult]) -> list[int]:
 def _compared(problem: Problem, pitch: Field, results: Sequence[CameraResult]) -> list[Pair]:
     """Compare pairs of cameras by the network's responses or, where it has not looked in full, by measured lines.
 
-    By ridges if these do not register what should be.
+    By ridges if these do not register what should be. How far those are apart that agree is measured by lines.
     """
     chosen = _comparable(results)
     seeing = [
         _response_of(problem, n, results[n].camera, partial(_evidence_of, results[n]), results[n]) for n in chosen
     ]
     pairs = compare_pairs(pitch, seeing)
-    nothing = all(pair.error_px is None for pair in pairs)
-    if not pairs or not (nothing or any(pair.missed for pair in pairs)):
-        return pairs
-    channels = problem.observed.observations.channels
-    ridges = [ridges_of(pitch, results[n].camera, channels[n]) for n in chosen]
-    by_ridges = compare_pairs(pitch, [replace(one, response=its) for one, its in zip(seeing, ridges, strict=True)])
-    return [again if pair.error_px is None else pair for pair, again in zip(pairs, by_ridges, strict=True)]
+    nothing = bool(pairs) and all(pair.error_px is None for pair in pairs)
+    if nothing or any(pair.missed for pair in pairs):
+        channels = problem.observed.observations.channels
+        ridges = [ridges_of(pitch, results[n].camera, channels[n]) for n in chosen]
+        by_ridges = compare_pairs(pitch, [replace(one, response=its) for one, its in zip(seeing, ridges, strict=True)])
+        pairs = [again if pair.error_px is None else pair for pair, again in zip(pairs, by_ridges, strict=True)]
+    return measured_by_lines(pitch, pairs, seeing, problem.gate)
 
 
 def _evidence_of(result: CameraResult) -> Evidence:

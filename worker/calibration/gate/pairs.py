@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -118,11 +118,31 @@ def _register(pitch: Field, first: CameraResponse, second: CameraResponse) -> Re
     """Register two cameras by their responses, or by their measured lines unless both have one."""
     if first.response is not None and second.response is not None:
         return register_pair(pitch, first.camera, second.camera, first.response, second.response)
+    return _register_lines(pitch, first, second)
+
+
+def _register_lines(pitch: Field, first: CameraResponse, second: CameraResponse) -> Registration | None:
     if first.measured is None or second.measured is None:
         return None
     return register_lines(
         pitch, MeasuredLines(first.camera, first.measured), MeasuredLines(second.camera, second.measured)
     )
+
+
+def measured_by_lines(pitch: Field, pairs: Sequence[Pair], cameras: Sequence[CameraResponse], gate: Gate) -> list[Pair]:
+    """Return the pairs, of which those that agree have the error that the lines measured in both views say.
+
+    So the error means the same whether or not the network has looked in full, and lines are measured finer than
+    responses. Whether two cameras contradict each other the responses say: a camera that takes one line for another
+    measures no contradiction.
+    """
+    by_id = {one.camera.id: one for one in cameras}
+    found = []
+    for pair in pairs:
+        lines = _register_lines(pitch, by_id[pair.first], by_id[pair.second]) if pair.agrees(gate) else None
+        finer = pair if lines is None else replace(pair, error_px=lines.error_px, registration=lines)
+        found.append(finer if finer.agrees(gate) else pair)
+    return found
 
 
 def compare_pairs_before(

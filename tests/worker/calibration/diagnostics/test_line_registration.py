@@ -10,6 +10,8 @@ from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_measurement import measure_lines
 from worker.calibration.diagnostics.line_registration import MeasuredLines, register_lines
 from worker.calibration.diagnostics.registration import PIXEL_M, Registration
+from worker.calibration.gate.pairs import CameraResponse, Pair, measured_by_lines
+from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.camera import Camera
 
 BLIND = np.zeros((1, 1), np.float32)
@@ -51,3 +53,24 @@ def test_nothing_is_said_where_nothing_is_measured_in_common() -> None:
     assert register_lines(CROWNED, measured(left, left), measured(away, away)) is None
     grass = np.broadcast_to(pair_frames()[1][-1, -1], pair_frames()[1].shape)
     assert register_lines(CROWNED, measured(left, left), measured(right, right, np.ascontiguousarray(grass))) is None
+
+
+def seen(lines: MeasuredLines) -> CameraResponse:
+    return CameraResponse(lines.camera, BLIND, lambda: pytest.fail("not asked"), lines.measured)
+
+
+def test_of_a_pair_that_agrees_the_lines_say_how_far_it_is_apart() -> None:
+    (left, right), frames = pair(), pair_frames()
+    cameras = [seen(measured(left, left, frames[0])), seen(measured(right, right, frames[1]))]
+    by_responses = Pair(left.id, right.id, 0.7, plenty=True, confirmed=True)
+    (by_lines,) = measured_by_lines(CROWNED, [by_responses], cameras, Gate())
+    assert by_lines.error_px == registered().error_px
+    assert by_lines.registration is not None
+
+
+@pytest.mark.parametrize("error_px", [None, 3.0])
+def test_lines_do_not_gainsay_a_contradiction(error_px) -> None:
+    (left, right), frames = pair(), pair_frames()
+    cameras = [seen(measured(left, left, frames[0])), seen(measured(right, right, frames[1]))]
+    by_responses = Pair(left.id, right.id, error_px, plenty=True, confirmed=False)
+    assert measured_by_lines(CROWNED, [by_responses], cameras, Gate()) == [by_responses]
