@@ -36,9 +36,20 @@ TO_VENUES = Added(
     of_cameras=["light"],
 )
 TO_RESULTS = Added(
-    own=["warnings", "adoptable"],
+    # `path` has words that 0.1.0 does not know; without it a result is told as one of a search.
+    own=["warnings", "adoptable", "path"],
     of_parts={},
-    of_cameras=["light", "refined", "lens_change", "nights", "displacement", "cross_check", "knocked", "proposed"],
+    of_cameras=[
+        "light",
+        "refined",
+        "lens_change",
+        "nights",
+        "displacement",
+        "cross_check",
+        "knocked",
+        "proposed",
+        "seen_by_network",
+    ],
 )
 
 

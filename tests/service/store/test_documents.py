@@ -50,7 +50,7 @@ def everything():
 
 
 def whole_result(of):
-    """With every field that 0.1.0 does not know."""
+    """With every field, and every word of one that has a default, that 0.1.0 does not know."""
     pose, lens = of.cameras[0].pose, of.cameras[0].intrinsics
     refined = Refined(pose=pose, intrinsics=lens, covariance=None, sigma=None, longer=0.1, differs_m=None)
     change = LensChange(longer=0.1, sigma=0.1, since=None, words=None)
@@ -60,6 +60,7 @@ def whole_result(of):
         "lens_change": change,
         "nights": 3,
         "knocked": True,
+        "seen_by_network": "full",
         "proposed": Proposal(
             pose=pose, sigma=None, moved=Moved(rotation_deg=11.2, position_m=0.3, pixels=None), found=0.97
         ),
@@ -68,7 +69,8 @@ def whole_result(of):
     }
     found = result(of, accepted=True)
     cameras = [found.cameras[0].model_copy(update=more), *found.cameras[1:]]
-    return found.model_copy(update={"cameras": cameras, "warnings": ["no sigma"], "adoptable": [RIDGE]})
+    own = {"warnings": ["no sigma"], "adoptable": [RIDGE], "path": "anywhere"}
+    return found.model_copy(update={"cameras": cameras, **own})
 
 
 def test_0_1_0_can_read_the_document_of_a_venue_and_nothing_of_it_is_lost():
