@@ -31,9 +31,11 @@ LOST = frozenset({"lines", "few-lines", "moved"})
 """Reasons for a refusal that a knocked camera may have."""
 UNFIT = frozenset({"residual", "zoomed", "undetermined"})
 """Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
-LEAST_PAINT, LEAST_UNEXPLAINED = 200, 0.4
+LEAST_PAINT, LEAST_UNEXPLAINED, UNEXPLAINED_BY_WEATHER = 200, 0.4, 0.85
 """Lines are clearly seen elsewhere when so many of the places on the middles of paint are there, and this share of them
-lies on no line by any pose that was found."""
+lies on no line by any pose that was found. Where the frame looks fogged or blocked at that pose it has to be nearly all
+of them: what shows through fog, or beside what blocks the view, lies for a third or more on the lines of a camera that
+has not moved, and a search every quarter of an hour of a foggy night is dear."""
 ON_ITS_MOUNT_M = 2.5
 """How far from its stored place a camera is searched for first."""
 LONGEST_S = 20.0
@@ -157,7 +159,8 @@ def _has_lines_elsewhere(problem: Problem, result: CameraResult, response: Respo
         return False
     if result.refusal is not None and result.refusal.reason == "moved":
         return True
-    return paint.explained_by(problem.pitch, result.camera) <= 1 - LEAST_UNEXPLAINED
+    least = UNEXPLAINED_BY_WEATHER if result.view.cause in OF_THE_GROUND else LEAST_UNEXPLAINED
+    return paint.explained_by(problem.pitch, result.camera) <= 1 - least
 
 
 def _on_its_side(markings: FieldMap, stored: Camera, found: Relocalisation, place: Place) -> Camera | None:
