@@ -172,6 +172,10 @@ OneCamera = Annotated[
 ]
 Output = Annotated[Path | None, typer.Option("-o", "--output", help="File to write; otherwise standard output.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of lines.")]
+IdempotencyKey = Annotated[
+    str | None,
+    typer.Option("--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."),
+]
 OptionsText = Annotated[
     str,
     typer.Option(

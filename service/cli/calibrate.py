@@ -11,6 +11,7 @@ from service.cli.arguments import (
     DEFAULT_URL,
     ApiKey,
     Frames,
+    IdempotencyKey,
     OneCamera,
     OptionsText,
     Url,
@@ -42,12 +43,7 @@ def calibrate(
     ] = None,
     options: OptionsText = "{}",
     wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end and print it.")] = False,
-    key: Annotated[
-        str | None,
-        typer.Option(
-            "--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."
-        ),
-    ] = None,
+    key: IdempotencyKey = None,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:

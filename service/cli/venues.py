@@ -23,6 +23,7 @@ from service.cli.arguments import (
     Candidates,
     FormatOption,
     Frames,
+    IdempotencyKey,
     LensOption,
     OneCamera,
     Output,
@@ -362,12 +363,7 @@ def find_cameras(
     pictures: Annotated[
         Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera; waits.")
     ] = None,
-    key: Annotated[
-        str | None,
-        typer.Option(
-            "--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."
-        ),
-    ] = None,
+    key: IdempotencyKey = None,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:

@@ -297,7 +297,7 @@ class Result(Schema):
 
     @property
     def recovered_cameras(self) -> list[str]:
-        """Those that were knocked and whose new poses may replace the stored ones."""
+        """Ids of the cameras that were knocked and whose new poses may replace the stored ones."""
         return [camera.id for camera in self.cameras if camera.accepted and camera.knocked]
 
     @property
@@ -491,7 +491,7 @@ FindReason = Annotated[
 
 
 class FoundCameraResult(Schema):
-    """What was found for a camera: `candidates`, the best first; where it is accepted, its first one is the camera."""
+    """Answer of a search for one camera: `candidates`, the best first; where it is accepted, the first is taken."""
 
     id: Id
     accepted: bool

@@ -187,7 +187,7 @@ def _set_anchor(connection: sa.Connection, venue_id: str, camera: PosedCamera, r
 
 
 def _row(result: CameraResult, moved: Displacement, anchor: int) -> dict[str, Any]:
-    """What the row of a camera says of one night."""
+    """Return the values of the row of a camera for one night."""
     sigma = result.sigma
     return {
         "camera": result.id,

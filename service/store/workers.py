@@ -55,7 +55,7 @@ class WorkerStart:
 
 @dataclass(frozen=True)
 class Round:
-    """What a heartbeat hears of the others: workers that are silent, and open jobs that nothing is heard of.
+    """News of the others that a heartbeat hears: workers that are silent, and open jobs that nothing is heard of.
 
     `is_of_this_start`: whether the row of the worker was still of the start that sent the heartbeat.
     """

@@ -207,7 +207,7 @@ def _evidence_of(result: CameraResult) -> Evidence:
 def _response_of(
     problem: Problem, number: int, camera: Camera, evidence: Callable[[], Evidence], result: CameraResult
 ) -> CameraResponse:
-    """What is compared of camera `number`, standing as `camera` does."""
+    """Return what is compared of camera `number` when it stands as `camera` does."""
     response = problem.observed.observations.responses[number] if number in problem.observed.in_full else None
     return CameraResponse(camera, response, evidence, result.measured)
 

@@ -66,7 +66,7 @@ class ObservedCameras:
         )
 
     def seen_by_network(self, number: int) -> Response:
-        """What the network sees of a camera: its response to the frame, or else to the overview."""
+        """Return the network's response (h, w) to the frame of a camera, or else to its overview."""
         overview = self.overviews[number]
         return self.observations.responses[number] if overview is None or number in self.in_full else overview
 

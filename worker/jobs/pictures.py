@@ -67,7 +67,7 @@ def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
 
 
 def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.float32]]) -> dict[str, bytes]:
-    """What the network saw (h, w), in 0..1, to be laid over the frames; nothing else can tell it later."""
+    """Draw the network's responses (h, w), in 0..1, to be laid over the frames; nothing else can tell them later."""
     return {
         f"mask_{camera.id}": encode_png(layers.mask_layer(_in_bytes(response), _smaller(camera, response.shape[1])))
         for camera in cameras

@@ -55,7 +55,7 @@ class Drawable:
 
 @dataclass(frozen=True)
 class FoundSite:
-    """What a job found that looked for cameras: of the venue that it began with, None: it was not stored yet."""
+    """Answer of a search for cameras, with the venue that it `began_with`, None where that was not stored yet."""
 
     began_with: Venue | None
     site: SoughtSite
@@ -212,7 +212,7 @@ def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] 
 
 
 def found_site(connection: sa.Connection, job_id: str) -> FoundSite | None:
-    """What a job found that looked for cameras; None: it has no result (yet), or looked for none."""
+    """Return the answer of a search for cameras; None for a job without a result (yet), or of another kind."""
     row = connection.execute(ONE, {"job_id": job_id}).one_or_none()
     if row is None or row.kind != "find" or not row.result:
         return None
@@ -225,7 +225,7 @@ def found_site(connection: sa.Connection, job_id: str) -> FoundSite | None:
 
 
 def job_input_values(row: Any) -> dict[str, Any]:
-    """What was asked of a job, as the members of `JobInput`."""
+    """Return the members of the `JobInput` of a job's row."""
     return {
         "job_id": row.id,
         "kind": row.kind,

@@ -37,7 +37,7 @@ def bilinear_planes(image: NDArray[np.float32], column: Plane, row: Plane, outsi
 def read_planes(
     image: NDArray[np.float32], column: NDArray[np.float32], row: NDArray[np.float32], outside: float = 0.0
 ) -> NDArray[np.float32]:
-    """The same for columns and rows (P, N) that are all finite."""
+    """Sample at columns and rows (P, N) that are all finite."""
     if column.size == 0:
         return np.empty(column.shape, dtype=np.float32)
     parts = [

@@ -16,7 +16,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.observe import NOTHING_USUAL, FrameObserver
 from worker.calibration.paper.ground_objective import NARROW, GroundObjective
-from worker.calibration.paper.search import ALONE_ON_THE_GROUND, ON_THE_GROUND, Level, search_on_ground
+from worker.calibration.paper.search import ALONE_ON_THE_GROUND, ON_THE_GROUND, GroundLevel, search_on_ground
 from worker.calibration.records import (
     NOT_RECORDED,
     Calibration,
@@ -38,7 +38,7 @@ from worker.calibration.solve import PoseSolution, Problem, assess_stored, joine
 class Preset:
     """The levels of a search on the ground, and whether it takes the ground for a plane."""
 
-    levels: Sequence[Level]
+    levels: Sequence[GroundLevel]
     flat: bool
 
 
@@ -87,7 +87,7 @@ def calibrate_by_paper(
     return found if flattened else replace(found, memories=remember(judged, cameras, frames, memories, taken_at))
 
 
-def _solve(problem: Problem, levels: Sequence[Level], progress: ProgressReporter) -> PoseSolution:
+def _solve(problem: Problem, levels: Sequence[GroundLevel], progress: ProgressReporter) -> PoseSolution:
     """Search for the usable cameras; the others are assessed at their stored poses."""
     together = problem.usable
     group = problem.of(together)
@@ -104,7 +104,7 @@ def _solve(problem: Problem, levels: Sequence[Level], progress: ProgressReporter
     return PoseSolution(problem.pitch, list(begun.values()), in_order, together, deviations, found.generations)
 
 
-def _search(problem: Problem, levels: Sequence[Level], progress: ProgressReporter) -> Found:
+def _search(problem: Problem, levels: Sequence[GroundLevel], progress: ProgressReporter) -> Found:
     """Search from the stored poses by the network's responses as they are."""
     options = problem.options
     with progress.timed("evolution"):

@@ -26,7 +26,7 @@ from worker.calibration.search.search import (
 
 
 @dataclass(frozen=True)
-class Level:
+class GroundLevel:
     """A stretch of generations with the same blurs, and the strength of mutation at its start.
 
     `alone`: each camera has a population of its own, and nothing is stitched. `swings`: a turn swings the camera about
@@ -40,11 +40,11 @@ class Level:
 
 
 ALONE_ON_THE_GROUND = (
-    Level(BROAD, 3.0, alone=True, swings=False),
-    Level(NARROW, 1.0, alone=True, swings=True),
+    GroundLevel(BROAD, 3.0, alone=True, swings=False),
+    GroundLevel(NARROW, 1.0, alone=True, swings=True),
 )
 """Three times the mutation at first: with the paper's, cameras get half of the way from 2.1°."""
-ON_THE_GROUND = (*ALONE_ON_THE_GROUND, Level(NARROW, 0.5, alone=False, swings=True))
+ON_THE_GROUND = (*ALONE_ON_THE_GROUND, GroundLevel(NARROW, 0.5, alone=False, swings=True))
 """The same, and then all cameras together."""
 
 
@@ -52,7 +52,7 @@ def search_on_ground(
     pitch: Field,
     cameras: Sequence[Camera],
     responses: Sequence[NDArray[np.float32]],
-    levels: Sequence[Level],
+    levels: Sequence[GroundLevel],
     strategy: Strategy,
     rng: np.random.Generator,
     on_generation: Callable[[int, float], None],
@@ -115,7 +115,7 @@ def _groups(
     pitch: Field,
     here: Sequence[Camera],
     responses: Sequence[NDArray[np.float32]],
-    level: Level,
+    level: GroundLevel,
     strategy: Strategy,
     population: Array,
     rng: np.random.Generator,
