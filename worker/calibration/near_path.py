@@ -68,14 +68,23 @@ def refine_with_network(
     more = _cameras_with_lines_near(problem, others, reader)
     if not more:
         return by_lines
-    return _refine_near_stored(problem, sorted([*found, *more]), reader, progress.muted())
+    return _refine_near_stored(problem, sorted([*found, *more]), reader, progress.muted(), by_lines)
 
 
 def _refine_near_stored(
-    problem: Problem, numbers: list[int], reader: LineReader, progress: ProgressReporter
+    problem: Problem,
+    numbers: list[int],
+    reader: LineReader,
+    progress: ProgressReporter,
+    known: NearSolution | None = None,
 ) -> NearSolution | None:
-    """Refine the cameras that stand almost at their stored poses, out of those of these `numbers`; None if none do."""
+    """Refine the cameras that stand almost at their stored poses, out of those of these `numbers`; None if none do.
+
+    `known`: the solution of some of them, which is not computed again when the others drop out.
+    """
     while numbers:
+        if known is not None and numbers == known.numbers:
+            return known
         group = problem.of(numbers)
         with progress.timed("refinement"):
             progress.at("refinement", 0.0)

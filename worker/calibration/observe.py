@@ -30,8 +30,6 @@ from worker.calibration.solve import CAPTURE_RAD, ObservedCameras, Problem
 FEWEST_VISIBLE_POINTS = 60
 """Line points (25 cm apart) a stored pose has to see; less cannot fix a pose."""
 NOTHING_USUAL: Mapping[str, UsualView] = MappingProxyType({})
-NOT_LOOKED_AT: Response = np.zeros((1, 1), dtype=np.float32)
-"""The response of a network that has not looked at a frame: it sees a marking nowhere."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +66,7 @@ class FrameObserver:
                 for view in [view_of(self.frames[camera.id], self.pitch, camera, usual.get(camera.id))]
             ]
         channels = [Channels(self.frames[camera.id], self.swayed[camera.id]) for camera in self.cameras]
-        return ObservedCameras(
-            views, Observations(channels, [NOT_LOOKED_AT] * len(channels)), [None] * len(channels), frozenset()
-        )
+        return ObservedCameras(views, Observations.of_lines_alone(channels), [None] * len(channels), frozenset())
 
     def with_overviews(self, problem: Problem, numbers: Collection[int], progress: ProgressReporter) -> Problem:
         """Return the problem with what the network sees in overviews of the first frames of some cameras."""

@@ -127,9 +127,8 @@ def search_and_refine(
     results = {n: attempt.result for n, attempt in alone.items()}
     refined = RefinedPoses(problem.pitch, [], [], [])
     while together:
-        group = problem.of(together)
-        refined = refine_poses(group, [begun[n] for n in together], progress)
-        results |= zip(together, judge_each(group, refined, progress), strict=True)
+        refined, judged = refine_and_judge(problem.of(together), [begun[n] for n in together], progress)
+        results |= zip(together, judged, strict=True)
         failing = [n for n in together if not results[n].accepted]
         if not failing:
             break
@@ -191,7 +190,7 @@ def _other_starts(problem: Problem, progress: ProgressReporter, *, lost: bool) -
 
 
 def _attempt(problem: Problem, begun: Camera, progress: ProgressReporter) -> Attempt:
-    refined = refine_poses(problem, [begun], progress)
+    refined = refine_poses(problem, [begun], problem.observed.observations, progress)
     return Attempt(begun, refined, judge_each(problem, refined, progress)[0])
 
 
@@ -248,14 +247,33 @@ def ridges_of(pitch: Field, camera: Camera, channels: Channels) -> Response:
     return of_use(camera.ignored, ridge_response(channels, lines, CAPTURE_RAD * camera.intrinsics.focal_length_px))
 
 
-def refine_poses(problem: Problem, begun: Sequence[Camera], progress: ProgressReporter) -> RefinedPoses:
-    """Refine the cameras jointly, from where the search left them (`begun`)."""
+def refine_and_judge(
+    problem: Problem, begun: Sequence[Camera], progress: ProgressReporter
+) -> tuple[RefinedPoses, list[CameraResult]]:
+    """Refine the cameras jointly from where they were found (`begun`), and judge each by itself.
+
+    By lines alone, as the near path does: so that both end in one place. Where a camera does not pass so, with what the
+    network has seen of them.
+    """
+    by_lines = Observations.of_lines_alone(problem.observed.observations.channels)
+    refined = refine_poses(problem, begun, by_lines, progress)
+    results = judge_each(problem, refined, progress)
+    if all(result.accepted for result in results):
+        return refined, results
+    refined = refine_poses(problem, begun, problem.observed.observations, progress)
+    return refined, judge_each(problem, refined, progress)
+
+
+def refine_poses(
+    problem: Problem, begun: Sequence[Camera], observations: Observations, progress: ProgressReporter
+) -> RefinedPoses:
+    """Refine the cameras jointly onto the lines of these `observations`, from where they were found (`begun`)."""
     with progress.timed("refinement"):
         progress.at("refinement", 0.0)
         return refine(
             problem.pitch,
             begun,
-            problem.observed.observations,
+            observations,
             problem.options.stitch_weight,
             free_parameters(problem),
             stored=problem.cameras,
@@ -271,8 +289,8 @@ def refine_without(
     if len(together) in (0, len(solution.together)):
         return replace(solution, together=together)
     group = problem.of(together)
-    refined = refine_poses(group, [solution.begun[n] for n in together], progress)
-    results = dict(enumerate(solution.results)) | dict(zip(together, judge_each(group, refined, progress), strict=True))
+    refined, judged = refine_and_judge(group, [solution.begun[n] for n in together], progress)
+    results = dict(enumerate(solution.results)) | dict(zip(together, judged, strict=True))
     ids = {problem.cameras[n].id for n in together}
     of_others = [d for d in solution.deviations if d.camera is not None and d.camera not in ids]
     return replace(

@@ -82,5 +82,5 @@ def _refined_with_lens(
     stored = problem.cameras[number]
     lens = replace(begun.intrinsics, sigma={**stored.intrinsics.sigma, "fx": sigma_px})
     alone = replace(single_camera_problem(problem, number), cameras=[replace(stored, intrinsics=lens)])
-    refined = refine_poses(alone, [replace(begun, intrinsics=lens)], progress)
+    refined = refine_poses(alone, [replace(begun, intrinsics=lens)], alone.observed.observations, progress)
     return judge_each(alone, refined, progress)[0]

@@ -53,6 +53,27 @@ def test_they_are_found_where_a_search_finds_them():
         assert short.sigma.position_m == pytest.approx(long.sigma.position_m, rel=0.05)
 
 
+def test_they_are_found_where_a_search_finds_them_when_only_the_network_sees_some_lines():
+    noise, faint = np.random.default_rng(1), {}
+    for one, frame in zip(pair(), pair_frames(), strict=True):
+        ground = np.median(frame.reshape(-1, 3), axis=0)
+        pale = ground + 0.5 * (frame - ground) + noise.normal(0, 12, frame.shape)
+        faint[one.id] = [np.clip(pale, 0, 255).astype(np.uint8)]
+    clear = {id(faint[one.id][0]): frame for one, frame in zip(pair(), pair_frames(), strict=True)}
+
+    def seeing_through_noise(frame, regions):
+        return white_on_green(clear.get(id(frame), frame), regions)
+
+    stored = [moved(one, *WIND) for one in pair()]
+    near, wide = (
+        calibrate(CROWNED, stored, faint, seeing_through_noise, Options(seed=5, search=search))
+        for search in ("auto", "wide")
+    )
+    assert [(near.path, near.verdict), (wide.path, wide.verdict)] == [("near", "accepted"), ("wide", "accepted")]
+    for short, long in zip(near.cameras, wide.cameras, strict=True):
+        assert np.linalg.norm(short.camera.pose.position - long.camera.pose.position) < 1e-4
+
+
 def test_cameras_that_moved_far_are_searched_for():
     found = calibrated(by=STORM)
     assert (found.path, found.verdict) == ("wide", "accepted")

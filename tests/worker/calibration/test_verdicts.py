@@ -122,8 +122,8 @@ def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeyp
         finished.append([camera.id for camera in begun])
         return finish(problem, begun, progress)
 
-    finish = solve.refine_poses
-    monkeypatch.setattr(solve, "refine_poses", finishing)
+    finish = solve.refine_and_judge
+    monkeypatch.setattr(solve, "refine_and_judge", finishing)
     monkeypatch.setattr(engine, "compare_pairs", contradicted)
     monkeypatch.setattr(engine, "measured_by_lines", lambda _, pairs, *__: pairs)
     found = run(chain)

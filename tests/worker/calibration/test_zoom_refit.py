@@ -70,13 +70,13 @@ def test_a_lens_that_may_drift_is_accepted_with_the_focal_length_it_has():
 
 
 def test_the_neighbours_of_a_camera_that_zoomed_are_finished_without_it(monkeypatch):
-    finished, finish = [], solve.refine_poses
+    finished, finish = [], solve.refine_and_judge
 
     def finishing(problem, begun, progress):
         finished.append([one.id for one in begun])
         return finish(problem, begun, progress)
 
-    monkeypatch.setattr(solve, "refine_poses", finishing)
+    monkeypatch.setattr(solve, "refine_and_judge", finishing)
     beside = camera("beside", (-8.0, -62.0, 18.0), (4.0, 2.0), focal=1600.0, size=(1280, 720))
     frames = {"tele": [picture()], "beside": [paint_frame(CROWNED, beside)]}
     options = Options(seed=1, generations=60, lens_may_drift=True)

@@ -32,6 +32,9 @@ ALONG = (LEAST_ALONG - 0.05, LEAST_ALONG + 0.05)
 SEARCH_EDGE_PX, PICTURE_EDGE_PX = 1.0, 2.0
 """Over so many pixels a measurement fades towards the end of the search and the border of the picture."""
 CENTRE_STEPS = 2
+MOST_UPHILL = 8
+"""Sampling steps from the match that is preferred for lying near to where the line is expected to the best match beside
+it: where a line is measured does not depend on where it is expected."""
 RIDGE = 1e-6
 OFF_CENTRE_PENALTY = 0.15
 """Correlation that a candidate at the end of the search loses against one where the pose expects the line."""
@@ -176,7 +179,7 @@ class LineProfiles:
         beside = np.abs(shifts - expected[:, None])
         preference = matches.correlation - OFF_CENTRE_PENALTY * (beside / search_px) ** 2
         preference[~(beside <= search_px + matches.sampling_px)] = -np.inf
-        best = np.argmax(preference, axis=1)
+        best = _peaks(matches.correlation, np.argmax(preference, axis=1))
         every = np.arange(len(best))
         like_a_line = matches.correlation[every, best] > CORRELATION[0]
         row = np.flatnonzero(like_a_line & (best > 0) & (best < shifts.shape[1] - 1))
@@ -234,6 +237,19 @@ class _Centred:
             centre = _centre(across, self._width_px[there], self.matches.offsets, self.matches.sampling_px)
             self._centre[there], self._window[there] = centre, begins
         return self._centre[row]
+
+
+def _peaks(values: Array, begun: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the columns (N,) of the local maxima in rows of values (N, S) that lie uphill of columns `begun` (N,)."""
+    rows, last = np.arange(len(values)), values.shape[1] - 1
+    here = begun
+    for _ in range(MOST_UPHILL):
+        around = np.stack([np.clip(here + by, 0, last) for by in (0, -1, 1)])
+        higher = np.argmax(np.nan_to_num(values[rows, around], nan=-np.inf), axis=0)
+        if not higher.any():
+            break
+        here = around[higher, rows]
+    return here
 
 
 def _ramp(value: Plane, low: float, high: float) -> Array:

@@ -53,6 +53,8 @@ when so many steps were no shorter than one before: a line point that fits two s
 READ_ALIKE_M, LEAST_NEARER = 1e-4, 0.2
 """Cameras that the next reading of the frames would move less than this have arrived. Each moves them by about the same
 part of what the one before did, and by no less than this part of it."""
+NOT_LOOKED_AT: NDArray[np.float32] = np.zeros((1, 1), dtype=np.float32)
+"""The response of a network that has not looked at a frame: it sees a marking nowhere."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,11 @@ class Observations:
 
     channels: Sequence[Channels]
     responses: Sequence[NDArray[np.float32]]
+
+    @classmethod
+    def of_lines_alone(cls, channels: Sequence[Channels]) -> Observations:
+        """Return the observations of frames that the network has not looked at."""
+        return cls(channels, [NOT_LOOKED_AT] * len(channels))
 
     def of(self, numbers: Sequence[int]) -> Observations:
         """That of some of the cameras."""
@@ -191,7 +198,7 @@ class _Finish:
         moves = list[float]()
         self.reader.read_anew()
         for _ in range(MOST_READINGS):
-            last = self.around(here).follow(here)
+            last = replace(self.around(here), found=here.cameras).follow(here)
             moves.append(last.to.largest_move_m(here))
             here = last.to
             nearer = moves[-1] / moves[-2] if len(moves) > 1 else 1.0

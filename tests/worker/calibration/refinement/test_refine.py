@@ -20,7 +20,7 @@ from tests.worker.calibration.synthetic import (
 )
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.line_matching import expected_profiles, sliding_correlation
-from worker.calibration.detection.line_measurement import measure_lines
+from worker.calibration.detection.line_measurement import LineProfiles, measure_lines
 from worker.calibration.diagnostics.registration import register_pair
 from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.field import Field
@@ -92,6 +92,19 @@ def test_lines_that_the_network_misses_are_measured_by_their_ridges():
     truth = cameras[0].project(found.points.position)
     assert len(found) > 300
     assert np.abs(np.median(np.sum((found.pixel - truth) * found.normal, axis=1))) < 0.02
+
+
+def test_where_a_line_is_measured_does_not_depend_on_where_it_is_expected():
+    cameras, channels, responses = scene()
+    lines, here = CROWNED.line_points(), cameras[0]
+    beside = moved(here, SMALL_TURN)
+    profiles = LineProfiles(lines, here, channels[0], responses[0], 12.0)
+    one, other = (profiles.measure(camera, lines, 5.0) for camera in (here, beside))
+    _, at_one, at_other = np.intersect1d(one.index, other.index, return_indices=True)
+    assert len(at_one) > 300
+    apart = np.linalg.norm(one.pixel[at_one] - other.pixel[at_other], axis=1)
+    # What fits a line next to it nearly as well may be taken for it from elsewhere.
+    assert np.mean(apart == 0) > 0.98
 
 
 def test_ridges_that_do_not_go_on_along_a_line_are_not_measured():
