@@ -44,8 +44,9 @@ class Options:
     """Options of a calibration; `parents`, `offspring`, `generations` and `stitch_weight` are mu, lambda, G and the
     trade-off lambda of section III of the paper.
 
-    `search`: `auto` tries the near path before it searches, and then searches anywhere for cameras whose lines are
-    elsewhere; `wide` always searches around the stored poses, and nowhere else; `anywhere` searches anywhere for all.
+    `search`: `auto` tries the near path before it searches, and last searches for cameras whose lines are elsewhere
+    where they stood, turned by any angle; `wide` always searches around the stored poses, and nowhere else; `anywhere`
+    searches for all cameras, where they stood and then anywhere.
     `recover`: whether a camera that was knocked and found is proposed to a person or accepted; `never`: it is not
     searched for. `fit_focal_length`: solve for the focal length of each camera, which heat changes; `fit_ridge`: for
     the ridge's height; `lens_may_drift`: whether a pose may be accepted with another focal length than the stored one.

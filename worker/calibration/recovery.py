@@ -1,7 +1,7 @@
 """Recovery of knocked cameras: those whose lines are clearly seen, and not where the stored poses expect them.
 
-Such a camera is searched for where it stood, turned on its mount by any angle; and if that finds nothing, anywhere.
-What is found is refined and judged with the other cameras, as if it had been stored, and holds only if none of them is
+Such a camera is searched for where it stood, turned on its mount by any angle; and if that finds nothing and the
+calibration was asked to, anywhere. What is found is refined and judged with the other cameras, as if it had been stored, and holds only if none of them is
 refused for it. Beyond the gate's limits of movement it is proposed to a person, or accepted where the venue says so.
 """
 
@@ -120,15 +120,16 @@ def _search(
     observer: FrameObserver,
     progress: ProgressReporter,
 ) -> FoundAgain | None:
-    """Search for a camera at its stored place, and then anywhere; None where it is not surely found."""
+    """Search for a camera at its stored place, and then, if that was asked for, anywhere; None if not surely found."""
     stored = problem.cameras[number]
     progress.at("evolution", 0.0)
     response = observer.response_everywhere(stored)
     if problem.options.search == "auto" and not _has_lines_elsewhere(problem, result, response):
         return None
     markings = FieldMap.of(problem.pitch)
+    mount = Place(position=stored.pose.position, radius_m=ON_ITS_MOUNT_M)
     begun = time.process_time()
-    for place in (Place(position=stored.pose.position, radius_m=ON_ITS_MOUNT_M), ANYWHERE):
+    for place in (mount, ANYWHERE) if problem.options.search == "anywhere" else (mount,):
         if time.process_time() - begun > LONGEST_S:
             break
         found = relocalise(
