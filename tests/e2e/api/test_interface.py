@@ -1,7 +1,7 @@
 """The OpenAPI document against the service: schemathesis with all its checks, keys asked for.
 
-Few requests of each kind are made up in `make test`, more in `make test-long`; ESC_TEST_EXAMPLES=500 tries so many, from
-another seed every time.
+Few requests of each kind are made up in `make test`, more in `make test-long`; there, ESC_TEST_EXAMPLES=500 tries so
+many, from another seed every time.
 """
 
 import json
@@ -76,7 +76,7 @@ def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_p
         (tmp_path / f"{name}.txt").write_text("".join(f'"{value}"\n' for value in values))
     shutil.copy(HERE / "schemathesis.toml", tmp_path)
 
-    seed = random.randrange(2**32) if EXAMPLES else 1
+    seed = random.randrange(2**32) if examples == EXAMPLES else 1
     command = ["run", f"{guarded.url}/openapi.json", "--checks", "all", "--seed", seed]
     # A map of a lens keeps a core busy for seconds, and the machine may have other work.
     command += [
