@@ -17,6 +17,8 @@ from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import Candidate, NotFound, Relocalisation, twin
 from worker.calibration.relocalisation.sought import ANYWHERE
 
+pytestmark = pytest.mark.slow
+
 TURNED_DEG = 14.0
 UPRIGHT = np.array([0.0, 0.0, 1.0])
 
