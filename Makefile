@@ -28,7 +28,7 @@ test-fast: setup
 	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numprocesses=logical --dist=worksteal -m "not (long or slow or servers)" \
 		tests/fields tests/service tests/worker tests/openapi tests/test_architecture.py
 
-# Before a release: a year of a venue, and where ../shared/real is, the walk of docs/first-calibration.md.
+# Before a release: a year of a venue, more made-up requests, and where ../shared/real is, the walk of docs/first-calibration.md.
 test-long: setup
 	$(PYTEST) -m long
 

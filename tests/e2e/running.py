@@ -81,8 +81,8 @@ class Service:
         return code
 
     def worker(self) -> int:
-        """The process id of the worker that `esc up` keeps."""
-        return wait_for(lambda: next(iter(children(self.process.pid)), None))
+        """The process id of the worker that `esc up` keeps: unlike a spare one it has a session of its own."""
+        return wait_for(lambda: next(filter(leads_a_session, children(self.process.pid)), None))
 
     def worker_beside(self, folder: Path, name: str) -> subprocess.Popen:
         """A worker as on another machine, with nothing but the addresses of its home."""
@@ -212,6 +212,12 @@ def children(process: int) -> list[int]:
     """Process ids of the children of all threads of a process."""
     files = Path(f"/proc/{process}/task").glob("*/children")
     return [int(child) for file in files for child in file.read_text().split()]
+
+
+def leads_a_session(process: int) -> bool:
+    with suppress(ProcessLookupError):
+        return os.getsid(process) == process
+    return False
 
 
 def alive(process: int) -> bool:

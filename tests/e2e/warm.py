@@ -20,6 +20,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 PR_SET_CHILD_SUBREAPER = 36
@@ -28,6 +29,8 @@ IMPORTED = ("service.cli.main", "service.serving", "worker.supervisor", "service
 # What the interpreter reads as it starts.
 OF_THE_INTERPRETER = "PYTHON"
 LONGEST_REQUEST = 1 << 20
+# Of each `esc up`: the one that it keeps, and another for when that is killed.
+SPARE_WORKERS = 2
 
 
 class Popen(subprocess.Popen):
@@ -97,13 +100,15 @@ class WarmParent:
 class SpareWorker:
     """A child that was forked before its parent had threads, and waits to be the worker of `esc up`."""
 
-    def __init__(self) -> None:
+    def __init__(self, elder: Sequence["SpareWorker"]) -> None:
+        """`elder`: those that wait already, whose pipes are none of its business."""
         reader, self._writer = os.pipe()
         self.pid: int | None = os.fork()
         if self.pid:
             os.close(reader)
             return
-        os.close(self._writer)
+        for writer in (self._writer, *(one._writer for one in elder)):
+            os.close(writer)
         with os.fdopen(reader, "rb") as pipe:
             asked = pipe.read()
         if not asked:
@@ -114,22 +119,31 @@ class SpareWorker:
         become(*json.loads(asked))
 
     def begin(self, arguments: list[str], folder: str, environment: dict[str, str]) -> int | None:
-        """Its id, now that it runs; None if it does no more."""
-        pid, self.pid = self.pid, None
+        """Its id, now that it runs."""
         with os.fdopen(self._writer, "wb") as pipe:
             pipe.write(json.dumps([arguments, folder, environment]).encode())
-        return pid
+        return self.pid
 
 
-def kept_by(spare: SpareWorker) -> type[subprocess.Popen]:
-    """What `esc up` starts its worker with: the spare one first, later ones as always."""
+def spare_workers() -> list[SpareWorker]:
+    """Those of this process; none in each of them, which goes on from here as the worker that it is asked to be."""
+    spare: list[SpareWorker] = []
+    while len(spare) < SPARE_WORKERS:
+        spare.append(SpareWorker(spare))
+        if not spare[-1].pid:
+            return []
+    return spare
+
+
+def kept_by(waiting: list[SpareWorker]) -> type[subprocess.Popen]:
+    """What `esc up` starts its worker with: the spare ones first, later ones as always."""
 
     class Kept(subprocess.Popen):
         def _execute_child(self, args, *how):
             arguments = arguments_of(args, how[5])
-            if spare.pid is None or not arguments or arguments[0] != "worker":
+            if not waiting or not arguments or arguments[0] != "worker":
                 return super()._execute_child(args, *how)
-            self.pid = spare.begin(arguments, str(how[4] or Path.cwd()), dict(how[5]))
+            self.pid = waiting.pop(0).begin(arguments, str(how[4] or Path.cwd()), dict(how[5]))
             self._child_created = True
             return self._close_pipe_fds(*how[9:15])
 
@@ -185,9 +199,9 @@ def main() -> None:
     gc.freeze()
     serve(socket.socket(fileno=number), asking)
     if sys.argv[1:2] == ["up"]:
-        spare = SpareWorker()
-        if spare.pid:
-            subprocess.Popen = kept_by(spare)
+        waiting = spare_workers()
+        if waiting:
+            subprocess.Popen = kept_by(waiting)
     sys.modules["service.cli.main"].main()
 
 

@@ -27,6 +27,8 @@ SCHEMES = ("light", "dark")
 LOADED = """
 part => Promise.all([...part.querySelectorAll("img")].filter((one) => one.checkVisibility()).map((one) => one.decode()))
 """
+ASK_AXE = "tags => axe.run(document, {resultTypes: ['violations'], ...(tags && {runOnly: tags})})"
+OF_COLOURS = ["cat.color"]
 # Called before any script of a page: what the policy refuses is no console message in every browser.
 WATCH_POLICY = """
 addEventListener("securitypolicyviolation", (event) => violated(`${event.violatedDirective}: ${event.blockedURI}`));
@@ -114,14 +116,14 @@ def in_each_scheme(page: Page) -> Iterator[str]:
 def grave(page: Page) -> list[str]:
     """What keeps people with a screen reader, a keyboard or weak eyes from using the page: axe-core's findings.
 
-    In light colours and in dark ones.
+    In light colours and in dark ones, which differ in colours alone: only its rules of those are asked twice.
     """
     # Evaluated by the debugger: the policy of the page would refuse a script from elsewhere.
     page.evaluate(AXE.read_text())
     found = [
         (scheme, one)
         for scheme in in_each_scheme(page)
-        for one in page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+        for one in page.evaluate(ASK_AXE, None if scheme == SCHEMES[0] else OF_COLOURS)["violations"]
     ]
     return [
         f"{scheme}: {one['impact']}: {one['id']}: {one['nodes'][0]['html'][:200]} "

@@ -96,10 +96,17 @@ def test_what_is_not_explained_is_said_on_a_page(stub, visit):
     expect(page.get_by_role("link", name="To the venues")).to_be_visible()
 
 
-def test_the_interface_has_a_way_back_and_speaks_of_no_key_where_none_is_asked_for(stub, visit):
-    page = visit(stub.url, "/docs")
+def test_the_interface_is_drawn_without_internet_has_a_way_back_and_speaks_of_no_key_where_none_is_asked_for(
+    stub, visit
+):
+    page, asked = visit(stub.url, "/livez"), []
+    page.on("request", lambda request: asked.append(request.url))
+    # What the policy of the page refuses fails the test too.
+    page.goto("/docs")
     expect(page.get_by_text("venues", exact=True).first).to_be_visible()
     expect(page.get_by_text("No API key applied")).to_have_count(0)
+    assert f"{stub.url}/openapi.json" in asked
+    assert [url for url in asked if not url.startswith((f"{stub.url}/", "data:"))] == []
     page.get_by_role("link", name="Venues").click()
     expect(page).to_have_url(f"{stub.url}/")
 

@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 
 from service import child_process
+from tests.e2e import warm
 from tests.e2e.running import PROGRAM as OF_THIS_VERSION
 from tests.e2e.running import Service
 
@@ -59,7 +60,7 @@ def worker_beside(service: Service, name: str, **environment: str) -> subprocess
     given = (
         os.environ | own | {"ESC_JOB_PROGRAM": json.dumps(OF_THIS_VERSION)} | environment | child_process.for_child()
     )
-    return subprocess.Popen(command, env=given, stderr=service.log)
+    return warm.Popen(command, env=given, stderr=service.log)
 
 
 def _git(*arguments: str, check: bool = True) -> subprocess.CompletedProcess | None:

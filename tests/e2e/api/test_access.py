@@ -3,8 +3,6 @@
 import json
 import os
 import re
-import shutil
-import subprocess
 
 import httpx
 import pytest
@@ -388,21 +386,3 @@ def test_the_documentation_needs_nothing_from_elsewhere(open_to_all):
     answer = open_to_all.http.get(script)
     assert (answer.status_code, answer.headers["content-type"]) == (200, "text/javascript; charset=utf-8")
     assert "MIT License" in open_to_all.http.get("/docs/LICENSE.txt").text
-
-
-def test_a_browser_without_internet_draws_it(open_to_all, tmp_path, missing):
-    browser = shutil.which("chromium") or missing("browser")
-    shown = subprocess.run(
-        [
-            *(browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
-            *(f"--user-data-dir={tmp_path}", "--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1"),
-            *("--window-size=1200,4000", "--virtual-time-budget=10000", f"--print-to-pdf={tmp_path}/docs.pdf"),
-            *("--enable-logging=stderr", f"{open_to_all.url}/docs"),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert "Content Security Policy" not in shown.stderr
-    asked = [json.loads(line) for line in (open_to_all.data / "log").read_text().splitlines()]
-    assert "/openapi.json" in [one.get("path") for one in asked]

@@ -1,6 +1,7 @@
 """The OpenAPI document against the service: schemathesis with all its checks, keys asked for.
 
-ESC_TEST_EXAMPLES=500 tries so many requests of each kind instead of a few, from another seed every time.
+Few requests of each kind are made up in `make test`, more in `make test-long`; there, ESC_TEST_EXAMPLES=500 tries so
+many, from another seed every time.
 """
 
 import json
@@ -19,6 +20,7 @@ from tests.e2e.running import Service, keys_in, upload, venue
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]
 EXAMPLES = int(os.environ.get("ESC_TEST_EXAMPLES", "0"))
+FEW, MORE = 2, 8
 # What must have happened, or the checks were about refusals only.
 REACHED = {
     ("PUT", "/venues/*", 201),
@@ -59,9 +61,11 @@ def guarded(tmp_path):
     service.kill()
 
 
-@pytest.mark.first
 @pytest.mark.timeout(300 + EXAMPLES * 10)
-def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_path):
+@pytest.mark.parametrize(
+    "examples", [pytest.param(FEW, marks=pytest.mark.first), pytest.param(EXAMPLES or MORE, marks=pytest.mark.long)]
+)
+def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_path, examples):
     venues, doomed = [f"v{n}" for n in range(9)], [f"d{n}" for n in range(9)]
     for name in venues + doomed:
         guarded.http.put(f"/venues/{name}", json=venue(name)).raise_for_status()
@@ -72,14 +76,14 @@ def test_the_service_does_what_its_document_says_and_nothing_else(guarded, tmp_p
         (tmp_path / f"{name}.txt").write_text("".join(f'"{value}"\n' for value in values))
     shutil.copy(HERE / "schemathesis.toml", tmp_path)
 
-    seed = random.randrange(2**32) if EXAMPLES else 1
+    seed = random.randrange(2**32) if examples == EXAMPLES else 1
     command = ["run", f"{guarded.url}/openapi.json", "--checks", "all", "--seed", seed]
     # A map of a lens keeps a core busy for seconds, and the machine may have other work.
     command += [
         "--request-timeout",
         60,
         "--max-examples",
-        EXAMPLES or 8,
+        examples,
         "--header",
         f"Authorization: {guarded.http.headers['Authorization']}",
     ]

@@ -3,13 +3,12 @@
 import os
 import signal
 import socket
-import subprocess
-import sys
 import time
 
 from service.serving import GRACE_S
 from tests.disks import filled
 from tests.e2e.books import settle
+from tests.e2e.commands import esc_process
 from tests.e2e.killing import (
     chance,
     kill_api,
@@ -102,10 +101,9 @@ def test_a_submission_killed_at_any_moment_is_one_job_or_none(start):
 
 
 def test_two_workers_of_one_name_do_not_run_on_one_machine(service):
-    command = [sys.executable, "-m", "service.cli", "worker", "--name", socket.gethostname()]
-    second = subprocess.run(command, env=service.environment, capture_output=True, timeout=30)
+    second = esc_process(service.data, "worker", "--name", socket.gethostname(), **service.environment)
     assert second.returncode == 2
-    assert b"already runs" in second.stderr
+    assert "already runs" in second.stderr
 
 
 def test_a_killed_service_leaves_no_process_and_goes_on_when_it_is_back(start):

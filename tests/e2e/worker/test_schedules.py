@@ -15,7 +15,7 @@ from tests.e2e.intake.cameras import NetworkCamera
 from tests.e2e.running import upload, venue, wait_for
 from tests.homes import in_both_homes
 
-LIMIT, CLIENTS, JOB_S = 2, 8, 1.0
+LIMIT, CLIENTS, JOB_S = 2, 4, 0.5
 # Until a place is free, frames are fetched by a process of their own, and the worker looks.
 TURN_S = 15.0
 
@@ -35,7 +35,7 @@ def push(service, name, until, answers):
                 return
             answer = client.post(f"/venues/{name}/calibrate", files=upload(shade % 256))
             answers.append((answer.status_code, answer.json().get("detail", "")))
-            time.sleep(0.01)
+            time.sleep(0.03)
 
 
 @in_both_homes

@@ -1,12 +1,11 @@
 """A worker that is asked to stop, and two that have one name."""
 
 import socket
-import subprocess
-import sys
 import time
 
 from service.store.database import connect
 from service.store.workers import WorkerRepository
+from tests.e2e.commands import esc_process
 from tests.e2e.observe.figures import figures
 from tests.e2e.running import alive, wait_for
 from tests.e2e.worker.test_crashes import poses
@@ -112,11 +111,10 @@ def test_a_worker_whose_name_was_taken_while_it_was_away_ends(start, tmp_path):
 def test_a_second_service_on_one_folder_is_told_so_and_ends(start):
     service = start().ready()
     worker = service.worker()
-    command = [sys.executable, "-m", "service.cli", "up", "--port", "0"]
-    second = subprocess.run(command, env=service.environment, capture_output=True, timeout=60)
+    second = esc_process(service.data, "up", "--port", "0", **service.environment)
     assert second.returncode == 2
-    assert f"A worker called {socket.gethostname()} already runs on" in second.stderr.decode()
-    assert b"listens" not in second.stdout
+    assert f"A worker called {socket.gethostname()} already runs on" in second.stderr
+    assert "listens" not in second.stdout
     assert service.worker() == worker
 
 
@@ -125,9 +123,8 @@ def test_a_service_whose_worker_has_the_name_of_another_machines_ends(start, tmp
     first = service.worker_beside(tmp_path / "one", "truck")
     service.ready()
     home = {"ESC_DATA": str(tmp_path / "two"), "ESC_DATABASE_URL": service.database_url}
-    command = [sys.executable, "-m", "service.cli", "up", "--port", "0"]
-    second = subprocess.run(command, env=service.environment | home, capture_output=True, timeout=60)
+    second = esc_process(service.data, "up", "--port", "0", **service.environment | home)
     assert second.returncode == 2
-    assert "A worker called truck already runs elsewhere" in second.stderr.decode()
+    assert "A worker called truck already runs elsewhere" in second.stderr
     first.kill()
     first.wait()

@@ -10,12 +10,16 @@ from tests.worker.calibration.synthetic import CROWNED, camera, pair
 from tests.worker.calibration.test_calibrate import frames, outdated, white_on_green
 from worker.calibration import recovery
 from worker.calibration.calibrate import calibrate
+from worker.calibration.gate.quality import Refusal
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.rotation import rotation_angles_deg, rotation_matrices, rotation_vectors
 from worker.calibration.records import Options, Stopped
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import Candidate, NotFound, Relocalisation, twin
 from worker.calibration.relocalisation.sought import ANYWHERE
+from worker.calibration.solve import Problem
+
+pytestmark = pytest.mark.slow
 
 TURNED_DEG = 14.0
 UPRIGHT = np.array([0.0, 0.0, 1.0])
@@ -86,6 +90,16 @@ def test_where_the_venue_accepts_it_the_pose_holds_and_its_memory_begins_there()
     assert not right.knocked
     np.testing.assert_array_equal(accepted().memories["left"].origin.pose.rotation, left.camera.pose.rotation)
     assert accepted().stitch_error_px < 0.2
+
+
+def test_a_camera_that_was_found_and_has_another_fault_is_refused_for_that_with_how_far_it_turned():
+    left, _ = proposed().cameras
+    zoomed = replace(left, knocked=False, refusal=Refusal("zoomed", "its focal length is 3 % longer."))
+    problem = Problem(CROWNED, knocked_venue(), None, Options(), [None, None])
+    told = recovery._beside_stored(problem, 0, zoomed, left)
+    assert (told.knocked, told.refusal.reason) == (True, "zoomed")
+    assert told.refusal.words.startswith(f"turned by {left.moved.rotation_deg:.1f} degrees")
+    assert told.refusal.words.endswith("found again there, but its focal length is 3 % longer.")
 
 
 def test_the_memory_of_a_camera_from_before_a_knock_is_forgotten():

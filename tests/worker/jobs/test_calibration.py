@@ -30,6 +30,8 @@ from worker.calibration.refinement.uncertainty import Sigma
 from worker.calibration.stitching.photometry import Light
 from worker.jobs import calibration, from_schemas, pictures, to_schemas
 from worker.jobs.calibration import NightHistory
+from worker.jobs.pictures import draw
+from worker.programs.draw import scene_of
 from worker.protocol import ComputeResources, Message
 
 pytestmark = pytest.mark.slow
@@ -222,6 +224,16 @@ def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the
     assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
 
 
+def drawn_by_a_process(given, frames):
+    program, message = [sys.executable, "-m", "worker.programs.draw"], encode_message(given, frames)
+    run = subprocess.run(program, input=message, stdout=subprocess.PIPE, check=True)
+    return decode_files(DrawnPictures.model_validate_json(run.stdout.splitlines()[0]).sizes, run.stdout)
+
+
+def drawn_here(given, frames):
+    return draw(scene_of(given, frames), given.names)
+
+
 @pytest.mark.parametrize("options", [Options(), Options(fit_ridge=True, fit_focal_length=True), Options(flat=True)])
 def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked, means, options):
     left, right = venue.cameras
@@ -235,16 +247,11 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     at_once = options.model_copy(update={"pictures": True})
     outcome = calibration.solve(venue, files, at_once, means, lambda _: None)
     first = {camera: several[0] for camera, several in files.items()}
+    drawn_later = drawn_by_a_process if options == Options() else drawn_here
     for name in ("preview", "birdseye", "frame_left", "frame_right"):
         needed = {camera: file for camera, file in first.items() if not name.startswith("frame") or camera in name}
         given = DrawingRequest.of(venue, outcome.result, [name], 1, needed)
-        run = subprocess.run(
-            [sys.executable, "-m", "worker.programs.draw"],
-            input=encode_message(given, needed),
-            stdout=subprocess.PIPE,
-            check=True,
-        )
-        drawn = decode_files(DrawnPictures.model_validate_json(run.stdout.splitlines()[0]).sizes, run.stdout)
+        drawn = drawn_later(given, needed)
         assert set(drawn) == set(drawn_together(name))
         assert all(picture == outcome.pictures[each] for each, picture in drawn.items())
 

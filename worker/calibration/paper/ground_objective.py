@@ -318,9 +318,22 @@ def _planes(surface: Array) -> tuple[Array, list[Picture]]:
     slope_y, slope_x = np.gradient(surface[..., 2], 1 / PIXELS_PER_METRE)
     offset = surface[..., 2] - slope_x * surface[..., 0] - slope_y * surface[..., 1]
     keys = np.round(np.stack([slope_x, slope_y, offset], axis=-1), 6)
-    planes, counts = np.unique(keys.reshape(-1, 3), axis=0, return_counts=True)
+    planes, counts = _distinct_rows(keys.reshape(-1, 3))
     # Grid points astride an edge have the mean slope of two planes: they belong to the nearer of the real ones.
     planes = planes[counts > 0.01 * counts.sum()]
     homogeneous = np.concatenate([surface[..., :2], np.ones((*surface.shape[:2], 1))], axis=-1)
     nearest = np.argmin(np.abs(homogeneous @ planes.T - surface[..., 2:]), axis=-1)
     return planes, [(255 * (nearest == number)).astype(np.uint8) for number in range(len(planes))]
+
+
+def _distinct_rows(rows: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the distinct rows (K, n) of many (N, n), in their order, and how often each of them occurs (K,).
+
+    np.unique sorts numbers twenty times as fast as rows.
+    """
+    columns = [np.unique(column) for column in rows.T]
+    sizes = tuple(len(values) for values in columns)
+    places = [np.searchsorted(values, column) for values, column in zip(columns, rows.T, strict=True)]
+    codes, counts = np.unique(np.ravel_multi_index(places, sizes), return_counts=True)
+    kept = zip(columns, np.unravel_index(codes, sizes), strict=True)
+    return np.stack([values[at] for values, at in kept], axis=1), counts

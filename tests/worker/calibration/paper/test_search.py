@@ -1,12 +1,15 @@
 """The paper's search on the ground."""
 
 import numpy as np
+import pytest
 
 from tests.demo.render import outdated
 from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.paper.search import ON_THE_GROUND, search_on_ground
 from worker.calibration.search.search import Strategy
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_camera_is_caught_that_is_as_far_off_as_the_papers():
