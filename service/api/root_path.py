@@ -1,4 +1,4 @@
-"""A service below a path of another site, as https://truck.example.com/esc/: addresses come in and leave with that path.
+"""A service below a path of another site, https://truck.example.com/esc/: addresses come and leave with that path.
 
 The routes know nothing of it. Addresses in JSON are relative to the address of the service, whatever that is: they are
 the same for every process and in every webhook, and are appended to the URL that a client was given.

@@ -25,7 +25,7 @@ LARGE_MB, FRAMES = 40, {"left": 3, "right": 2}
 
 
 class Proxy:
-    """A proxy by a sample in which only names, ports and the certificate are others, and where it is asked for, the path.
+    """A proxy by a sample in which only names, ports and the certificate are others, and the path where one is given.
 
     `root_path`: below which the service is shown, as docker/README.md has it.
     """

@@ -1,4 +1,4 @@
-"""A service below a path of another site: behind a proxy that leaves the path on requests, and one that takes it off."""
+"""A service below a path of another site, behind a proxy that leaves the path on requests and one that takes it off."""
 
 import shutil
 

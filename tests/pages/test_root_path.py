@@ -8,7 +8,7 @@ import pytest
 
 from tests.e2e.running import Service, png, venue
 from tests.e2e.test_proxies import Nginx
-from tests.pages.browsing import PATIENCE_MS, tab
+from tests.pages.browsing import tab
 
 ROOT = "/esc"
 # Addresses of ours in a page: none may begin at the root of the host.
