@@ -14,7 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from service.api.context import InContext, VenueIdPath
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.venues import no_such_venue
+from service.routes.contract.missing import no_such_venue
 from service.schemas.events.venue_event import FINAL_EVENT
 from service.schemas.names import EventKind
 from service.store.database import DATABASE_OUTAGES
