@@ -8,7 +8,7 @@ import pytest
 
 from tests.e2e.running import Service, png, venue
 from tests.e2e.test_proxies import Nginx
-from tests.pages.browsing import tab
+from tests.pages.browsing import PATIENCE_MS, tab
 
 ROOT = "/esc"
 # Addresses of ours in a page: none may begin at the root of the host.
@@ -31,7 +31,7 @@ def below(browser, proxied):
     """A page of it, and the addresses that it has asked for."""
     asked: list[str] = []
     context = browser.new_context(base_url=proxied.url, ignore_https_errors=True)
-    context.set_default_timeout(20000)
+    context.set_default_timeout(PATIENCE_MS)
     context.on("request", lambda request: asked.append(urlsplit(request.url).path))
     with tab(context) as page:
         yield page, asked
@@ -51,8 +51,9 @@ def test_a_venue_is_made_calibrated_and_looked_at_below_the_path(below, proxied)
         )
     page.get_by_role("button", name="Calibrate", exact=True).click()
     page.wait_for_url(f"{proxied.url}/ui/jobs/*")
+    first = page.url
     page.get_by_role("button", name="Again").click()
-    page.wait_for_url(lambda url: urlsplit(url).path.startswith(f"{ROOT}/ui/jobs/"))
+    page.wait_for_url(lambda url: url != first and urlsplit(url).path.startswith(f"{ROOT}/ui/jobs/"))
     page.locator(f"a[href$='/ui/venues/{name}']").first.click()
     for address in ("/ui/new-venue/by-hand", f"/ui/venues/{name}/settings", f"/ui/venues/{name}/ignore", "/docs"):
         page.goto(f"{proxied.url}{address}")
