@@ -17,6 +17,7 @@ from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
 from service.api.request_log import QUIET, RequestLog
+from service.api.root_path import RootPath
 from service.pages import FOR_BROWSERS
 from service.pages import ROUTERS as PAGES
 from service.routes import docs, event_streams, health, jobs, pictures, snapshot, stitch, venues
@@ -40,6 +41,7 @@ def create_app(settings: Settings) -> FastAPI:
         summary="Keeps fixed multi-camera installations on sports fields calibrated.",
         description=DESCRIPTION,
         openapi_tags=TAGS,
+        servers=[{"url": settings.root_path}] if settings.root_path else None,
         version=version("esc-calibration"),
         lifespan=_lifespan,
         # FastAPI's own pages load their scripts from the internet.
@@ -55,6 +57,8 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(BodyLimit, largest_form=int(settings.max_body_mb * 1e6))
     app.add_middleware(RequestLog, metrics=context.metrics)
     app.add_middleware(HttpDefaults)
+    if settings.root_path:
+        app.add_middleware(RootPath, root_path=settings.root_path)
     documented.document_callback(app)
     documented.document_alarms(app)
     documented.document_events(app)

@@ -87,7 +87,7 @@ class AsyncClient:
 
     def url_of(self, path: str) -> str:
         """The address of something the service linked to."""
-        return str(self._http.base_url.join(path))
+        return str(self._http.build_request("GET", path).url)
 
     # Venues
 
@@ -427,7 +427,7 @@ class Client:
 
     def url_of(self, path: str) -> str:
         """The address of something the service linked to."""
-        return str(self.calls.http.base_url.join(path))
+        return str(self.calls.http.build_request("GET", path).url)
 
     put_venue = Call(AsyncClient.put_venue)
     patch_venue = Call(AsyncClient.patch_venue)

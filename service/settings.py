@@ -31,6 +31,7 @@ FREED_AXES = re.compile(rf"(-?[xyz] ){{3}}{FREED_ANGLES}")
 HOST_PATTERN = re.compile(r"(?=.*[A-Za-z*])[A-Za-z0-9*._-]+")
 # Part of an address, which as a pattern of names would match no address but 10.1.0.evil.com.
 ADDRESS_PATTERN = re.compile(r"(?=.*\d)(?=.*\*)[\d.*-]+")
+ROOT_PATH = re.compile(r"(/[A-Za-z0-9_~-][A-Za-z0-9._~-]*)*")
 BLOB_URL = re.compile(r"(file|s3)://.+")
 # Settings that may stand in a file each, which ESC_..._FILE names.
 SECRETS = ("database_url", "webhook_secret")
@@ -61,6 +62,11 @@ class Settings(BaseSettings):
     # Listening.
     host: str = Field("127.0.0.1", description="Address to listen on.")
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one and prints it.")
+    root_path: str = Field(
+        "",
+        description="Path below which a proxy shows the service: `/esc` for https://truck.example.com/esc/. Pages, "
+        "redirects, the cookie and `/openapi.json` have it; the proxy may leave it on requests or take it off.",
+    )
     auth: Literal["auto", "off"] = Field(
         "auto",
         description="`auto`: callers need a key as soon as there is one, and always beyond this machine. `off`: anyone "
@@ -284,6 +290,14 @@ class Settings(BaseSettings):
         if url is not None and not BLOB_URL.fullmatch(url):
             raise ValueError("expected is s3://bucket, s3://bucket/folder or file:///folder")
         return url
+
+    @field_validator("root_path")
+    @classmethod
+    def _is_a_path_below_a_host(cls, path: str) -> str:
+        path = path.rstrip("/")
+        if not ROOT_PATH.fullmatch(path):
+            raise ValueError("give a path as /esc: after each slash letters, digits, '.', '_', '~' and '-'")
+        return path
 
     @field_validator("sources", "callbacks")
     @classmethod

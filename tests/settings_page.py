@@ -71,7 +71,7 @@ def _default(name: str, field: FieldInfo) -> str:
     if name in OF_THE_MACHINE:
         return OF_THE_MACHINE[name]
     match field.default:
-        case None | []:
+        case None | [] | "":
             return "none"
         case bool():
             return f"`{str(field.default).lower()}`"

@@ -17,6 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.responses import HTMLResponse, RedirectResponse
 
 from service.api.auth import COOKIE, SCOPES, page_token
+from service.api.root_path import with_root_path
 from service.pages import formatting
 from service.pages.assets import address
 from service.pages.seam import seam_curve
@@ -103,14 +104,16 @@ def render_page(request: Request, template: str, status: int = 200, **content: A
     """A page from its template."""
     key: Key | None = getattr(request.state, "key", None)
     token = request.cookies.get(COOKIE)
+    root_path = request.app.state.context.settings.root_path
     text = templates.get_template(template).render(
+        root_path=root_path,
         key=key,
         token=page_token(token) if key and token else "",
         may=lambda scope: has_scope(key, scope),
         path=request.url.path,
         **content,
     )
-    return HTMLResponse(text, status, HEADERS)
+    return HTMLResponse(with_root_path(text, root_path), status, HEADERS)
 
 
 def has_scope(key: Key | None, needed: Scope) -> bool:

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
 
 from service.api.auth import COOKIE
-from service.api.context import InContext
+from service.api.context import Context, InContext
 from service.pages.page_rendering import HEADERS, SIGN_IN, Page, local_target, render_page
 from service.routes.contract.documented import FOR_ALL
 from service.routes.contract.guarded import Guarded
@@ -47,6 +47,7 @@ async def sign_in(request: Request, context: InContext) -> Response:
         COOKIE,
         session,
         max_age=round(3600 * context.settings.session_hours),
+        path=_cookie_path(context),
         httponly=True,
         samesite="strict",
         secure=_over_tls(request),
@@ -60,8 +61,14 @@ async def sign_out(request: Request, context: InContext) -> Response:
     _require_own_page(request)
     await context.authenticator.sign_out(request)
     answer = Response(status_code=HTTPStatus.NO_CONTENT)
-    answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=_over_tls(request))
+    answer.delete_cookie(
+        COOKIE, path=_cookie_path(context), httponly=True, samesite="strict", secure=_over_tls(request)
+    )
     return answer
+
+
+def _cookie_path(context: Context) -> str:
+    return context.settings.root_path or "/"
 
 
 def _require_own_page(request: Request) -> None:

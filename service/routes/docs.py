@@ -8,6 +8,7 @@ from fastapi import APIRouter, Response
 from starlette.responses import FileResponse, HTMLResponse
 
 from service.api.context import InContext
+from service.api.root_path import with_root_path
 from service.routes.contract.documented import FOR_ALL
 from service.routes.contract.guarded import Guarded
 
@@ -27,13 +28,19 @@ async def page(context: InContext) -> Response:
     text = (FILES / "index.html").read_text(encoding="utf-8")
     if not await context.authenticator.asks_for_keys():
         text = text.replace('allow-authentication="true"', 'allow-authentication="false"')
-    return HTMLResponse(text, headers={"Content-Security-Policy": POLICY})
+    return HTMLResponse(with_root_path(text, context.settings.root_path), headers={"Content-Security-Policy": POLICY})
 
 
 @router.get("/rapidoc-min.js", openapi_extra=FOR_ALL)
 async def script() -> FileResponse:
     """What draws it: RapiDoc 9.3.8."""
     return FileResponse(FILES / "rapidoc-min.js", media_type="text/javascript")
+
+
+@router.get("/scheme.js", openapi_extra=FOR_ALL)
+async def scheme() -> FileResponse:
+    """What tells it whether the browser prefers dark colours."""
+    return FileResponse(FILES / "scheme.js", media_type="text/javascript")
 
 
 @router.get("/LICENSE.txt", openapi_extra=FOR_ALL)

@@ -11,10 +11,10 @@ from fastapi import APIRouter, Depends, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from service.api.context import InContext
+from service.api.context import InContext, VenueIdPath
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
-from service.routes.venues import ExistingVenue
+from service.routes.contract.missing import no_such_venue
 from service.schemas.events.venue_event import FINAL_EVENT
 from service.schemas.names import EventKind
 from service.store.database import DATABASE_OUTAGES
@@ -45,6 +45,16 @@ def _last_seen_number(
     return int(given) if given.isascii() and given.isdecimal() and len(given) < LONGEST_NUMBER else None
 
 
+LastSeenNumber = Annotated[int | None, Depends(_last_seen_number)]
+
+
+def _followed_venue(venue_id: VenueIdPath, context: InContext, seen: LastSeenNumber) -> str:
+    """The id of a venue that is there, or whose end the client has not heard yet."""
+    if context.venues.get(venue_id) is None and not (seen is not None and context.events.ends_after(venue_id, seen)):
+        raise no_such_venue(venue_id)
+    return venue_id
+
+
 @router.get(
     "/venues/{venue_id}/events",
     openapi_extra=needs_scope("read"),
@@ -53,32 +63,32 @@ def _last_seen_number(
     dependencies=[Depends(_follower_place)],
 )
 async def venue_events(
-    venue: ExistingVenue,
+    venue_id: Annotated[str, Depends(_followed_venue)],
     context: InContext,
-    seen: Annotated[int | None, Depends(_last_seen_number)],
+    seen: LastSeenNumber,
     events: Annotated[list[EventKind], Query(max_length=4, description="Only these; absent: all.")] = [],  # noqa: B006
 ) -> AsyncIterable[ServerSentEvent]:
     """Stream what happens to a venue as server-sent events: each has the name of its `type`, and the body of a webhook.
 
     The first is `poses.current`, the poses that hold. Who comes back with the id of the last event that arrived
     (`Last-Event-ID`) gets what was missed instead; if that is more than is kept, `poses.current` again. The stream ends
-    after `venue.deleted`, and otherwise after an hour: connect again.
+    after `venue.deleted`, which is told after the fact as well, and otherwise after an hour: connect again.
     """
     until, number = time.monotonic() + LONGEST_S, seen or 0
     try:
-        beginning = await run_in_threadpool(context.events.beginning, venue.id, seen)
+        beginning = await run_in_threadpool(context.events.beginning, venue_id, seen)
         if beginning is not None:
             number = beginning.number
             yield _server_sent_event(beginning)
         while not context.venue_watch.closed and time.monotonic() < until:
-            page = await run_in_threadpool(context.events.since, venue.id, number, events, PAGE)
+            page = await run_in_threadpool(context.events.since, venue_id, number, events, PAGE)
             number = page.up_to
             for event in page.events:
                 yield _server_sent_event(event)
                 if event.event.type == FINAL_EVENT:
                     return
             if not page.more:
-                await context.venue_watch.until(venue.id, number.__lt__, LONGEST_POLL_INTERVAL_S)
+                await context.venue_watch.until(venue_id, number.__lt__, LONGEST_POLL_INTERVAL_S)
     except DATABASE_OUTAGES:
         # The client connects again, as after any stream that broke off.
         log.warning("cannot tell of a venue", exc_info=True)

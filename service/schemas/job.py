@@ -106,7 +106,7 @@ class Job(Schema):
     frames: dict[str, list[str]] = Field(
         {}, description="Addresses of the frames as they came, by camera or the name of a photo; empty: none are kept."
     )
-    links: dict[str, str]
+    links: dict[str, str] = Field(description="Addresses, relative to that of the service.")
 
     @property
     def open(self) -> bool:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import os
 import socket
 import tempfile
 import threading
@@ -28,6 +27,7 @@ import sqlalchemy as sa
 
 from service.store import tables
 from tests.benchmarks.service.stage import EMBEDDED, SERVERS, homes, service
+from tests.clocks import Clock
 from tests.disks import filled, may_mount, small_disk
 from tests.e2e.intake.cameras import NetworkCamera
 from tests.e2e.running import Service, png, upload, venue
@@ -63,7 +63,6 @@ CALLERS: dict[str, Call] = {
     "an upload": lambda http: http.post("/venues/v/calibrate", files=upload()),
 }
 CLOCK_MOVED_S = 6 * 3600
-MOVED_CLOCK = Path(__file__).parents[1] / "moved_clock"
 NUMBERS = itertools.count()
 
 
@@ -219,27 +218,18 @@ def put_camera(running: Service, name: str, source: str, **more: object) -> None
 def with_a_clock_that_moves(home: Home, seconds: float) -> dict[str, Seen]:
     """What callers see of a service whose clock is hours ahead from the beginning, and right again half way."""
     with tempfile.TemporaryDirectory(prefix="esc-bench-") as folder:
-        clock = Path(folder) / "clock"
-        clock.write_text("0")
-        path = os.pathsep.join([str(MOVED_CLOCK), *filter(None, [os.environ.get("PYTHONPATH")])])
+        clock = Clock(Path(folder))
 
         @contextmanager
         def moves(_: Service) -> Iterator[None]:
-            move(clock, CLOCK_MOVED_S)
-            back = threading.Timer(seconds / 2, move, (clock, 0))
+            clock.put(CLOCK_MOVED_S)
+            back = threading.Timer(seconds / 2, clock.put, (0,))
             back.start()
             yield
             back.join()
 
-        with service(home, MOVED_CLOCK=str(clock), PYTHONPATH=path) as running:
+        with service(home, **clock.environment) as running:
             return watched(running.ready(), moves, CALLERS | TO_ITS_END, seconds)
-
-
-def move(clock: Path, seconds: float) -> None:
-    """Set a clock ahead, for all who read it at once."""
-    new = clock.with_suffix(".new")
-    new.write_text(str(seconds))
-    new.replace(clock)
 
 
 @contextmanager

@@ -91,13 +91,19 @@ def main() -> None:
     pictures = ["preview", "birdseye", *(f"overlay_{camera['id']}" for camera in cameras)]
     if behaviour == "reject":
         pictures.remove("preview")
-    good = {"reject": 0, "partly": 1, "knock": 1}.get(behaviour, len(cameras))
+    good = {"reject": 0, "swapped": 0, "partly": 1, "knock": 1}.get(behaviour, len(cameras))
     everyone = good == len(cameras)
     common = {
         "accepted": everyone,
         "rejected_because": None if everyone else "the lines do not fit",
         "cameras": [
-            found(camera, task.get("anchors", {}).get(camera["id"]), accepted=number < good)
+            found(
+                camera,
+                task.get("anchors", {}).get(camera["id"]),
+                accepted=number < good,
+                # Of another camera's frame no pose is sought.
+                nearer=1 if behaviour == "swapped" else NEARER,
+            )
             | (refined(camera, memories) if behaviour == "refine" else {})
             | (knocked(camera) if behaviour == "knock" and number >= good else {})
             for number, camera in enumerate(cameras)
@@ -243,14 +249,14 @@ def contradicted(field: dict) -> dict:
     }
 
 
-def found(camera: dict, anchor: dict | None, *, accepted: bool) -> dict:
+def found(camera: dict, anchor: dict | None, *, accepted: bool, nearer: float = NEARER) -> dict:
     pose = camera["pose"]
-    nearer = {place: [NEARER * component for component in pose[place]] for place in ("position", "translation")}
+    moved = {place: [nearer * component for component in pose[place]] for place in ("position", "translation")}
     return {
         "id": camera["id"],
         "accepted": accepted,
         "rejected_because": None if accepted else "the lines do not fit",
-        "pose": pose | nearer,
+        "pose": pose | moved,
         "sigma": None,
         "moved": {"rotation_deg": 0, "position_m": 6.4, "pixels": 1.0},
         "iou": 0.9,

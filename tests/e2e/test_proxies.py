@@ -25,14 +25,18 @@ LARGE_MB, FRAMES = 40, {"left": 3, "right": 2}
 
 
 class Proxy:
-    """A proxy by a sample in which only names, ports and the certificate are others."""
+    """A proxy by a sample in which only names, ports and the certificate are others, and the path where one is given.
 
-    def __init__(self, folder: Path, service: Service) -> None:
+    `root_path`: below which the service is shown, as docker/README.md has it.
+    """
+
+    def __init__(self, folder: Path, service: Service, root_path: str = "") -> None:
         self.folder = folder
+        self.root_path = root_path
         self.upstream = service.url.removeprefix("http://")
         certificate(folder, NAME)
         self.http_port, self.https_port = free_port(), free_port()
-        self.url = f"https://{NAME}:{self.https_port}"
+        self.url = f"https://{NAME}:{self.https_port}{root_path}"
         with (folder / "log").open("wb") as log:
             self.process = subprocess.Popen(self.command(), cwd=folder, stdout=log, stderr=log, env=self.environment())
         self.trusted = ssl.create_default_context(cafile=folder / "certificate.pem")
@@ -81,6 +85,7 @@ class Nginx(Proxy):
                 "/etc/letsencrypt/live/esc.example.com/fullchain.pem": f"{self.folder}/certificate.pem",
                 "/etc/letsencrypt/live/esc.example.com/privkey.pem": f"{self.folder}/key.pem",
                 "esc.example.com": NAME,
+                "location / {": f"location {self.root_path}/ {{",
             },
         )
         kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
@@ -104,10 +109,16 @@ class Caddy(Proxy):
                 "{\n\tservers": f"{{\n\tadmin off\n\thttp_port {self.http_port}\n\thttps_port {self.https_port}\n"
                 "\tskip_install_trust\n\tservers",
                 "\nesc.example.com {": f"\n{NAME} {{\n\ttls {self.folder}/certificate.pem {self.folder}/key.pem",
-            },
+            }
+            | self.below(),
         )
         (self.folder / "Caddyfile").write_text(site)
         return [shutil.which(self.program), "run", "--config", "Caddyfile", "--adapter", "caddyfile"]
+
+    def below(self) -> dict[str, str]:
+        """Takes the path off, where nginx leaves it on."""
+        proxied = f"\treverse_proxy {self.upstream}"
+        return {proxied: f"\thandle_path {self.root_path}/* {{\n\t{proxied}\n\t}}"} if self.root_path else {}
 
 
 def free_port() -> int:

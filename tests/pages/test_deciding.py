@@ -28,6 +28,17 @@ def test_poses_of_a_venue_that_was_changed_since_are_not_offered_and_the_way_out
     expect(page.get_by_text("cannot be accepted any more").get_by_role("link", name=way_out)).to_be_visible()
 
 
+def test_a_calibration_that_moved_no_camera_offers_nothing_and_speaks_of_no_change_of_the_venue(stub, visit):
+    name = stub.venue("left-alone", "swapped")
+    job = stub.calibrated(name)["id"]
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    expect(page.get_by_text("The stored poses were left as they are.")).to_be_visible()
+    for address in (f"/ui/jobs/{job}", f"/ui/venues/{name}"):
+        page.goto(address)
+        expect(page.get_by_text("changed since")).to_have_count(0)
+        expect(page.get_by_role("button", name="Accept")).to_have_count(0)
+
+
 def test_what_was_restored_away_can_be_had_back_as_the_page_says(stub, visit):
     name = stub.venue("had-back")
     stub.calibrated(name)

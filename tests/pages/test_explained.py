@@ -3,6 +3,7 @@
 import re
 
 import httpx
+import numpy as np
 import pytest
 from playwright.sync_api import expect
 
@@ -10,7 +11,7 @@ from service.pages import documents
 from service.pages.problem_pages import DOCUMENT_NAME, wants_page
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS
 from tests.e2e.running import Service, keys_in
-from tests.pages.browsing import grave
+from tests.pages.browsing import grave, in_each_scheme, look, wait_until
 
 CHROME = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,image/webp,*/*;q=0.8"
 
@@ -109,6 +110,14 @@ def test_the_interface_is_drawn_without_internet_has_a_way_back_and_speaks_of_no
     assert [url for url in asked if not url.startswith((f"{stub.url}/", "data:"))] == []
     page.get_by_role("link", name="Venues").click()
     expect(page).to_have_url(f"{stub.url}/")
+
+
+def test_the_interface_has_the_colours_that_the_browser_prefers(stub, visit):
+    page = visit(stub.url, "/docs")
+    expect(page.get_by_text("venues", exact=True).first).to_be_visible()
+    for scheme in in_each_scheme(page):
+        wait_until(page, f"document.querySelector('rapi-doc').getAttribute('theme') == '{scheme}'")
+        assert (np.median(look(page)) < 64) == (scheme == "dark")
 
 
 def test_the_interface_takes_a_key_where_one_is_asked_for(tmp_path, visit):

@@ -68,6 +68,8 @@ def test_the_list_shows_each_venue_with_its_last_result(stub, ended, years, visi
     for venue, says in (("fine", "Accepted"), ("poor", "Rejected"), ("broken", "Failed")):
         row = page.locator(".venue-row", has=page.locator(f"a[href='/ui/venues/{venue}']"))
         expect(row.locator(".badge")).to_have_text(says)
+        # Whatever a calibration found: none that was refused has moved a camera.
+        expect(row.locator("dd").last).to_have_text("1.00 px" if says == "Accepted" else "–")
     row = page.locator(".venue-row", has=page.locator("a[href='/ui/venues/years']"))
     expect(row.get_by_role("img", name="Stitch error")).to_be_visible()
 

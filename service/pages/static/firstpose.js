@@ -1,6 +1,6 @@
 // New first poses of a venue that is there: of those of its cameras that a frame is chosen of.
 
-import {call} from "./page.js";
+import {call, root} from "./page.js";
 import {Camera, common} from "./posing.js";
 
 const box = document.getElementById("cameras");
@@ -38,8 +38,8 @@ async function store() {
   storeButton.disabled = refused.hidden = true;
   const cameras = Object.fromEntries(common.cameras.filter((camera) => camera.result).map((camera) => [camera.id, patch(camera)]));
   try {
-    await call("PATCH", `/venues/${venue.id}`, {cameras}, {"If-Match": box.dataset.tag});
-    location.assign(`/ui/venues/${venue.id}`);
+    await call("PATCH", `${root}/venues/${venue.id}`, {cameras}, {"If-Match": box.dataset.tag});
+    location.assign(`${root}/ui/venues/${venue.id}`);
   } catch (refusal) {
     refused.textContent = refusal.message;
     refused.hidden = false;
@@ -49,7 +49,7 @@ async function store() {
 
 common.tell = tell;
 storeButton.addEventListener("click", store);
-common.plan = await call("POST", "/ui/new-venue/plan", venue.field);
+common.plan = await call("POST", `${root}/ui/new-venue/plan`, venue.field);
 for (const camera of venue.cameras) common.cameras.push(asStored(camera));
 for (const camera of common.cameras) camera.offerPoints();
 tell();

@@ -1,6 +1,6 @@
 // What a search found: a candidate of each camera is chosen by a click, and all of them are taken by another.
 
-import {call} from "./page.js";
+import {call, root} from "./page.js";
 
 const form = document.getElementById("found");
 const button = form?.querySelector("button[type=submit]");
@@ -27,8 +27,8 @@ async function take(event) {
   button.disabled = refused.hidden = true;
   const candidates = Object.fromEntries(cameras.map((camera) => [camera, chosen(camera)]));
   try {
-    await call("POST", `/venues/${form.dataset.venue}/adopt-found`, {job: form.dataset.job, candidates});
-    location.assign(`/ui/venues/${form.dataset.venue}`);
+    await call("POST", `${root}/venues/${form.dataset.venue}/adopt-found`, {job: form.dataset.job, candidates});
+    location.assign(`${root}/ui/venues/${form.dataset.venue}`);
   } catch (problem) {
     refused.textContent = problem.message;
     refused.hidden = false;

@@ -1,6 +1,6 @@
 // Forms that send frames: for each camera, or for some, looked at here, sent with their progress shown.
 
-import {signed} from "./page.js";
+import {root, signed} from "./page.js";
 import {objection, thumbnail} from "./frames.js";
 
 const form = document.getElementById("send-frames");
@@ -112,7 +112,7 @@ function send(event) {
   });
   request.addEventListener("load", () => {
     const answer = JSON.parse(request.responseText);
-    if (request.status < 300) location.assign(`/ui/jobs/${answer.id}`);
+    if (request.status < 300) location.assign(`${root}/ui/jobs/${answer.id}`);
     else refuse(answer);
   });
   request.addEventListener("error", () => refuse({detail: "The service cannot be reached."}));

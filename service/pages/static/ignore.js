@@ -1,6 +1,6 @@
 // Areas of each camera's frame that are to be ignored: drawn corner by corner, saved as a part of the venue.
 
-import {call} from "./page.js";
+import {call, root} from "./page.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const WIDEST = 1920;
@@ -137,7 +137,7 @@ save.addEventListener("click", async () => {
   save.disabled = true;
   const changes = Object.fromEntries(cameras.map((one) => [one.camera, {ignore: one.areas}]));
   try {
-    await call("PATCH", `/venues/${venue}`, {cameras: changes});
+    await call("PATCH", `${root}/venues/${venue}`, {cameras: changes});
     saved.textContent = "Saved. The next calibration ignores these areas.";
   } catch (refused) {
     save.disabled = false;

@@ -1,6 +1,6 @@
 // A new venue by its sport and a frame of each camera: sent to be found, and shown as the job that finds them.
 
-import {call} from "./page.js";
+import {call, root} from "./page.js";
 import {objection, sizeOf, thumbnail} from "./frames.js";
 import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
 import {complain, number} from "./steps.js";
@@ -86,8 +86,8 @@ async function find() {
   button.disabled = refused.hidden = true;
   missing.textContent = "Sending the frames …";
   try {
-    const job = await call("POST", `/venues/${id}/find`, body);
-    location.assign(`/ui/jobs/${job.id}`);
+    const job = await call("POST", `${root}/venues/${id}/find`, body);
+    location.assign(`${root}/ui/jobs/${job.id}`);
   } catch (problem) {
     refused.textContent = problem.message;
     refused.hidden = false;

@@ -1,6 +1,8 @@
 // What every page does: times that stay right, and buttons that call the interface.
 
 const token = document.querySelector('meta[name="token"]').content;
+/** The path of another site below which this one is; empty: none. */
+export const {root} = document.documentElement.dataset;
 const OFTEN = 5000;
 
 // What the interface says to programs by its own addresses, for who has the page before them.
@@ -100,7 +102,7 @@ async function press(button) {
   try {
     const content = button.dataset.content ? JSON.parse(button.dataset.content) : undefined;
     const answer = await call(button.dataset.method || "POST", button.dataset.call, content);
-    if ("follow" in button.dataset) location.assign(`/ui/jobs/${answer.id}`);
+    if ("follow" in button.dataset) location.assign(`${root}/ui/jobs/${answer.id}`);
     else if (button.dataset.then) location.assign(button.dataset.then);
     else location.reload();
   } catch (refused) {

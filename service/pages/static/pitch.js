@@ -1,6 +1,6 @@
 // The pitch of a new venue: its id, its sport and its measures, looked at as they are typed.
 
-import {call} from "./page.js";
+import {call, root} from "./page.js";
 import {complain, drawPlan, later, number} from "./steps.js";
 
 export const pitchForm = document.getElementById("pitch");
@@ -25,7 +25,7 @@ function fieldAsTyped() {
 async function readPitch(changed) {
   const wrong = pitchForm.querySelector(".wrong");
   try {
-    pitch.plan = await call("POST", "/ui/new-venue/plan", fieldAsTyped());
+    pitch.plan = await call("POST", `${root}/ui/new-venue/plan`, fieldAsTyped());
     complain(wrong, "");
   } catch (refused) {
     pitch.plan = null;
@@ -42,11 +42,11 @@ async function readId(changed) {
   const {id} = pitchForm.elements;
   const place = document.getElementById("taken");
   const asked = id.value;
-  const answer = asked && id.checkValidity() ? await call("GET", `/ui/new-venue/taken?id=${encodeURIComponent(asked)}`) : {taken: false};
+  const answer = asked && id.checkValidity() ? await call("GET", `${root}/ui/new-venue/taken?id=${encodeURIComponent(asked)}`) : {taken: false};
   if (asked !== id.value) return;
   pitch.isTaken = answer.taken;
   place.hidden = !pitch.isTaken;
-  place.querySelector("a").href = `/ui/venues/${asked}/first-pose`;
+  place.querySelector("a").href = `${root}/ui/venues/${asked}/first-pose`;
   changed();
 }
 

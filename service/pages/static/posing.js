@@ -1,6 +1,6 @@
 // Cameras whose first pose is found by clicking points of the pitch in a frame.
 
-import {call, Refused} from "./page.js";
+import {call, Refused, root} from "./page.js";
 import {objection, sizeOf} from "./frames.js";
 import {drawn, Sighting} from "./sighting.js";
 import {complain, drawPlan, later, number} from "./steps.js";
@@ -136,7 +136,7 @@ export class Camera {
     body.append("options", JSON.stringify({board, model: this.field("model").value}));
     told.textContent = "Sending the photos …";
     try {
-      const job = await ended(await call("POST", "/intrinsics", body), (now) => { told.textContent = now; });
+      const job = await ended(await call("POST", `${root}/intrinsics`, body), (now) => { told.textContent = now; });
       if (!job.result) throw new Refused({detail: job.error ? job.error.detail : `The job was ${job.status}.`}, 0);
       this.intrinsics = job.result.intrinsics;
       told.textContent = [`Found: ${job.result.rms_px.toFixed(2)} px rms.`, ...job.result.warnings].join(" ");
@@ -219,7 +219,7 @@ export class Camera {
     const asked = [...this.points];
     try {
       const points = asked.map(({name, pixel}) => ({world: name, pixel}));
-      const answer = await call("POST", "/ui/new-venue/pose", {field: common.plan.field, id: this.id || "camera", image_size: this.size, intrinsics, points});
+      const answer = await call("POST", `${root}/ui/new-venue/pose`, {field: common.plan.field, id: this.id || "camera", image_size: this.size, intrinsics, points});
       this.take(answer, asked);
     } catch (refused) {
       if (refused.status === 503) this.askAgain = true;
@@ -288,7 +288,7 @@ function residual(point) {
 /** A job once it has ended; tells meanwhile how far it is. */
 function ended(job, told) {
   return new Promise((resolve, reject) => {
-    const events = new EventSource(job.links.events);
+    const events = new EventSource(`${root}${job.links.events}`);
     events.addEventListener("progress", (event) => {
       const {progress, status} = JSON.parse(event.data);
       told(progress ? `${progress.stage}, ${Math.round(100 * progress.fraction)} %` : status);

@@ -1,6 +1,6 @@
 // The schedule of a venue: saved with the sources that it needs, and tried.
 
-import {call, say} from "./page.js";
+import {call, root, say} from "./page.js";
 import {whenShown} from "./parts.js";
 
 /** What the form changes of the venue; options of the schedule stay as they are. */
@@ -17,7 +17,7 @@ async function save(event, refused) {
   const form = event.currentTarget;
   refused.hidden = true;
   try {
-    await call("PATCH", `/venues/${form.dataset.venue}`, patch(form));
+    await call("PATCH", `${root}/venues/${form.dataset.venue}`, patch(form));
     location.reload();
   } catch (refusal) {
     refused.textContent = refusal.message;
@@ -31,8 +31,8 @@ async function tryNow(trying) {
   body.append("options", trying.dataset.options);
   say("Fetching the frames …");
   try {
-    const job = await call("POST", `/venues/${trying.dataset.venue}/calibrate`, body);
-    location.assign(`/ui/jobs/${job.id}`);
+    const job = await call("POST", `${root}/venues/${trying.dataset.venue}/calibrate`, body);
+    location.assign(`${root}/ui/jobs/${job.id}`);
   } catch (refusal) {
     say(refusal.message, true);
     trying.disabled = false;

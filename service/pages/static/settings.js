@@ -1,9 +1,9 @@
 // The settings of a venue: alarms, lenses, and its end. Each is saved by itself, on the venue that the page shows.
 
-import {call} from "./page.js";
+import {call, root} from "./page.js";
 
 const box = document.getElementById("settings");
-const address = `/venues/${box.dataset.venue}`;
+const address = `${root}/venues/${box.dataset.venue}`;
 const ifSame = () => ({"If-Match": box.dataset.tag});
 const end = document.getElementById("delete");
 

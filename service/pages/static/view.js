@@ -1,6 +1,6 @@
 // The stitched view of a venue: its knobs, what they do to the last frames, and the packages of it for other tools.
 
-import {call} from "./page.js";
+import {call, root} from "./page.js";
 import {whenShown} from "./parts.js";
 
 const PAUSE = 250;
@@ -74,7 +74,7 @@ class View {
 
   changed() {
     this.angles.disabled = this.form.elements.projection.value === "birds-eye";
-    for (const link of this.packages) link.href = `/venues/${this.form.dataset.venue}/stitch?${this.query({format: link.dataset.format})}`;
+    for (const link of this.packages) link.href = `${root}/venues/${this.form.dataset.venue}/stitch?${this.query({format: link.dataset.format})}`;
     clearTimeout(this.pause);
     this.pause = setTimeout(() => this.draw(), PAUSE);
   }
@@ -90,7 +90,7 @@ class View {
     event.preventDefault();
     const {tag} = document.querySelector("[data-tag]").dataset;
     try {
-      await call("PATCH", `/venues/${this.form.dataset.venue}`, {view: this.chosen}, {"If-Match": tag});
+      await call("PATCH", `${root}/venues/${this.form.dataset.venue}`, {view: this.chosen}, {"If-Match": tag});
       location.reload();
     } catch (refusal) {
       this.refuse(refusal.message);

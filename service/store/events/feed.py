@@ -72,6 +72,13 @@ class EventRepository(Repository):
             number, PosesEvent(type="poses.current", timestamp=revision.at, data=poses, by=revision.by)
         )
 
+    def ends_after(self, venue_id: str, seen: int) -> bool:
+        """Whether a venue was deleted after an event that was seen, and all that came between is kept."""
+        deleted = sa.exists().where(e.venue == venue_id, e.type == FINAL_EVENT, e.id > seen)
+        with reading(self._engine) as connection:
+            oldest, is_deleted = connection.execute(sa.select(sa.func.min(e.id), deleted)).one()
+            return bool(is_deleted and oldest - 1 <= seen)
+
     def since(self, venue_id: str, seen: int, kinds: Collection[EventKind], limit: int) -> EventPage:
         """What is of these kinds (none given: of any) among the next `limit` events after one that was seen.
 

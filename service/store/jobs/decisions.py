@@ -42,11 +42,12 @@ class OpenDecisions:
     """What can still be decided about a calibration.
 
     `accept`: the cameras that do not stand as it found them and can be made to; `reject`: whether its poses hold and
-    can be given back.
+    can be given back; `is_outdated`: whether nothing can be, since the venue was changed.
     """
 
     accept: frozenset[str]
     reject: bool
+    is_outdated: bool = False
 
 
 class DecisionRepository(Repository):
@@ -63,10 +64,9 @@ class DecisionRepository(Repository):
             if venue is None or newest is None:
                 return OpenDecisions(frozenset(), reject=False)
             taken = _was_taken(job_id, newest)
-            return OpenDecisions(
-                _not_taken(venue, result) if _untouched(venue, began_with, result, taken=taken) else frozenset(),
-                reject=taken,
-            )
+            if not _untouched(venue, began_with, result, taken=taken):
+                return OpenDecisions(frozenset(), taken, is_outdated=not taken)
+            return OpenDecisions(_not_taken(venue, result), reject=taken)
 
     def cancel(self, job_id: str, by: Actor | None = None) -> None:
         """End a job that is still open; its worker notices."""

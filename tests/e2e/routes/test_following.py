@@ -86,6 +86,21 @@ def test_who_follows_a_venue_is_told_of_its_poses_and_of_whatever_happens(servic
 
 
 @in_both_homes
+def test_who_was_away_when_a_venue_was_deleted_is_told_so_once(service, name):
+    service.venue(name)
+    with followed(service, name) as stream:
+        last_id = stream.next()["id"]
+    service.calibrated(name)
+    service.http.delete(f"/venues/{name}").raise_for_status()
+    with followed(service, name, last_id) as stream:
+        *_, deleted = stream.until("venue.deleted")
+        with pytest.raises(EOFError):
+            stream.next()
+    for seen in (deleted["id"], "nonsense"):
+        assert service.http.get(f"/venues/{name}/events", headers={"Last-Event-ID": seen}).status_code == 404
+
+
+@in_both_homes
 def test_what_was_missed_is_told_by_another_process_after_a_restart(start):
     service = start("up").ready()
     service.venue("v")

@@ -34,7 +34,7 @@ def test_nothing_can_be_decided_about_a_venue_that_somebody_changed_since(stock)
     stock.venue("v")
     job = stock.calibrated("v", accepted=["left"])
     stock.moved_by_hand("v", -3.0)
-    assert stock.decisions.decidable(job) == NOTHING
+    assert stock.decisions.decidable(job) == OpenDecisions(frozenset(), reject=False, is_outdated=True)
     for decide in (stock.decisions.accept, stock.decisions.reject):
         with pytest.raises(VenueHasChanged):
             decide(job)

@@ -144,9 +144,12 @@ class CameraResult(RefinedPose):
 
 
 def in_one_sentence(reasons: Sequence[str]) -> str:
-    """Join reasons, some of which are sentences of their own: only the last one keeps its full stop."""
+    """Join reasons, some of which are sentences of their own: only the last one keeps its full stop.
+
+    After a question, which keeps its mark, no semicolon follows.
+    """
     *before, last = reasons or [""]
-    return "; ".join([*(reason.removesuffix(".") for reason in before), last])
+    return "; ".join([*(reason.removesuffix(".") for reason in before), last]).replace("?; ", "? ")
 
 
 def credible_deviations(
@@ -178,10 +181,15 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
     if seen.agreement < gate.least_agreement:
         return Refusal(
             "lines",
-            f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it ought "
-            f"to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen anywhere); "
-            "is it the right camera, is the view free and lit, is the stored pose within a few degrees?"
-            f"{_other_lines(result)}",
+            in_one_sentence(
+                [
+                    f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it "
+                    f"ought to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen "
+                    "anywhere); is it the right camera, is the view free and lit, is the stored pose within a few "
+                    "degrees?",
+                    *_other_lines(result),
+                ]
+            ),
         )
     if result.residual_px is None or result.sigma is None:
         return Refusal(
@@ -192,8 +200,13 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
     if result.residual_px > limit:
         return Refusal(
             "residual",
-            f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} allowed; "
-            f"check intrinsics and the field's measures{_other_lines(result)}",
+            in_one_sentence(
+                [
+                    f"lines are {result.residual_px:.2f} px from where the pose puts them, at most {limit:.2f} "
+                    "allowed; check intrinsics and the field's measures",
+                    *_other_lines(result),
+                ]
+            ),
         )
     if result.zoom is not None and zoomed_beyond_doubt(result, gate):
         return Refusal(
@@ -239,21 +252,21 @@ def _reason_of(view: ViewCondition) -> Reason:
             return "view"
 
 
-def _other_lines(result: CameraResult) -> str:
+def _other_lines(result: CameraResult) -> list[str]:
     """What to do about lines that are not the venue's, where there are many."""
     if not films_a_field(result.camera.pose):
-        return (
-            "; from such a pose no field is filmed (it hangs upside down, or far away): was it written in another "
+        return [
+            "from such a pose no field is filmed (it hangs upside down, or far away): was it written in another "
             "convention, camera to world or in centimetres?"
-        )
+        ]
     overlap = result.overlap
     if overlap.unexpected < MUCH_UNEXPECTED:
-        return ""
-    return (
-        f"; the network finds {overlap.found:.0%} of the lines, and {overlap.unexpected:.0%} of what it takes for "
+        return []
+    return [
+        f"the network finds {overlap.found:.0%} of the lines, and {overlap.unexpected:.0%} of what it takes for "
         "lines on the pitch lies beside all of them: if another sport is painted there, list it in the field's "
         "other_markings"
-    )
+    ]
 
 
 def zoomed_beyond_doubt(result: CameraResult, gate: Gate) -> bool:

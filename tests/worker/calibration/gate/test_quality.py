@@ -9,7 +9,7 @@ from tests.worker.calibration.synthetic import PITCH, moved, pair
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection
+from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection, in_one_sentence
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.refinement.uncertainty import Deviation, Sigma
 
@@ -103,3 +103,16 @@ def test_a_pose_from_which_no_field_is_filmed_is_doubted_before_the_sport_is():
     words = alone_rejection(replace(lost, camera=hanging), Gate()).words
     assert "was it written in another convention" in words
     assert "other_markings" not in words
+
+
+@pytest.mark.parametrize(
+    ("reasons", "said"),
+    [
+        ([], ""),
+        (["it is dark."], "it is dark."),
+        (["left: it is dark.", "right: it is dark."], "left: it is dark; right: it is dark."),
+        (["left: is it free?", "right: is it lit?"], "left: is it free? right: is it lit?"),
+    ],
+)
+def test_reasons_are_joined_with_one_sign_after_each(reasons, said):
+    assert in_one_sentence(reasons) == said

@@ -1,0 +1,57 @@
+"""A service below a path of another site, https://truck.example.com/esc/: addresses come and leave with that path.
+
+The routes know nothing of it. Addresses in JSON are relative to the address of the service, whatever that is: they are
+the same for every process and in every webhook, and are appended to the URL that a client was given.
+"""
+
+from __future__ import annotations
+
+import re
+
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+# Attributes of our pages that hold addresses. What others wrote cannot look like one: its quotes are escaped.
+ADDRESS = re.compile(
+    r'(\b(?:href|src|action|spec-url|data-(?:address|call|events|follows|history|seam|then))=")(?=/(?!/))'
+)
+
+
+def with_root_path(html: str, root_path: str) -> str:
+    """A page whose addresses of this service have the path that it is below."""
+    return ADDRESS.sub(rf"\g<1>{root_path}", html) if root_path else html
+
+
+class RootPath:
+    """ASGI middleware, around all others: takes the path off requests that have it, and puts it into `Location`."""
+
+    def __init__(self, app: ASGIApp, root_path: str) -> None:
+        """`root_path`: begins with a slash and ends without one."""
+        self._app = app
+        self._root_path = root_path
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def answer(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                if (target := headers.get("location", "")).startswith("/"):
+                    headers["location"] = self._root_path + target
+            await send(message)
+
+        await self._app(self._below(scope), receive, answer)
+
+    def _below(self, scope: Scope) -> Scope:
+        path: str = scope["path"]
+        if path != self._root_path and not path.startswith(f"{self._root_path}/"):
+            return scope
+        raw_path: bytes = scope["raw_path"]
+        return {
+            **scope,
+            "path": path.removeprefix(self._root_path) or "/",
+            "raw_path": raw_path.removeprefix(self._root_path.encode("ascii")) or b"/",
+        }

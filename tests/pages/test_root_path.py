@@ -1,0 +1,85 @@
+"""The pages of a service below a path of another site: nothing that a browser asks for is beside that path."""
+
+import re
+import shutil
+from urllib.parse import urlsplit
+
+import pytest
+
+from tests.e2e.running import Service, png, venue
+from tests.e2e.test_proxies import Nginx
+from tests.pages.browsing import PATIENCE_MS, tab
+
+ROOT = "/esc"
+# Addresses of ours in a page: none may begin at the root of the host.
+BESIDE = re.compile(r'="/(?!esc[/"])')
+
+
+@pytest.fixture(scope="module")
+def proxied(tmp_path_factory, missing):
+    if shutil.which(Nginx.program) is None:
+        missing(Nginx.program)
+    service = Service(tmp_path_factory.mktemp("below"), ESC_ROOT_PATH=ROOT, ESC_ALLOWED_HOSTS='["localhost"]').ready()
+    proxy = Nginx(tmp_path_factory.mktemp("nginx"), service, ROOT)
+    yield proxy
+    proxy.stop()
+    service.kill()
+
+
+@pytest.fixture
+def below(browser, proxied):
+    """A page of it, and the addresses that it has asked for."""
+    asked: list[str] = []
+    context = browser.new_context(base_url=proxied.url, ignore_https_errors=True)
+    context.set_default_timeout(PATIENCE_MS)
+    context.on("request", lambda request: asked.append(urlsplit(request.url).path))
+    with tab(context) as page:
+        yield page, asked
+    context.close()
+
+
+def test_a_venue_is_made_calibrated_and_looked_at_below_the_path(below, proxied):
+    name, (page, asked) = "walked", below
+    with proxied.client() as http:
+        http.put(f"/venues/{name}", json=venue(name)).raise_for_status()
+    page.goto(f"{proxied.url}/")
+    page.locator(f"a[href$='/ui/venues/{name}']").click()
+    page.get_by_role("link", name="Calibrate", exact=True).click()
+    for number in range(2):
+        page.locator("input[type=file]").nth(number).set_input_files(
+            {"name": f"{number}.png", "mimeType": "image/png", "buffer": png()}
+        )
+    page.get_by_role("button", name="Calibrate", exact=True).click()
+    page.wait_for_url(f"{proxied.url}/ui/jobs/*")
+    first = page.url
+    page.get_by_role("button", name="Again").click()
+    page.wait_for_url(lambda url: url != first and urlsplit(url).path.startswith(f"{ROOT}/ui/jobs/"))
+    page.locator(f"a[href$='/ui/venues/{name}']").first.click()
+    for address in ("/ui/new-venue/by-hand", f"/ui/venues/{name}/settings", f"/ui/venues/{name}/ignore", "/docs"):
+        page.goto(f"{proxied.url}{address}")
+    page.locator("rapi-doc").get_by_text("PUT").first.wait_for()
+    assert not [path for path in asked if not path.startswith(f"{ROOT}/")]
+    assert {f"{ROOT}/openapi.json", f"{ROOT}/venues/{name}/events"} <= set(asked)
+
+
+def test_every_address_of_every_page_is_below_the_path(proxied):
+    name = "read"
+    with proxied.client(Accept="text/html") as http:
+        http.put(f"/venues/{name}", json=venue(name)).raise_for_status()
+        files = [(camera, (f"{camera}.png", png())) for camera in ("left", "right")]
+        job = http.post(f"/venues/{name}/calibrate", files=files).json()["id"]
+        http.get(f"/jobs/{job}", params={"wait": 60})
+        venue_pages = ("", "/settings", "/ignore", "/calibrate", "/find", "/first-pose")
+        pages = [
+            "/",
+            "/docs",
+            "/ui/jobs",
+            f"/ui/jobs/{job}",
+            "/ui/new-venue",
+            "/ui/new-venue/by-hand",
+            "/refusals/residual",
+        ]
+        for address in (*pages, *(f"/ui/venues/{name}{page}" for page in venue_pages)):
+            answer = http.get(address)
+            assert answer.status_code == 200, address
+            assert BESIDE.findall(answer.text) == [], address
