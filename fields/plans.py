@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from fields.shapes import WHITE, Shape
@@ -25,6 +26,19 @@ def plan_of(template: str | Mapping[str, Any], uneven_m: float | None) -> Templa
         markings = [marking_entry(marking) for marking in template["markings"]]
         plan = Template(marking=markings, points=template["points"])
     return plan if uneven_m is None else replace(plan, uneven=uneven_m)
+
+
+def markings_of(template: str | Mapping[str, Any], size: Mapping[str, float]) -> tuple[Shape, ...]:
+    """Return all that is painted by a template's name or a layout, for the measures of a field."""
+    if isinstance(template, str):
+        return _markings_of_template(template, tuple(sorted(size.items())))
+    return tuple(plan_of(template, None).markings(size))
+
+
+@lru_cache(maxsize=256)
+def _markings_of_template(name: str, size: tuple[tuple[str, float], ...]) -> tuple[Shape, ...]:
+    """Fields are of few sizes, and drawing one takes a thousand times as long as to look it up."""
+    return tuple(load(name).markings(dict(size)))
 
 
 def marking_entry(marking: Mapping[str, Any]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from pydantic import (
     model_validator,
 )
 
-from fields.plans import TEMPLATE_MEASURES, other_shapes, plan_of, size_of
+from fields.plans import TEMPLATE_MEASURES, markings_of, other_shapes, plan_of, size_of
 from fields.shapes import COLOUR_PATTERN, WHITE, Shape
 from fields.template import NAMES, Extent, Template, load
 from service.schemas.base import Name, Number, Schema, is_tolerant
@@ -209,7 +209,7 @@ class FieldOfPlay(Schema):
     def _a_field(self) -> Self:
         if not self.is_known:
             return self
-        for shape in self.plan.markings(self.size):
+        for shape in self.markings:
             x, y = shape.reach
             if x > self.length_m / 2 + MARGIN_M or y > self.width_m / 2 + MARGIN_M:
                 raise ValueError(
@@ -270,6 +270,12 @@ class FieldOfPlay(Schema):
         """Markings and named points, and how uneven their ground is."""
         template = self.template if isinstance(self.template, str) else self.template.model_dump()
         return plan_of(template, self.uneven_m)
+
+    @property
+    def markings(self) -> tuple[Shape, ...]:
+        """All that is painted of it."""
+        template = self.template if isinstance(self.template, str) else self.template.model_dump()
+        return markings_of(template, self.size)
 
     @property
     def others(self) -> list[Shape]:
