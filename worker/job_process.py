@@ -22,7 +22,8 @@ from service.schemas.base import TOLERANTLY
 from service.schemas.programs.files import split_files
 from service.settings import Settings
 from service.store.jobs.task import Task
-from worker.protocol import ComputeResources, Files, JobRequest, Message
+from worker.compute_resources import ComputeResources
+from worker.protocol import Files, JobRequest, Message
 
 # Twice as often as a cancellation needs to reach the child.
 POLL_S = 0.5

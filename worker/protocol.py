@@ -2,37 +2,24 @@
 
 In: a line of JSON, a `JobRequest`, and the bytes of the files. Out: lines of JSON, a `Message` each; the bytes of
 the pictures follow the line that announces them. So the program needs no store, and nobody tidies up after it.
+
+These are the worker's models of it, which check what comes out of a program. The program itself reads and writes plain
+JSON, see `worker.jobs.program`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Literal
+from typing import IO, Any
 
 from pydantic import BaseModel
 
 from service.schemas.job import JobError, Progress
 from service.schemas.results import AnyResult, IntrinsicsResult, Result
 from service.store.jobs.task import Task
-
-if TYPE_CHECKING:
-    from service.settings import Settings
+from worker.compute_resources import ComputeResources
 
 Files = Mapping[str, Sequence[bytes]]
-
-
-class ComputeResources(BaseModel):
-    """What a job is computed with: the network, its execution provider, and the number of threads."""
-
-    model: Path
-    provider: Literal["cpu", "cuda", "openvino"] = "cpu"
-    threads: int
-
-    @classmethod
-    def of(cls, settings: Settings) -> ComputeResources:
-        """Return the resources of the settings, with an absolute path of the model."""
-        return cls(model=settings.model.absolute(), provider=settings.provider, threads=settings.threads)
 
 
 class JobRequest(BaseModel):
@@ -51,12 +38,6 @@ class JobRequest(BaseModel):
         """Return the request for a task, without the addresses that its program does not need."""
         sizes = {name: [len(file) for file in several] for name, several in files.items()}
         return cls(task=task.without_addresses(), means=means, sizes=sizes)
-
-    @classmethod
-    def read(cls, stream: IO[bytes]) -> tuple[JobRequest, dict[str, list[bytes]]]:
-        """Read a request that `write` wrote, and its files."""
-        given = cls.model_validate_json(stream.readline(), extra="ignore")
-        return given, {name: [stream.read(size) for size in several] for name, several in given.sizes.items()}
 
     def write(self, stream: IO[bytes], files: Files) -> None:
         """Write the request as a line of JSON, then the bytes of the files."""
@@ -103,7 +84,3 @@ class Message(BaseModel):
             return self
         warnings = [*self.result.warnings, why]
         return self.model_copy(update={"result": self.result.model_copy(update={"warnings": warnings}), "pictures": {}})
-
-    def line(self) -> str:
-        """Return the message as a line of JSON."""
-        return self.model_dump_json(exclude_unset=True)

@@ -24,7 +24,8 @@ from service.application_state import ApplicationState
 from service.observability import tracing
 from service.queue import GivenUp, WorkerQueue
 from service.schemas.job import JobError
-from service.schemas.problems import PROBLEM_TYPES, first_line, problem_uri
+from service.schemas.names import problem_uri
+from service.schemas.problems import PROBLEM_TYPES, first_line
 from service.settings import Settings
 from service.store.database import DATABASE_OUTAGES, without_timeouts
 from service.store.expiry import ExpiryRepository

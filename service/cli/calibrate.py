@@ -24,9 +24,9 @@ from service.cli.printing import (
     calibration_exit_code,
     follow_to_end,
     job_exit_code,
-    job_progress_bar,
     print_json,
     print_note,
+    progress_bar,
 )
 from service.cli.service_client import open_client
 
@@ -108,12 +108,14 @@ def run(
     settings, chosen = engine_settings(), parse_options(options)
     if chosen.callback_url is not None:
         print_note("callback_url is not used: without a service nobody is told. The exit code says how it went.")
+    from service.schemas.results import Result
     from service.schemas.venue import VenueIn
     from service.store.jobs.files import picture_file
     from worker.calibration.records import NOT_RECORDED
-    from worker.jobs import calibration
+    from worker.compute_resources import ComputeResources
+    from worker.jobs import calibration, inputs
     from worker.jobs.debugging import DebugRecorder
-    from worker.protocol import ComputeResources
+    from worker.jobs.inputs import read_record
 
     stored = parse_document(VenueIn, venue.read_bytes(), str(venue)).to_venue()
     if chosen.seed is None:
@@ -122,9 +124,14 @@ def run(
     files = checked_files(stored, frames, settings)
     resources, recorder = ComputeResources.of(settings), NOT_RECORDED if debug is None else DebugRecorder()
     try:
-        with report_job_failures(), job_progress_bar() as show:
+        with report_job_failures(), progress_bar() as show:
             solution = calibration.solve(
-                stored, files, chosen, resources, lambda step: show(step, ""), recorder=recorder
+                read_record(inputs.Venue, stored.model_dump(mode="json")),
+                files,
+                read_record(inputs.Options, chosen.model_dump(mode="json")),
+                resources,
+                lambda step: show(step["stage"], step["fraction"]),
+                recorder=recorder,
             )
     finally:
         # What was seen before a failure tells its cause.
@@ -133,8 +140,9 @@ def run(
             for name, data in recorder.files.items():
                 (debug / name).write_bytes(data)
     output.mkdir(parents=True, exist_ok=True)
-    (output / "result.json").write_text(solution.result.model_dump_json(indent=2) + "\n")
+    result = Result.model_validate(solution.result)
+    (output / "result.json").write_text(result.model_dump_json(indent=2) + "\n")
     for name, picture in solution.pictures.items():
         (output / picture_file(name)).write_bytes(picture)
-    print_json(solution.result)
-    raise typer.Exit(calibration_exit_code(solution.result))
+    print_json(result)
+    raise typer.Exit(calibration_exit_code(result))

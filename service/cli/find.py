@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.arguments import Frames, parse_document, parse_frame_files
-from service.cli.printing import REJECTED, USAGE, fail, job_progress_bar, print_found_summary, print_json
+from service.cli.printing import REJECTED, USAGE, fail, print_found_summary, print_json, progress_bar
 
 if TYPE_CHECKING:
     from service.schemas.find import SoughtSite
@@ -45,12 +45,12 @@ def find(
     settings = engine_settings()
     place = parse_document(SoughtSite, site.read_bytes(), str(site))
     files = _checked_files(place, frames, settings)
+    from worker.compute_resources import ComputeResources
     from worker.jobs import find as finding
-    from worker.protocol import ComputeResources
 
     resources = ComputeResources.of(settings)
-    with report_job_failures(), job_progress_bar() as show:
-        solution = finding.solve(place, files, seed, resources, lambda step: show(step, ""))
+    with report_job_failures(), progress_bar() as show:
+        solution = finding.solve(place, files, seed, resources, lambda step: show(step["stage"], step["fraction"]))
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
         for name, picture in solution.pictures.items():

@@ -45,4 +45,4 @@ def report_job_failures() -> Iterator[None]:
     except Problem as problem:
         fail(problem_text(problem.detail, problem.parts), FAILED)
     except JobFailedError as failure:
-        fail(failure.error.detail, FAILED)
+        fail(str(failure), FAILED)

@@ -17,12 +17,12 @@ from service.cli.printing import (
     fail,
     follow_to_end,
     job_exit_code,
-    job_progress_bar,
     print_field_summary,
     print_json,
     print_lens_summary,
     print_note,
     print_pose_summary,
+    progress_bar,
 )
 from service.cli.service_client import open_client
 from service.schemas.names import ID_PATTERN, LensModel
@@ -96,10 +96,10 @@ def intrinsics(
     from worker.jobs import intrinsics
 
     files = {str(path): path.read_bytes() for path in photos}
-    with report_job_failures(), job_progress_bar() as show:
+    with report_job_failures(), progress_bar() as show:
         for name, data in files.items():
             image_checks.check_photo(name, data, settings)
-        solution = intrinsics.solve(files, options, lambda step: show(step, ""))
+        solution = intrinsics.solve(files, options, lambda step: show(step["stage"], step["fraction"]))
     output.write_text(solution.result.model_dump_json(indent=2) + "\n")
     if picture is not None:
         picture.write_bytes(solution.pictures["coverage"])
@@ -173,7 +173,7 @@ def pose(
     results, failures = [], []
     for camera, end in locate_all(place.field, engine_lenses, clicks, seen, stored).items():
         if isinstance(end, JobFailedError):
-            failures.append(end.error.detail)
+            failures.append(str(end))
             continue
         result = end.result
         results.append(result)
@@ -240,13 +240,15 @@ def _fit_locally(file: Path, frames: list[str], options: FieldOptions) -> tuple[
     from service.schemas.venue import VenueIn
 
     settings = engine_settings()
+    from worker.compute_resources import ComputeResources
     from worker.jobs import field
-    from worker.protocol import ComputeResources
 
     stored = parse_document(VenueIn, file.read_bytes(), str(file)).to_venue()
     files = checked_files(stored, frames, settings)
-    with report_job_failures(), job_progress_bar() as show:
-        solution = field.solve(stored, files, options, ComputeResources.of(settings), lambda step: show(step, ""))
+    with report_job_failures(), progress_bar() as show:
+        solution = field.solve(
+            stored, files, options, ComputeResources.of(settings), lambda step: show(step["stage"], step["fraction"])
+        )
     return stored, solution.result, solution.pictures
 
 

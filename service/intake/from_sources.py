@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from service.intake.snapshots import Snapshots
 from service.intake.submit import Intake, frame_paths
 from service.schemas.job import Job, JobError
+from service.schemas.names import problem_uri
 from service.schemas.options import Options
-from service.schemas.problems import PROBLEM_TYPES, Problem, problem_uri
+from service.schemas.problems import PROBLEM_TYPES, Problem
 from service.schemas.venue import Venue
 from service.store.blobs import Blobs
 from service.store.ids import new_id

@@ -62,7 +62,7 @@ def plan(field: FieldOfPlay) -> dict[str, Any]:
     """A pitch from above: the field with all its measures, its lines and its named points, in metres."""
     return {
         "field": field.model_dump(mode="json"),
-        "lines": [_polyline(shape) for shape in field.plan.markings(field.size)],
+        "lines": [_polyline(shape) for shape in field.markings],
         "points": field.plan.places(field.size),
     }
 

@@ -14,14 +14,8 @@ from service.observability.readiness import DECIDES
 from service.routes.contract.documented import FOR_ALL, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
 from service.schemas.health import Health
-from service.schemas.problems import (
-    PROBLEM_TYPES,
-    REFUSAL_REASONS,
-    REFUSALS_DOCUMENT,
-    Problem,
-    problem_uri,
-    refusal_uri,
-)
+from service.schemas.names import problem_uri, refusal_uri
+from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, REFUSALS_DOCUMENT, Problem
 
 # The same addresses are pages for browsers.
 OF_PROGRAMS = {"Vary": "Accept"}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any, Self
 
@@ -20,6 +19,7 @@ from pydantic import (
     model_validator,
 )
 
+from fields.plans import TEMPLATE_MEASURES, markings_of, other_shapes, plan_of, size_of
 from fields.shapes import COLOUR_PATTERN, WHITE, Shape
 from fields.template import NAMES, Extent, Template, load
 from service.schemas.base import Name, Number, Schema, is_tolerant
@@ -88,17 +88,6 @@ class MarkingIn(Schema):
             raise ValueError(f"marking {self.name} has the same point twice in a row")
         return self
 
-    @property
-    def entry(self) -> dict[str, Any]:
-        """As `fields.template` reads it."""
-        entry: dict[str, Any] = {"name": self.name, "colour": self.colour}
-        entry |= {} if self.width_m is None else {"width": self.width_m}
-        if self.circle:
-            return entry | {"circle": {"centre": self.circle.centre, "radius": self.circle.radius_m}}
-        if self.spot:
-            return entry | {"spot": {"centre": self.spot.centre, "diameter": self.spot.diameter_m}}
-        return entry | ({"arc": self.arc.model_dump()} if self.arc else {"line": self.line})
-
 
 class Layout(Schema):
     """Markings of one's own in place of a template's name, and names for points of them."""
@@ -114,8 +103,6 @@ def _is_a_template(name: str, info: ValidationInfo) -> str:
 
 
 TemplateName = Annotated[str, AfterValidator(_is_a_template), WithJsonSchema({"type": "string", "enum": list(NAMES)})]
-# Of a field, and what a template calls them.
-TEMPLATE_MEASURES = {"length_m": "length", "width_m": "width", "line_width_m": "line"}
 
 
 class OtherField(Schema):
@@ -145,15 +132,7 @@ class OtherField(Schema):
     @property
     def size(self) -> dict[str, float]:
         """What its plan is drawn by, where that is not as usual."""
-        given = {measure: getattr(self, name) for name, measure in TEMPLATE_MEASURES.items()}
-        return {name: measure for name, measure in given.items() if measure is not None} | self.measures_m
-
-    @property
-    def shapes(self) -> list[Shape]:
-        """What is painted of it, on the venue's field."""
-        x, y = self.centre
-        turn = math.radians(self.turned_deg)
-        return [shape.turned(turn).shifted((x, y)) for shape in load(self.template).markings(self.size)]
+        return size_of(dict(self))
 
 
 def _kind_of_other(given: Any) -> str:
@@ -230,7 +209,7 @@ class FieldOfPlay(Schema):
     def _a_field(self) -> Self:
         if not self.is_known:
             return self
-        for shape in self.plan.markings(self.size):
+        for shape in self.markings:
             x, y = shape.reach
             if x > self.length_m / 2 + MARGIN_M or y > self.width_m / 2 + MARGIN_M:
                 raise ValueError(
@@ -289,23 +268,24 @@ class FieldOfPlay(Schema):
     @property
     def plan(self) -> Template:
         """Markings and named points, and how uneven their ground is."""
-        if isinstance(self.template, str):
-            plan = load(self.template)
-        else:
-            plan = Template(marking=[one.entry for one in self.template.markings], points=self.template.points)
-        return plan if self.uneven_m is None else replace(plan, uneven=self.uneven_m)
+        template = self.template if isinstance(self.template, str) else self.template.model_dump()
+        return plan_of(template, self.uneven_m)
+
+    @property
+    def markings(self) -> tuple[Shape, ...]:
+        """All that is painted of it."""
+        template = self.template if isinstance(self.template, str) else self.template.model_dump()
+        return markings_of(template, self.size)
 
     @property
     def others(self) -> list[Shape]:
         """What else is painted on the ground."""
-        own = [marking.entry for marking in self.other_markings if isinstance(marking, MarkingIn)]
-        fields = [field for field in self.other_markings if isinstance(field, OtherField)]
-        return [*Template(marking=own).markings(self.size), *(shape for field in fields for shape in field.shapes)]
+        return other_shapes([other.model_dump() for other in self.other_markings], self.size)
 
     @property
     def size(self) -> dict[str, float]:
         """What the plan is drawn by."""
-        return {"length": self.length_m, "width": self.width_m, "line": self.line_width_m, **self.measures_m}
+        return size_of(dict(self))
 
 
 def _must_lie(given: float, extent: Extent, what: str) -> None:

@@ -12,6 +12,7 @@ from typing import Annotated, Self
 from pydantic import BaseModel, Field, model_validator
 
 from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
+from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
 from service.schemas.names import OPTIONS_PART, LensModel
 
 DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
@@ -21,9 +22,7 @@ COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
 }
 # Of a camera matrix: both focal lengths, the ratio fy/fx, the principal point.
 MATRIX_NUMBERS = ("fx", "fy", "aspect", "cx", "cy")
-LEAST_SIGMA, LARGEST_SIGMA = 1e-9, 1e6
 LARGEST_SIDE = 16384
-LARGEST_COEFFICIENT = 1000
 # A position and a translation that are less apart say the same: more is not lost by writing them down.
 AGREEING_M = 1e-6
 Metres = Annotated[Number, Field(ge=-2000, le=2000)]

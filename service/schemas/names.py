@@ -33,3 +33,13 @@ JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 # Of calibrations.
 Verdict = Literal["accepted", "partly", "rejected"]
 OPEN_STATUSES: tuple[JobStatus, ...] = ("queued", "running")
+
+
+def problem_uri(kind: str) -> str:
+    """The `type` member of a problem: a URI reference that the service itself answers with an explanation."""
+    return f"/problems/{kind}"
+
+
+def refusal_uri(reason: str) -> str:
+    """The address that a result names for a refused pose: the service itself answers it with an explanation."""
+    return f"/refusals/{reason}"

@@ -11,6 +11,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
+from service.schemas.names import problem_uri
+
 MEDIA_TYPE = "application/problem+json"
 
 
@@ -117,11 +119,6 @@ PROBLEM_TYPES: dict[str, ProblemType] = {
     "unavailable": ProblemType(503, "The service cannot answer right now"),
     "internal-error": ProblemType(500, "The service made a mistake"),
 }
-
-
-def problem_uri(kind: str) -> str:
-    """The `type` member: a URI reference that the service itself answers with an explanation."""
-    return f"/problems/{kind}"
 
 
 REFUSALS_DOCUMENT = "docs/refused.md"
@@ -238,11 +235,6 @@ REFUSAL_REASONS: dict[str, RefusalReason] = {
         "refused-and-what-now",
     ),
 }
-
-
-def refusal_uri(reason: str) -> str:
-    """The address that a result names: the service itself answers it with an explanation."""
-    return f"/refusals/{reason}"
 
 
 def first_line(error: Exception) -> str:

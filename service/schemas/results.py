@@ -14,7 +14,7 @@ from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Light, Moved, Pose, Row
 from service.schemas.names import FieldNumber, Verdict
 from service.schemas.options import Coordinates, Landmark
-from service.schemas.problems import refusal_uri
+from service.schemas.refusals import refuse_camera, refuse_result
 from service.schemas.trend import Displacement
 
 NO_CHOICE: Mapping[str, int | None] = MappingProxyType({})
@@ -308,23 +308,10 @@ class Result(Schema):
     def refused(self, because: str, reason: str = "all-or-none") -> Result:
         """Return the result with every pose refused, for a reason of `REFUSAL_REASONS` (`service.schemas.problems`)."""
         cameras = [
-            camera.model_copy(
-                update={
-                    "accepted": False,
-                    "rejected_because": camera.rejected_because or because,
-                    "refusal": camera.refusal if camera.rejected_because else refusal_uri(reason),
-                }
-            )
+            camera.model_copy(update={**refuse_camera(camera.rejected_because, camera.refusal, because, reason)})
             for camera in self.cameras
         ]
-        reasons = [because] if self.rejected_because is None else [self.rejected_because, because]
-        told = {
-            "verdict": "rejected",
-            "accepted": False,
-            "rejected_because": "; ".join(one.removesuffix(".") for one in reasons),
-            "cameras": cameras,
-        }
-        return self.model_copy(update=told)
+        return self.model_copy(update={**refuse_result(self.rejected_because, because), "cameras": cameras})
 
 
 class PhotoResult(Schema):

@@ -15,6 +15,7 @@ from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
 from service.schemas.health import Alarm, Alarms, CalibrationEnd
+from service.schemas.lens_limits import assumed_lens_warning
 from service.schemas.options import Options
 from service.schemas.schedule import Schedule
 from service.schemas.view import VIEW_EXAMPLE, ViewChoice
@@ -59,8 +60,6 @@ Ignore = Annotated[
     ),
 ]
 
-# What the engine takes the focal length of a lens without a sigma to be known to, one standard deviation.
-BOARD_FOCAL_PERCENT = 0.03
 LIGHT = "How it is evened out with the others in a stitched view; accepted calibrations find it and keep it steady."
 
 
@@ -236,12 +235,7 @@ class Venue(NamedField):
     @property
     def lens_warnings(self) -> list[str]:
         """A line for each camera whose lens is taken to be well known because nobody said how well it is."""
-        return [
-            f"camera {camera.id}: its lens has no sigma and is taken to be as sure as a good board leaves it, "
-            f"{BOARD_FOCAL_PERCENT:g} % of the focal length"
-            for camera in self.cameras
-            if not camera.intrinsics.sigma
-        ]
+        return [assumed_lens_warning(camera.id) for camera in self.cameras if not camera.intrinsics.sigma]
 
     @property
     def poses_and_lenses(self) -> list[PosedCamera]:

@@ -8,6 +8,7 @@ movement is wanted.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 
 import cv2
@@ -51,7 +52,7 @@ def _rotation(camera: PosedCamera) -> Array:
 def visible_m(field: FieldOfPlay, camera: PosedCamera) -> float:
     """Metres of markings in a camera's picture, to within some metres: the ground is flat and the places are few."""
     points = points_on_markings(field)
-    length = sum(shape.length for shape in field.plan.markings(field.size) if not isinstance(shape, Spot))
+    length = sum(shape.length for shape in field.markings if not isinstance(shape, Spot))
     return float(_inside(camera, pixels(camera, points)).mean() * length)
 
 
@@ -70,9 +71,15 @@ def _inside(camera: PosedCamera, places: Array) -> NDArray[np.bool_]:
 
 def points_on_markings(field: FieldOfPlay) -> Array:
     """Places on the markings of a field (N, 2), evenly along them."""
-    shapes = field.plan.markings(field.size)
+    return _points_on(field.markings)
+
+
+@lru_cache(maxsize=256)
+def _points_on(shapes: tuple[Shape, ...]) -> Array:
     spacing = sum(shape.length for shape in shapes if not isinstance(shape, Spot)) / POINTS
-    return np.concatenate([_along(shape, spacing) for shape in shapes])
+    points = np.concatenate([_along(shape, spacing) for shape in shapes])
+    points.setflags(write=False)
+    return points
 
 
 def _along(shape: Shape, spacing: float) -> Array:

@@ -114,10 +114,10 @@ def arguments() -> argparse.Namespace:
 def settings(folder: Path, database_url: str, chosen: argparse.Namespace) -> dict[str, str]:
     model, stub = folder / "model.onnx", folder / "stub.sh"
     model.write_bytes(b"a network")
-    progress = Message(progress=Progress(stage="segmentation", fraction=0.1)).line()
+    progress = line_of(Message(progress=Progress(stage="segmentation", fraction=0.1)))
     reports = " ".join(map(str, range(REPORTS)))
     pause = chosen.seconds / REPORTS
-    stub.write_text(STUB.format(progress=progress, reports=reports, pause=pause, result=result().line()))
+    stub.write_text(STUB.format(progress=progress, reports=reports, pause=pause, result=line_of(result())))
     return os.environ | {
         "ESC_DATA": str(folder),
         "ESC_DATABASE_URL": database_url,
@@ -128,6 +128,11 @@ def settings(folder: Path, database_url: str, chosen: argparse.Namespace) -> dic
         "ESC_QUEUE_LIMIT": str(chosen.venues),
         "ESC_LOG_LEVEL": "warning",
     }
+
+
+def line_of(message: Message) -> str:
+    """As the program of a job writes it."""
+    return message.model_dump_json(exclude_unset=True)
 
 
 def result() -> Message:

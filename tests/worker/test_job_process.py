@@ -11,7 +11,7 @@ from service.schemas.venue import VENUE_EXAMPLE, VenueIn
 from service.settings import Settings
 from service.store.jobs.task import Task
 from worker import job_process as children
-from worker.protocol import JobRequest
+from worker.jobs.program import read_request
 
 VENUE = VenueIn.model_validate(VENUE_EXAMPLE).to_venue()
 TASK = Task(
@@ -59,9 +59,10 @@ def test_a_child_computes_with_one_blas_thread(tmp_path):
 
 
 def test_a_child_is_given_its_task_and_its_files_but_not_the_address_that_is_told_of_its_end(tmp_path):
-    given, files = JobRequest.read(io.BytesIO(told(tmp_path, "sys.stdin.read()").encode()))
-    assert (given.task, files) == (TASK.without_addresses(), FILES)
-    assert (given.task.venue, given.task.options.seed, given.task.options.callback_url) == (VENUE, 7, None)
+    given, files = read_request(io.BytesIO(told(tmp_path, "sys.stdin.read()").encode()))
+    task = Task.model_validate(given["task"])
+    assert (task, files) == (TASK.without_addresses(), FILES)
+    assert (task.venue, task.options.seed, task.options.callback_url) == (VENUE, 7, None)
 
 
 def drawing(tmp_path, sizes, data):
@@ -112,11 +113,9 @@ def test_a_child_inherits_no_secret_and_no_way_to_the_files(tmp_path, monkeypatc
 
 LOADED = """
 import sys
-import worker.jobs.program, worker.jobs.calibration, worker.jobs.field, worker.jobs.intrinsics, worker.jobs.locate
-print(*{name.partition(".")[0] for name in sys.modules} - sys.stdlib_module_names)
+import worker.jobs.program, {}
+print(*{{name.partition(".")[0] for name in sys.modules}} - sys.stdlib_module_names)
 """
-# Of what the project depends on; the last reads the task.
-COMPUTES_WITH = {"numpy", "cv2", "onnxruntime", "pydantic"}
 NOTHING_OF = {
     *("fastapi", "starlette", "uvicorn", "httpx", "jinja2"),
     *("sqlalchemy", "alembic", "dbos", "psycopg", "obstore"),
@@ -124,8 +123,20 @@ NOTHING_OF = {
 }
 
 
+def loaded_by(*modules):
+    """The packages that a program of jobs has loaded with these modules of it."""
+    command = [sys.executable, "-P", "-c", LOADED.format(", ".join(f"worker.jobs.{module}" for module in modules))]
+    return set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
+
+
 def test_what_computes_a_job_loads_nothing_of_the_web_the_database_or_the_store():
-    run = subprocess.run([sys.executable, "-P", "-c", LOADED], capture_output=True, text=True, check=True)
-    loaded = set(run.stdout.split())
-    assert loaded >= COMPUTES_WITH
+    loaded = loaded_by("calibration", "field", "find", "intrinsics", "locate")
+    # The last reads the tasks of all kinds but one.
+    assert loaded >= {"numpy", "cv2", "pydantic"}
     assert not loaded & NOTHING_OF
+
+
+def test_a_calibration_begins_without_the_models_of_the_wire_and_without_the_network():
+    loaded = loaded_by("calibration", "inputs")
+    assert loaded >= {"numpy", "cv2"}
+    assert not loaded & {"pydantic", "pydantic_core", "annotated_types", "onnxruntime"}

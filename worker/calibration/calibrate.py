@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import UsualView
@@ -38,7 +39,6 @@ from worker.calibration.records import (
     Recorder,
     Segment,
 )
-from worker.calibration.recovery import Solved, recover_knocked
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.solve import (
     NO_CAMERAS,
@@ -52,6 +52,9 @@ from worker.calibration.solve import (
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.swapped_cameras import mark_swapped_frames
 from worker.calibration.zoom_refit import refit_zoomed
+
+if TYPE_CHECKING:
+    from worker.calibration.recovery import Solved
 
 NO_MEMORIES: Mapping[str, CameraMemory] = MappingProxyType({})
 
@@ -92,7 +95,7 @@ def calibrate(
     solved = _solve(problem, observer, progress)
 
     # Recover: search anywhere for cameras that do not stand where they stood.
-    problem, solution, judged, path = recover_knocked(solved, observer, _solve, progress)
+    problem, solution, judged, path = _recover(solved, observer, progress)
     seen = [problem.observed.seen_by_network(n) for n in range(len(cameras))]
     recorder.observed(cameras, frames, problem.observed.views, seen)
     recorder.judged(judged.pitch, cameras, judged.cameras)
@@ -149,6 +152,17 @@ def _judged_near(
     solution = with_unusable_cameras(near, problem, progress)
     judged = judge_together(problem, solution.pitch, solution.results, progress)
     return (solution, judged) if all(judged.cameras[n].accepted for n in near.numbers) else None
+
+
+def _recover(solved: Solved, observer: FrameObserver, progress: ProgressReporter) -> Solved:
+    """Return the solution with those cameras in it that were knocked and found again; most nights there are none."""
+    problem, _, judged, _ = solved
+    if judged.accepted and problem.options.search != "anywhere":
+        return solved
+    # Only such nights pay for loading it.
+    from worker.calibration.recovery import recover_knocked
+
+    return recover_knocked(solved, observer, _solve, progress)
 
 
 def judge_together(

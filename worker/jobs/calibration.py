@@ -6,14 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
-from service.schemas.job import Progress
-from service.schemas.names import FieldNumber
-from service.schemas.options import Options
-from service.schemas.results import AdoptableNumber, Provenance, Result, Suspicion, View
-from service.schemas.trend import Anchor
-from service.schemas.venue import Venue
+from service.schemas.refusals import refuse_camera, refuse_result
+from service.store.jobs.files import names_of_all
 from worker.calibration import records as engine
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.view_condition import UsualView
@@ -21,14 +17,16 @@ from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import field_parameters
 from worker.calibration.memory.camera_memory import CameraMemory, memories_of_field
-from worker.calibration.paper.calibrate import PRESETS, calibrate_by_paper
 from worker.calibration.refinement import diagnosis
 from worker.calibration.stitching.photometry import Light
+from worker.compute_resources import ComputeResources
 from worker.jobs import frames_job
+from worker.jobs.answers import AdoptableNumber, CameraResult, Progress, Provenance, Result, Suspicion
 from worker.jobs.frames_job import EngineInputs, JobPictures
 from worker.jobs.from_schemas import light_of
+from worker.jobs.inputs import Anchor, Options, Venue, View
+from worker.jobs.masks import masks
 from worker.jobs.nights import lens_change_to_schema, read_memories, refined_to_schema
-from worker.jobs.pictures import PictureInputs, draw, masks
 from worker.jobs.to_schemas import (
     Solution,
     camera_to_schema,
@@ -39,7 +37,6 @@ from worker.jobs.to_schemas import (
     pair_to_schema,
     round_to_ms,
 )
-from worker.protocol import ComputeResources
 
 
 @dataclass(frozen=True)
@@ -80,7 +77,7 @@ def solve(
     return frames_job.solve(
         venue,
         files,
-        options,
+        dict(vars(options)),
         means,
         report,
         lambda given, step: _method(options)(
@@ -105,6 +102,12 @@ def solve(
 
 def _drawn(venue: Venue, given: EngineInputs, found: engine.Calibration, options: Options) -> JobPictures:
     """What only this job can draw; and all the rest at once where somebody asks for it, or will want to see why."""
+    seen = masks(given.cameras, found.responses)
+    if found.accepted and not options.pictures:
+        return JobPictures(seen, names_of_all([camera.id for camera in given.cameras]))
+    # Most jobs draw nothing.
+    from worker.jobs.pictures import PictureInputs, draw
+
     scene = PictureInputs(
         (given.pitch, given.cameras),
         (found.pitch, [result.camera for result in found.cameras]),
@@ -112,9 +115,6 @@ def _drawn(venue: Venue, given: EngineInputs, found: engine.Calibration, options
         {result.camera.id: result.markings for result in found.cameras},
         _steadied(venue, found),
     )
-    seen = masks(given.cameras, found.responses)
-    if found.accepted and not options.pictures:
-        return JobPictures(seen, scene.names)
     return JobPictures(draw(scene, scene.names) | seen)
 
 
@@ -125,14 +125,18 @@ def _steadied(venue: Venue, found: engine.Calibration) -> dict[str, Light]:
 
 
 def _method(options: Options) -> Callable[..., engine.Calibration]:
-    """Return the engine's own method, or for comparison the paper's."""
-    return calibrate if options.preset == "esc" else partial(calibrate_by_paper, PRESETS[options.preset])
+    """Return the engine's own method, or for comparison the paper's, which is loaded for those who compare."""
+    if options.preset == "esc":
+        return calibrate
+    from worker.calibration.paper.calibrate import PRESETS, calibrate_by_paper
+
+    return partial(calibrate_by_paper, PRESETS[options.preset])
 
 
 def _engine_options(venue: Venue, options: Options) -> engine.Options:
-    asked = {field.name for field in fields(engine.Options)}
+    shared = {field.name for field in fields(engine.Options)}
     return engine.Options(
-        **options.model_dump(include=asked, exclude_none=True),
+        **{name: value for name, value in vars(options).items() if name in shared and value is not None},
         lens_may_drift=venue.lens == "may-drift",
         recover=venue.recover,
     )
@@ -155,19 +159,18 @@ def _result(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
         cameras=[
-            camera_to_schema(
-                camera,
-                lens_to_schema(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
-                lights.get(camera.camera.id),
-                displacement_to_schema(found.pitch, camera, nights.anchors.get(camera.camera.id)),
-            ).model_copy(
-                update={
-                    "refined": refined_to_schema(found.pitch, camera),
-                    "lens_change": lens_change_to_schema(camera, nights.taken_at),
-                    "nights": _nights(found.pitch, remembered.get(camera.camera.id)),
-                    "seen_by_network": "full" if camera.camera.id in found.in_full else "overview",
-                }
-            )
+            {
+                **camera_to_schema(
+                    camera,
+                    lens_to_schema(camera.camera.intrinsics) if options.fit_focal_length or camera.lens_found else None,
+                    lights.get(camera.camera.id),
+                    displacement_to_schema(found.pitch, camera, nights.anchors.get(camera.camera.id)),
+                ),
+                "refined": refined_to_schema(found.pitch, camera),
+                "lens_change": lens_change_to_schema(camera, nights.taken_at),
+                "nights": _nights(found.pitch, remembered.get(camera.camera.id)),
+                "seen_by_network": "full" if camera.camera.id in found.in_full else "overview",
+            }
             for camera in found.cameras
         ],
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
@@ -203,7 +206,7 @@ def _adoptable(venue: Venue, found: engine.Calibration) -> list[AdoptableNumber]
     given = {parameter.name: parameter.read(found.pitch) for parameter in field_parameters(found.pitch)}
     return [
         AdoptableNumber(
-            name=cast(FieldNumber, one.quantity),
+            name=one.quantity,
             given=given[one.quantity],
             value=round(given[one.quantity] + one.deviation, MILLIMETRE),
             sigma=one.sigma,
@@ -221,10 +224,19 @@ def _nights(pitch: Field, memory: CameraMemory | None) -> int:
 
 def _allowed(venue: Venue, options: Options, result: Result) -> Result:
     """What of it may hold: poses that belong together only together."""
-    if result.verdict != "partly":
+    if result["verdict"] != "partly":
         return result
     if venue.accept == "all":
-        return result.refused("the venue accepts the poses of all cameras or none")
+        return _refused(result, "the venue accepts the poses of all cameras or none")
     if options.fit_ridge:
-        return result.refused("a ridge is accepted with the poses of all cameras or not at all")
+        return _refused(result, "a ridge is accepted with the poses of all cameras or not at all")
     return result
+
+
+def _refused(result: Result, because: str) -> Result:
+    """The result with every pose refused."""
+    cameras: list[CameraResult] = [
+        {**camera, **refuse_camera(camera["rejected_because"], camera["refusal"], because, "all-or-none")}
+        for camera in result["cameras"]
+    ]
+    return {**result, **refuse_result(result["rejected_because"], because), "cameras": cameras}

@@ -6,18 +6,18 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 
 from service.schemas.field import FieldOfPlay
-from service.schemas.job import Progress
 from service.schemas.options import FieldOptions
-from service.schemas.results import FieldResult, MeasureResult, Provenance
+from service.schemas.results import FieldResult, MeasureResult
 from service.schemas.venue import Venue
 from worker.calibration.field_fit.measures import FieldFit, Measure, fit_field
 from worker.calibration.records import StageTimings
 from worker.calibration.rendering.overlays import overlay
+from worker.compute_resources import ComputeResources
 from worker.jobs import frames_job
+from worker.jobs.answers import Progress, Provenance
 from worker.jobs.frames_job import EngineInputs, JobPictures
 from worker.jobs.from_schemas import encode_jpeg
 from worker.jobs.to_schemas import Solution, camera_to_schema, finite_or_none, round_to_ms
-from worker.protocol import ComputeResources
 
 MILLIMETRE = 3
 log = logging.getLogger(__name__)
@@ -35,7 +35,8 @@ def solve(
     return frames_job.solve(
         venue,
         files,
-        options,
+        # Who is told changes no number, and the address may be a secret.
+        options.model_dump(mode="json", exclude={"callback_url"}),
         means,
         report,
         lambda given, step: fit_field(given.pitch, given.cameras, given.frames, given.network, seed, step),

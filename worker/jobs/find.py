@@ -12,13 +12,11 @@ import numpy as np
 from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, PosedCamera
 from service.schemas.geometry import Pose as PoseSchema
-from service.schemas.job import Progress
-from service.schemas.results import CandidateResult, FindResult, FoundCameraResult, Provenance
+from service.schemas.results import CandidateResult, FindResult, FoundCameraResult
 from service.store.jobs.files import candidate_picture_name
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.records import CalibrationError
 from worker.calibration.relocalisation.relocalise import Candidate
 from worker.calibration.relocalisation.sought import (
     Place,
@@ -28,6 +26,8 @@ from worker.calibration.relocalisation.sought import (
     unknown_lenses,
 )
 from worker.calibration.rendering.overlays import candidate_picture
+from worker.compute_resources import ComputeResources
+from worker.jobs.answers import Progress, Provenance
 from worker.jobs.from_schemas import (
     JobFailedError,
     Picture,
@@ -41,6 +41,7 @@ from worker.jobs.from_schemas import (
 )
 from worker.jobs.to_schemas import (
     Solution,
+    engine_failures,
     finite_or_none,
     lens_to_schema,
     load_segmenter,
@@ -50,7 +51,6 @@ from worker.jobs.to_schemas import (
     round_to_ms,
     sigma_to_schema,
 )
-from worker.protocol import ComputeResources
 
 log = logging.getLogger(__name__)
 FIELD_OF_VIEW_UNCERTAIN = 0.15
@@ -71,18 +71,16 @@ def solve(
     pitch = pitch_of(site.field)
     sought = [_sought(camera, frames[camera.id][0]) for camera in site.cameras if camera.pose is None]
     known = [_known(camera) for camera in site.cameras if camera.pose is not None]
-    try:
+    with engine_failures():
         found = find_cameras(
             pitch, sought, known, frames, segmenter, seed, lambda step: report(progress_to_schema(step))
         )
-    except CalibrationError as error:
-        raise JobFailedError(error.kind, error.detail, error.camera) from error
     pictures = {
         name: picture
         for camera in found.cameras
         for name, picture in _pictures(pitch, camera, frames[camera.id][0]).items()
     }
-    return Solution(_result(found, sought, provenance_of(segmenter, seed, {"seed": seed})), pictures)
+    return Solution(_result(found, sought, provenance_of(means, segmenter, seed, {"seed": seed})), pictures)
 
 
 def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:

@@ -4,22 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import cv2
 
-from service.schemas.job import Progress
-from service.schemas.options import FieldOptions, Options
-from service.schemas.results import Provenance
-from service.schemas.venue import Venue
 from worker.calibration import records
 from worker.calibration.detection.segmentation import Segmenter
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.records import CalibrationError, EngineResult, StageTimings
-from worker.jobs.from_schemas import JobFailedError, Picture, camera_with_ignored_areas, decode_frame, pitch_of
-from worker.jobs.to_schemas import PREVIEW_FRACTION, R, Solution, load_segmenter, progress_to_schema, provenance_of
-from worker.protocol import ComputeResources
+from worker.calibration.records import EngineResult, StageTimings
+from worker.compute_resources import ComputeResources
+from worker.jobs.answers import Progress, Provenance
+from worker.jobs.from_schemas import Picture, camera_with_ignored_areas, decode_frame, pitch_of
+from worker.jobs.to_schemas import (
+    PREVIEW_FRACTION,
+    R,
+    Solution,
+    engine_failures,
+    load_segmenter,
+    progress_to_schema,
+    provenance_of,
+)
+
+if TYPE_CHECKING:
+    from service.schemas.venue import Venue
+    from worker.jobs import inputs
 
 A = TypeVar("A", bound=EngineResult)
 Frames = Mapping[str, Sequence[Picture]]
@@ -44,9 +53,9 @@ class JobPictures:
 
 
 def solve(
-    venue: Venue,
+    venue: Venue | inputs.Venue,
     files: Mapping[str, Sequence[bytes]],
-    options: Options | FieldOptions,
+    options: dict[str, Any],
     means: ComputeResources,
     report: Callable[[Progress], None],
     engine: Callable[[EngineInputs, Callable[[records.Progress], None]], A],
@@ -56,7 +65,8 @@ def solve(
 ) -> Solution[R]:
     """Call the `engine` with what a venue and the files of its cameras hold, `draw` its answer and `tell` it.
 
-    `remember`: the memories that the answer leaves, by camera. With or without a server around it.
+    `options`: what was asked for, to be told of with the result, `seed` among it. `remember`: the memories that the
+    answer leaves, by camera. With or without a server around it.
     """
     segmenter = load_segmenter(means)
     cv2.setNumThreads(means.threads)
@@ -65,15 +75,11 @@ def solve(
         frames = {c.id: [decode_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
     cameras = [camera_with_ignored_areas(camera, camera.ignore) for camera in venue.cameras]
     given = EngineInputs(pitch_of(venue.field), cameras, frames, segmenter)
-    try:
+    with engine_failures():
         answer = engine(given, lambda step: report(progress_to_schema(step)))
-    except CalibrationError as error:
-        raise JobFailedError(error.kind, error.detail, error.camera) from error
     report(Progress(stage="preview", fraction=PREVIEW_FRACTION))
     spent.add(answer.timings)
     with spent.timed("preview"):
         drawn = draw(given, answer)
-    # Who is told changes no number, and the address may be a secret.
-    asked = options.model_dump(mode="json", exclude={"callback_url"})
-    result = tell(answer, spent, provenance_of(segmenter, options.seed or 0, asked))
+    result = tell(answer, spent, provenance_of(means, segmenter, options.get("seed") or 0, options))
     return Solution(result, drawn.pictures, drawn.later, remember(answer))

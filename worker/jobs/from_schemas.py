@@ -1,4 +1,7 @@
-"""What a job or a drawing is given, as the engine takes it: files become pictures, the wire the engine's types."""
+"""What a job or a drawing is given, as the engine takes it: files become pictures, the wire the engine's types.
+
+The wire's models and the plain records that are parts of them (`worker.jobs.inputs`) are read alike.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from service.schemas import geometry, view
-from service.schemas.field import FieldOfPlay
-from service.schemas.problems import PROBLEM_TYPES, problem_uri
+from service.schemas.names import problem_uri
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ignored_areas import Ignored
@@ -21,7 +22,14 @@ from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import ViewChoice
 
 if TYPE_CHECKING:
-    from service.schemas.job import JobError
+    from service.schemas import field, geometry, view
+    from worker.jobs import inputs
+    from worker.jobs.answers import JobError
+
+    FieldOfPlay = field.FieldOfPlay | inputs.FieldOfPlay
+    Intrinsics = geometry.Intrinsics | inputs.Intrinsics
+    PosedCamera = geometry.PosedCamera | inputs.PosedCamera
+    GivenLight = geometry.Light | inputs.Light
 
 Picture = NDArray[np.uint8]
 JPEG_QUALITY = 90
@@ -37,11 +45,15 @@ class JobFailedError(Exception):
     @property
     def error(self) -> JobError:
         """For the row of the job."""
-        # What a drawing needs would take twice as long to load with all that a job can be.
-        from service.schemas.job import JobError
+        # Nearly all jobs end without.
+        from service.schemas.problems import PROBLEM_TYPES
 
-        told = {"type": problem_uri(self.kind), "title": PROBLEM_TYPES[self.kind].title}
-        return JobError(**told, detail=self._detail, camera=self._camera)
+        return {
+            "type": problem_uri(self.kind),
+            "title": PROBLEM_TYPES[self.kind].title,
+            "detail": self._detail,
+            "camera": self._camera,
+        }
 
     def because(self, why: str) -> JobFailedError:
         """The same, with its likeliest cause."""
@@ -92,13 +104,13 @@ def pitch_of(field: FieldOfPlay) -> Field:
     return Field(*size, ridge, field.plan, field.measures_m, others=field.others)
 
 
-def lens_of(lens: geometry.Intrinsics, image_size: list[int]) -> Lens:
+def lens_of(lens: Intrinsics, image_size: list[int]) -> Lens:
     """The engine's lens."""
     matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
     return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]), dict(lens.sigma or {}))
 
 
-def camera_of(camera: geometry.PosedCamera) -> Camera:
+def camera_of(camera: PosedCamera) -> Camera:
     """The engine's camera at its stored pose."""
     pose = Pose(np.array(camera.pose.rotation), np.array(camera.pose.position))
     return Camera(camera.id, lens_of(camera.intrinsics, camera.image_size), pose)
@@ -110,13 +122,13 @@ def choice_of(choice: view.ViewChoice) -> ViewChoice:
     return ViewChoice(choice.projection, *size, choice.field_of_view_deg, choice.pan_deg, choice.horizon)
 
 
-def light_of(light: geometry.Light) -> Light:
+def light_of(light: GivenLight) -> Light:
     """How a camera's picture is evened out, for the engine: colours from blue to red."""
     red, green, blue = light.gain
     return Light((blue, green, red), light.contrast, light.falloff, light.reach)
 
 
-def camera_with_ignored_areas(camera: geometry.PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:
+def camera_with_ignored_areas(camera: PosedCamera, ignore: Sequence[Sequence[Sequence[float]]]) -> Camera:
     """The engine's camera, with the polygons of its frames that are to be ignored."""
     return replace(camera_of(camera), ignored=ignored_areas_of(ignore, camera.image_size))
 

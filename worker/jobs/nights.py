@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from service.schemas import geometry
-from service.schemas.results import LensChange, Refined
+from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
@@ -23,6 +22,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.refinement import uncertainty
+from worker.jobs.answers import LensChange, Refined
 from worker.jobs.to_schemas import lens_to_schema, pose_to_schema, sigma_to_schema
 
 
@@ -41,7 +41,7 @@ def refined_to_schema(pitch: Field, found: CameraResult) -> Refined | None:
     covariance = refined.covariance if np.isfinite(refined.covariance).all() else None
     return Refined(
         pose=pose_to_schema(refined.camera.pose),
-        intrinsics=lens_to_schema(refined.camera.intrinsics).model_copy(update={"sigma": _lens_sigma(covariance)}),
+        intrinsics={**lens_to_schema(refined.camera.intrinsics), "sigma": _lens_sigma(covariance)},
         covariance=None if covariance is None else covariance.tolist(),
         sigma=sigma_to_schema(refined.sigma),
         longer=focal_refined / focal - 1,
@@ -55,14 +55,14 @@ def _is_a_camera(camera: Camera) -> bool:
     numbers = np.concatenate([camera.pose.rotation, camera.pose.position, lens.matrix.ravel(), lens.distortion])
     focal = np.diag(lens.matrix)[:2]
     bent = np.abs(lens.distortion).max(initial=0.0)
-    return bool(np.isfinite(numbers).all() and (focal > 0).all() and bent <= geometry.LARGEST_COEFFICIENT)
+    return bool(np.isfinite(numbers).all() and (focal > 0).all() and bent <= LARGEST_COEFFICIENT)
 
 
 def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:
     """The standard deviations of the numbers of a lens, from the (12, 12) of pose and lens."""
     if covariance is None:
         return None
-    sigma = np.sqrt(np.diag(covariance)[POSE_NUMBERS:]).clip(geometry.LEAST_SIGMA, geometry.LARGEST_SIGMA)
+    sigma = np.sqrt(np.diag(covariance)[POSE_NUMBERS:]).clip(LEAST_SIGMA, LARGEST_SIGMA)
     return dict(zip(SIGMA_NAMES.values(), sigma.tolist(), strict=True))
 
 
@@ -72,7 +72,10 @@ def lens_change_to_schema(found: CameraResult, tonight: datetime | None) -> Lens
     if change is None or not math.isfinite(change.sigma) or not math.isfinite(change.longer):
         return None
     return LensChange(
-        longer=change.longer, sigma=change.sigma, since=change.since, words=lens_change_in_words(change, tonight)
+        longer=change.longer,
+        sigma=change.sigma,
+        since=None if change.since is None else change.since.isoformat(),
+        words=lens_change_in_words(change, tonight),
     )
 
 

@@ -10,9 +10,8 @@ from functools import partial
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED
+from service.store.jobs.files import BIRDSEYE, OF_CAMERA, STITCHED, names_of_all
 from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
@@ -21,9 +20,9 @@ from worker.calibration.rendering.overlays import overlay
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import ViewChoice, chosen_view
 from worker.jobs.from_schemas import Picture, encode_jpeg, encode_png
+from worker.jobs.masks import size_as_shown
 
-# Of the frames that layers are laid over: a wide screen. The overlays have the size of the frames.
-FRAME_WIDTH, PREVIEW_WIDTH = 1920, 1920
+PREVIEW_WIDTH = 1920
 FRAME_QUALITY = 75
 log = logging.getLogger(__name__)
 
@@ -44,7 +43,7 @@ class PictureInputs:
     @property
     def names(self) -> list[str]:
         """All pictures that can be drawn."""
-        return [*STITCHED, *BIRDSEYE, *(f"{kind}_{camera.id}" for camera in self.stored[1] for kind in OF_CAMERA)]
+        return names_of_all([camera.id for camera in self.stored[1]])
 
 
 def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
@@ -64,15 +63,6 @@ def draw(scene: PictureInputs, names: Sequence[str]) -> dict[str, bytes]:
         except Exception:  # poses that were rejected may look anywhere; a picture is not worth losing the reason
             log.warning("cannot draw", exc_info=True)
     return pictures
-
-
-def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.float32]]) -> dict[str, bytes]:
-    """Draw the network's responses (h, w), in 0..1, to be laid over the frames; nothing else can tell them later."""
-    return {
-        f"mask_{camera.id}": encode_png(layers.mask_layer(_in_bytes(response), _smaller(camera, response.shape[1])))
-        for camera in cameras
-        for response in [responses[camera.id]]
-    }
 
 
 def _stitched(scene: PictureInputs) -> dict[str, bytes]:
@@ -98,7 +88,7 @@ def _birdseye(scene: PictureInputs) -> dict[str, bytes]:
 def _of_camera(scene: PictureInputs, number: int) -> dict[str, bytes]:
     """The frame with both fields on it and what is wrong with markings; and smaller, with what is laid over it."""
     stored, new = ((pitch, cameras[number]) for pitch, cameras in (scene.stored, scene.found))
-    camera, size = stored[1].id, _smaller(stored[1])
+    camera, size = stored[1].id, size_as_shown(stored[1])
     frame = scene.frames[camera]
     small = np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), np.uint8)
     return {
@@ -107,15 +97,3 @@ def _of_camera(scene: PictureInputs, number: int) -> dict[str, bytes]:
         f"stored_{camera}": encode_png(layers.stored_layer(*stored, size)),
         f"new_{camera}": encode_png(layers.new_layer(*new, size)),
     }
-
-
-def _in_bytes(response: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """A response (h, w) in 0..1 as 0..255."""
-    return np.rint(255 * response).astype(np.uint8)
-
-
-def _smaller(camera: Camera, largest: int = FRAME_WIDTH) -> tuple[int, int]:
-    """Width and height of a frame as it is shown, at most as wide as the `largest` picture of it."""
-    width, height = camera.intrinsics.size
-    shown = min(width, largest, FRAME_WIDTH)
-    return shown, round(height * shown / width)

@@ -1,28 +1,38 @@
 """The job program computes one job in a process of its own: reads the request, runs the engine, draws, reports.
 
 `python -m worker.jobs.program` reads a `worker.protocol.JobRequest` with its files on its standard input and prints a
-line of JSON for each step of progress and one for the end, a `Message` each; pictures follow the last line. It decodes
-what strangers sent, so it sees no database, no store and no settings: its parent reads and writes them.
+line of JSON for each step of progress and one for the end, a `worker.protocol.Message` each; pictures follow the last
+line. It decodes what strangers sent, so it sees no database, no store and no settings: its parent reads and writes
+them.
+
+Nearly every job is a calibration near its stored poses, and begins this program anew. So a calibration loads what that
+needs and no models of the wire: its parent has checked the request, and checks the answer. Other kinds load the models.
 """
 
 from __future__ import annotations
 
+import json
 import logging
+import math
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
 
 import cv2
+import numpy as np
 
 from service import child_process
-from service.schemas.find import SoughtSite
-from service.schemas.job import Progress
-from service.schemas.options import FieldOptions, FindOptions, IntrinsicsOptions, LocateOptions
-from service.schemas.results import AnyResult
-from service.store.jobs.task import Task
+from worker.compute_resources import ComputeResources
+from worker.jobs.answers import Progress
 from worker.jobs.from_schemas import JobFailedError
 from worker.jobs.to_schemas import Solution
-from worker.protocol import ComputeResources, JobRequest, Message
+
+if TYPE_CHECKING:
+    from service.schemas.find import SoughtSite
+    from service.schemas.options import FindOptions
+    from service.store.jobs.task import Task
 
 BEHIND_THE_OTHERS = 10
 """Niceness: answers of the API and heartbeats of the worker on the same machine go before the computation."""
@@ -34,22 +44,56 @@ def main() -> None:
     os.nice(BEHIND_THE_OTHERS)
     parent = Parent()
     logging.basicConfig(handlers=[parent], format="%(message)s")
-    given, files = JobRequest.read(sys.stdin.buffer)
+    request, files = read_request(sys.stdin.buffer)
+    means = ComputeResources(**request["means"] | {"model": Path(request["means"]["model"])})
     try:
-        solution = _compute(given.task, files, given.means, lambda progress: parent.told(Message(progress=progress)))
+        solution = _compute(request["task"], files, means, lambda progress: parent.told({"progress": progress}))
     except JobFailedError as failure:
-        parent.told(Message(error=failure.error))
+        parent.told({"error": failure.error})
         return
-    sizes = {name: len(picture) for name, picture in solution.pictures.items()}
-    last = Message(result=solution.result, pictures=sizes, later=list(solution.later), memories=dict(solution.memories))
+    last = {
+        "result": _document(solution.result),
+        "pictures": {name: len(picture) for name, picture in solution.pictures.items()},
+        "later": list(solution.later),
+        "memories": dict(solution.memories),
+    }
     parent.told(last, *solution.pictures.values())
 
 
+def read_request(stream: IO[bytes]) -> tuple[dict[str, Any], dict[str, list[bytes]]]:
+    """Read a request that `JobRequest.write` wrote, as JSON, and its files."""
+    request = json.loads(stream.readline())
+    return request, {name: [stream.read(size) for size in several] for name, several in request["sizes"].items()}
+
+
 def _compute(
-    task: Task, files: Mapping[str, Sequence[bytes]], means: ComputeResources, report: Callable[[Progress], None]
-) -> Solution[AnyResult]:
+    task: dict[str, Any],
+    files: Mapping[str, Sequence[bytes]],
+    means: ComputeResources,
+    report: Callable[[Progress], None],
+) -> Solution[Any]:
     """What the kind of the job asks for; what other kinds need is not loaded."""
     cv2.setNumThreads(means.threads)
+    if task["kind"] != "calibration":
+        return _compute_by_models(task, files, means, report)
+    from worker.jobs import calibration, inputs
+
+    given = inputs.read_record(inputs.Task, task)
+    nights = calibration.NightHistory(given.last_views, given.memories, given.anchors, given.taken_at)
+    return calibration.solve(given.venue, files, given.options, means, report, nights)
+
+
+def _compute_by_models(
+    document: dict[str, Any],
+    files: Mapping[str, Sequence[bytes]],
+    means: ComputeResources,
+    report: Callable[[Progress], None],
+) -> Solution[Any]:
+    """What is asked for once in the life of a venue."""
+    from service.schemas.options import FieldOptions, FindOptions, IntrinsicsOptions, LocateOptions
+    from service.store.jobs.task import Task
+
+    task = Task.model_validate(document, extra="ignore")
     match task.options:
         case IntrinsicsOptions() as options:
             from worker.jobs import intrinsics
@@ -70,20 +114,44 @@ def _compute(
             from worker.jobs import find
 
             return find.solve(_site_of(task, options, files), files, options.seed or 0, means, report)
-        case options:
-            from worker.jobs import calibration
-
-            assert task.venue is not None
-            nights = calibration.NightHistory(task.last_views, task.memories, task.anchors, task.taken_at)
-            return calibration.solve(task.venue, files, options, means, report, nights)
+        case _:
+            raise AssertionError(task.kind)
 
 
 def _site_of(task: Task, options: FindOptions, files: Mapping[str, Sequence[bytes]]) -> SoughtSite:
     """The site whose cameras are to be found: the one that was sent, or the stored venue."""
+    from service.schemas.find import SoughtSite
+
     if task.site is not None:
         return task.site
     assert task.venue is not None
     return SoughtSite.of(task.venue, options, files)
+
+
+def _document(result: Any) -> dict[str, Any]:
+    """A result as JSON has it, which is a model of the wire unless it is plain already."""
+    document: dict[str, Any] = result if isinstance(result, dict) else result.model_dump(mode="json")
+    return document
+
+
+def encode(message: Mapping[str, Any]) -> bytes:
+    """The line of JSON of a message."""
+    return json.dumps(_plain(message), ensure_ascii=False).encode()
+
+
+def _plain(value: Any) -> Any:
+    """A value without NumPy's scalars, and without what JSON has no numbers for."""
+    match value:
+        case dict():
+            return {name: _plain(one) for name, one in value.items()}
+        case list() | tuple():
+            return [_plain(one) for one in value]
+        case float():
+            return float(value) if math.isfinite(value) else None
+        case np.generic():
+            return _plain(value.item())
+        case _:
+            return value
 
 
 class Parent(logging.Handler):
@@ -97,15 +165,15 @@ class Parent(logging.Handler):
         self._messages = os.fdopen(os.dup(1), "wb")
         os.dup2(2, 1)
 
-    def told(self, message: Message, *files: bytes) -> None:
-        """Say it, and hand over the files behind it."""
-        self._messages.write(message.line().encode() + b"\n")
+    def told(self, message: Mapping[str, Any], *files: bytes) -> None:
+        """Say it, the members of a `worker.protocol.Message`, and hand over the files behind it."""
+        self._messages.write(encode(message) + b"\n")
         self._messages.writelines(files)
         self._messages.flush()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Say a line of the log, which the parent knows the job of."""
-        self.told(Message(warning=self.format(record)))
+        self.told({"warning": self.format(record)})
 
 
 if __name__ == "__main__":

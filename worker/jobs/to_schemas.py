@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from math import isfinite, isnan
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from service.schemas import geometry
-from service.schemas.geometry import Moved
-from service.schemas.job import Progress
-from service.schemas.problems import refusal_uri
-from service.schemas.results import (
-    AnyResult,
-    CameraResult,
-    CrossCheck,
-    MarkingResult,
-    PairResult,
-    Proposal,
-    Provenance,
-    SeamPlace,
-    Sigma,
-    View,
-)
-from service.schemas.trend import Anchor, Displacement
+from service.schemas.lens_limits import LARGEST_SIGMA, LEAST_SIGMA
+from service.schemas.names import refusal_uri
 from worker.calibration import records
 from worker.calibration.detection.segmentation import ProviderMissing, Segmenter
 from worker.calibration.detection.view_condition import ViewCondition
@@ -38,19 +23,39 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.refinement import cross_check, uncertainty
 from worker.calibration.stitching.photometry import Light
+from worker.compute_resources import ComputeResources
+from worker.jobs import answers
+from worker.jobs.answers import (
+    CameraResult,
+    CrossCheck,
+    Displacement,
+    MarkingResult,
+    Moved,
+    PairResult,
+    Progress,
+    Proposal,
+    Provenance,
+    SeamPlace,
+    Sigma,
+    View,
+)
 from worker.jobs.from_schemas import JobFailedError, camera_of
-from worker.protocol import ComputeResources
+
+if TYPE_CHECKING:
+    from service.schemas import trend
+    from worker.jobs import inputs
 
 PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
 # The engine's report ends with the refinement; what is left is drawing.
 PREVIEW_FRACTION = 0.96
-R = TypeVar("R", bound=AnyResult, covariant=True)
+R = TypeVar("R", covariant=True)
 
 
 @dataclass(frozen=True)
 class Solution(Generic[R]):
     """A result and the files of its pictures, by the names that `service.store.jobs.files.picture_file` knows.
 
+    That of a calibration is a plain record, those of other kinds are models of the wire.
     `later`: the names of those that can be drawn when somebody looks; `memories`: of the accepted cameras, by camera.
     """
 
@@ -60,9 +65,9 @@ class Solution(Generic[R]):
     memories: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def provenance_of(segmenter: Segmenter, seed: int, options: dict[str, Any]) -> Provenance:
+def provenance_of(means: ComputeResources, segmenter: Segmenter, seed: int, options: dict[str, Any]) -> Provenance:
     """What computes a solution by these options, so that it can be computed again."""
-    return Provenance(software=version("esc-calibration"), model_sha256=segmenter.sha256, seed=seed, options=options)
+    return {"software": means.software, "model_sha256": segmenter.sha256, "seed": seed, "options": options}
 
 
 def round_to_ms(timings_s: Mapping[str, float]) -> dict[str, float]:
@@ -70,29 +75,27 @@ def round_to_ms(timings_s: Mapping[str, float]) -> dict[str, float]:
     return {stage: round(seconds, 3) for stage, seconds in timings_s.items()}
 
 
-def lens_to_schema(lens: Lens) -> geometry.Intrinsics:
+def lens_to_schema(lens: Lens) -> answers.Intrinsics:
     """A lens of the engine for the wire."""
     # What photos or clicks hardly tell has a deviation beyond any number that says something.
     sigma = {
-        name: min(max(value, geometry.LEAST_SIGMA), geometry.LARGEST_SIGMA)
-        for name, value in lens.sigma.items()
-        if not isnan(value)
+        name: min(max(value, LEAST_SIGMA), LARGEST_SIGMA) for name, value in lens.sigma.items() if not isnan(value)
     }
-    return geometry.Intrinsics(
+    return answers.Intrinsics(
         model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist(), sigma=sigma or None
     )
 
 
-def light_to_schema(light: Light) -> geometry.Light:
+def light_to_schema(light: Light) -> answers.Light:
     """How a camera's picture is evened out, for the wire: colours from red to blue."""
-    return geometry.Light(
+    return answers.Light(
         gain=[*reversed(light.gain)], contrast=light.contrast, falloff=light.falloff, reach=light.reach
     )
 
 
-def pose_to_schema(pose: Pose) -> geometry.Pose:
+def pose_to_schema(pose: Pose) -> answers.Pose:
     """A pose of the engine for the wire."""
-    return geometry.Pose(
+    return answers.Pose(
         rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
     )
 
@@ -103,11 +106,19 @@ def finite_or_none(value: Any) -> float | None:
 
 
 def load_segmenter(means: ComputeResources) -> Segmenter:
-    """The network that the settings name."""
+    """The network that the settings name, which is loaded when it is first asked."""
     if not means.model.is_file():
         raise JobFailedError("model-missing", f"{means.model} is not there; set ESC_MODEL or train one.")
+    return Segmenter(means.model, means.threads, PROVIDERS[means.provider])
+
+
+@contextmanager
+def engine_failures() -> Iterator[None]:
+    """Say of what the engine cannot compute why the job has no result; raises `JobFailedError`."""
     try:
-        return Segmenter(means.model, means.threads, PROVIDERS[means.provider])
+        yield
+    except records.CalibrationError as error:
+        raise JobFailedError(error.kind, error.detail, error.camera) from error
     except ProviderMissing as missing:
         raise JobFailedError(
             "provider-missing", f"{missing} Set ESC_PROVIDER=cpu or install what is asked for."
@@ -126,8 +137,8 @@ def progress_to_schema(step: records.Progress) -> Progress:
 
 def camera_to_schema(
     found: quality.CameraResult,
-    lens: geometry.Intrinsics | None = None,
-    light: geometry.Light | None = None,
+    lens: answers.Intrinsics | None = None,
+    light: answers.Light | None = None,
     moved_from_anchor: Displacement | None = None,
 ) -> CameraResult:
     """What a finish has to say of a camera; `lens` and `light` where they were found as well."""
@@ -149,6 +160,10 @@ def camera_to_schema(
         view=_view(found.view),
         residual_px=finite_or_none(found.residual_px),
         light=light,
+        refined=None,
+        lens_change=None,
+        nights=0,
+        seen_by_network=None,
         markings=[_marking(one) for one in found.markings],
         knocked=found.knocked,
         proposed=_proposal(found) if _is_proposed(found) else None,
@@ -174,7 +189,9 @@ def _proposal(found: quality.CameraResult) -> Proposal:
     )
 
 
-def displacement_to_schema(pitch: Field, found: quality.CameraResult, anchor: Anchor | None) -> Displacement | None:
+def displacement_to_schema(
+    pitch: Field, found: quality.CameraResult, anchor: trend.Anchor | inputs.Anchor | None
+) -> Displacement | None:
     """How far a camera is from its anchor; one that has none yet is its own. None where that cannot be told."""
     begun = found.camera if anchor is None else camera_of(anchor.posed)
     moved = measure_displacement(pitch, begun, found)

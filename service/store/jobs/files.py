@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 # Pictures to be laid over others.
 LAYERS = ("seam", "stored", "new", "mask")
 # Pictures of a calibration that can be drawn when somebody looks, of all cameras and of each; those that share most of
@@ -36,6 +38,11 @@ def drawn_together(name: str) -> tuple[str, ...]:
     if kind in OF_CAMERA and camera:
         return tuple(f"{each}_{camera}" for each in OF_CAMERA)
     return BIRDSEYE if name in BIRDSEYE else ()
+
+
+def names_of_all(cameras: Sequence[str]) -> list[str]:
+    """The names of all pictures that can be drawn when somebody looks, of a calibration of these cameras."""
+    return [*STITCHED, *BIRDSEYE, *(f"{kind}_{camera}" for camera in cameras for kind in OF_CAMERA)]
 
 
 def source_file(folder: str, camera: str) -> str:

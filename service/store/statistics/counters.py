@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
@@ -68,9 +69,15 @@ def add(connection: sa.Connection, amounts: Mapping[CounterKey, float]) -> None:
         {"metric": metric, "labels": ",".join(labels), "value": amount}
         for (metric, labels), amount in sorted(amounts.items())
     ]
-    insert = INSERT[connection.dialect.name](tables.tallies).values(rows)
+    connection.execute(_grow(connection.dialect.name), rows)
+
+
+@cache
+def _grow(dialect: str) -> sa.Executable:
+    """The statement that adds to counters, of which one is sent for all rows: those that it returns are not read."""
+    insert = INSERT[dialect](tables.tallies)
     grown = {"value": t.value + insert.excluded.value}
-    connection.execute(insert.on_conflict_do_update(index_elements=["metric", "labels"], set_=grown))
+    return insert.on_conflict_do_update(index_elements=["metric", "labels"], set_=grown).returning(t.metric)
 
 
 def read(connection: sa.Connection) -> dict[CounterKey, float]:

@@ -7,8 +7,8 @@ from datetime import datetime
 from typing import get_args
 
 from service.schemas.job import JobError
-from service.schemas.names import JobKind, JobStatus
-from service.schemas.problems import PROBLEM_TYPES, problem_uri
+from service.schemas.names import JobKind, JobStatus, problem_uri
+from service.schemas.problems import PROBLEM_TYPES
 from service.schemas.results import AnyResult, Cause, Result
 from service.store.statistics.counters import DURATION, STAGE, STITCH_ERROR, WAIT, Increments, total
 

@@ -42,6 +42,13 @@ PROGRAM = (
     "import json; from service.settings import Settings; "
     "print(json.dumps(Settings.model_fields['job_program'].default))"
 )
+# The program, and what it loads when it has seen that its job is a calibration.
+IMPORTS = """
+import importlib, importlib.util, sys
+kind = sys.argv[1].rpartition(".")[0] + ".calibration"
+importlib.import_module(sys.argv[1])
+importlib.util.find_spec(kind) and importlib.import_module(kind)
+"""
 # What the page of a venue shows.
 LOOKED_AT = ("preview.jpg",)
 
@@ -115,9 +122,9 @@ def measure(release: Release, asked: Case) -> dict:
 
 
 def imports_s(release: Release) -> float:
-    """Core-seconds of an interpreter that imports what a job's program does, and ends."""
+    """Core-seconds of an interpreter that imports what the program of a calibration does, and ends."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [release.program[0], "-P", "-c", f"import {release.program[-1]}"]
+    command = [release.program[0], "-P", "-c", IMPORTS, release.program[-1]]
     subprocess.run(command, cwd=release.folder, env=os.environ | _one_blas_thread(), check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

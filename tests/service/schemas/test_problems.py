@@ -6,7 +6,8 @@ from typing import get_args
 
 import pytest
 
-from service.schemas.problems import REFUSAL_REASONS, REFUSALS_DOCUMENT, refusal_uri
+from service.schemas.names import refusal_uri
+from service.schemas.problems import REFUSAL_REASONS, REFUSALS_DOCUMENT
 from worker.calibration.gate import quality
 
 ROOT = Path(__file__).parents[3]

@@ -17,13 +17,14 @@ from service.schemas.venue import Venue, VenueIn
 from service.store import database as database
 from service.store import movement
 from tests.worker.calibration.synthetic import CROWNED, camera, paint_frame
+from tests.worker.jobs.by_models import history_of, solve
 from tests.worker.stock import Stock, anyway
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import with_focal_length
+from worker.compute_resources import ComputeResources
 from worker.duties.alarms import AlarmTimer
-from worker.jobs import calibration
-from worker.protocol import ComputeResources
+from worker.jobs import pictures
 
 VENUE = "v"
 SIZE, FOCAL, LENS = (640, 360), 400.0, (-0.12, 0.02, 0.0, 0.0, 0.0)
@@ -90,7 +91,7 @@ class Clock:
 def fast_motion() -> Iterator[Clock]:
     """A clock for the store, while nobody looks at the pictures of jobs."""
     clock = Clock()
-    with mock.patch.object(database, "datetime", clock), mock.patch.object(calibration, "draw", return_value={}):
+    with mock.patch.object(database, "datetime", clock), mock.patch.object(pictures, "draw", return_value={}):
         yield clock
 
 
@@ -121,9 +122,8 @@ class Year:
         files = {name: [cv2.imencode(".jpg", frame)[1].tobytes()] for name, frame in frames.items()}
         task = self.home.attempts.begin(self.home.submitted(VENUE, generations=40, parents=32, offspring=64))
         assert task is not None
-        nights = calibration.NightHistory(task.last_views, task.memories, task.anchors, task.taken_at)
         means = ComputeResources.of(self.home.settings)
-        found = calibration.solve(task.venue, files, task.options, means, lambda _: None, nights)
+        found = solve(task.venue, files, task.options, means, lambda _: None, history_of(task))
         self.home.attempts.finish(task, found.result, [], found.memories)
         self.job = task.job_id
         return found.result

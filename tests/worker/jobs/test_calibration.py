@@ -1,3 +1,4 @@
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -9,12 +10,14 @@ import pytest
 
 from service.schemas import geometry
 from service.schemas.field import OtherField
+from service.schemas.lens_limits import LARGEST_SIGMA, LEAST_SIGMA
 from service.schemas.options import Options
 from service.schemas.programs.drawing import FLAT, DrawingRequest, DrawnPictures, decode_files, encode_message
-from service.schemas.results import AdoptableNumber, View
+from service.schemas.results import AdoptableNumber
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
 from service.store.jobs.files import drawn_together, picture_file
+from tests.worker.jobs.by_models import solve
 from worker.calibration import records as engine
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import UsualView, ViewCondition, ViewFigures
@@ -24,15 +27,17 @@ from worker.calibration.gate.quality import CameraResult, Movement, Refusal
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.memory.camera_memory import CameraMemory, fingerprint
 from worker.calibration.memory.epoch import Epoch
+from worker.calibration.paper import calibrate as paper
 from worker.calibration.paper.calibrate import PRESETS
 from worker.calibration.refinement.diagnosis import Suspicion
 from worker.calibration.refinement.uncertainty import Sigma
 from worker.calibration.stitching.photometry import Light
-from worker.jobs import calibration, from_schemas, pictures, to_schemas
+from worker.compute_resources import ComputeResources
+from worker.jobs import calibration, from_schemas, inputs, pictures, program, to_schemas
 from worker.jobs.calibration import NightHistory
 from worker.jobs.pictures import draw
 from worker.programs.draw import scene_of
-from worker.protocol import ComputeResources, Message
+from worker.protocol import Message
 
 pytestmark = pytest.mark.slow
 
@@ -132,15 +137,15 @@ def means(tmp_path):
 
 
 def test_what_the_last_accepted_job_saw_reaches_the_engine(venue, files, asked, means):
-    last = {"left": View(usable=True, detail="", lines_found=0.9, blur_px=None)}
-    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None, NightHistory(last))
+    last = {"left": inputs.View(lines_found=0.9, blur_px=None)}
+    outcome = solve(venue, files, Options(seed=7), means, lambda _: None, NightHistory(last))
     assert asked["usual"] == {"left": UsualView(0.9, None)}
     assert outcome.result.cameras[0].view.lines_found == 0.8
 
 
 def test_the_engine_gets_the_venue_and_the_frames(venue, files, asked, means):
     options = Options(seed=7, stitch_weight=0.25, parents=8)
-    calibration.solve(venue, files, options, means, lambda _: None)
+    solve(venue, files, options, means, lambda _: None)
     assert asked["pitch"].ridge.tolist() == [[-18, 0, 0.2], [18, 0, 0.2]]
     left = asked["cameras"][0]
     assert (left.id, left.intrinsics.size, left.pose.rotation.tolist()) == ("left", SIZE, UP_LEFT)
@@ -155,8 +160,8 @@ def test_the_papers_presets_are_calculated_by_its_own_method(venue, files, asked
         asked["preset"] = by
         return calibration.calibrate(*given, **known)
 
-    monkeypatch.setattr(calibration, "calibrate_by_paper", calibrate_by_paper)
-    calibration.solve(venue, files, Options(preset=preset), means, lambda _: None)
+    monkeypatch.setattr(paper, "calibrate_by_paper", calibrate_by_paper)
+    solve(venue, files, Options(preset=preset), means, lambda _: None)
     assert asked["preset"] is PRESETS[preset]
 
 
@@ -165,7 +170,7 @@ def test_what_else_is_painted_and_what_is_to_be_ignored_reach_the_engine(venue, 
     field = venue.field.model_copy(update={"other_markings": [OtherField(template="handball")]})
     partly = left.model_copy(update={"ignore": [[[0, 100], [319, 100], [319, 179], [0, 179]]]})
     given = venue.model_copy(update={"field": field, "cameras": [partly, right]})
-    calibration.solve(given, files, Options(), means, lambda _: None)
+    solve(given, files, Options(), means, lambda _: None)
     assert "left goal line" in [shape.name for shape in asked["pitch"].others]
     assert asked["cameras"][0].ignored.area[150].all()
     assert not asked["cameras"][0].ignored.area[90].any()
@@ -178,7 +183,7 @@ def test_how_well_a_lens_is_known_reaches_the_engine_and_comes_back_with_the_len
         update={"intrinsics": left.intrinsics.model_copy(update={"sigma": {"fx": 2.0, "k1": 0.01}})}
     )
     given = venue.model_copy(update={"cameras": [known, right]})
-    result = calibration.solve(given, files, Options(fit_focal_length=True), means, lambda _: None).result
+    result = solve(given, files, Options(fit_focal_length=True), means, lambda _: None).result
     assert [camera.intrinsics.sigma for camera in asked["cameras"]] == [{"fx": 2.0, "k1": 0.01}, {}]
     assert [camera.intrinsics for camera in result.cameras] == [known.intrinsics, right.intrinsics]
 
@@ -189,8 +194,8 @@ def test_what_is_hardly_told_of_a_lens_fits_what_a_venue_takes():
     )
     said = to_schemas.lens_to_schema(
         replace(lens, sigma={"fx": 0.0, "k2": 1e12, "k3": float("inf"), "k1": float("nan")})
-    ).sigma
-    assert said == {"fx": geometry.LEAST_SIGMA, "k2": geometry.LARGEST_SIGMA, "k3": geometry.LARGEST_SIGMA}
+    )["sigma"]
+    assert said == {"fx": LEAST_SIGMA, "k2": LARGEST_SIGMA, "k3": LARGEST_SIGMA}
 
 
 ALL_PICTURES = {"preview", "preview_before", "seam", "birdseye"} | {
@@ -201,13 +206,13 @@ MASKS = {"mask_left", "mask_right"}
 
 def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files, asked, means):
     steps = []
-    outcome = calibration.solve(venue, files, Options(seed=7, pictures=True), means, steps.append)
+    outcome = solve(venue, files, Options(seed=7, pictures=True), means, steps.append)
     result = outcome.result
     assert result.accepted
     assert result.cameras[0].pose.position == [-0.95, -49, 8]
     assert (result.provenance.seed, result.provenance.model_sha256) == (7, "f" * 64)
     assert set(result.timings_s) == set(result.cpu_s) == {"decode", "evolution", "preview"}
-    assert [step.stage for step in steps] == ["evolution", "preview"]
+    assert [step["stage"] for step in steps] == ["evolution", "preview"]
     assert [camera.seen_by_network for camera in result.cameras] == ["overview", "full"]
     assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
     begins = {".jpg": b"\xff\xd8", ".png": b"\x89PNG"}
@@ -217,10 +222,10 @@ def test_the_outcome_is_what_was_found_with_pictures_and_provenance(venue, files
 def test_pictures_of_poses_that_are_accepted_wait_for_who_looks_but_for_what_the_network_saw(
     venue, files, asked, means
 ):
-    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None)
+    outcome = solve(venue, files, Options(seed=7), means, lambda _: None)
     assert (set(outcome.pictures), set(outcome.later)) == (MASKS, ALL_PICTURES)
     asked["against"] = {"right": "it is dark"}
-    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None)
+    outcome = solve(venue, files, Options(seed=7), means, lambda _: None)
     assert (set(outcome.pictures), outcome.later) == (ALL_PICTURES | MASKS, ())
 
 
@@ -245,7 +250,7 @@ def test_a_picture_drawn_later_is_the_one_that_the_job_draws(venue, files, asked
     ]
     asked["raised"] = 0.1 if options.fit_ridge else 0.0
     at_once = options.model_copy(update={"pictures": True})
-    outcome = calibration.solve(venue, files, at_once, means, lambda _: None)
+    outcome = solve(venue, files, at_once, means, lambda _: None)
     first = {camera: several[0] for camera, several in files.items()}
     drawn_later = drawn_by_a_process if options == Options() else drawn_here
     for name in ("preview", "birdseye", "frame_left", "frame_right"):
@@ -262,7 +267,7 @@ def test_a_flat_method_is_drawn_flat():
 
 def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue, files, asked, means):
     plain, fitted = (
-        calibration.solve(venue, files, Options(fit_focal_length=fit, fit_ridge=fit), means, lambda _: None).result
+        solve(venue, files, Options(fit_focal_length=fit, fit_ridge=fit), means, lambda _: None).result
         for fit in (False, True)
     )
     assert (plain.cameras[0].intrinsics, plain.ridge) == (None, None)
@@ -274,13 +279,13 @@ def test_lens_and_ridge_are_told_when_they_were_to_be_found_and_only_then(venue,
 def test_a_venue_says_whether_a_knocked_camera_is_proposed_or_accepted(venue, files, asked, means):
     for recover in ("propose", "accept"):
         found = venue.model_copy(update={"recover": recover})
-        calibration.solve(found, files, Options(seed=7), means, lambda _: None)
+        solve(found, files, Options(seed=7), means, lambda _: None)
         assert asked["options"].recover == recover
 
 
 def test_where_a_knocked_camera_was_found_is_in_the_answer_as_a_proposal(venue, files, asked, means):
     asked |= {"against": {"left": "turned by 11.2 degrees"}, "reason": "knocked"}
-    left, right = calibration.solve(venue, files, Options(seed=7), means, lambda _: None).result.cameras
+    left, right = solve(venue, files, Options(seed=7), means, lambda _: None).result.cameras
     assert (left.knocked, left.refusal) == (True, "/refusals/knocked")
     assert (left.proposed.pose, left.proposed.moved, left.proposed.sigma) == (left.pose, left.moved, left.sigma)
     assert (right.knocked, right.proposed) == (False, None)
@@ -288,37 +293,37 @@ def test_where_a_knocked_camera_was_found_is_in_the_answer_as_a_proposal(venue, 
 
 def test_a_venue_whose_lens_may_drift_is_calibrated_so(venue, files, asked, means):
     for lens, may_drift in (("fixed", False), ("may-drift", True)):
-        calibration.solve(venue.model_copy(update={"lens": lens}), files, Options(), means, lambda _: None)
+        solve(venue.model_copy(update={"lens": lens}), files, Options(), means, lambda _: None)
         assert asked["options"].lens_may_drift is may_drift
 
 
 def test_each_camera_has_its_verdict_and_the_job_the_sum_of_them(venue, files, asked, means):
     asked["against"] = {"right": "it is dark"}
-    result = calibration.solve(venue, files, Options(), means, lambda _: None).result
+    result = solve(venue, files, Options(), means, lambda _: None).result
     assert (result.verdict, result.accepted, result.rejected_because) == ("partly", False, "camera right: it is dark")
     assert [(c.accepted, c.rejected_because) for c in result.cameras] == [(True, None), (False, "it is dark")]
     asked["against"] = {"left": "it is dark", "right": "it is dark"}
-    assert calibration.solve(venue, files, Options(), means, lambda _: None).result.verdict == "rejected"
+    assert solve(venue, files, Options(), means, lambda _: None).result.verdict == "rejected"
     asked["against"] = {}
-    assert calibration.solve(venue, files, Options(), means, lambda _: None).result.verdict == "accepted"
+    assert solve(venue, files, Options(), means, lambda _: None).result.verdict == "accepted"
 
 
 def test_the_light_of_a_camera_is_told_from_red_to_blue_and_steadied_by_what_the_venue_keeps(
     venue, files, asked, means
 ):
     asked["lights"] = {"left": Light((1.2, 1.0, 1.0), 0.1, 0.1)}
-    left, right = calibration.solve(venue, files, Options(), means, lambda _: None).result.cameras
+    left, right = solve(venue, files, Options(), means, lambda _: None).result.cameras
     assert (left.light.gain, left.light.contrast, right.light) == (pytest.approx([1.0, 1.0, 1.2]), 0.1, None)
     kept = [venue.cameras[0].model_copy(update={"light": geometry.Light(gain=[1.0, 1.0, 1.0])}), venue.cameras[1]]
     evened = venue.model_copy(update={"cameras": kept})
-    left, _ = calibration.solve(evened, files, Options(), means, lambda _: None).result.cameras
+    left, _ = solve(evened, files, Options(), means, lambda _: None).result.cameras
     assert 1.0 < left.light.gain[2] < 1.1
 
 
 def test_a_venue_that_takes_all_or_nothing_refuses_what_is_accepted_in_part(venue, files, asked, means):
     asked["against"] = {"right": "it is dark"}
     every = venue.model_copy(update={"accept": "all"})
-    result = calibration.solve(every, files, Options(), means, lambda _: None).result
+    result = solve(every, files, Options(), means, lambda _: None).result
     assert (result.verdict, result.accepted_cameras) == ("rejected", [])
     assert result.rejected_because == "camera right: it is dark; the venue accepts the poses of all cameras or none"
     assert result.cameras[0].rejected_because == "the venue accepts the poses of all cameras or none"
@@ -328,12 +333,12 @@ def test_a_venue_that_takes_all_or_nothing_refuses_what_is_accepted_in_part(venu
 
 def test_a_ridge_that_was_found_is_accepted_with_all_poses_or_not_at_all(venue, files, asked, means):
     asked["against"] = {"right": "it is dark"}
-    result = calibration.solve(venue, files, Options(fit_ridge=True), means, lambda _: None).result
+    result = solve(venue, files, Options(fit_ridge=True), means, lambda _: None).result
     assert (result.verdict, result.cameras[0].accepted) == ("rejected", False)
 
 
 def test_what_the_lines_contradict_is_told(venue, files, asked, means):
-    (doubt,) = calibration.solve(venue, files, Options(), means, lambda _: None).result.diagnosis
+    (doubt,) = solve(venue, files, Options(), means, lambda _: None).result.diagnosis
     assert (doubt.camera, doubt.quantity, doubt.deviation, doubt.sigma) == ("left", "k1", 0.01, 0.001)
 
 
@@ -343,44 +348,50 @@ def test_numbers_of_the_field_are_offered_in_millimetres_with_how_far_they_move_
     moves = {"left": 0.0812, "right": 0.0794}
     asked["of_field"] = [Suspicion(None, "ridge_height_m", 0.1321, 0.016, "the lines fit ...", moves_m=moves)]
     asked["against"] = {"right": "it is dark"}
-    (ridge,) = calibration.solve(venue, files, Options(), means, lambda _: None).result.adoptable
+    (ridge,) = solve(venue, files, Options(), means, lambda _: None).result.adoptable
     assert ridge == AdoptableNumber(name="ridge_height_m", given=0.2, value=0.332, sigma=0.016, moves_m={"left": 0.081})
-    assert calibration.solve(venue, files, Options(flat=True), means, lambda _: None).result.adoptable == []
+    assert solve(venue, files, Options(flat=True), means, lambda _: None).result.adoptable == []
 
 
 def test_what_json_cannot_say_is_null(venue, files, asked, means):
     steps = []
-    camera = calibration.solve(venue, files, Options(seed=7), means, steps.append).result.cameras[0]
+    camera = solve(venue, files, Options(seed=7), means, steps.append).result.cameras[0]
     assert (camera.sigma, camera.moved.pixels, camera.residual_px) == (None, None, None)
     assert camera.repeatability.position_m == 0.02
-    assert (steps[0].loss, steps[0].fraction) == (None, to_schemas.PREVIEW_FRACTION)
+    assert (steps[0]["loss"], steps[0]["fraction"]) == (None, to_schemas.PREVIEW_FRACTION)
 
 
 def test_what_a_program_says_is_what_its_worker_understands(venue, files, asked, means):
     steps = []
-    outcome = calibration.solve(venue, files, Options(), means, steps.append)
-    for message in (Message(progress=steps[0]), Message(result=outcome.result)):
-        assert Message.model_validate_json(message.line()) == message
+    outcome = solve(venue, files, Options(), means, steps.append)
+    assert Message.model_validate_json(program.encode({"progress": steps[0]})).progress.stage == "evolution"
+    said = program.encode({"result": outcome.result.model_dump(mode="json"), "later": list(outcome.later)})
+    assert Message.model_validate_json(said) == Message(result=outcome.result, later=outcome.later)
+
+
+def test_numbers_of_numpy_and_such_as_json_has_none_for_are_written_as_it_can(tmp_path):
+    said = {"a": np.float32(0.5), "b": [np.int64(3), np.bool_(True)], "c": (float("nan"), np.float64("inf")), "d": "é"}
+    assert json.loads(program.encode(said)) == {"a": 0.5, "b": [3, True], "c": [None, None], "d": "é"}
 
 
 def test_the_orientation_a_camera_writes_into_its_files_is_not_obeyed(venue, files, asked, means):
     turned = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
     files["right"] = [files["right"][0][:2] + turned + files["right"][0][2:]]
-    calibration.solve(venue, files, Options(), means, lambda _: None)
+    solve(venue, files, Options(), means, lambda _: None)
     assert asked["frames"]["right"][0].shape == (180, 320, 3)
 
 
 def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, files, asked, means):
     files["right"] = [b"\xff\xd8\xff\xda\0\x02\xff\xd9"]
     with pytest.raises(from_schemas.JobFailedError) as failure:
-        calibration.solve(venue, files, Options(), means, lambda _: None)
-    assert (failure.value.error.type, failure.value.error.camera) == ("/problems/broken-image", "right")
+        solve(venue, files, Options(), means, lambda _: None)
+    assert (failure.value.error["type"], failure.value.error["camera"]) == ("/problems/broken-image", "right")
 
 
 def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, means):
     files["right"] = [cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()]
     with pytest.raises(from_schemas.JobFailedError, match=r"right decodes to 64x48 pixels; .* 320x180"):
-        calibration.solve(venue, files, Options(), means, lambda _: None)
+        solve(venue, files, Options(), means, lambda _: None)
 
 
 def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, asked, means, monkeypatch):
@@ -389,29 +400,33 @@ def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, ask
 
     monkeypatch.setattr(calibration, "calibrate", calibrate)
     with pytest.raises(from_schemas.JobFailedError) as failure:
-        calibration.solve(venue, files, Options(), means, lambda _: None)
+        solve(venue, files, Options(), means, lambda _: None)
     error = failure.value.error
-    assert (error.type, error.camera, error.detail) == ("/problems/no-markings-in-view", "left", "store another pose")
+    assert (error["type"], error["camera"], error["detail"]) == (
+        "/problems/no-markings-in-view",
+        "left",
+        "store another pose",
+    )
 
 
 def test_a_missing_network_fails_and_says_where_it_should_be(venue, files, means):
-    gone = means.model_copy(update={"model": means.model / "nowhere"})
+    gone = replace(means, model=means.model / "nowhere")
     with pytest.raises(from_schemas.JobFailedError, match="nowhere"):
-        calibration.solve(venue, files, Options(), gone, lambda _: None)
+        solve(venue, files, Options(), gone, lambda _: None)
 
 
 def test_a_provider_that_is_not_installed_fails_and_says_what_to_set(venue, files):
     with pytest.raises(
         from_schemas.JobFailedError, match=r"no CUDAExecutionProvider, only .* ESC_PROVIDER=cpu"
     ) as failure:
-        calibration.solve(
+        solve(
             venue,
             files,
             Options(),
             ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1, provider="cuda"),
             lambda _: None,
         )
-    assert failure.value.error.type == "/problems/provider-missing"
+    assert failure.value.error["type"] == "/problems/provider-missing"
 
 
 def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, means, monkeypatch):
@@ -419,7 +434,7 @@ def test_a_picture_that_cannot_be_drawn_costs_no_result(venue, files, asked, mea
         raise ValueError
 
     monkeypatch.setattr(pictures.stitched_pictures, "stitched", stitched)
-    outcome = calibration.solve(venue, files, Options(seed=1, pictures=True), means, lambda _: None)
+    outcome = solve(venue, files, Options(seed=1, pictures=True), means, lambda _: None)
     assert {"birdseye", "overlay_left", "overlay_right"} <= set(outcome.pictures)
     assert not {"preview", "preview_before"} & set(outcome.pictures)
 
@@ -436,9 +451,7 @@ def test_memories_reach_the_engine_and_those_that_it_leaves_come_back(venue, fil
     asked["after"] = {"left": memory_of(left)}
     before = {"left": memory_of(left).to_json(), "right": {"format": 0}}
     at = datetime(2026, 11, 23, 2, tzinfo=UTC)
-    outcome = calibration.solve(
-        venue, files, Options(seed=7), means, lambda _: None, NightHistory(memories=before, taken_at=at)
-    )
+    outcome = solve(venue, files, Options(seed=7), means, lambda _: None, NightHistory(memories=before, taken_at=at))
     assert (asked["taken_at"], list(asked["memories"])) == (at, ["left"])
     assert asked["memories"]["left"].to_json() == before["left"]
     assert outcome.memories == {"left": memory_of(left).to_json()}
@@ -449,12 +462,12 @@ def test_memories_reach_the_engine_and_those_that_it_leaves_come_back(venue, fil
 def test_the_nights_of_a_camera_are_counted(venue, files, asked, means):
     fits = fingerprint(from_schemas.pitch_of(venue.field).line_points())
     asked["after"] = {"left": replace(memory_of(venue.cameras[0]), lines=fits)}
-    outcome = calibration.solve(venue, files, Options(seed=7), means, lambda _: None)
+    outcome = solve(venue, files, Options(seed=7), means, lambda _: None)
     assert [camera.nights for camera in outcome.result.cameras] == [1, 0]
-    dry = calibration.solve(venue, files, Options(seed=7, dry_run=True), means, lambda _: None)
+    dry = solve(venue, files, Options(seed=7, dry_run=True), means, lambda _: None)
     assert [camera.nights for camera in dry.result.cameras] == [0, 0]
 
 
 def test_an_answer_says_which_lenses_are_taken_to_be_well_known(venue, files, asked, means):
-    warnings = calibration.solve(venue, files, Options(seed=7), means, lambda _: None).result.warnings
+    warnings = solve(venue, files, Options(seed=7), means, lambda _: None).result.warnings
     assert [warning.split(":")[0] for warning in warnings] == ["camera left", "camera right"]

@@ -8,9 +8,9 @@ from service.schemas.options import Options
 from service.schemas.venue import VenueIn
 from service.settings import MODEL_BESIDE_THE_CODE
 from tests.architecture import ROOT
-from worker.jobs import calibration
+from tests.worker.jobs.by_models import solve
+from worker.compute_resources import ComputeResources
 from worker.jobs.debugging import DebugRecorder
-from worker.protocol import ComputeResources
 
 pytestmark = pytest.mark.slow
 
@@ -39,7 +39,7 @@ def runs():
     resources, options = ComputeResources(model=MODEL_BESIDE_THE_CODE, threads=1), Options(seed=1, search="wide")
     recorder = DebugRecorder()
     plain, recorded = (
-        calibration.solve(venue, files, options, resources, lambda _: None, **recording).result
+        solve(venue, files, options, resources, lambda _: None, **recording).result
         for recording in ({}, {"recorder": recorder})
     )
     return plain, recorded, recorder.files

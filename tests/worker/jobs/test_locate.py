@@ -53,7 +53,7 @@ ONE, OTHERS = lens(1250), {"another focal length": lens(1310), "twice the size":
 def test_points_exchanged_between_cameras_of_other_lenses_are_refused_as_such(other):
     found = located({"left": ONE, "right": other}, {"left": clicked(other, RIGHT, 1), "right": clicked(ONE, LEFT, 2)})
     for end in found.values():
-        why = end.error.detail if isinstance(end, JobFailedError) else end.rejected_because
+        why = end.error["detail"] if isinstance(end, JobFailedError) else end.rejected_because
         assert "points of left fit the lens of right (" in why
         assert "the points of the two cameras are exchanged, or else their lenses" in why
         assert isinstance(end, JobFailedError) or not end.accepted
@@ -85,7 +85,7 @@ def test_two_lenses_that_were_measured_badly_are_no_exchange():
 
 
 def stored():
-    return {name: pose_to_schema(pose) for name, pose in (("left", LEFT), ("right", RIGHT))}
+    return {name: geometry.Pose(**pose_to_schema(pose)) for name, pose in (("left", LEFT), ("right", RIGHT))}
 
 
 def test_points_of_a_camera_with_the_same_lens_are_told_by_the_stored_poses():
@@ -100,7 +100,11 @@ def test_points_of_a_camera_with_the_same_lens_are_told_by_the_stored_poses():
 
 def test_a_camera_that_stands_as_it_is_stored_or_as_none_is_warned_of_nothing():
     moved = geometry.Pose.from_position(stored()["left"].rotation, [-20.0, -55.0, 14.0])
-    for known in (stored(), stored() | {"left": moved, "right": moved}, {"right": pose_to_schema(LEFT)}):
+    for known in (
+        stored(),
+        stored() | {"left": moved, "right": moved},
+        {"right": stored()["left"]},
+    ):
         (result,) = located({"left": ONE}, {"left": clicked(ONE, LEFT, 1)}, known).values()
         assert result.accepted
         assert not any("is stored" in warning for warning in result.warnings)

@@ -54,12 +54,7 @@ def asked(cameras, wanted, lights, field=FIELD, **view):
 def told(one):
     """A camera of the engine as the wire has it."""
     pose, lens = pose_to_schema(one.pose), lens_to_schema(one.intrinsics)
-    return {
-        "id": one.id,
-        "image_size": [*one.intrinsics.size],
-        "intrinsics": lens.model_dump(),
-        "pose": pose.model_dump(),
-    }
+    return {"id": one.id, "image_size": [*one.intrinsics.size], "intrinsics": lens, "pose": pose}
 
 
 def demo_pair():

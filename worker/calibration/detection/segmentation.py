@@ -12,15 +12,19 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
-import onnxruntime as ort
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.field import Field
+
+if TYPE_CHECKING:
+    import onnxruntime as ort
 
 HALO_PX = 96
 """Context that answers depend on (three poolings of 2 x 2 px reach 92 px beyond a region), a multiple of the pooled."""
@@ -54,24 +58,43 @@ class Region:
 class Segmenter:
     """The exported U-Net: `models/unet.onnx`, RGB 0..1 in, probability of a marking out.
 
-    `provider`: what computes, by its name in ONNX Runtime; raises `ProviderMissing` where it is not installed.
+    `provider`: what computes, by its name in ONNX Runtime. It is loaded when the network first looks at something,
+    which raises `ProviderMissing` where it is not installed.
     """
 
     def __init__(self, model: Path, threads: int, provider: str = "CPUExecutionProvider") -> None:
-        if provider not in ort.get_available_providers():
-            raise ProviderMissing(provider, ort.get_available_providers())
+        self._model, self._threads, self._provider = model, threads, provider
+        self.sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
+
+    @cached_property
+    def session(self) -> ort.InferenceSession:
+        """The network, ready to run."""
+        import onnxruntime as ort
+
+        if self._provider not in ort.get_available_providers():
+            raise ProviderMissing(self._provider, ort.get_available_providers())
         options = ort.SessionOptions()
-        options.intra_op_num_threads = threads
+        options.intra_op_num_threads = self._threads
         options.inter_op_num_threads = 1
         # Regions differ in size: memory planned for one does not fit the next.
         options.enable_mem_pattern = False
-        self.session = ort.InferenceSession(model, options, providers=[provider])
-        self.sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
-        self.input_name = self.session.get_inputs()[0].name
+        return ort.InferenceSession(self._model, options, providers=[self._provider])
+
+    @cached_property
+    def input_name(self) -> str:
+        """What the network calls the picture that it is given."""
+        name: str = self.session.get_inputs()[0].name
+        return name
+
+    @cached_property
+    def _run_options(self) -> ort.RunOptions:
+        import onnxruntime as ort
+
+        options = ort.RunOptions()
         # A run takes hundreds of megabytes, which search, judgement and pictures need after it.
-        self.run_options = ort.RunOptions()
-        if provider == "CPUExecutionProvider":
-            self.run_options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
+        if self._provider == "CPUExecutionProvider":
+            options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
+        return options
 
     def __call__(self, frame: Frame, regions: Sequence[Region]) -> NDArray[np.uint8]:
         """Probabilities of a BGR frame (H, W, 3) as (H, W) in 0..255; 0 outside the regions.
@@ -112,7 +135,7 @@ class Segmenter:
 
     def _probabilities(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
         rgb = picture[:, :, ::-1].transpose(2, 0, 1)[None].astype(np.float32) / 255
-        (answer,) = self.session.run(None, {self.input_name: rgb}, self.run_options)
+        (answer,) = self.session.run(None, {self.input_name: rgb}, self._run_options)
         return np.asarray(answer, dtype=np.float32)[0, 0]
 
 

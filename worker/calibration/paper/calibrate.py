@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Literal
 
 import numpy as np
 
@@ -42,7 +41,7 @@ class Preset:
     flat: bool
 
 
-PRESETS: Mapping[Literal["paper", "scpr"], Preset] = {
+PRESETS: Mapping[str, Preset] = {
     "paper": Preset(ON_THE_GROUND, flat=False),
     "scpr": Preset(ALONE_ON_THE_GROUND, flat=True),
 }

@@ -48,6 +48,8 @@ def memory(kind):
         return next(int(line.split()[1]) for line in file if line.startswith(kind))
 
 segmenter = Segmenter(Path(sys.argv[1]), 1)
+# From here on it is loaded.
+segmenter.session
 before = memory("VmRSS")
 frame, regions = np.random.default_rng(0).integers(0, 255, (544, 960, 3), np.uint8), whole_frame((960, 544))
 said = segmenter(frame, regions)

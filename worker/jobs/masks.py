@@ -1,0 +1,36 @@
+"""Pictures of what the network saw of each frame, which nothing else can tell later."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.rendering.layers import mask_layer
+from worker.jobs.from_schemas import encode_png
+
+FRAME_WIDTH = 1920
+"""Of the frames that layers are laid over: a wide screen."""
+
+
+def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.float32]]) -> dict[str, bytes]:
+    """Draw the network's responses (h, w), in 0..1, to be laid over the frames."""
+    return {
+        f"mask_{camera.id}": encode_png(mask_layer(_in_bytes(response), size_as_shown(camera, response.shape[1])))
+        for camera in cameras
+        for response in [responses[camera.id]]
+    }
+
+
+def size_as_shown(camera: Camera, largest: int = FRAME_WIDTH) -> tuple[int, int]:
+    """Width and height of a frame as it is shown, at most as wide as the `largest` picture of it."""
+    width, height = camera.intrinsics.size
+    shown = min(width, largest, FRAME_WIDTH)
+    return shown, round(height * shown / width)
+
+
+def _in_bytes(response: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """A response (h, w) in 0..1 as 0..255."""
+    return np.rint(255 * response).astype(np.uint8)
