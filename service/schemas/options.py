@@ -31,8 +31,8 @@ class Options(Handling):
     search: Annotated[Literal["auto", "wide", "anywhere"], OPEN_WORD] = Field(
         "auto",
         description="auto looks first whether the cameras stand almost where they stood, which takes no search, then "
-        "searches around their stored poses, and last where it stood, turned by any angle, for a camera whose lines are "
-        "clearly seen elsewhere; wide searches around the stored poses in any case, and nowhere else; anywhere "
+        "searches around their stored poses, and last where it stood, turned by any angle, for a camera whose lines "
+        "are clearly seen elsewhere; wide searches around the stored poses in any case, and nowhere else; anywhere "
         "searches for each where it stood, and then anywhere.",
     )
     seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")

@@ -1,8 +1,9 @@
 """Recovery of knocked cameras: those whose lines are clearly seen, and not where the stored poses expect them.
 
 Such a camera is searched for where it stood, turned on its mount by any angle; and if that finds nothing and the
-calibration was asked to, anywhere. What is found is refined and judged with the other cameras, as if it had been stored, and holds only if none of them is
-refused for it. Beyond the gate's limits of movement it is proposed to a person, or accepted where the venue says so.
+calibration was asked to, anywhere. What is found is refined and judged with the other cameras, as if it had been
+stored, and holds only if none of them is refused for it. Beyond the gate's limits of movement it is proposed to a
+person, or accepted where the venue says so.
 """
 
 from __future__ import annotations
