@@ -34,7 +34,7 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
-ATTEMPTS = 2
+ATTEMPTS, BEGUN_ANEW = 2, frozenset({"lines", "no-lines"})
 """Where no pose explains the lines the search, which draws at random, is begun anew: so often in all."""
 REFINED, MUCH_WORSE = 4, 0.12
 """So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
@@ -105,24 +105,27 @@ def relocalise(
     response: Response,
     seed: int,
     pulse: Callable[[], None] = lambda: None,
+    least_agreement: float = 0.0,
 ) -> Relocalisation:
     """Find the camera that took a frame; `response` (height, width) in 0..1 of the network; `markings`: of the field.
 
     Where its focal length is not known, k1, k2 and principal point are found with it and the pose. `pulse` is called
-    every second or so, and may raise to end the search.
+    every second or so, and may raise to end the search. Proposals of less than `least_agreement` are not refined.
     """
     small = np.rint(response * 255).astype(np.uint8)
     sight = _Sight(field, Observations([channels], [response]), Paint.of(small))
     candidates = list[Candidate]()
     for attempt in range(ATTEMPTS):
         pulse()
-        proposals = propose(markings, small, sought, seed + attempt)
+        proposals = [
+            one for one in propose(markings, small, sought, seed + attempt) if one.agreement >= least_agreement
+        ]
         for camera in _distinct(field, markings, sought, proposals):
             pulse()
             candidates.append(sight.with_lens_and_pose(camera) if sought.is_lens_sought else sight.with_pose(camera))
         candidates.sort(key=lambda one: -one.agreement)
         found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, candidates))
-        if not candidates or found.refusal is None or found.refusal.reason != "lines":
+        if found.refusal is None or found.refusal.reason not in BEGUN_ANEW:
             break
     return found
 
