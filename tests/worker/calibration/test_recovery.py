@@ -14,6 +14,7 @@ from worker.calibration.gate.quality import Refusal
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.rotation import rotation_angles_deg, rotation_matrices, rotation_vectors
 from worker.calibration.records import Options, Stopped
+from worker.calibration.relocalisation import relocalise as relocalisation
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import Candidate, NotFound, Relocalisation, twin
 from worker.calibration.relocalisation.sought import ANYWHERE
@@ -143,10 +144,27 @@ def test_a_frame_without_lines_is_looked_at_once_more_and_not_searched(monkeypat
     assert not found.accepted
 
 
+def test_what_hardly_agrees_with_the_lines_of_an_upside_down_frame_is_not_refined(monkeypatch):
+    searched, refined = [], []
+    look_for = recovery.relocalise
+
+    def watched(*given, **named):
+        searched.append(look_for(*given, **named))
+        return searched[-1]
+
+    monkeypatch.setattr(recovery, "relocalise", watched)
+    monkeypatch.setattr(relocalisation, "refine", lambda *given, **_: refined.append(given))
+    upside_down = {"left": (np.ascontiguousarray(frames()["left"][0][::-1]),)}
+    (found,) = run([outdated()[0]], upside_down, seed=3).cameras
+    assert not found.accepted
+    assert [one.candidates for one in searched] == [[]]
+    assert refined == []
+
+
 def test_a_request_to_stop_ends_a_search_anywhere(monkeypatch):
     asked = []
 
-    def searching(*given):
+    def searching(*given, least_agreement):
         asked.append(given)
         (*_, pulse) = given
         pulse()
