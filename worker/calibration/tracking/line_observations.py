@@ -56,6 +56,9 @@ class LineObservations:
     offset: Array
     slope: Array
 
+    def __getitem__(self, chosen: NDArray[np.bool_]) -> LineObservations:
+        return LineObservations(self.expected, self.piece[chosen], self.offset[chosen], self.slope[chosen])
+
 
 class TrackedLines:
     """The lines that one camera is followed by; `reference`: the camera that changes are counted from.
@@ -74,7 +77,8 @@ class TrackedLines:
         self._some = np.arange(0, len(chosen), COARSELY)
         self._patch = chosen // CLUSTER_POINTS
         self._usual = 0.0
-        self._beside_weight = np.full(len(chosen), (BESIDE_PX * self._scale) ** -2)
+        self._unknown_weight = (BESIDE_PX * self._scale) ** -2
+        self._beside_weight = np.full(len(chosen), self._unknown_weight)
         self._beside_sum = np.zeros(len(chosen))
 
     def _shown(self, lines: LinePoints, first: Frame) -> NDArray[np.intp]:
@@ -119,6 +123,7 @@ class TrackedLines:
 
     def observed(self, seen: LineObservations) -> PoseObservation:
         """What they say of the pose: robust least squares, with what pieces of one patch err together."""
+        seen = self._known(seen)
         sigma = self._sigma(seen)
         rows, values = seen.slope / sigma[:, None], (seen.offset - self._beside[seen.piece]) / sigma
         prior = np.diag(np.repeat([PRIOR_RAD, PRIOR_M], 3) ** -2.0)
@@ -135,6 +140,15 @@ class TrackedLines:
             change_between(self.reference, moved(seen.expected, change)),
             np.asarray(np.linalg.solve(np.eye(POSE_NUMBERS) + known @ of_picture, known), float),
         )
+
+    def _known(self, seen: LineObservations) -> LineObservations:
+        """The pieces that have been seen before, or all where those are too few.
+
+        A whole line that a wrong lens puts at the end of what is looked at comes into it when the pose stirs, and would
+        pull the pose by as much as it lies beside its place.
+        """
+        known = self._beside_weight[seen.piece] > self._unknown_weight
+        return seen[known] if known.sum() >= FEWEST_PIECES else seen
 
     def learn(self, seen: LineObservations, now: Camera) -> None:
         """Keep how far beside their places the pieces lie when the camera is where it is `now` known to be."""
