@@ -33,8 +33,8 @@ class Measured:
     """What one job of two 4K cameras costs."""
 
     # `make bench-cost`, near the stored pose, on two quiet cores of a rented server.
-    core_s: float = 2.1
-    elapsed_s: float = 2.3
+    core_s: float = 1.56
+    elapsed_s: float = 1.83
     frame_mb: float = 5.76
     frames: int = 2
     # Of the masks; the other pictures are drawn when somebody looks, and are then so many and so large.
@@ -46,9 +46,9 @@ class Measured:
     transactions: float = 10
     wal_kb: float = 29
     database_kb: float = 16.9
-    api_core_s: float = 0.024
-    worker_core_s: float = 0.035
-    postgres_core_s: float = 0.016
+    api_core_s: float = 0.020
+    worker_core_s: float = 0.025
+    postgres_core_s: float = 0.009
 
 
 @dataclass(frozen=True)

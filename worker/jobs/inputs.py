@@ -25,7 +25,7 @@ _HINTS: dict[type[Any], dict[str, Any]] = {}
 class Record:
     """A plain record of annotated fields. To type checkers a frozen dataclass, which takes longer to make than to fill.
 
-    Two are equal only if they are one.
+    Records are compared by identity, not by value.
     """
 
     def __init__(self, **values: Any) -> None:
