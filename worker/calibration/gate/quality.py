@@ -185,8 +185,8 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
                 [
                     f"the markings in the frame do not fit this pitch: {seen.share:.0%} of their length is where it "
                     f"ought to be, at least {gate.least_share(seen):.0%} are needed ({seen.by_chance:.0%} is seen "
-                    "anywhere); is it the right camera, is the view free and lit, is the stored pose within a few "
-                    "degrees?",
+                    "anywhere); is it the right camera and the right sport, is the view free and lit, is the stored "
+                    "pose within a few degrees?",
                     *_other_lines(result),
                 ]
             ),
