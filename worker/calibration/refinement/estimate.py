@@ -1,7 +1,8 @@
 """Where a least squares over everything unknown stands, and its steps: cameras, pitch, and the ground under it.
 
-A weak prior holds each camera near where the search left it. Where lines tell something it changes nothing. Where they
-do not (a lone touchline) it keeps the camera from running away along them, and the covariance says how little is known.
+A weak prior holds each camera near where it was when the lines were caught. Where lines tell something it changes
+nothing. Where they do not (a lone touchline) it keeps the camera from running away along them, and the covariance says
+how little is known.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ class GaussNewtonStep:
 def gauss_newton_step(
     here: Estimate, found: Sequence[Camera], measured: Sequence[Measurements], unknowns: Unknowns, weigh: Weigh
 ) -> GaussNewtonStep:
-    """One Gauss-Newton step for everything together; `found`: where the search left the cameras."""
+    """One Gauss-Newton step for everything together; `found`: where the weak prior holds the cameras."""
     equations = normal_equations(weigh_rows(here.rows(measured, unknowns), here.heights, unknowns, weigh))
     prior = here.prior(unknowns)
     pull = equations.gradient + prior @ here.change_from(found)
