@@ -49,7 +49,7 @@ def test_the_reason_beside_a_camera_leads_to_what_the_document_says_of_it(stub, 
     page = visit(stub.url, "/refusals/residual")
     expect(page.get_by_role("heading", level=1)).to_have_text("Lines are beside where the pose puts them")
     expect(page.get_by_text("The blue drawing crosses the lines.")).to_be_visible()
-    expect(page.get_by_text("Limit: 2.5 px")).to_be_visible()
+    expect(page.get_by_text("Limit: 2.4 px")).to_be_visible()
     # What the same part of the document says of other reasons stays there.
     expect(page.get_by_text("few-lines")).to_have_count(0)
     page.get_by_role("link", name="Refused, and what now: the whole document").click()

@@ -36,8 +36,8 @@ class Gate:
 
     least_agreement: float = 0.6
     agreement_loss: float = 0.1
-    largest_residual_px: float = 2.5
-    residual_floor_px: float = 1.25
+    largest_residual_px: float = 2.4
+    residual_floor_px: float = 1.2
     largest_sigma_deg: float = 1.5
     largest_sigma_m: float = 0.5
     largest_zoomed_m: float = 0.2
@@ -45,6 +45,10 @@ class Gate:
     largest_shift_m: float = 1.5
     largest_stitch_error_px: float = 1.5
     highest_ridge_m: float = 3.0
+
+    def most_residual_px(self, camera: Camera) -> float:
+        """Rms offset of lines, in pixels of the camera's own frame, up to which a pose fits them."""
+        return max(self.largest_residual_px * camera.intrinsics.relative_size, self.residual_floor_px)
 
     def least_share(self, seen: Evidence) -> float:
         """Of the markings that has to be seen, 0..1, where chance finds as much as it does."""
@@ -196,7 +200,7 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             "few-lines",
             f"fewer than {FEWEST_MEASUREMENTS} points of lines could be measured; is the view free and lit?",
         )
-    limit = max(gate.largest_residual_px * result.camera.intrinsics.relative_size, gate.residual_floor_px)
+    limit = gate.most_residual_px(result.camera)
     if result.residual_px > limit:
         return Refusal(
             "residual",
