@@ -335,8 +335,11 @@ def test_many_ends_are_told_to_one_receiver_without_pauses(stock, receiver, cloc
     for _ in range(3 * AT_ONCE_PER_RECEIVER):
         ended(home, hook.url)
     sender = callbacks(home, clock)
-    while home.callbacks() != {"delivered": 3 * AT_ONCE_PER_RECEIVER}:
-        assert sender.poll() == 0.0
+    all_delivered = {"delivered": 3 * AT_ONCE_PER_RECEIVER}
+    while home.callbacks() != all_delivered:
+        pause = sender.poll()
+        # The last of them may have been told while it looked for more.
+        assert pause == 0.0 or home.callbacks() == all_delivered
 
 
 @in_both_homes
