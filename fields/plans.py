@@ -1,4 +1,4 @@
-"""What a field of a venue is made of: the plan that it is drawn by, and what else is painted on its ground.
+"""Plans of a venue's field: the markings that it is drawn by, and those that are painted on its ground besides.
 
 Fields are given as documents, the members of `field` of a venue: so a program that has one as JSON needs no models.
 """
@@ -15,7 +15,7 @@ from fields.shapes import WHITE, Shape
 from fields.template import Template, load
 
 TEMPLATE_MEASURES = {"length_m": "length", "width_m": "width", "line_width_m": "line"}
-"""Of a field, and what a template calls them."""
+"""Names of measures of a field, and of the same in a template."""
 
 
 def plan_of(template: str | Mapping[str, Any], uneven_m: float | None) -> Template:

@@ -1,4 +1,4 @@
-"""What a job is computed with. No models: the program that computes a job begins without them."""
+"""Resources that a job is computed with; without models, for the program that computes a job begins without them."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ async def script() -> FileResponse:
 
 @router.get("/scheme.js", openapi_extra=FOR_ALL)
 async def scheme() -> FileResponse:
-    """What tells it whether the browser prefers dark colours."""
+    """Return the script that tells RapiDoc whether the browser prefers dark colours."""
     return FileResponse(FILES / "scheme.js", media_type="text/javascript")
 
 

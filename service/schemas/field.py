@@ -268,14 +268,17 @@ class FieldOfPlay(Schema):
     @property
     def plan(self) -> Template:
         """Markings and named points, and how uneven their ground is."""
-        template = self.template if isinstance(self.template, str) else self.template.model_dump()
-        return plan_of(template, self.uneven_m)
+        return plan_of(self._template, self.uneven_m)
 
     @property
     def markings(self) -> tuple[Shape, ...]:
         """All that is painted of it."""
-        template = self.template if isinstance(self.template, str) else self.template.model_dump()
-        return markings_of(template, self.size)
+        return markings_of(self._template, self.size)
+
+    @property
+    def _template(self) -> str | dict[str, Any]:
+        """The name of a template, or a layout as `fields.plans` takes it."""
+        return self.template if isinstance(self.template, str) else self.template.model_dump()
 
     @property
     def others(self) -> list[Shape]:

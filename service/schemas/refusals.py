@@ -8,7 +8,7 @@ from service.schemas.names import Verdict, refusal_uri
 
 
 class CameraRefusal(TypedDict):
-    """What refusing all poses changes in the answer about a camera."""
+    """Members of the answer about a camera that a refusal of all poses changes."""
 
     accepted: bool
     rejected_because: str
@@ -16,7 +16,7 @@ class CameraRefusal(TypedDict):
 
 
 class ResultRefusal(TypedDict):
-    """What refusing all poses changes in a result, beside its cameras."""
+    """Members of a result, beside its cameras, that a refusal of all poses changes."""
 
     verdict: Verdict
     accepted: bool

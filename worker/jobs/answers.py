@@ -1,4 +1,4 @@
-"""What a calibration answers, as plain records: dictionaries that are written as JSON, and that its parent checks.
+"""The result of a calibration as plain records: dictionaries that are written as JSON, and that its parent checks.
 
 They are the wire's models, field by field and under the same names, which a test holds them to. The models themselves
 take longer to load than a near job takes to refine a camera.

@@ -1,4 +1,4 @@
-"""What a calibration is given, as plain records: the task as its parent wrote it, which has checked it already.
+"""The inputs of a calibration as plain records: the task as its parent wrote it, which has checked it already.
 
 They are parts of the wire's models, under the same names, without what an engine has no use for. The models themselves
 take longer to load than a near job takes to refine a camera. A test compares the two, field by field.
@@ -92,7 +92,7 @@ class FieldOfPlay(Record):
 
     @property
     def others(self) -> list[Shape]:
-        """What else is painted on the ground."""
+        """Other markings that are painted on the ground."""
         return other_shapes(self.other_markings, size_of(vars(self)))
 
 

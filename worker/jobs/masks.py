@@ -12,7 +12,7 @@ from worker.calibration.rendering.layers import mask_layer
 from worker.jobs.from_schemas import encode_png
 
 FRAME_WIDTH = 1920
-"""Of the frames that layers are laid over: a wide screen."""
+"""Width of the frames that layers are laid over, px: a wide screen."""
 
 
 def masks(cameras: Sequence[Camera], responses: Mapping[str, NDArray[np.float32]]) -> dict[str, bytes]:

@@ -89,7 +89,7 @@ def _compute_by_models(
     means: ComputeResources,
     report: Callable[[Progress], None],
 ) -> Solution[Any]:
-    """What is asked for once in the life of a venue."""
+    """Compute a job of the kinds that a venue asks for once in its life."""
     from service.schemas.options import FieldOptions, FindOptions, IntrinsicsOptions, LocateOptions
     from service.store.jobs.task import Task
 

@@ -82,7 +82,7 @@ class Segmenter:
 
     @cached_property
     def input_name(self) -> str:
-        """What the network calls the picture that it is given."""
+        """The name of the network's input, the picture."""
         name: str = self.session.get_inputs()[0].name
         return name
 
