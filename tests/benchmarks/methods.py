@@ -197,23 +197,25 @@ def cma_es(seen: Seen, cameras: list[Camera], seed: int) -> Answer:
 
 
 def _by_cma_es(seen: Seen, cameras: list[Camera], options: Options, seed: int) -> list[Camera]:
-    responses = [seen.response(camera) for camera in cameras]
-    scale = np.tile([MUTATION_RAD] * 3 + [MUTATION_M] * 3, len(cameras))
-    here = list(cameras)
+    scale = np.array([MUTATION_RAD] * 3 + [MUTATION_M] * 3)
     generations = options.generations // len(COARSE_TO_FINE)
-    for number, level in enumerate(COARSE_TO_FINE):
-        objective = Objective(seen.scene.pitch, here, responses, options.stitch_weight, level.blur_px)
-        centre = genome_of(here)
-        strategy = cma.CMAEvolutionStrategy(
-            np.zeros(len(centre)),
-            level.mutation,
-            {"popsize": options.offspring, "seed": 10 * seed + number + 1, "verbose": -9},
-        )
-        for _ in range(generations):
-            asked = strategy.ask()
-            strategy.tell(asked, objective.losses(centre + scale * np.array(asked)).tolist())
-        here = with_genome(cameras, centre + scale * strategy.result.xbest)
-    return here
+    found = []
+    for camera in cameras:
+        here = camera
+        for number, level in enumerate(COARSE_TO_FINE):
+            objective = Objective.build(seen.scene.pitch, here, seen.response(camera), level.blur_px)
+            centre = genome_of([here])
+            strategy = cma.CMAEvolutionStrategy(
+                np.zeros(len(centre)),
+                level.mutation,
+                {"popsize": options.offspring, "seed": 10 * seed + number + 1, "verbose": -9},
+            )
+            for _ in range(generations):
+                asked = strategy.ask()
+                strategy.tell(asked, objective.losses(centre + scale * np.array(asked)).tolist())
+            (here,) = with_genome([camera], centre + scale * strategy.result.xbest)
+        found.append(here)
+    return found
 
 
 def by_homography(find: Displacement) -> Method:

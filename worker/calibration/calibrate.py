@@ -26,7 +26,7 @@ from worker.calibration.gate.quality import CameraResult, Gate, credible_deviati
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.memory.camera_memory import AcceptedJob, CameraMemory, fingerprint_of_frames, memories_of_field
-from worker.calibration.near_path import NearSolution, refine_by_lines, refine_with_network, with_unusable_cameras
+from worker.calibration.near_path import NearSolution, refine_by_lines
 from worker.calibration.observe import NOTHING_USUAL, FrameObserver
 from worker.calibration.records import (
     NOT_RECORDED,
@@ -41,16 +41,16 @@ from worker.calibration.records import (
 )
 from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.solve import (
-    NO_CAMERAS,
     PoseSolution,
     Problem,
     loss_of,
     refine_without,
     ridges_of,
-    search_and_refine,
+    with_unusable_cameras,
 )
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.swapped_cameras import mark_swapped_frames
+from worker.calibration.wide_path import NO_CAMERAS, search_and_refine, search_in_overviews
 from worker.calibration.zoom_refit import refit_zoomed
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def calibrate(
     known = [memories.get(camera.id) for camera in cameras]
     problem = Problem(pitch, cameras, observed, options, known, recorder=recorder)
 
-    # Solve and judge: by the near path if all usable cameras pass there, else by search and refinement.
+    # Solve and judge: where the cameras stood if all usable ones pass there, else by search and refinement.
     solved = _solve(problem, observer, progress)
 
     # Recover: search anywhere for cameras that do not stand where they stood.
@@ -110,29 +110,31 @@ def calibrate(
 def _solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> Solved:
     """Solve for the poses and judge them; return the problem with all that the network was asked for on the way.
 
-    Lines are asked first, and the network looks in full where they do not suffice. Only cameras that are not near their
-    stored poses are searched for.
+    Lines are asked first, where the cameras stood and then around it, and the network looks in full where they do not
+    suffice. Only cameras that are not near their stored poses are searched for.
     """
     everyone = range(len(problem.cameras))
-    tries_near = problem.options.search == "auto"
-    near = None
-    if tries_near:
-        problem, near = refine_by_lines(problem, observer, progress)
-    problem = observer.look_in_full(problem, [n for n in everyone if near is None or n not in near.numbers], progress)
-    problem = replace(problem, observed=mark_swapped_frames(problem, observer.frames, progress))
+    problem = observer.with_overviews(problem, progress)
 
-    solved = _judged_near(problem, near, progress)
-    if solved is None and tries_near:
-        if near is not None and near.numbers == problem.usable:
-            problem, near = observer.look_in_full(problem, everyone, progress), None
-        near = refine_with_network(problem, near, progress)
-        solved = _judged_near(problem, near, progress)
+    # Where the cameras stood.
+    near = refine_by_lines(problem, progress) if problem.options.search == "auto" else None
+    solved = _judged_together(problem, _near_solution(problem, near, progress), progress)
     if solved is not None:
         return problem, *solved, "near"
 
-    # Cameras that are all near and contradict each other: one of them is not where it seems to be.
-    apart = near is not None and near.numbers != problem.usable
-    solution = search_and_refine(problem, progress, near.cameras if near is not None and apart else NO_CAMERAS)
+    # Around it, by overviews. Cameras that are all near contradict each other: none of them is known to be right.
+    lost = [n for n in everyone if near is None or n not in near.numbers]
+    problem = replace(problem, observed=mark_swapped_frames(problem, lost, observer.frames, progress))
+    if near is None or near.numbers == problem.usable:
+        near, lost = None, list(everyone)
+    found_near = NO_CAMERAS if near is None else near.cameras
+    solved = _judged_together(problem, search_in_overviews(problem, progress, found_near), progress)
+    if solved is not None:
+        return problem, *solved, "wide"
+
+    # Around it, by all that the network sees.
+    problem = observer.look_in_full(problem, lost, progress)
+    solution = search_and_refine(problem, progress, found_near)
     solution = refit_zoomed(problem, solution, progress)
     while True:
         judged = judge_together(problem, solution.pitch, solution.results, progress)
@@ -143,15 +145,21 @@ def _solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter
         solution = refine_without(contradicted, problem, solution, progress)
 
 
-def _judged_near(
-    problem: Problem, near: NearSolution | None, progress: ProgressReporter
-) -> tuple[PoseSolution, EngineResult] | None:
-    """Judge the near solution; None unless all usable cameras are in it and are accepted together."""
+def _near_solution(problem: Problem, near: NearSolution | None, progress: ProgressReporter) -> PoseSolution | None:
+    """Return the solution of the near path; None unless all usable cameras are near."""
     if near is None or near.numbers != problem.usable:
         return None
-    solution = with_unusable_cameras(near, problem, progress)
+    return with_unusable_cameras(problem, problem.cameras, near.refined, near.results, 0, progress)
+
+
+def _judged_together(
+    problem: Problem, solution: PoseSolution | None, progress: ProgressReporter
+) -> tuple[PoseSolution, EngineResult] | None:
+    """Judge the cameras of a solution against each other; None unless all that were refined together are accepted."""
+    if solution is None:
+        return None
     judged = judge_together(problem, solution.pitch, solution.results, progress)
-    return (solution, judged) if all(judged.cameras[n].accepted for n in near.numbers) else None
+    return (solution, judged) if all(judged.cameras[n].accepted for n in solution.together) else None
 
 
 def _recover(solved: Solved, observer: FrameObserver, progress: ProgressReporter) -> Solved:

@@ -68,14 +68,18 @@ class FrameObserver:
         channels = [Channels(self.frames[camera.id], self.swayed[camera.id]) for camera in self.cameras]
         return ObservedCameras(views, Observations.of_lines_alone(channels), [None] * len(channels), frozenset())
 
-    def with_overviews(self, problem: Problem, numbers: Collection[int], progress: ProgressReporter) -> Problem:
-        """Return the problem with what the network sees in overviews of the first frames of some cameras."""
+    def with_overviews(self, problem: Problem, progress: ProgressReporter) -> Problem:
+        """Return the problem with what the network sees in overviews of the first frames of all cameras.
+
+        Of those that it has looked at in full, none is needed.
+        """
         overviews = list(problem.observed.overviews)
         with progress.timed("segmentation"):
-            for n in numbers:
+            for n in [n for n in range(len(self.cameras)) if n not in problem.observed.in_full]:
                 frame = overview(self.frames[self.cameras[n].id][0])
                 camera = self.cameras[n].resized(frame.shape[1])
-                response = self.segment(frame, reachable_regions(self.pitch, camera, 0.0)).astype(np.float32)
+                regions = reachable_regions(self.pitch, camera, CAPTURE_RAD * camera.intrinsics.focal_length_px)
+                response = self.segment(frame, regions).astype(np.float32)
                 overviews[n] = of_use(camera.ignored, response / np.float32(255))
         return replace(problem, observed=replace(problem.observed, overviews=overviews))
 

@@ -78,10 +78,15 @@ def recover_knocked(
 
     `solve`: what has `solved` the problem. The cameras of the problem that is returned are at their stored poses.
     """
-    problem, _, judged, _ = solved
+    problem, solution, judged, path = solved
+    if problem.options.search == "wide" or problem.options.recover == "never":
+        return solved
+    of_the_ground = [n for n, view in enumerate(problem.observed.views) if view.cause in OF_THE_GROUND]
+    problem = observer.look_in_full(problem, of_the_ground, progress)
     sought = [n for n in range(len(problem.cameras)) if _is_sought(problem, n, judged.cameras[n])]
     if not sought:
         return solved
+    solved = problem, solution, judged, path
     with progress.timed("evolution"):
         searched = {n: _search(problem, judged.cameras[n], n, observer, progress) for n in sought}
     found = {n: one for n, one in searched.items() if one is not None}
@@ -99,8 +104,6 @@ def recover_knocked(
 
 def _is_sought(problem: Problem, number: int, result: CameraResult) -> bool:
     """Whether a camera is to be searched for: whatever its result, or where that is one of a knocked camera."""
-    if problem.options.search == "wide" or problem.options.recover == "never":
-        return False
     if problem.options.search == "anywhere":
         return result.view.cause != "other-camera"
     if result.view.cause in OF_THE_GROUND:

@@ -1,16 +1,12 @@
-"""Search and joint refinement: from stored poses to refined ones, in which a bad camera drags no other along.
-
-All cameras whose frames can be used are searched for and refined together. A camera that then fails the gate is tried
-on its own. If it passes there, the others get it back once, at the pose from which it passed; if not, or if it fails
-again, it stays by itself, and the others are refined without it.
+"""The problem of a calibration and what its paths are made of: search, joint refinement, and the judgement of each
+camera by itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from types import MappingProxyType
 
 import cv2
 import numpy as np
@@ -18,19 +14,21 @@ import numpy as np
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.evidence import Evidence, evidence_of
 from worker.calibration.detection.exclusions import left_out, of_use
+from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.detection.ridge_response import ridge_response
 from worker.calibration.detection.view_condition import ViewCondition
 from worker.calibration.diagnostics.markings import report_markings
 from worker.calibration.diagnostics.overlap import overlap_of
 from worker.calibration.diagnostics.registration import Response
-from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection
+from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult, Gate, Movement, alone_rejection
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.memory.camera_memory import CameraMemory
 from worker.calibration.records import NOT_RECORDED, Options, ProgressReporter, Recorder
-from worker.calibration.refinement.refine import Observations, evaluate_poses, refine
+from worker.calibration.refinement.diagnosis import is_sure
+from worker.calibration.refinement.refine import SEARCH_PX, LineReader, Observations, evaluate_poses, refine
 from worker.calibration.refinement.uncertainty import Deviation, RefinedPoses
 from worker.calibration.search.genome import genome_of
 from worker.calibration.search.objective import Objective
@@ -38,9 +36,10 @@ from worker.calibration.search.search import COARSE_TO_FINE, Found, Strategy, se
 
 CAPTURE_RAD = 0.1
 """How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
+LEAST_CAUGHT = 0.6
+"""Share of the expected lines that has to be caught in the frame for lines alone to suffice."""
 SEARCHED_POWER = 3
 """Power of the network's responses in the search: what it half believes (a shadow's edge, a board) hardly pulls."""
-NO_CAMERAS: Mapping[int, Camera] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -110,39 +109,23 @@ class PoseSolution:
     generations: int
 
 
-def search_and_refine(
-    problem: Problem, progress: ProgressReporter, near: Mapping[int, Camera] = NO_CAMERAS
+def with_unusable_cameras(
+    problem: Problem,
+    begun: Sequence[Camera],
+    refined: RefinedPoses,
+    results: Sequence[CameraResult],
+    generations: int,
+    progress: ProgressReporter,
 ) -> PoseSolution:
-    """Search for all usable cameras but those that were found `near` their stored poses, and refine; see the module."""
+    """Return the solution when all usable cameras were refined from where they `begun`; the others are assessed at
+    their stored poses. `results`: those of the usable ones."""
     together = problem.usable
-    lost = [n for n in together if n not in near]
-    searched = Found([], np.inf, 0)
-    if lost:
-        searched = search_poses(problem.of(lost), network_responses(problem.of(lost)), progress)
-    begun = [near.get(n, camera) for n, camera in enumerate(problem.cameras)]
-    for n, camera in zip(lost, searched.cameras, strict=True):
-        begun[n] = camera
-    everyone = range(len(begun))
-    alone = {n: assess_stored(problem.of([n]), progress) for n in everyone if n not in together}
-    results = {n: attempt.result for n, attempt in alone.items()}
-    refined = RefinedPoses(problem.pitch, [], [], [])
-    while together:
-        refined, judged = refine_and_judge(problem.of(together), [begun[n] for n in together], progress)
-        results |= zip(together, judged, strict=True)
-        failing = [n for n in together if not results[n].accepted]
-        if not failing:
-            break
-        for n in failing:
-            tried_before = n in alone
-            if not tried_before:
-                alone[n] = best_attempt(single_camera_problem(problem, n), begun[n], progress)
-                begun[n] = alone[n].begun
-            if tried_before or not alone[n].result.accepted:
-                together = [other for other in together if other != n]
-                results[n] = alone[n].result
-    deviations = joined_deviations(refined, [alone[n].refined for n in everyone if n not in together])
-    in_order = [results[n] for n in everyone]
-    return PoseSolution(refined.pitch, begun, in_order, together, deviations, searched.generations)
+    by_number = dict(zip(together, results, strict=True))
+    in_order = [
+        by_number[n] if n in by_number else assess_stored(problem.of([n]), progress).result
+        for n in range(len(problem.cameras))
+    ]
+    return PoseSolution(refined.pitch, list(begun), in_order, together, refined.deviations, generations)
 
 
 def joined_deviations(together: RefinedPoses, apart: Sequence[RefinedPoses]) -> list[Deviation]:
@@ -208,26 +191,26 @@ def assess_stored(problem: Problem, progress: ProgressReporter) -> Attempt:
 
 
 def search_poses(problem: Problem, responses: Sequence[Response], progress: ProgressReporter) -> Found:
-    """Search from the stored poses by the `responses` (H, W) of the cameras."""
+    """Search from the stored poses by the `responses` (h, w) to the frames of the cameras or to reduced ones."""
     options = problem.options
-    strategy = Strategy(options.parents, options.offspring, options.generations, options.stitch_weight)
+    reduced = [camera.resized(seen.shape[1]) for camera, seen in zip(problem.cameras, responses, strict=True)]
     with progress.timed("evolution"):
-        rng = np.random.default_rng(options.seed)
-        on_generation = progress.evolution(options.generations)
-        return search(
+        found = search(
             problem.pitch,
-            problem.cameras,
+            reduced,
             responses,
-            strategy,
-            rng,
-            on_generation,
+            Strategy(options.parents, options.offspring, options.generations),
+            np.random.default_rng(options.seed),
+            progress.evolution(options.generations),
             lambda level, genomes, best: problem.recorder.searched(problem.cameras, level, genomes, best),
         )
+    in_full = [camera.with_pose(one.pose) for camera, one in zip(problem.cameras, found.cameras, strict=True)]
+    return replace(found, cameras=in_full)
 
 
 def network_responses(problem: Problem) -> list[Response]:
-    """Return the network's responses (H, W) in 0..1 as the search uses them, raised to `SEARCHED_POWER`."""
-    return raised(problem.observed.observations.responses)
+    """Return the network's responses (h, w) in 0..1 as the search uses them, raised to `SEARCHED_POWER`."""
+    return raised([problem.observed.seen_by_network(n) for n in range(len(problem.cameras))])
 
 
 def raised(responses: Sequence[Response]) -> list[Response]:
@@ -349,6 +332,35 @@ def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReport
         return [replace(result, refusal=alone_rejection(result, problem.gate)) for result in results]
 
 
+def shows_most_lines(pitch: Field, cameras: Sequence[Camera], reader: LineReader) -> list[bool]:
+    """Say of each camera whether its frame shows most of the lines near to where the camera expects them."""
+    lines = pitch.line_points()
+    measured = reader.measure(lines, cameras, SEARCH_PX[0])
+    return [
+        _measured_share(VisibleLines.from_camera(lines, camera), found) >= LEAST_CAUGHT
+        for camera, found in zip(cameras, measured, strict=True)
+    ]
+
+
+def _measured_share(expected: VisibleLines, found: Measurements) -> float:
+    """Return the share 0..1 of the expected length that was measured; lines below a pixel count by their width."""
+    weight = expected.length_px * np.minimum(expected.width_px, 1.0)
+    return float(np.sum(weight[np.isin(expected.index, found.index)]) / max(np.sum(weight), 1e-12))
+
+
+def is_confirmed(problem: Problem, number: int, result: CameraResult) -> bool:
+    """True unless most of the lines that the network sees on the pitch lie where the camera expects none.
+
+    Asked of overviews; where the network has looked in full, evidence and gate have.
+    """
+    return number in problem.observed.in_full or result.overlap.unexpected < MUCH_UNEXPECTED
+
+
+def follows_zoom(problem: Problem, result: CameraResult) -> bool:
+    """True if a lens that may drift has surely done so."""
+    return problem.options.lens_may_drift and result.zoom is not None and is_sure(result.zoom)
+
+
 def _evidence_at_stored(
     lines: LinePoints, pitch: Field, stored: Camera, channels: Channels, response: Response
 ) -> Evidence:
@@ -367,8 +379,11 @@ def loss_of(problem: Problem, pitch: Field, answered: Sequence[Camera]) -> float
     cameras = [answered[n].resized(response.shape[1]) for n, response in zip(group, seen, strict=True)]
     responses = of_use_at(cameras, raised(seen), pitch)
     blur_px = COARSE_TO_FINE[1].blur_px
-    objective = Objective(pitch, cameras, responses, stitch_weight=0.0, blur_px=blur_px)
-    return float(objective.losses(genome_of(cameras)[None])[0])
+    losses = [
+        Objective.build(pitch, camera, response, blur_px).losses(genome_of([camera])[None])[0]
+        for camera, response in zip(cameras, responses, strict=True)
+    ]
+    return float(np.mean(losses))
 
 
 def of_use_at(cameras: Sequence[Camera], responses: Sequence[Response], pitch: Field) -> list[Response]:

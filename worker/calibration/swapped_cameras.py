@@ -32,15 +32,14 @@ NEARER_BY_SIGMAS = 3.0
 
 
 def mark_swapped_frames(
-    problem: Problem, frames: Mapping[str, Sequence[Frame]], progress: ProgressReporter
+    problem: Problem, lost: Sequence[int], frames: Mapping[str, Sequence[Frame]], progress: ProgressReporter
 ) -> ObservedCameras:
     """Return the observations, in which the view of a frame of another camera is not usable and names that camera.
 
+    `lost`: the numbers of the cameras that are asked about, whose lines did not find them at their own poses;
     `frames[camera.id]`: the frames of the problem's observations.
     """
-    # What lines found at its own pose needs no other.
-    asked = sorted(problem.observed.in_full)
-    shown = {n: of for n in asked if (of := _shown_in(problem, frames, n, progress)) is not None}
+    shown = {n: of for n in lost if (of := _shown_in(problem, frames, n, progress)) is not None}
     views = list(problem.observed.views)
     for n, of in shown.items():
         mutual = of.number in shown and shown[of.number].number == n

@@ -63,7 +63,7 @@ class DebugRecorder(Recorder):
                 f"{name}.response.png",
                 encode_png(_smaller(picture)),
                 "response of the network: probability that a pixel is a marking",
-                "0..255 for 0..1, size of the frame or 1920 px wide",
+                "0..255 for 0..1; as wide as the frame, at most 1920 px, or 768 px where an overview sufficed",
                 "2-a-measurement",
             )
 

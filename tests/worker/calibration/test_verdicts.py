@@ -16,7 +16,7 @@ from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, moved, p
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, white_on_green
 from tests.worker.calibration.test_sports import field
 from worker.calibration import calibrate as engine
-from worker.calibration import solve
+from worker.calibration import solve, wide_path
 from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.pairs import Pair
 from worker.calibration.geometry.camera import Camera
@@ -123,7 +123,8 @@ def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeyp
         return finish(problem, begun, progress)
 
     finish = solve.refine_and_judge
-    monkeypatch.setattr(solve, "refine_and_judge", finishing)
+    for module in (solve, wide_path):
+        monkeypatch.setattr(module, "refine_and_judge", finishing)
     monkeypatch.setattr(engine, "compare_pairs", contradicted)
     monkeypatch.setattr(engine, "measured_by_lines", lambda _, pairs, *__: pairs)
     found = run(chain)

@@ -9,7 +9,7 @@ import pytest
 from tests.scenes import plane
 from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame
 from tests.worker.calibration.test_calibrate import white_on_green
-from worker.calibration import solve
+from worker.calibration import solve, wide_path
 from worker.calibration.calibrate import calibrate
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.parameters import with_focal_length
@@ -76,7 +76,8 @@ def test_the_neighbours_of_a_camera_that_zoomed_are_finished_without_it(monkeypa
         finished.append([one.id for one in begun])
         return finish(problem, begun, progress)
 
-    monkeypatch.setattr(solve, "refine_and_judge", finishing)
+    for module in (solve, wide_path):
+        monkeypatch.setattr(module, "refine_and_judge", finishing)
     beside = camera("beside", (-8.0, -62.0, 18.0), (4.0, 2.0), focal=1600.0, size=(1280, 720))
     frames = {"tele": [picture()], "beside": [paint_frame(CROWNED, beside)]}
     options = Options(seed=1, generations=60, lens_may_drift=True)

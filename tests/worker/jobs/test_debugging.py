@@ -73,7 +73,9 @@ def test_lines_lie_on_the_paint_and_their_residuals_shrink(runs, camera):
     lines = json.loads(runs[2][f"{camera}.lines.json"])
     assert lines["rms_px"] < 0.2 * lines["rms_before_px"]
     response = cv2.imdecode(np.frombuffer(runs[2][f"{camera}.response.png"], np.uint8), cv2.IMREAD_GRAYSCALE)
-    column, row = np.rint(np.array(lines["pixel"])).astype(int).T
+    frame = cv2.imdecode(np.frombuffer(smaller_demo()[1][camera][0], np.uint8), cv2.IMREAD_GRAYSCALE)
+    scale = response.shape[1] / frame.shape[1]
+    column, row = np.rint((np.array(lines["pixel"]) + 0.5) * scale - 0.5).astype(int).T
     sure = np.array(lines["weight"]) > 0.5
     assert np.median(response[row[sure], column[sure]]) > 100
     assert np.max(np.abs(lines["ground_height_m"])) < 0.2

@@ -21,7 +21,8 @@ from worker.calibration.observe import FrameObserver
 from worker.calibration.records import EngineResult, Options, Progress, ProgressReporter, Segment
 from worker.calibration.refinement.refine import SEARCH_PX, Observations, refine
 from worker.calibration.refinement.uncertainty import ParameterUncertainty, RefinedPoses
-from worker.calibration.solve import Problem, judge_each, search_and_refine
+from worker.calibration.solve import Problem, judge_each
+from worker.calibration.wide_path import search_and_refine
 
 FIRST_SEARCH_PX = (40.0, 24.0)
 """A pitch whose measures are guesses has its lines farther from where they are expected than one that is known."""

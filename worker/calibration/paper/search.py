@@ -13,13 +13,11 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.paper.ground_objective import BROAD, NARROW, Blurs, GroundObjective
 from worker.calibration.paper.swinging import from_swinging, looked_at, swinging
 from worker.calibration.search.evolution import EvolutionStrategy, exponential_decay
-from worker.calibration.search.genome import genome_of, with_genome
+from worker.calibration.search.genome import GENES, genome_of, with_genome
 from worker.calibration.search.search import (
     DECAY,
     Found,
     Strategy,
-    genes_of,
-    grouped,
     mutation_of,
     shared_among,
 )
@@ -54,11 +52,15 @@ def search_on_ground(
     responses: Sequence[NDArray[np.float32]],
     levels: Sequence[GroundLevel],
     strategy: Strategy,
+    stitch_weight: float,
     rng: np.random.Generator,
     on_generation: Callable[[int, float], None],
     on_level: Callable[[int, Array, list[Camera]], None] = lambda *_: None,
 ) -> Found:
-    """Evolve the poses of all cameras, level by level, through all generations; arguments as of `search`."""
+    """Evolve the poses of all cameras, level by level, through all generations; arguments as of `search`.
+
+    `stitch_weight`: the paper's trade-off lambda between what cameras see of each other and of the field.
+    """
     decay = exponential_decay(DECAY)
     everyone = EvolutionStrategy(strategy.parents, strategy.offspring, mutation_of(len(cameras)), rng)
     population = everyone.first_parents(genome_of(cameras), levels[0].mutation)
@@ -67,7 +69,7 @@ def search_on_ground(
     for at, (level, generations) in enumerate(
         zip(levels, shared_among(strategy.generations, len(levels)), strict=True)
     ):
-        groups = _groups(pitch, here, responses, level, strategy, population, rng)
+        groups = _groups(pitch, here, responses, level, strategy, stitch_weight, population, rng)
         for generation in range(generations):
             for group in groups:
                 group.next_generation(level.mutation * decay(generation))
@@ -117,6 +119,7 @@ def _groups(
     responses: Sequence[NDArray[np.float32]],
     level: GroundLevel,
     strategy: Strategy,
+    stitch_weight: float,
     population: Array,
     rng: np.random.Generator,
 ) -> list[_Group]:
@@ -126,12 +129,22 @@ def _groups(
         cameras, seen = [here[i] for i in members], [responses[i] for i in members]
         group = _Group(
             EvolutionStrategy(strategy.parents, strategy.offspring, mutation_of(len(members)), rng),
-            GroundObjective(pitch, cameras, seen, strategy.stitch_weight, level.blurs),
+            GroundObjective(pitch, cameras, seen, stitch_weight, level.blurs),
             np.array([looked_at(camera) for camera in cameras]) if level.swings else None,
         )
         group.begin_with(genes_of(members, population))
         groups.append(group)
     return groups
+
+
+def grouped(cameras: int, *, alone: bool) -> list[list[int]]:
+    """Return the numbers of the cameras that are searched for together: each `alone`, or all in one group."""
+    return [[number] for number in range(cameras)] if alone else [list(range(cameras))]
+
+
+def genes_of(members: Sequence[int], population: Array) -> Array:
+    """Return the genes (parents, 6 M) of M neighbouring cameras in a population (parents, 6 N)."""
+    return population[:, GENES * members[0] : GENES * (members[-1] + 1)]
 
 
 def _mean_loss(groups: Sequence[_Group]) -> float:

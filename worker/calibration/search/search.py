@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,49 +12,40 @@ from numpy.typing import NDArray
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.search.evolution import EvolutionStrategy, exponential_decay
-from worker.calibration.search.genome import GENES, genome_of, with_genome
+from worker.calibration.search.genome import genome_of, with_genome
 from worker.calibration.search.objective import Objective
 
 MUTATION_RAD = 0.005
 MUTATION_M = 0.1
 DECAY = 0.95
 PATIENCE, STALLED_BY = 6, 1e-5
-"""A level ends before its time when its best loss fell by less than this in so many generations."""
+"""The search for a camera on a level ends when its best loss fell by less than this in so many generations."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """A stretch of generations at one blur (px of a 4K frame), and the strength of mutation at its start.
-
-    `alone`: each camera has a population of its own, and nothing is stitched.
-    """
+    """A stretch of generations at one blur (px of a 4K frame), and the strength of mutation at its start."""
 
     blur_px: float
     mutation: float
-    alone: bool
 
 
-COARSE_TO_FINE = (Level(48, 4, alone=True), Level(16, 1.5, alone=True), Level(6, 0.5, alone=False))
-"""Each level pulls from about one blur away, and hands over within the next one's reach, or the finish's.
-
-Cameras are searched for one by one until they are near: six numbers are found faster than 6 N, and two cameras that are
-both far off agree best about the wrong lines.
-"""
+COARSE_TO_FINE = (Level(48, 4), Level(16, 1.5), Level(6, 0.5))
+"""Each level pulls from about one blur away, and hands over within the next one's reach, or the refinement's."""
 
 
 @dataclass(frozen=True)
 class Strategy:
-    """The numbers of the paper's strategy: mu parents, lambda offspring, G generations in all, and the trade-off w."""
+    """The numbers of the paper's strategy: mu parents, lambda offspring, and G generations in all."""
 
     parents: int
     offspring: int
     generations: int
-    stitch_weight: float
 
 
 @dataclass(frozen=True)
 class Found:
-    """Where the search ended."""
+    """Where the search ended: the best poses, the mean of their losses, and the generations that it took."""
 
     cameras: list[Camera]
     loss: float
@@ -69,92 +61,83 @@ def search(
     on_generation: Callable[[int, float], None],
     on_level: Callable[[int, Array, list[Camera]], None] = lambda *_: None,
 ) -> Found:
-    """Evolve the poses of all cameras together, level by level.
+    """Evolve the pose of each camera level by level, all of them side by side and none of them knowing of another.
 
-    `responses` (H, W): segmentations in 0..1. `on_generation(number, loss)` is called after each generation and may
-    raise to stop; `on_level(level, population, best)` after each level, with the genomes (parents, 6 N) at its end.
+    Six numbers are found faster than 6 N, and two cameras that are both far off agree best about the wrong lines.
+    `responses` (H, W): segmentations in 0..1. `on_generation(number, loss)` is called after each generation of all
+    cameras and may raise to stop; `on_level(level, population, best)` after each level, with the genomes (parents, 6 N)
+    at its end.
     """
     decay = exponential_decay(DECAY)
-    everyone = EvolutionStrategy(strategy.parents, strategy.offspring, mutation_of(len(cameras)), rng)
-    population = everyone.first_parents(genome_of(cameras), COARSE_TO_FINE[0].mutation)
-    here = list(cameras)
-    done = 0
+    searches = [
+        _CameraSearch(pitch, camera, response, strategy, own)
+        for camera, response, own in zip(cameras, responses, rng.spawn(len(cameras)), strict=True)
+    ]
     shares = shared_among(strategy.generations, len(COARSE_TO_FINE))
+    done = 0
     for at, (level, generations) in enumerate(zip(COARSE_TO_FINE, shares, strict=True)):
-        groups = _groups(pitch, here, responses, level, strategy, population, rng)
-        best = [_mean_loss(groups)]
+        for one in searches:
+            one.begin(level)
         for generation in range(generations):
-            for group in groups:
-                group.next_generation(level.mutation * decay(generation))
-            done += 1
-            best.append(_mean_loss(groups))
-            on_generation(done, best[-1])
-            if _nothing_moves(best):
+            moving = [one for one in searches if not one.has_stalled]
+            if not moving:
                 break
-        population = np.concatenate([group.evolution.population for group in groups], axis=1)
-        here = with_genome(cameras, np.concatenate([group.evolution.best for group in groups]))
-        on_level(at, population, here)
-    return Found(here, best[-1], done)
+            for one in moving:
+                one.next_generation(level.mutation * decay(generation))
+            done += 1
+            on_generation(done, _mean_loss(searches))
+        on_level(at, np.concatenate([one.population for one in searches], axis=1), [one.camera for one in searches])
+    return Found([one.camera for one in searches], _mean_loss(searches), done)
 
 
-@dataclass(frozen=True)
-class _Group:
-    """Cameras that are searched for together."""
+class _CameraSearch:
+    """The search for one `camera`: the best of its `population` (parents, 6) so far."""
 
-    evolution: EvolutionStrategy
-    objective: Objective
+    def __init__(
+        self,
+        pitch: Field,
+        camera: Camera,
+        response: NDArray[np.float32],
+        strategy: Strategy,
+        rng: np.random.Generator,
+    ) -> None:
+        self.camera = camera
+        self._pitch, self._response = pitch, response
+        self._evolve = partial(EvolutionStrategy, strategy.parents, strategy.offspring, mutation_of(1), rng)
+        self.population = self._evolve().first_parents(genome_of([camera]), COARSE_TO_FINE[0].mutation)
+        self.best_losses = list[float]()
+
+    def begin(self, level: Level) -> None:
+        """Begin a level at the pose where the last one ended, with its population."""
+        self._objective = Objective.build(self._pitch, self.camera, self._response, level.blur_px)
+        self._evolution = self._evolve()
+        self.best_losses.clear()
+        self._judge(self.population)
 
     def next_generation(self, strength: float) -> None:
-        """Children of the parents, and the best of both."""
-        children = self.evolution.ask(strength)
-        self.evolution.tell(children, self.objective.losses(children))
+        """Judge the children of the population, and keep the best of both."""
+        self._judge(self._evolution.ask(strength))
+
+    @property
+    def has_stalled(self) -> bool:
+        """True if the last of the best losses is hardly below that of `PATIENCE` generations before."""
+        best = self.best_losses
+        return len(best) > PATIENCE and best[-1 - PATIENCE] - best[-1] < STALLED_BY
+
+    def _judge(self, genomes: Array) -> None:
+        self._evolution.tell(genomes, self._objective.losses(genomes))
+        self.population = self._evolution.population
+        self.best_losses.append(self._evolution.best_loss)
+        (self.camera,) = with_genome([self.camera], self._evolution.best)
 
 
-def _groups(
-    pitch: Field,
-    here: Sequence[Camera],
-    responses: Sequence[NDArray[np.float32]],
-    level: Level,
-    strategy: Strategy,
-    population: Array,
-    rng: np.random.Generator,
-) -> list[_Group]:
-    """One group per camera or one of all, each with its genes of the `population` (parents, 6 N), judged."""
-    groups = []
-    for members in grouped(len(here), alone=level.alone):
-        cameras, seen = [here[i] for i in members], [responses[i] for i in members]
-        group = _Group(
-            EvolutionStrategy(strategy.parents, strategy.offspring, mutation_of(len(members)), rng),
-            Objective(pitch, cameras, seen, strategy.stitch_weight, level.blur_px),
-        )
-        genomes = genes_of(members, population)
-        group.evolution.tell(genomes, group.objective.losses(genomes))
-        groups.append(group)
-    return groups
-
-
-def grouped(cameras: int, *, alone: bool) -> list[list[int]]:
-    """Return the numbers of the cameras that are searched for together: each `alone`, or all in one group."""
-    return [[number] for number in range(cameras)] if alone else [list(range(cameras))]
-
-
-def genes_of(members: Sequence[int], population: Array) -> Array:
-    """Return the genes (parents, 6 M) of M neighbouring cameras in a population (parents, 6 N)."""
-    return population[:, GENES * members[0] : GENES * (members[-1] + 1)]
+def _mean_loss(searches: Sequence[_CameraSearch]) -> float:
+    return float(np.mean([one.best_losses[-1] for one in searches]))
 
 
 def mutation_of(cameras: int) -> Array:
     """Return the standard deviations (6 N,) of a mutation of strength 1."""
     return np.tile([MUTATION_RAD] * 3 + [MUTATION_M] * 3, cameras)
-
-
-def _mean_loss(groups: Sequence[_Group]) -> float:
-    return float(np.mean([group.evolution.best_loss for group in groups]))
-
-
-def _nothing_moves(best: Sequence[float]) -> bool:
-    """True if the last of the best losses is hardly below that of `PATIENCE` generations before."""
-    return len(best) > PATIENCE and best[-1 - PATIENCE] - best[-1] < STALLED_BY
 
 
 def shared_among(total: int, parts: int) -> list[int]:

@@ -15,10 +15,10 @@ pytestmark = pytest.mark.slow
 def test_a_camera_is_caught_that_is_as_far_off_as_the_papers():
     camera, markings = pair()[0], pair_markings()[0]
     start = camera.with_pose(outdated(camera.pose, 0.162, 2.1, np.random.default_rng(3)))
-    strategy = Strategy(24, 48, 30, 0.5)
+    strategy = Strategy(24, 48, 30)
 
     found = search_on_ground(
-        CROWNED, [start], [markings], ON_THE_GROUND, strategy, np.random.default_rng(0), lambda *_: None
+        CROWNED, [start], [markings], ON_THE_GROUND, strategy, 0.5, np.random.default_rng(0), lambda *_: None
     ).cameras[0]
 
     assert rotation_angles_deg(found.pose.rotation, camera.pose.rotation) < 0.5
@@ -31,7 +31,8 @@ def test_all_generations_are_used_even_where_nothing_moves():
         pair()[:1],
         [np.zeros_like(pair_markings()[0])],
         ON_THE_GROUND,
-        Strategy(2, 2, 30, 0.5),
+        Strategy(2, 2, 30),
+        0.5,
         np.random.default_rng(0),
         lambda number, loss: steps.append((number, loss)),
     )

@@ -17,7 +17,7 @@ def searched(responses, generations):
         CROWNED,
         cameras,
         responses,
-        Strategy(16, 32, generations, 0.5),
+        Strategy(16, 32, generations),
         np.random.default_rng(0),
         lambda number, loss: steps.append((number, loss)),
         lambda *_: ends.append(len(steps)),
@@ -45,3 +45,22 @@ def test_generations_are_shared_among_the_levels():
     found, _, ends = searched(pair_markings(), 10)
     assert found.generations == 10
     assert ends == [4, 7, 10]
+
+
+def test_where_a_camera_is_found_does_not_depend_on_its_neighbours():
+    cameras, responses = [moved(camera, (0.01, -0.01, 0.0)) for camera in pair()], pair_markings()
+    ends = [
+        search(
+            CROWNED,
+            cameras[:number],
+            responses[:number],
+            Strategy(16, 32, 30),
+            np.random.default_rng(0),
+            lambda *_: None,
+        )
+        .cameras[0]
+        .pose
+        for number in (1, 2)
+    ]
+    np.testing.assert_array_equal(ends[0].position, ends[1].position)
+    np.testing.assert_array_equal(ends[0].rotation, ends[1].rotation)
