@@ -70,7 +70,7 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--before", type=Path, help="a clone of an earlier release, with its .venv")
     arguments.add_argument("--runs", type=int, default=7, help="of each kind of job")
-    arguments.add_argument("--cameras", nargs="+", default=["demo", "1", "2", "4", "8"], help="demo, or 1 to 8")
+    arguments.add_argument("--cameras", nargs="+", default=["demo", "1", "2", "4", "8", "16"], help="demo, or 1 to 16")
     arguments.add_argument("--starts", nargs="+", default=["near", "start"], help="near, start")
     asked = arguments.parse_args()
     with ExitStack() as open_until_the_end:

@@ -1,4 +1,4 @@
-"""The venues whose jobs are measured: the demo, and one to eight 4K cameras around a pitch, rendered once."""
+"""The venues whose jobs are measured: the demo, and one to sixteen 4K cameras around a pitch, rendered once."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STARTS = {"near": (0.005, 0.02), "start": (START_M, START_DEG)}
 DEMO_CAMERAS = "demo"
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.3], [18.5, 0.0, 0.3]]))
 # Along the pitch (m), in the order in which cameras are added, on the near side and then on the far one.
-PLACES = [(x, side) for side in (-1, 1) for x in (13.0, -13.0, 38.0, -38.0)]
+PLACES = [(x, side) for few in ((13.0, -13.0, 38.0, -38.0), (25.5, -25.5, 4.5, -4.5)) for side in (-1, 1) for x in few]
 SEED = 7
 
 
@@ -36,7 +36,7 @@ class Case:
 
 
 def case(cameras: str, start: str) -> Case:
-    """The demo (`demo`), or the first so many of the eight cameras, with stored poses so far off."""
+    """The demo (`demo`), or the first so many of the sixteen cameras, with stored poses so far off."""
     return _demo(start) if cameras == DEMO_CAMERAS else _around(int(cameras), start)
 
 
