@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from service import child_process
-from service.cli import calibrate, find, home, jobs, keys, onboarding, serve, stitch, venues
+from service.cli import calibrate, find, home, jobs, keys, live, onboarding, serve, stitch, venues
 from service.cli.printing import FAILED, fail
 
 COMMANDS = (
@@ -26,6 +26,7 @@ COMMANDS = (
     onboarding.pose,
     find.find,
     stitch.stitch,
+    live.live,
 )
 NOUNS = {"venue": venues.app, "field": onboarding.field_app, "job": jobs.app, "key": keys.app, "home": home.app}
 

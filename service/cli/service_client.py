@@ -7,16 +7,21 @@ command, are told in a third of the time without them.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service import build
+from service.cli.arguments import parse_document
 from service.cli.printing import BUSY, FAILED, USAGE, fail, key_hint, problem_text
+from service.schemas.names import ID_PATTERN
 
 if TYPE_CHECKING:
     from service.client import Client
+    from service.schemas.venue import Venue
 
 
 @contextmanager
@@ -52,3 +57,15 @@ def _skip_unused_imports() -> None:
     """
     sys.modules.setdefault("httpx._main", None)  # type: ignore[arg-type]
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+
+
+def load_venue(venue: str, url: str, api_key: str | None) -> Venue:
+    """A venue of the service by its id, or of a file."""
+    if Path(venue).is_file():
+        from service.schemas.venue import VenueIn
+
+        return parse_document(VenueIn, Path(venue).read_bytes(), venue).to_venue()
+    if not re.fullmatch(ID_PATTERN, venue):
+        fail(f"There is no file {venue}, and it is no id such as `esc venue list` prints", USAGE)
+    with open_client(url, api_key) as client:
+        return client.venue(venue)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -14,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, Url, parse_document
+from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, Url
 from service.cli.printing import FAILED, USAGE, fail, print_note, progress_bar
-from service.cli.service_client import open_client
-from service.schemas.names import ID_PATTERN, Projection
+from service.cli.service_client import load_venue
+from service.schemas.names import Projection
 
 if TYPE_CHECKING:
     from service.schemas.venue import Venue
@@ -132,7 +131,7 @@ def stitch(
     }
     if any(isinstance(chosen[side], float | int) and chosen[side] % 2 for side in ("width", "height")):
         fail("--width and --height are even numbers: video takes no others", USAGE)
-    stored = _load_venue(venue, url, api_key)
+    stored = load_venue(venue, url, api_key)
 
     from service.cli.local_engine import engine_settings
 
@@ -224,18 +223,6 @@ def _parse_number_or_auto(text: str | None, option: str, least: float, most: flo
     if not least <= number <= most:
         fail(f"{option} {text}: from {least:g} to {most:g}, or {AUTO}", USAGE)
     return int(number) if number.is_integer() else number
-
-
-def _load_venue(venue: str, url: str, api_key: str | None) -> Venue:
-    """A venue of the service by its id, or of a file."""
-    if Path(venue).is_file():
-        from service.schemas.venue import VenueIn
-
-        return parse_document(VenueIn, Path(venue).read_bytes(), venue).to_venue()
-    if not re.fullmatch(ID_PATTERN, venue):
-        fail(f"There is no file {venue}, and it is no id such as `esc venue list` prints", USAGE)
-    with open_client(url, api_key) as client:
-        return client.venue(venue)
 
 
 def _stitch_inputs(venue: Venue, chosen: Mapping[str, Any]) -> StitchScene:

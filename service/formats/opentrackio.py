@@ -24,7 +24,25 @@ SENSOR_WIDTH_MM = 36.0
 AHEAD_IS_Y = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
 # A second of timecode has no more.
 MOST_FRAMES = 120
+SEQUENCE_NUMBERS = 2**32
 SOURCES = uuid.UUID("3d6b2a0e-7f3c-5c8f-9d2b-52b8f4a7c1e6")
+
+
+# A venue knows its cameras by their ids alone, and Unreal 5.7 shows none of which one of the three is missing.
+UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When a sample that is sent was taken: `unix_ns` by the clock of the machine, the `number` of the sample from 0.
+
+    `rate`: samples a second; `status`: of the tracking.
+    """
+
+    unix_ns: int
+    number: int
+    rate: Fraction
+    status: str
 
 
 @dataclass(frozen=True)
@@ -56,6 +74,21 @@ def write_frame(shot: NumberedCamera, frame: Frame) -> bytes:
         },
     }
     return (json.dumps(_with_sample_id(_sample(shot) | moment), separators=(",", ":")) + "\n").encode()
+
+
+def write_moment(shot: NumberedCamera, moment: Moment) -> bytes:
+    """One sample of a stream, compact JSON. Its timestamp is UTC in seconds since 1970 by the sender's clock."""
+    seconds, nanoseconds = divmod(moment.unix_ns, 1_000_000_000)
+    timing = {
+        "tracker": {"status": moment.status},
+        "timing": {
+            "mode": "external",
+            "sampleRate": _rational(moment.rate),
+            "sampleTimestamp": {"seconds": seconds, "nanoseconds": nanoseconds},
+            "sequenceNumber": moment.number % SEQUENCE_NUMBERS,
+        },
+    }
+    return json.dumps(_with_sample_id(_sample(shot) | timing), separators=(",", ":")).encode()
 
 
 def _sample(shot: NumberedCamera) -> dict[str, Any]:
@@ -101,6 +134,9 @@ def _rational(rate: Fraction) -> dict[str, int]:
 def _sensor(shot: NumberedCamera) -> dict[str, Any]:
     (width, height), (fx, fy) = shot.size, shot.focal
     return {
+        "make": UNKNOWN,
+        "model": UNKNOWN,
+        "serialNumber": shot.id,
         "label": shot.id,
         "activeSensorResolution": {"width": width, "height": height},
         # There is one focal length: pixels that are not square are told by the height.

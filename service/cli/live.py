@@ -1,0 +1,164 @@
+"""`esc live`: the poses of a venue, sent to renderers on the network at the rate of their pictures."""
+
+from __future__ import annotations
+
+import re
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings
+from service.cli.printing import USAGE, fail, print_note
+from service.cli.service_client import load_venue
+
+if TYPE_CHECKING:
+    from service.live.destinations import Destination, UdpSocket
+    from service.live.hold import HeldPoses
+    from service.schemas.venue import Venue
+
+# Accepted jobs come every few minutes; a renderer may see the new pose so much later.
+LOOK_AGAIN_S = 2.0
+HIGHEST_RATE = 1000
+MULTICAST = "multicast"
+
+
+def live(
+    venue: Annotated[
+        str, typer.Argument(metavar="VENUE", help="Id of a venue of the service, or the JSON file of one.")
+    ],
+    rate: Annotated[
+        str, typer.Option("--rate", metavar="FPS", help="Samples a second of each camera: 25, 50 or 30000/1001.")
+    ] = "25",
+    opentrackio: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--opentrackio",
+            metavar="HOST[:PORT]|multicast",
+            help="Send OpenTrackIO 1.0.1 there; multicast: camera N of the venue to 239.135.1.N:55555, as is done "
+            "where no destination is given.",
+        ),
+    ] = None,
+    freed: Annotated[
+        list[str] | None, typer.Option("--freed", metavar="HOST:PORT", help="Send FreeD D1 packets there.")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a line of JSON for each sample on standard output.")
+    ] = False,
+    interface: Annotated[
+        str | None,
+        typer.Option("--interface", metavar="IP", help="Address of the network interface that multicast leaves by."),
+    ] = None,
+    url: Url = DEFAULT_URL,
+    api_key: ApiKey = None,
+) -> None:
+    """Send the stored poses of a venue at a steady rate until stopped, and new ones soon after a job is accepted.
+
+    OpenTrackIO and FreeD over UDP. The pictures are not looked at: for cameras that stand still between two jobs.
+    """
+    beat = _parse_rate(rate)
+    from service.live.destinations import UdpSocket
+
+    with UdpSocket(interface) as socket:
+        destinations = _destinations(socket, opentrackio or [], freed or [], as_json=as_json)
+        _send(load_venue(venue, url, api_key), destinations, beat, None if Path(venue).is_file() else (url, api_key))
+
+
+def _send(
+    stored: Venue, destinations: Sequence[Destination], beat: Fraction, service: tuple[str, str | None] | None
+) -> None:
+    """Send poses until stopped; `service`: its address and key, where it is to be asked for new ones."""
+    from service.live.hold import HeldPoses, send_held
+
+    poses, stop = HeldPoses(stored), threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    if service is not None:
+        threading.Thread(target=_follow_venue, args=(poses, *service, stop), daemon=True).start()
+    cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
+    print_note(f"Sending the stored poses of venue {stored.id} {float(beat):g} times a second: {cameras}")
+    complaints = _Complaints()
+    sent = send_held(poses, destinations, beat, stop, lambda error: complaints.say(f"Not sent: {error}"))
+    print_note(f"Stopped after {sent} samples of each camera.")
+
+
+class _Complaints:
+    """What goes wrong again and again is said when it begins."""
+
+    def __init__(self) -> None:
+        self._said = ""
+
+    def say(self, words: str) -> None:
+        """Print it, unless it was the last thing said."""
+        if words != self._said:
+            print_note(words)
+        self._said = words
+
+    def over(self, words: str) -> None:
+        """Print that it is over, if anything was wrong."""
+        if self._said:
+            print_note(words)
+        self._said = ""
+
+
+def _follow_venue(poses: HeldPoses, url: str, api_key: str | None, stop: threading.Event) -> None:
+    """Ask for the venue's poses again and again; where the service does not answer, the last ones hold."""
+    import time
+
+    import httpx
+
+    from service.client import Client, NotUnderstood, Refused
+
+    complaints, venue = _Complaints(), poses.venue.id
+    with Client(url, api_key) as client:
+        while not stop.wait(LOOK_AGAIN_S):
+            try:
+                new = poses.replace(client.venue(venue), time.monotonic())
+            except (Refused, NotUnderstood, httpx.HTTPError) as error:
+                complaints.say(f"Poses stay as they are, the service does not tell them: {error}")
+                continue
+            complaints.over("The service tells its poses again")
+            if new:
+                print_note(f"New pose or lens: {', '.join(new)}")
+
+
+def _destinations(
+    socket: UdpSocket, opentrackio: Sequence[str], freed: Sequence[str], *, as_json: bool
+) -> list[Destination]:
+    from service.live.destinations import OPENTRACKIO_PORT, FreeD, JsonLines, OpenTrackIO
+
+    if not (opentrackio or freed or as_json):
+        opentrackio = [MULTICAST]
+    found: list[Destination] = [
+        OpenTrackIO(socket)
+        if address == MULTICAST
+        else OpenTrackIO(socket, *_parse_address(address, "--opentrackio", OPENTRACKIO_PORT))
+        for address in opentrackio
+    ]
+    axes = load_settings().freed_axes if freed else ""
+    found += [FreeD(socket, *_parse_address(address, "--freed", None), axes) for address in freed]
+    return [*found, JsonLines(sys.stdout)] if as_json else found
+
+
+def _parse_address(text: str, option: str, usual_port: int | None) -> tuple[str, int]:
+    """Of HOST:PORT, [IPV6]:PORT, or HOST alone where there is a usual port."""
+    match = re.fullmatch(r"(?:\[(?P<six>[^\]]+)\]|(?P<host>[^:\s]+))(?::(?P<port>\d{1,5}))?", text)
+    port = None if match is None else match["port"] or usual_port
+    if match is None or port is None or not 0 < int(port) < 65536:
+        fail(f"{option} {text}: expected HOST:PORT, such as 10.1.0.20:40000", USAGE)
+    return match["six"] or match["host"], int(port)
+
+
+def _parse_rate(text: str) -> Fraction:
+    try:
+        rate = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        rate = Fraction(0)
+    if not 0 < rate <= HIGHEST_RATE:
+        fail(f"--rate {text}: samples a second, such as 25, 29.97 or 30000/1001", USAGE)
+    return rate

@@ -1,0 +1,121 @@
+"""Where poses are sent: datagrams to a renderer or a multicast group, and lines of JSON for programs."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import IO, Protocol, Self
+
+from service.formats import freed, opentrackio
+from service.formats.lens import NumberedCamera
+from service.live.packets import datagrams
+
+# Groups of OpenTrackIO: 239.135.1.N is that of source number N.
+OPENTRACKIO_GROUP, OPENTRACKIO_PORT, MOST_SOURCES = "239.135.1.{number}", 55555, 200
+# As far as multicast goes unless somebody decides otherwise: not beyond the next router.
+MULTICAST_TTL = 1
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A camera at a moment."""
+
+    shot: NumberedCamera
+    moment: opentrackio.Moment
+
+
+class Destination(Protocol):
+    """Takes the samples of all cameras of a moment, in the order of the venue."""
+
+    def send(self, samples: Sequence[Sample]) -> None:
+        """Send them on. Raises `OSError` where the network does not take them."""
+
+
+class UdpSocket:
+    """Sends datagrams by IPv4 or IPv6, to multicast groups by the `interface` of this IPv4 address, if one is named.
+
+    To be used as a context, which closes it.
+    """
+
+    def __init__(self, interface: str | None = None) -> None:
+        self._sockets: dict[int, socket.socket] = {}
+        self._interface = interface
+
+    def send(self, datagram: bytes, host: str, port: int) -> None:
+        """Send a datagram. Raises `OSError`."""
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        if family not in self._sockets:
+            self._sockets[family] = self._opened(family)
+        self._sockets[family].sendto(datagram, address)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for opened in self._sockets.values():
+            opened.close()
+
+    def _opened(self, family: int) -> socket.socket:
+        opened = socket.socket(family, socket.SOCK_DGRAM)
+        if family == socket.AF_INET:
+            opened.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, MULTICAST_TTL)
+            if self._interface is not None:
+                opened.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(self._interface))
+        return opened
+
+
+@dataclass(frozen=True)
+class OpenTrackIO:
+    """Samples of OpenTrackIO 1.0.1, to one address or, where none is given, to the group of each camera's number."""
+
+    socket: UdpSocket
+    host: str | None = None
+    port: int = OPENTRACKIO_PORT
+
+    def send(self, samples: Sequence[Sample]) -> None:
+        """Send a sample of each camera, in as many datagrams as it takes."""
+        for sample in samples:
+            host = self.host or OPENTRACKIO_GROUP.format(number=sample.shot.number)
+            content = opentrackio.write_moment(sample.shot, sample.moment)
+            for datagram in datagrams(content, sample.moment.number):
+                self.socket.send(datagram, host, self.port)
+
+
+@dataclass(frozen=True)
+class FreeD:
+    """Packets of FreeD D1, a datagram for each camera."""
+
+    socket: UdpSocket
+    host: str
+    port: int
+    axes: str
+
+    def send(self, samples: Sequence[Sample]) -> None:
+        """Send a packet of each camera."""
+        for sample in samples:
+            self.socket.send(freed.write([sample.shot], self.axes), self.host, self.port)
+
+
+@dataclass(frozen=True)
+class JsonLines:
+    """A line of JSON for each camera, on a stream of text."""
+
+    stream: IO[str]
+
+    def send(self, samples: Sequence[Sample]) -> None:
+        """Write a line for each camera."""
+        for sample in samples:
+            moment, camera = sample.moment, sample.shot.camera
+            line = {
+                "time": datetime.fromtimestamp(moment.unix_ns / 1e9, UTC).isoformat(timespec="microseconds"),
+                "number": moment.number,
+                "camera": camera.id,
+                "status": moment.status,
+                "rotation": list(camera.pose.rotation),
+                "position": list(camera.pose.position),
+            }
+            print(json.dumps(line, separators=(",", ":")), file=self.stream)
+        self.stream.flush()

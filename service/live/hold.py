@@ -1,0 +1,116 @@
+"""Stored poses, sent again and again at the rate of the pictures, and moved to new ones as jobs are accepted."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from service.formats.lens import NumberedCamera
+from service.formats.opentrackio import Moment
+from service.live.destinations import Destination, Sample
+from service.schemas.geometry import Pose
+from service.schemas.venue import Camera, Venue
+
+HELD = "held"
+# A pose that changes by less is moved to over so many seconds, which nobody sees; what changes more was wrong, and is
+# right at once.
+SMALL_TURN_RAD, SMALL_MOVE_M, MOVED_IN_S = math.radians(0.5), 0.1, 1.0
+# After a sleep of the machine the next samples are those of now, and not all that were missed.
+MOST_MISSED_S = 1.0
+
+
+@dataclass(frozen=True)
+class _Approach:
+    """A camera on its way from a pose to a newer one, since `begun`, of `time.monotonic`."""
+
+    before: Camera
+    after: Camera
+    begun: float
+
+    def at(self, now: float) -> Camera:
+        """The camera at a time."""
+        share = min((now - self.begun) / MOVED_IN_S, 1.0)
+        if share == 1.0 or not _is_small_step(self.before, self.after):
+            return self.after
+        rotation, position = (
+            [(1 - share) * old + share * new for old, new in zip(one, other, strict=True)]
+            for one, other in (
+                (self.before.pose.rotation, self.after.pose.rotation),
+                (self.before.pose.position, self.after.pose.position),
+            )
+        )
+        return self.after.model_copy(update={"pose": Pose.from_position(rotation, position)})
+
+
+def _is_small_step(before: Camera, after: Camera) -> bool:
+    turned = math.dist(before.pose.rotation, after.pose.rotation)
+    moved = math.dist(before.pose.position, after.pose.position)
+    return before.intrinsics == after.intrinsics and turned <= SMALL_TURN_RAD and moved <= SMALL_MOVE_M
+
+
+@dataclass
+class HeldPoses:
+    """The poses of a venue that hold at a time. `replace` may be called by another thread."""
+
+    venue: Venue
+    _approaches: dict[str, _Approach] = field(default_factory=dict, init=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
+
+    def __post_init__(self) -> None:
+        self._approaches = {camera.id: _Approach(camera, camera, 0.0) for camera in self.venue.cameras}
+
+    def replace(self, venue: Venue, now: float) -> list[str]:
+        """Move to the poses of a venue, from where the cameras are `now`. Return the cameras whose poses are new."""
+        with self._lock:
+            before = {camera: approach.at(now) for camera, approach in self._approaches.items()}
+            stored = {camera: approach.after for camera, approach in self._approaches.items()}
+            new = [camera.id for camera in venue.cameras if not _is_alike(stored.get(camera.id), camera)]
+            self._approaches = {
+                camera.id: _Approach(before.get(camera.id, camera), camera, now)
+                if camera.id in new
+                else self._approaches[camera.id]
+                for camera in venue.cameras
+            }
+            return new
+
+    def at(self, now: float) -> list[NumberedCamera]:
+        """The cameras at a time, of `time.monotonic`, in the order of the venue."""
+        with self._lock:
+            return [NumberedCamera(one.at(now), number) for number, one in enumerate(self._approaches.values(), 1)]
+
+
+def _is_alike(stored: Camera | None, camera: Camera) -> bool:
+    return stored is not None and stored.pose == camera.pose and stored.intrinsics == camera.intrinsics
+
+
+def send_held(
+    poses: HeldPoses,
+    destinations: Sequence[Destination],
+    rate: Fraction,
+    stop: threading.Event,
+    failed: Callable[[OSError], None],
+) -> int:
+    """Send a sample of each camera `rate` times a second until `stop`; return how many moments were sent.
+
+    The beat is that of the machine's clock and does not drift. What the network does not take is told to `failed`, and
+    the next samples are sent all the same.
+    """
+    number, begun, beats = 0, time.monotonic(), 0
+    while not stop.is_set():
+        moment = Moment(time.time_ns(), number, rate, HELD)
+        samples = [Sample(shot, moment) for shot in poses.at(time.monotonic())]
+        for destination in destinations:
+            try:
+                destination.send(samples)
+            except OSError as error:
+                failed(error)
+        number, beats = number + 1, beats + 1
+        wait_s = begun + float(beats / rate) - time.monotonic()
+        if wait_s < -MOST_MISSED_S:
+            begun, beats, wait_s = time.monotonic(), 0, 0.0
+        stop.wait(max(wait_s, 0.0))
+    return number

@@ -1,0 +1,39 @@
+"""OpenTrackIO on the wire: a sample of JSON in one or more UDP datagrams (SMPTE RIS OSVP, OpenTrackIO 1.0.1).
+
+Each datagram has a header of 16 bytes, big-endian, and a segment of the sample: `OTrk`, a reserved byte, the encoding
+(1: JSON), the sequence number of the sample (16 bits), the offset of the segment in the sample (32 bits), its length in
+15 bits below a bit that is set in the last segment, and a checksum (Fletcher-16, modulo 256) over the first 14 bytes
+and the segment.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+
+IDENTIFIER, JSON = b"OTrk", 1
+HEADER = struct.Struct(">4sBBHIH")
+CHECKSUM = struct.Struct(">H")
+# What an Ethernet frame of 1500 bytes holds beside the headers of IPv4, UDP and OpenTrackIO: more would be fragmented.
+LARGEST_SEGMENT = 1500 - 20 - 8 - HEADER.size - CHECKSUM.size
+LAST_SEGMENT = 0x8000
+SEQUENCE_NUMBERS = 0x10000
+
+
+def datagrams(sample: bytes, sequence: int, largest_segment: int = LARGEST_SEGMENT) -> Iterator[bytes]:
+    """Yield the datagrams of a sample of JSON. `sequence` counts samples; on the wire it begins anew after 65 535."""
+    for offset in range(0, len(sample), largest_segment):
+        segment = sample[offset : offset + largest_segment]
+        is_last = offset + largest_segment >= len(sample)
+        length = len(segment) | (LAST_SEGMENT if is_last else 0)
+        header = HEADER.pack(IDENTIFIER, 0, JSON, sequence % SEQUENCE_NUMBERS, offset, length)
+        yield header + CHECKSUM.pack(fletcher_16(header + segment)) + segment
+
+
+def fletcher_16(data: bytes) -> int:
+    """Return Fletcher's checksum modulo 256, 16 bits: the sum of all sums in the upper byte, the sum in the lower."""
+    total = of_totals = 0
+    for byte in data:
+        total = (total + byte) % 256
+        of_totals = (of_totals + total) % 256
+    return of_totals << 8 | total

@@ -1,0 +1,82 @@
+"""`esc live`, as somebody runs it beside a renderer."""
+
+import os
+import signal
+import sys
+from contextlib import contextmanager
+from subprocess import PIPE
+
+import pytest
+
+from tests.e2e import warm
+from tests.e2e.commands import esc_here
+from tests.e2e.running import venue
+from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
+
+
+@contextmanager
+def live(service, *arguments):
+    """The command, while it runs."""
+    command = [sys.executable, "-m", "service.cli", "live", *arguments]
+    with warm.Popen(
+        command, env=os.environ | service.environment | {"ESC_URL": service.url}, stdout=PIPE, stderr=PIPE, text=True
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_the_poses_of_a_venue_are_sent_and_new_ones_soon_after_they_are_stored(service, name):
+    service.venue(name)
+    with listening() as trackio, listening() as freed:
+        to = [f"--opentrackio=127.0.0.1:{port_of(trackio)}", f"--freed=127.0.0.1:{port_of(freed)}"]
+        with live(service, name, *to, "--rate", "10", "--json") as process:
+            _, sample = opentrackio_sample(lambda: trackio.recv(65536))
+            stored = venue(name)
+            assert sample["static"]["camera"]["label"] == stored["cameras"][0]["id"]
+            assert list(sample["transforms"][0]["translation"].values()) == stored["cameras"][0]["pose"]["position"]
+            assert freed_packet(freed.recv(64))[0] == 1
+            assert f'"camera":"{stored["cameras"][0]["id"]}"' in process.stdout.readline()
+
+            stored["cameras"][0]["pose"]["position"][2] += 3.0
+            service.http.put(f"/venues/{name}", json=stored).raise_for_status()
+            heights = (
+                opentrackio_sample(lambda: trackio.recv(65536))[1]["transforms"][0]["translation"]["z"]
+                for _ in range(200)
+            )
+            assert stored["cameras"][0]["pose"]["position"][2] in heights
+            process.send_signal(signal.SIGTERM)
+            told = process.communicate(timeout=30)[1]
+    assert process.returncode == 0
+    assert f"New pose or lens: {stored['cameras'][0]['id']}" in told
+    assert "Stopped after" in told
+
+
+def test_poses_go_on_when_the_service_is_gone(start, name):
+    service = start("up").ready()
+    service.venue(name)
+    with (
+        listening() as opened,
+        live(service, name, f"--freed=127.0.0.1:{port_of(opened)}", "--rate", "10") as process,
+    ):
+        opened.recv(64)
+        service.stop()
+        while "Poses stay as they are" not in process.stderr.readline():
+            pass
+        number, _, _ = freed_packet(opened.recv(64))
+        assert number in (1, 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--rate", "0"], "--rate 0: samples a second"),
+        (["--freed", "10.1.0.20"], "--freed 10.1.0.20: expected HOST:PORT"),
+        (["--opentrackio", "10.1.0.20:70000"], "expected HOST:PORT"),
+    ],
+)
+def test_what_is_no_rate_or_address_is_a_usage_error(service, tmp_path, arguments, said):
+    answer = esc_here(tmp_path, "live", "demo", *arguments, **{"ESC_URL": service.url})
+    assert answer.returncode == 2
+    assert said in answer.stderr

@@ -1,0 +1,184 @@
+"""Stored poses on the wire: read back from real sockets by readers of the test's own."""
+
+import json
+import math
+import socket
+import struct
+import threading
+import time
+from fractions import Fraction
+from io import StringIO
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from service.live.destinations import FreeD, JsonLines, OpenTrackIO, UdpSocket
+from service.live.hold import HeldPoses, send_held
+from service.schemas.geometry import Pose
+from service.schemas.venue import VenueIn
+from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
+
+DEMO = Path("tests/demo/venue.json")
+SCHEMA = json.loads(Path("tests/service/formats/opentrackio-1.0.1.schema.json").read_text())
+FASTEST = Fraction(200)
+
+
+def demo():
+    return VenueIn.model_validate_json(DEMO.read_bytes()).to_venue()
+
+
+def turned(venue, camera, by_rad):
+    """The venue with another stored pose of a camera."""
+    cameras = [
+        one.model_copy(
+            update={
+                "pose": Pose.from_position(
+                    [one.pose.rotation[0] + by_rad, *one.pose.rotation[1:]], list(one.pose.position)
+                )
+            }
+        )
+        if one.id == camera
+        else one
+        for one in venue.cameras
+    ]
+    return venue.model_copy(update={"cameras": cameras})
+
+
+@pytest.fixture
+def udp():
+    with UdpSocket() as opened:
+        yield opened
+
+
+class Sending:
+    """What is sent while the block runs."""
+
+    def __init__(self, destinations, poses=None, rate=FASTEST):
+        self.poses = poses or HeldPoses(demo())
+        self.errors = []
+        self._stop = threading.Event()
+        self._thread = threading.Thread(
+            target=send_held, args=(self.poses, destinations, rate, self._stop, self.errors.append)
+        )
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._stop.set()
+        self._thread.join()
+
+
+def test_samples_hold_to_the_schema_and_have_all_that_unreal_asks_of_a_camera(udp):
+    with listening() as opened, Sending([OpenTrackIO(udp, "127.0.0.1", port_of(opened))]):
+        samples = [opentrackio_sample(lambda: opened.recv(65536)) for _ in range(4)]
+    validator = jsonschema.Draft202012Validator(SCHEMA)
+    for _, sample in samples:
+        validator.validate(sample)
+        camera = sample["static"]["camera"]
+        assert all(camera[part] for part in ("make", "model", "serialNumber", "label"))
+        assert sample["tracker"]["status"] == "held"
+        assert len(sample["transforms"]) == 1
+    assert [sample["sourceNumber"] for _, sample in samples] == [1, 2, 1, 2]
+    assert [sequence for sequence, _ in samples] == [0, 0, 1, 1]
+    assert samples[0][1]["sourceId"] == samples[2][1]["sourceId"] != samples[1][1]["sourceId"]
+
+
+def test_the_time_of_a_sample_is_that_of_the_clock(udp):
+    with listening() as opened, Sending([OpenTrackIO(udp, "127.0.0.1", port_of(opened))]):
+        _, sample = opentrackio_sample(lambda: opened.recv(65536))
+        now = time.time()
+    stamp = sample["timing"]["sampleTimestamp"]
+    assert abs(stamp["seconds"] + stamp["nanoseconds"] / 1e9 - now) < 5
+
+
+def test_a_camera_goes_to_the_multicast_group_of_its_number():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        opened.bind(("239.135.1.2", 55555))
+        joined = struct.pack("4s4s", socket.inet_aton("239.135.1.2"), socket.inet_aton("127.0.0.1"))
+        opened.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, joined)
+        opened.settimeout(10)
+        with UdpSocket("127.0.0.1") as udp, Sending([OpenTrackIO(udp)]):
+            _, sample = opentrackio_sample(lambda: opened.recv(65536))
+    assert sample["sourceNumber"] == 2
+
+
+def test_packets_of_freed_say_the_stored_places(udp):
+    venue = demo()
+    with listening() as opened, Sending([FreeD(udp, "127.0.0.1", port_of(opened), "x y z pan tilt roll")]):
+        packets = [freed_packet(opened.recv(64)) for _ in venue.cameras]
+    for (number, _, place), camera in zip(packets, venue.cameras, strict=True):
+        assert venue.cameras[number - 1].id == camera.id
+        assert place == pytest.approx(camera.pose.position, abs=1e-4)
+
+
+def test_lines_of_json_count_the_moments():
+    stream = StringIO()
+    with Sending([JsonLines(stream)]):
+        while stream.getvalue().count("\n") < 6:
+            time.sleep(0.01)
+    lines = [json.loads(line) for line in stream.getvalue().splitlines()[:6]]
+    assert [(line["number"], line["camera"]) for line in lines] == [
+        (number, camera.id) for number in range(3) for camera in demo().cameras
+    ]
+
+
+def test_samples_come_at_their_rate(udp):
+    with listening() as opened, Sending([FreeD(udp, "127.0.0.1", port_of(opened), "x y z pan tilt roll")]):
+        opened.recv(64)
+        begun = time.monotonic()
+        for _ in range(2 * 100):
+            opened.recv(64)
+        # A hundred moments of two cameras at 200 a second; a busy machine may be late, and never early.
+        assert time.monotonic() - begun >= 0.49
+
+
+def test_a_pose_that_changes_a_little_is_moved_to_within_a_second():
+    venue = demo()
+    camera = venue.cameras[0].id
+    poses = HeldPoses(venue)
+    target = turned(venue, camera, 0.002)
+
+    assert poses.replace(target, now=100.0) == [camera]
+
+    at = [poses.at(now)[0].camera.pose.rotation[0] - venue.cameras[0].pose.rotation[0] for now in (100.0, 100.5, 101.0)]
+    assert at == pytest.approx([0.0, 0.001, 0.002], abs=1e-12)
+    assert poses.at(102.0)[0].camera.pose == target.cameras[0].pose
+
+
+def test_a_pose_that_was_wrong_is_right_at_once():
+    venue = demo()
+    poses = HeldPoses(venue)
+    poses.replace(turned(venue, venue.cameras[0].id, math.radians(3)), now=100.0)
+    turn = poses.at(100.0)[0].camera.pose.rotation[0] - venue.cameras[0].pose.rotation[0]
+    assert turn == pytest.approx(math.radians(3))
+
+
+def test_a_new_pose_on_the_way_to_another_is_moved_to_from_there():
+    venue = demo()
+    camera, poses = venue.cameras[0].id, HeldPoses(demo())
+    poses.replace(turned(venue, camera, 0.004), now=100.0)
+    poses.replace(turned(venue, camera, 0.0), now=100.5)
+    first = venue.cameras[0].pose.rotation[0]
+    at = [poses.at(now)[0].camera.pose.rotation[0] - first for now in (100.5, 101.0, 101.5)]
+    assert at == pytest.approx([0.002, 0.001, 0.0], abs=1e-12)
+
+
+def test_an_unchanged_venue_changes_nothing():
+    poses = HeldPoses(demo())
+    assert poses.replace(demo(), now=5.0) == []
+
+
+def test_a_network_that_takes_nothing_is_told_and_the_others_are_served():
+    class Unplugged:
+        def send(self, _samples):
+            raise OSError("Network is unreachable")
+
+    stream = StringIO()
+    with Sending([Unplugged(), JsonLines(stream)]) as sending:
+        while stream.getvalue().count("\n") < 4:
+            time.sleep(0.01)
+    assert len(sending.errors) >= 2
