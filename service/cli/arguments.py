@@ -260,3 +260,16 @@ def parse_document(model: type[M], document: str | bytes, source: str, example: 
         told = describe_errors(found, model, json.loads(document) if is_json else None)
         lines = [f"{source}: {message}" for message in told]
         fail("\n".join([*lines, f"Expected is {example}"] if example else lines), USAGE)
+
+
+def parse_by_camera(arguments: Sequence[str], form: str) -> dict[str, str]:
+    """Return what CAMERA=VALUE arguments say of each camera; `form`: what is expected, in words."""
+    found: dict[str, str] = {}
+    for argument in arguments:
+        camera, equals, value = argument.partition("=")
+        if not (camera and equals and value):
+            fail(f"{argument!r} is not {form}", USAGE)
+        if camera in found:
+            fail(f"camera {camera} is given twice", USAGE)
+        found[camera] = value
+    return found

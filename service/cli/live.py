@@ -6,18 +6,19 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings
+from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera
 from service.cli.printing import USAGE, fail, print_note
 from service.cli.service_client import load_venue
 
 if TYPE_CHECKING:
+    from service.cli.followed_cameras import FollowedCameras
     from service.live.destinations import Destination, UdpSocket
     from service.live.hold import HeldPoses
     from service.schemas.venue import Venue
@@ -32,8 +33,19 @@ def live(
     venue: Annotated[
         str, typer.Argument(metavar="VENUE", help="Id of a venue of the service, or the JSON file of one.")
     ],
+    streams: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[CAMERA=STREAM...]",
+            help="Follow a camera in the pictures of its stream, such as left=rtsp://10.1.0.7/main. Needs the extra "
+            "`video`. Of other cameras the stored pose is sent.",
+        ),
+    ] = None,
+    follow_every: Annotated[
+        int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
+    ] = 1,
     rate: Annotated[
-        str, typer.Option("--rate", metavar="FPS", help="Samples a second of each camera: 25, 50 or 30000/1001.")
+        str, typer.Option("--rate", metavar="FPS", help="Samples of stored poses a second: 25, 50 or 30000/1001.")
     ] = "25",
     opentrackio: Annotated[
         list[str] | None,
@@ -57,34 +69,47 @@ def live(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Send the stored poses of a venue at a steady rate until stopped, and new ones soon after a job is accepted.
+    """Send the poses of a venue to renderers until stopped, by OpenTrackIO and FreeD over UDP.
 
-    OpenTrackIO and FreeD over UDP. The pictures are not looked at: for cameras that stand still between two jobs.
+    Stored poses at a steady rate, and new ones soon after a job is accepted; of cameras that are followed in a stream
+    a pose for each picture.
     """
+    addresses = parse_by_camera(streams or [], "CAMERA=STREAM, for instance left=rtsp://10.1.0.7/main")
     beat = _parse_rate(rate)
     from service.live.destinations import UdpSocket
 
     with UdpSocket(interface) as socket:
         destinations = _destinations(socket, opentrackio or [], freed or [], as_json=as_json)
-        _send(load_venue(venue, url, api_key), destinations, beat, None if Path(venue).is_file() else (url, api_key))
+        stored = load_venue(venue, url, api_key)
+        _send(stored, destinations, beat, addresses, follow_every, None if Path(venue).is_file() else (url, api_key))
 
 
 def _send(
-    stored: Venue, destinations: Sequence[Destination], beat: Fraction, service: tuple[str, str | None] | None
+    stored: Venue,
+    destinations: Sequence[Destination],
+    beat: Fraction,
+    addresses: Mapping[str, str],
+    every: int,
+    service: tuple[str, str | None] | None,
 ) -> None:
     """Send poses until stopped; `service`: its address and key, where it is to be asked for new ones."""
+    from service.cli.followed_cameras import FollowedCameras
+    from service.live.destinations import Outlet
     from service.live.hold import HeldPoses, send_held
 
-    poses, stop = HeldPoses(stored), threading.Event()
+    poses, stop, complaints = HeldPoses(stored), threading.Event(), _Complaints()
+    outlet = Outlet(destinations, lambda error: complaints.say(f"Not sent: {error}"))
+    followed = FollowedCameras.of(stored, addresses, every, outlet)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     if service is not None:
-        threading.Thread(target=_follow_venue, args=(poses, *service, stop), daemon=True).start()
+        threading.Thread(target=_follow_venue, args=(poses, followed, *service, stop), daemon=True).start()
     cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
-    print_note(f"Sending the stored poses of venue {stored.id} {float(beat):g} times a second: {cameras}")
-    complaints = _Complaints()
-    sent = send_held(poses, destinations, beat, stop, lambda error: complaints.say(f"Not sent: {error}"))
-    print_note(f"Stopped after {sent} samples of each camera.")
+    print_note(f"Sending the poses of venue {stored.id}, stored ones {float(beat):g} times a second: {cameras}")
+    followed.start()
+    send_held(poses, outlet, beat, stop, followed.is_followed)
+    followed.stop()
+    print_note("Stopped.")
 
 
 class _Complaints:
@@ -106,7 +131,9 @@ class _Complaints:
         self._said = ""
 
 
-def _follow_venue(poses: HeldPoses, url: str, api_key: str | None, stop: threading.Event) -> None:
+def _follow_venue(
+    poses: HeldPoses, followed: FollowedCameras, url: str, api_key: str | None, stop: threading.Event
+) -> None:
     """Ask for the venue's poses again and again; where the service does not answer, the last ones hold."""
     import time
 
@@ -118,12 +145,14 @@ def _follow_venue(poses: HeldPoses, url: str, api_key: str | None, stop: threadi
     with Client(url, api_key) as client:
         while not stop.wait(LOOK_AGAIN_S):
             try:
-                new = poses.replace(client.venue(venue), time.monotonic())
+                now = client.venue(venue)
+                new = poses.replace(now, time.monotonic())
             except (Refused, NotUnderstood, httpx.HTTPError) as error:
                 complaints.say(f"Poses stay as they are, the service does not tell them: {error}")
                 continue
             complaints.over("The service tells its poses again")
             if new:
+                followed.anchor([camera for camera in now.cameras if camera.id in new])
                 print_note(f"New pose or lens: {', '.join(new)}")
 
 

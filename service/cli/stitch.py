@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, Url
+from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, Url, parse_by_camera
 from service.cli.printing import FAILED, USAGE, fail, print_note, progress_bar
 from service.cli.service_client import load_venue
 from service.schemas.names import Projection
@@ -116,7 +116,7 @@ def stitch(
     api_key: ApiKey = None,
 ) -> None:
     """Stitch clips into one, on this machine. Needs the extra `video`. Exit: 0 made, 1 failed, 2 usage."""
-    addresses = _parse_by_camera(clips, "CAMERA=CLIP, for instance left=left.mp4")
+    addresses = parse_by_camera(clips, "CAMERA=CLIP, for instance left=left.mp4")
     begin_s, end_s = (None if time is None else _parse_seconds(time) for time in (begin, end))
     pictures = None if rate is None else _parse_rate(rate)
     if (poses_out is not None or follow_every > 1) and not follow:
@@ -166,23 +166,11 @@ def stitch(
         print(json.dumps(_json_document(made, output, follows.motions), indent=2))
 
 
-def _parse_by_camera(arguments: Sequence[str], form: str) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for argument in arguments:
-        camera, equals, value = argument.partition("=")
-        if not (camera and equals and value):
-            fail(f"{argument!r} is not {form}", USAGE)
-        if camera in found:
-            fail(f"camera {camera} is given twice", USAGE)
-        found[camera] = value
-    return found
-
-
 def _parse_offsets(given: Sequence[str]) -> dict[str, Offset]:
     from worker.video.stitch import Offset
 
     offsets = {}
-    for camera, text in _parse_by_camera(given, "CAMERA=SECONDS, for instance right=0.120 or right=3f").items():
+    for camera, text in parse_by_camera(given, "CAMERA=SECONDS, for instance right=0.120 or right=3f").items():
         number = _parse_number(text.removesuffix("f"), f"--offset {camera}={text}")
         offsets[camera] = Offset(number, text.endswith("f"))
     return offsets

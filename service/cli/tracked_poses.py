@@ -68,15 +68,15 @@ def motion_document(motion: MotionSummary) -> dict[str, Any]:
 def _tracked_camera(followed: TrackedPose, numbers: Mapping[str, int]) -> TrackedCamera:
     sigma, motion = followed.sigma, followed.motion_sigma
     return TrackedCamera(
-        NumberedCamera(_camera_schema(followed.camera), numbers[followed.camera.id]),
+        NumberedCamera(camera_document(followed.camera), numbers[followed.camera.id]),
         followed.how,
         (sigma.rotation_deg, sigma.position_m),
         (motion.rotation_deg, motion.position_m),
     )
 
 
-def _camera_schema(camera: engine.Camera) -> Camera:
-    """For the wire: the lens is that of the clip's frames, which may be smaller than those it was measured in."""
+def camera_document(camera: engine.Camera) -> Camera:
+    """Return the camera for the wire, with the lens of the clip's frames: they may be smaller than those it is of."""
     from service.schemas.venue import Camera
     from worker.jobs.to_schemas import lens_to_schema, pose_to_schema
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import Sequence
+import threading
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from fractions import Fraction
 from typing import IO, Protocol, Self
 
 from service.formats import freed, opentrackio
@@ -21,10 +24,11 @@ MULTICAST_TTL = 1
 
 @dataclass(frozen=True)
 class Sample:
-    """A camera at a moment."""
+    """A camera at a moment. `sigma`: of its rotation in degrees and its position in metres, if it was measured then."""
 
     shot: NumberedCamera
     moment: opentrackio.Moment
+    sigma: tuple[float, float] | None = None
 
 
 class Destination(Protocol):
@@ -109,7 +113,7 @@ class JsonLines:
         """Write a line for each camera."""
         for sample in samples:
             moment, camera = sample.moment, sample.shot.camera
-            line = {
+            line: dict[str, object] = {
                 "time": datetime.fromtimestamp(moment.unix_ns / 1e9, UTC).isoformat(timespec="microseconds"),
                 "number": moment.number,
                 "camera": camera.id,
@@ -117,5 +121,40 @@ class JsonLines:
                 "rotation": list(camera.pose.rotation),
                 "position": list(camera.pose.position),
             }
+            if sample.sigma is not None:
+                line["sigma_rotation_deg"], line["sigma_position_m"] = (round(value, 6) for value in sample.sigma)
             print(json.dumps(line, separators=(",", ":")), file=self.stream)
         self.stream.flush()
+
+
+class Outlet:
+    """Sends samples to all `destinations`, those of each camera numbered from 0. Several threads may call it.
+
+    What the network does not take is told to `failed`, and the next samples are sent all the same.
+    """
+
+    def __init__(self, destinations: Sequence[Destination], failed: Callable[[OSError], None]) -> None:
+        self._destinations = destinations
+        self._failed = failed
+        self._numbers = Counter[str]()
+        self._lock = threading.Lock()
+
+    def send(
+        self,
+        shots: Sequence[NumberedCamera],
+        unix_ns: int,
+        rate: Fraction,
+        status: str,
+        sigma: tuple[float, float] | None = None,
+    ) -> None:
+        """Send a sample of each of these cameras; the other arguments as of `Moment` and `Sample`."""
+        with self._lock:
+            samples = [
+                Sample(shot, opentrackio.Moment(unix_ns, self._numbers[shot.id], rate, status), sigma) for shot in shots
+            ]
+            self._numbers.update(shot.id for shot in shots)
+            for destination in self._destinations:
+                try:
+                    destination.send(samples)
+                except OSError as error:
+                    self._failed(error)

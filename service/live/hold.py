@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 
 from service.formats.lens import NumberedCamera
-from service.formats.opentrackio import Moment
-from service.live.destinations import Destination, Sample
+from service.live.destinations import Outlet
 from service.schemas.geometry import Pose
 from service.schemas.venue import Camera, Venue
 
@@ -89,28 +88,23 @@ def _is_alike(stored: Camera | None, camera: Camera) -> bool:
 
 def send_held(
     poses: HeldPoses,
-    destinations: Sequence[Destination],
+    outlet: Outlet,
     rate: Fraction,
     stop: threading.Event,
-    failed: Callable[[OSError], None],
+    is_followed: Callable[[str], bool] = lambda _: False,
 ) -> int:
-    """Send a sample of each camera `rate` times a second until `stop`; return how many moments were sent.
+    """Send a sample of each camera `rate` times a second until `stop`; return how many times it was so far.
 
-    The beat is that of the machine's clock and does not drift. What the network does not take is told to `failed`, and
-    the next samples are sent all the same.
+    The beat is that of the machine's clock and does not drift. A camera that is followed in its pictures is left out.
     """
-    number, begun, beats = 0, time.monotonic(), 0
+    sent, begun, beats = 0, time.monotonic(), 0
     while not stop.is_set():
-        moment = Moment(time.time_ns(), number, rate, HELD)
-        samples = [Sample(shot, moment) for shot in poses.at(time.monotonic())]
-        for destination in destinations:
-            try:
-                destination.send(samples)
-            except OSError as error:
-                failed(error)
-        number, beats = number + 1, beats + 1
+        held = [shot for shot in poses.at(time.monotonic()) if not is_followed(shot.id)]
+        if held:
+            outlet.send(held, time.time_ns(), rate, HELD)
+        sent, beats = sent + 1, beats + 1
         wait_s = begun + float(beats / rate) - time.monotonic()
         if wait_s < -MOST_MISSED_S:
             begun, beats, wait_s = time.monotonic(), 0, 0.0
         stop.wait(max(wait_s, 0.0))
-    return number
+    return sent

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from worker.calibration.geometry.camera import Camera
 from worker.video.errors import VideoError
 from worker.video.yuv_planes import Picture, picture_of
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 OPENING_S, WAITING_S = 10.0, 10.0
 # Where a clip is entered before the time that is wanted: a frame's own time may lie after that of its packet.
 EARLIER_S = 1.0
+# Frames whose sides are to each other as those of the lens to this part have its aspect ratio.
+SAME_ASPECT = 0.005
 # Streams that do not know their rate name that of their clock.
 USUAL_RATE, HIGHEST_RATE = Fraction(25), 1000
 NO_PYAV = "Video needs PyAV: pip install 'esc-calibration[video]'"
@@ -195,6 +198,21 @@ class Clip:
                 "ffmpeg -display_rotation 0 -i CLIP -c copy OTHER leaves the frames as they are (before version 6: "
                 "-metadata:s:v rotate=0), ffmpeg -i CLIP OTHER turns them"
             )
+
+
+def camera_for_clip(camera: Camera, clip: Clip | None) -> Camera:
+    """Return the camera with a lens for the frames of its clip. Raises `VideoError` where they have another shape."""
+    if clip is None or clip.facts.size == camera.intrinsics.size:
+        return camera
+    (width, height), (expected_width, expected_height) = clip.facts.size, camera.intrinsics.size
+    if not width or abs(width * expected_height / (height * expected_width) - 1) > SAME_ASPECT:
+        raise VideoError(
+            f"camera {camera.id}: its clip has {width}x{height} pixels, its lens was measured for "
+            f"{expected_width}x{expected_height}. The same picture at another size would do; this one is of another "
+            "shape: cut, or from another mode of the camera. Record in the mode in which the lens was measured"
+        )
+    lens = camera.intrinsics.scaled(width / expected_width)
+    return camera.with_lens(lens if lens.size == clip.facts.size else replace(lens, size=clip.facts.size))
 
 
 def is_live(address: str) -> bool:

@@ -10,7 +10,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import takewhile
 from math import inf
@@ -22,7 +22,7 @@ from worker.calibration.stitching.panorama import Panorama, panorama
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import View, ViewChoice, chosen_view
-from worker.video.clips import Clip, ClipPicture
+from worker.video.clips import Clip, ClipPicture, camera_for_clip
 from worker.video.encoding import Encoding, Sound, Writer
 from worker.video.errors import VideoError
 from worker.video.frame_timing import ClipTrack, FrameReader
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from av.audio.stream import AudioStream
     from av.packet import Packet
 
-# Frames whose sides are to each other as those of the lens to this part have its aspect ratio.
-SAME_ASPECT = 0.005
 SILENT = "none"
 # A clip that ends this much before the others has ended early.
 EARLY_S = 0.25
@@ -173,7 +171,7 @@ def stitch(
         heard = _heard(clips, plan.sound)
         if heard is not None:
             heard.listen()
-        fitted = {camera.id: _fitted(camera, clips.get(camera.id)) for camera in scene.cameras}
+        fitted = {camera.id: camera_for_clip(camera, clips.get(camera.id)) for camera in scene.cameras}
         offsets, found = _offsets(scene, clips, fitted, plan, told)
         rate = plan.rate or next(iter(clips.values())).facts.rate
         tracks = {camera: _track(stack, clip, offsets[camera], plan.begin_s, rate) for camera, clip in clips.items()}
@@ -322,21 +320,6 @@ def _heard(clips: Mapping[str, Clip], wanted: str | None) -> Clip | None:
     if not clips[wanted].has_sound:
         raise VideoError(f"--audio: the clip of camera {wanted} has no sound; --audio none makes a silent one")
     return clips[wanted]
-
-
-def _fitted(camera: Camera, clip: Clip | None) -> Camera:
-    """The camera with a lens for the frames of its clip."""
-    if clip is None or clip.facts.size == camera.intrinsics.size:
-        return camera
-    (width, height), (expected_width, expected_height) = clip.facts.size, camera.intrinsics.size
-    if not width or abs(width * expected_height / (height * expected_width) - 1) > SAME_ASPECT:
-        raise VideoError(
-            f"camera {camera.id}: its clip has {width}x{height} pixels, its lens was measured for "
-            f"{expected_width}x{expected_height}. The same picture at another size would do; this one is of another "
-            "shape: cut, or from another mode of the camera. Record in the mode in which the lens was measured"
-        )
-    lens = camera.intrinsics.scaled(width / expected_width)
-    return camera.with_lens(lens if lens.size == clip.facts.size else replace(lens, size=clip.facts.size))
 
 
 def _offsets(

@@ -1,5 +1,6 @@
 """`esc live`, as somebody runs it beside a renderer."""
 
+import json
 import os
 import signal
 import sys
@@ -9,9 +10,12 @@ from subprocess import PIPE
 import pytest
 
 from tests.e2e import warm
+from tests.e2e.client.test_stitching import document
 from tests.e2e.commands import esc_here
 from tests.e2e.running import venue
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
+from tests.worker.calibration.synthetic import pair
+from tests.worker.video.shaking import film_shaking
 
 
 @contextmanager
@@ -50,7 +54,7 @@ def test_the_poses_of_a_venue_are_sent_and_new_ones_soon_after_they_are_stored(s
             told = process.communicate(timeout=30)[1]
     assert process.returncode == 0
     assert f"New pose or lens: {stored['cameras'][0]['id']}" in told
-    assert "Stopped after" in told
+    assert "Stopped." in told
 
 
 def test_poses_go_on_when_the_service_is_gone(start, name):
@@ -80,3 +84,24 @@ def test_what_is_no_rate_or_address_is_a_usage_error(service, tmp_path, argument
     answer = esc_here(tmp_path, "live", "demo", *arguments, **{"ESC_URL": service.url})
     assert answer.returncode == 2
     assert said in answer.stderr
+
+
+@pytest.mark.slow
+def test_a_camera_is_followed_in_its_stream_and_the_other_one_is_held(service, name, tmp_path):
+    clip = film_shaking(tmp_path)["left"]
+    service.http.put(f"/venues/{name}", json=document(name, pair())).raise_for_status()
+    with live(service, name, f"left={clip}", "--json", "--rate", "5") as process:
+        lines = (json.loads(line) for line in process.stdout)
+        left = next(line for line in lines if line["camera"] == "left" and line["status"] == "measured")
+        right = next(line for line in lines if line["camera"] == "right")
+    assert 0 < left["sigma_position_m"] < 0.1
+    assert left["position"] == pytest.approx(pair()[0].pose.position.tolist(), abs=0.04)
+    assert right["status"] == "held"
+    assert "sigma_position_m" not in right
+
+
+def test_a_stream_of_a_camera_that_the_venue_has_not_is_a_usage_error(esc, service, name):
+    service.venue(name)
+    answer = esc("live", name, "middle=rtsp://10.1.0.7/main")
+    assert answer.returncode == 2
+    assert "The venue has no camera middle; it has left, right" in answer.stderr

@@ -13,7 +13,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from service.live.destinations import FreeD, JsonLines, OpenTrackIO, UdpSocket
+from service.live.destinations import FreeD, JsonLines, OpenTrackIO, Outlet, UdpSocket
 from service.live.hold import HeldPoses, send_held
 from service.schemas.geometry import Pose
 from service.schemas.venue import VenueIn
@@ -58,9 +58,8 @@ class Sending:
         self.poses = poses or HeldPoses(demo())
         self.errors = []
         self._stop = threading.Event()
-        self._thread = threading.Thread(
-            target=send_held, args=(self.poses, destinations, rate, self._stop, self.errors.append)
-        )
+        outlet = Outlet(destinations, self.errors.append)
+        self._thread = threading.Thread(target=send_held, args=(self.poses, outlet, rate, self._stop))
 
     def __enter__(self):
         self._thread.start()

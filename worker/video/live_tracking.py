@@ -1,0 +1,212 @@
+"""Cameras that are followed while they film: each stream by itself, its newest picture first, for months.
+
+A picture that comes while an earlier one is looked at takes the place of others that wait. A stream that breaks off, or
+whose pictures change their size, is opened again.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Self
+
+from worker.calibration.geometry.camera import Camera
+from worker.calibration.geometry.field import Field
+from worker.calibration.records import CalibrationError
+from worker.calibration.tracking.follower import CameraTracker, TrackedPose
+from worker.video.clips import Clip, camera_for_clip
+from worker.video.errors import VideoError
+from worker.video.yuv_planes import Picture
+
+# Between two attempts to open a stream, and to find the lines of a camera in a picture.
+FIRST_PAUSE_S, LONGEST_PAUSE_S, LOST_PAUSE_S = 1.0, 30.0, 1.0
+# A camera that was not looked at for longer is not where the filter takes it to be.
+LONGEST_GAP_S = 5.0
+# Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
+LOST_AFTER_S = 3.0
+
+
+@dataclass(frozen=True)
+class LivePose:
+    """A camera by one picture of its stream.
+
+    `arrived_ns`: when the picture had been decoded, Unix time; `number`: of the picture, from 0 at the stream's first;
+    `rate`: of the stream; `followed`: pose, sigma and how it is known.
+    """
+
+    followed: TrackedPose
+    arrived_ns: int
+    number: int
+    rate: Fraction
+
+
+@dataclass(frozen=True)
+class _Arrived:
+    picture: Picture
+    number: int
+    at_ns: int
+
+
+class _NewestPicture:
+    """The pictures of a clip as they arrive, decoded in a thread; who comes late gets the newest.
+
+    To be used as a context: it lets go of the clip before that is closed.
+    """
+
+    def __init__(self, clip: Clip) -> None:
+        self._clip = clip
+        self._changed = threading.Condition()
+        self._newest: _Arrived | None = None
+        self._ended: BaseException | None = None
+        self._over = self._unwanted = False
+        self._thread = threading.Thread(target=self._read, name=f"read {clip.camera}", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._unwanted = True
+        self._thread.join()
+
+    def __iter__(self) -> Iterator[_Arrived]:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._newest is not None or self._over)
+                newest, self._newest = self._newest, None
+            if newest is None:
+                if self._ended is not None:
+                    raise self._ended
+                return
+            yield newest
+
+    def _read(self) -> None:
+        try:
+            for number, shot in enumerate(self._clip.shots()):
+                if self._unwanted:
+                    break
+                with self._changed:
+                    self._newest = _Arrived(shot.picture, number, time.time_ns())
+                    self._changed.notify()
+        except BaseException as error:
+            self._ended = error
+        with self._changed:
+            self._over = True
+            self._changed.notify()
+
+
+@dataclass
+class LiveCamera:
+    """A camera that is followed in its stream at `address` by a thread of its own, from where it is `stored`.
+
+    `every`: lines are measured in every so many-th picture. `report` takes each pose, `complain` what goes wrong, in
+    words; both are called by that thread.
+    """
+
+    pitch: Field
+    stored: Camera
+    address: str
+    every: int
+    report: Callable[[LivePose], None]
+    complain: Callable[[str], None]
+    _stop: threading.Event = field(default_factory=threading.Event, init=False)
+
+    def start(self) -> None:
+        """Begin to follow it."""
+        threading.Thread(target=self._run, name=f"follow {self.stored.id}", daemon=True).start()
+
+    def anchor(self, stored: Camera) -> None:
+        """Begin anew from another stored pose, at the next picture."""
+        self.stored = stored
+
+    def stop(self) -> None:
+        """End after the picture that is looked at."""
+        self._stop.set()
+
+    def _run(self) -> None:
+        pause_s = FIRST_PAUSE_S
+        while not self._stop.is_set():
+            opened = time.monotonic()
+            try:
+                with Clip.open(self.stored.id, self.address, opened) as clip:
+                    self._follow(clip)
+                ended = f"camera {self.stored.id}: its stream has ended"
+            except VideoError as error:
+                ended = str(error)
+            if self._stop.is_set():
+                return
+            # A stream that ran for long begins anew with the shortest pause.
+            pause_s = (
+                FIRST_PAUSE_S if time.monotonic() - opened > LONGEST_PAUSE_S else min(2 * pause_s, LONGEST_PAUSE_S)
+            )
+            self.complain(f"{ended}; it is opened again in {pause_s:.0f} s")
+            self._stop.wait(pause_s)
+
+    def _follow(self, clip: Clip) -> None:
+        """Follow the camera through a stream until that ends. Raises `VideoError`."""
+        tracked: _Tracked | None = None
+        tried_at = -LOST_PAUSE_S
+        with _NewestPicture(clip) as pictures:
+            for arrived in pictures:
+                if self._stop.is_set():
+                    return
+                if tracked is not None and tracked.goes_on(arrived, self.stored):
+                    self.report(tracked.at(arrived))
+                elif time.monotonic() - tried_at >= LOST_PAUSE_S:
+                    tried_at = time.monotonic()
+                    tracked = self._found(clip, arrived)
+
+    def _found(self, clip: Clip, arrived: _Arrived) -> _Tracked | None:
+        """Find the camera in a picture, near to where it is stored."""
+        stored, rate = self.stored, clip.facts.rate
+        camera = camera_for_clip(stored, clip)
+        first = {camera.id: arrived.picture.colours}
+        try:
+            tracker = CameraTracker(self.pitch, [camera], first, float(rate), self.every)
+        except CalibrationError:
+            self.complain(
+                f"camera {camera.id}: its lines are not seen near where the stored pose expects them; its stored pose "
+                "is sent. Calibrate the venue, or look at the picture"
+            )
+            return None
+        found = _Tracked(tracker, stored, rate, arrived.number, time.monotonic())
+        self.report(found.now(arrived))
+        return found
+
+
+@dataclass
+class _Tracked:
+    """A camera that was found in a picture and is followed since, from where it was `stored`.
+
+    `number`: of the last picture that was looked at; `seen_s`: when its lines were last where they were expected.
+    """
+
+    tracker: CameraTracker
+    stored: Camera
+    rate: Fraction
+    number: int
+    seen_s: float
+
+    def goes_on(self, arrived: _Arrived, stored: Camera) -> bool:
+        """Whether the camera can be followed from where it was: it was seen lately, and no new pose is stored."""
+        gap_s = (arrived.number - self.number) / float(self.rate)
+        return stored is self.stored and gap_s <= LONGEST_GAP_S and time.monotonic() - self.seen_s <= LOST_AFTER_S
+
+    def at(self, arrived: _Arrived) -> LivePose:
+        """The pose by a picture. Pictures that were left out pass as if they had shown nothing."""
+        for _ in range(arrived.number - self.number - 1):
+            self.tracker.see({})
+        self.tracker.see({self.stored.id: arrived.picture.colours} if self.tracker.looks else {})
+        self.number = arrived.number
+        return self.now(arrived)
+
+    def now(self, arrived: _Arrived) -> LivePose:
+        """The newest pose; what was before it is forgotten."""
+        (followed,) = self.tracker.now.cameras
+        self.tracker.settled()
+        if followed.how == "measured":
+            self.seen_s = time.monotonic()
+        return LivePose(followed, arrived.at_ns, arrived.number, self.rate)
