@@ -13,7 +13,9 @@ SITE_PART = "site"
 
 LensModel = Literal["opencv", "fisheye"]
 # Of files that poses leave in; `service.formats.table` has what is behind the names.
-FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
+FormatName = Literal[
+    "json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "pose2sim", "st-map", "st-map-unreal"
+]
 # What a list says of each of its entries.
 ListFields = Literal["all", "summary"]
 # With which lens: the one that the venue has, or the one that the lines have.
