@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
@@ -29,6 +29,7 @@ FieldNumber = Literal["ridge_height_m", "length_m", "width_m"]
 Scope = Literal["read", "calibrate", "admin"]
 # Of what happens to venues; `venue.*`: whatever begins so.
 EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
+EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
 # Of jobs.
 JobKind = Literal["calibration", "intrinsics", "locate", "field", "find"]
 JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]
