@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long check wheel bench bench-find bench-knocked bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long format check wheel bench bench-find bench-knocked bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
 
 setup: $(VENV)/.installed
 
@@ -31,6 +31,11 @@ test-fast: setup
 # Before a release: a year of a venue, more made-up requests, and where ../shared/real is, the walk of docs/first-calibration.md.
 test-long: setup
 	$(PYTEST) -m long
+
+# What `make check` says of layout and imports, mended.
+format: setup
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
 
 check: setup
 	$(BIN)/ruff format --check .

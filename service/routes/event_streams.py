@@ -16,7 +16,7 @@ from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.missing import no_such_venue
 from service.schemas.events.venue_event import FINAL_EVENT
-from service.schemas.names import EventKind
+from service.schemas.names import EVENT_KINDS, EventKind
 from service.store.database import DATABASE_OUTAGES
 from service.store.events.feed import NumberedEvent
 
@@ -66,7 +66,7 @@ async def venue_events(
     venue_id: Annotated[str, Depends(_followed_venue)],
     context: InContext,
     seen: LastSeenNumber,
-    events: Annotated[list[EventKind], Query(max_length=4, description="Only these; absent: all.")] = [],  # noqa: B006
+    events: Annotated[list[EventKind], Query(max_length=len(EVENT_KINDS), description="Only these; absent: all.")] = [],  # noqa: B006
 ) -> AsyncIterable[ServerSentEvent]:
     """Stream what happens to a venue as server-sent events: each has the name of its `type`, and the body of a webhook.
 

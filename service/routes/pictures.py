@@ -111,7 +111,7 @@ for each in PICTURES:
     responses={200: {"content": {JPEG: BINARY, PNG: BINARY}}, **problem_responses(404, 410)},
 )
 def job_frame(job: ExistingJob, number: Annotated[int, Path(ge=0, le=10_000)], context: InContext) -> Response:
-    """Return a frame or photo of a job as it came; `frames` of the job has the addresses of all."""
+    """Return a frame or photo of a job as it came. `frames` of the job has the addresses of all."""
     path = context.jobs.frame(job.id, number)
     data = None if path is None else context.blobs.get(path)
     if data is None and job.frames:

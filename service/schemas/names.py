@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
@@ -13,7 +13,9 @@ SITE_PART = "site"
 
 LensModel = Literal["opencv", "fisheye"]
 # Of files that poses leave in; `service.formats.table` has what is behind the names.
-FormatName = Literal["json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"]
+FormatName = Literal[
+    "json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "pose2sim", "st-map", "st-map-unreal"
+]
 # What a list says of each of its entries.
 ListFields = Literal["all", "summary"]
 # With which lens: the one that the venue has, or the one that the lines have.
@@ -27,6 +29,7 @@ FieldNumber = Literal["ridge_height_m", "length_m", "width_m"]
 Scope = Literal["read", "calibrate", "admin"]
 # Of what happens to venues; `venue.*`: whatever begins so.
 EventKind = Literal["poses.changed", "venue.*", "job.*", "alarm.*"]
+EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
 # Of jobs.
 JobKind = Literal["calibration", "intrinsics", "locate", "field", "find"]
 JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]

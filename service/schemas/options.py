@@ -30,10 +30,10 @@ class Options(Handling):
     preset: Annotated[Literal["esc", "paper", "scpr"], OPEN_WORD] = "esc"
     search: Annotated[Literal["auto", "wide", "anywhere"], OPEN_WORD] = Field(
         "auto",
-        description="auto looks first whether the cameras stand almost where they stood, which takes no search, then "
-        "searches around their stored poses, and last where it stood, turned by any angle, for a camera whose lines "
-        "are clearly seen elsewhere; wide searches around the stored poses in any case, and nowhere else; anywhere "
-        "searches for each where it stood, and then anywhere.",
+        description="`auto`: no search where the cameras stand almost as stored, else one around the stored poses; "
+        "last, for a camera whose lines are clearly seen but not where its pose expects them, one where "
+        "it stood, turned by any angle. `wide`: around the stored poses in any case, and nowhere else. "
+        "`anywhere`: for every camera, first where it stood and then elsewhere too.",
     )
     seed: Annotated[Integer, Field(ge=0, le=2**53 - 1)] | None = Field(None, description="Absent: one is chosen.")
     generations: Annotated[Integer, Field(ge=1, le=2000)] = Field(100, description="G of the paper.")

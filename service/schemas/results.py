@@ -288,8 +288,9 @@ class Result(Schema):
     generations: int
     path: Annotated[Literal["near", "wide", "anywhere"], OPEN_WORD] = Field(
         "wide",
-        description="Whether the poses were found near the stored ones, by a search around these, or that of some "
-        "camera by a search anywhere.",
+        description="`near`: the cameras stand almost as stored, and no search was needed. `wide`: a search around the "
+        "stored poses. `anywhere`: some camera was lost and found again, where it stood, turned by any angle, or, with "
+        "`search` `anywhere`, elsewhere.",
     )
     timings_s: dict[str, float]
     cpu_s: dict[str, float] = CPU_S

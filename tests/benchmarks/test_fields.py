@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from fields.template import NAMES
 from tests.benchmarks.fields.engine import Engine
 from tests.benchmarks.fields.judging import caught, far_off, near, outcome, overconfident, reason, reasons, share
-from tests.benchmarks.fields.rendered import LARGE_M, random_camera, usual_field
+from tests.benchmarks.fields.rendered import GROUNDS, LARGE_M, random_camera, usual_field
 from tests.benchmarks.rows import Rows
 from worker.calibration.geometry.camera import inside
 
@@ -72,6 +73,10 @@ def test_what_has_been_run_is_not_run_again(tmp_path):
     assert again.remembered(key, lambda: pytest.fail("run again"))["accepted"]
     assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 1
     assert json.loads((tmp_path / "rows.jsonl").read_text())["key"] == key
+
+
+def test_every_sport_is_rendered_on_what_it_is_played_on():
+    assert set(GROUNDS) == set(NAMES)
 
 
 @pytest.mark.parametrize("name", ["volleyball", "football"])

@@ -1,6 +1,8 @@
 """Templates against the measures that the laws print: outer edges, inner edges and middles of the paint."""
 
 import math
+import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -11,6 +13,7 @@ from fields.shapes import Arc, Line, Spot, dashes
 from fields.template import NAMES, Template, load
 
 every = pytest.mark.parametrize("name", NAMES)
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "fields.md").read_text()
 
 
 def usual(name):
@@ -38,6 +41,13 @@ def test_a_template_names_its_source_and_its_size(name):
     assert {"length", "width", "line"} <= set(template.size)
     for extent in template.size.values():
         assert extent.least <= extent.default <= extent.most
+
+
+@every
+def test_a_template_has_a_row_with_its_usual_size_in_the_document(name):
+    size = usual(name)
+    row = rf"^\| `{name}` \| {size['length']:g} x {size['width']:g}[ ,].*\| {size['line']:g}[ ,]"
+    assert re.search(row, DOCUMENT, re.MULTILINE)
 
 
 @every

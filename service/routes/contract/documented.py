@@ -51,16 +51,16 @@ class DocumentedApp(FastAPI):
             schema = model.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
             document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
         document["components"]["securitySchemes"] = SECURITY_SCHEMES
-        for path in document["paths"].values():
+        for path in (*document["paths"].values(), *document["webhooks"].values()):
             for operation in path.values():
-                operation["summary"], operation["description"] = _summary_first(operation["description"])
+                operation["summary"] = _first_sentence(operation["description"])
         return document
 
 
-def _summary_first(description: str) -> tuple[str, str]:
-    """The first sentence of a route's description, which says more than the name of its function, and all of it."""
+def _first_sentence(description: str) -> str:
+    """The first sentence of a route's description, which says more than the name of its function, as plain text."""
     first = re.split(r"(?<=\.)\s", description, maxsplit=1)[0]
-    return " ".join(first.removesuffix(".").split()), description
+    return " ".join(first.removesuffix(".").replace("`", "").split())
 
 
 def document_callback(app: FastAPI) -> None:

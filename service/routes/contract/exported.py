@@ -24,7 +24,9 @@ from service.store.refined import with_refined
 DOCUMENTS: dict[int | str, dict[str, Any]] = {
     200: {
         "content": {
-            **dict.fromkeys(("application/yaml", "application/zip", "application/octet-stream"), BINARY),
+            **dict.fromkeys(
+                ("application/yaml", "application/zip", "application/octet-stream", "application/toml"), BINARY
+            ),
             "application/json": {},
         },
         **header_docs("ETag"),

@@ -50,8 +50,9 @@ UPLOAD["requestBody"]["content"]["multipart/form-data"]["encoding"][SITE_PART] =
     openapi_extra=UPLOAD | needs_scope("calibrate"),
 )
 async def find(venue_id: VenueIdPath, request: Request, context: InContext, sender: FromSender) -> Response:
-    """Find cameras from their frames and the field alone: of a stored venue, or of one that `site` describes.
+    """Find cameras from their frames and the field alone: those of a stored venue, or of a new one.
 
+    `site` describes a new venue; a stored one needs none.
     The result has candidates of each camera with pose and lens, and `candidate/{camera}/{number}.jpg` shows them.
     Nothing is stored by itself: `POST /venues/{id}/adopt-found` creates the venue or moves its cameras.
     """

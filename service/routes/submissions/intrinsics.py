@@ -42,7 +42,7 @@ async def intrinsics(
     context: InContext,
     sender: FromSender,
 ) -> Response:
-    """Submit photos of a board: the job's result is the lens of the camera that took them, `coverage.jpg` its basis."""
+    """Submit photos of a board, from which a job finds the lens. Its picture `coverage.jpg` shows what it rests on."""
     forms.require_form(request)
     await run_in_threadpool(forms.require_disk_space, context)
     await run_in_threadpool(job_submission.require_queue_room, context, None, "intrinsics", sender)

@@ -57,12 +57,9 @@ class VenueEvent(Attributed):
 
 
 Event = Annotated[PosesEvent | VenueEvent | JobEvent | AlarmEvent, Field(discriminator="type")]
+EVENT_MODELS: tuple[type[Attributed], ...] = get_args(get_args(Event)[0])
 # Those of a newer version are passed over.
-EVENT_TYPES = frozenset(
-    word
-    for event in (PosesEvent, VenueEvent, JobEvent, AlarmEvent)
-    for word in get_args(event.model_fields["type"].annotation)
-)
+EVENT_TYPES = frozenset(word for event in EVENT_MODELS for word in get_args(event.model_fields["type"].annotation))
 
 
 def matches_kinds(event: str, kinds: Collection[EventKind]) -> bool:

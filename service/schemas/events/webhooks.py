@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field
 
 from service.schemas.addresses import CallbackUrl
 from service.schemas.base import OPEN_WORD, Schema
-from service.schemas.names import EventKind
+from service.schemas.names import EVENT_KINDS, EventKind
 
 WEBHOOK_EXAMPLE: dict[str, Any] = {"url": "https://example.com/poses", "events": ["poses.changed"]}
 
@@ -19,6 +19,6 @@ class Webhook(Schema):
     model_config = ConfigDict(json_schema_extra={"examples": [WEBHOOK_EXAMPLE]})
 
     url: CallbackUrl
-    events: Annotated[list[Annotated[EventKind, OPEN_WORD]], Field(min_length=1, max_length=4)] = Field(
+    events: Annotated[list[Annotated[EventKind, OPEN_WORD]], Field(min_length=1, max_length=len(EVENT_KINDS))] = Field(
         ["poses.changed"]
     )

@@ -1,11 +1,13 @@
 import io
 import json
 import zipfile
+from typing import get_args
 
 import cv2
 import OpenEXR
 import pytest
 
+from service.schemas.names import FormatName
 from tests.e2e.program import NEARER
 from tests.e2e.running import SIZE
 
@@ -23,6 +25,7 @@ def poses(service, path, form, **more):
         ("freed", "application/octet-stream", "freed.d1"),
         ("colmap", "application/zip", "colmap.zip"),
         ("soccernet", "application/zip", "soccernet.zip"),
+        ("pose2sim", "application/toml", "pose2sim.toml"),
     ],
 )
 def test_the_poses_that_hold_are_a_file_in_each_format(service, name, form, media_type, file):
@@ -74,7 +77,7 @@ def test_a_format_that_is_none_is_refused_with_those_there_are(service, name):
     service.venue(name)
     answer = poses(service, f"/venues/{name}", "fbx")
     assert (answer.status_code, answer.json()["type"]) == (422, "/problems/invalid-request")
-    for form in ("json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "st-map", "st-map-unreal"):
+    for form in get_args(FormatName):
         assert f"'{form}'" in answer.json()["detail"]
 
 

@@ -2,6 +2,7 @@
 
 import io
 import json
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from service.formats import colmap, freed, opencv, opentrackio, plain, soccernet
+from service.formats import colmap, freed, opencv, opentrackio, plain, pose2sim, soccernet
 from service.formats.lens import NumberedCamera
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera
@@ -264,6 +265,37 @@ def test_the_world_of_soccernet_has_z_down_and_the_near_side_ahead():
     assert 0 < parameters["tilt_degrees"] < 90
 
 
+# Pose2Sim, aniposelib
+
+
+def project_by_aniposelib(table, points):
+    """Pixels (N, 2) of our world points (N, 3), as the `Camera` of aniposelib does it from its table."""
+    rotation, translation, matrix, distortions = (
+        np.array(table[name], dtype=np.float64) for name in ("rotation", "translation", "matrix", "distortions")
+    )
+    return cv2.projectPoints(points, rotation, translation, matrix, distortions)[0][:, 0]
+
+
+@poses
+@pytest.mark.parametrize("distortion", [[], [0.1, 0.0, 1e-7, -2e-12], ALL_OF_OPENCV_8, WITH_TILT])
+def test_pose2sim_reprojects(rotation, distortion):
+    shots = [shot(distortion, rotation=rotation, number=number, focal=(2122.4, 2011.1)) for number in (1, 2)]
+    tables = tomllib.loads(pose2sim.write(shots).decode())
+    assert sorted(tables) == ["cam_01", "cam_02"]
+    for camera, table in zip(shots, tables.values(), strict=True):
+        assert (table["name"], table["size"], table["fisheye"]) == (camera.id, list(camera.size), False)
+        world, pixels = seen_points(camera)
+        assert farthest(project_by_aniposelib(table, world), pixels) < 1e-9
+
+
+def test_a_camera_called_metadata_stays_a_camera_for_pose2sim():
+    camera = shot()
+    named = NumberedCamera(camera.camera.model_copy(update={"id": "metadata"}), 1)
+    assert [(key, table["name"]) for key, table in tomllib.loads(pose2sim.write([named]).decode()).items()] == [
+        ("cam_01", "metadata")
+    ]
+
+
 # Ours
 
 
@@ -284,6 +316,7 @@ def test_our_json_gives_cameras_back_as_they_are():
         (soccernet.write, shot(WITH_TILT), ["tau_x", "tau_y"]),
         (opencv.write, shot(skew=1.0), ["skew"]),
         (colmap.write, [shot(skew=1.0)], ["skew"]),
+        (pose2sim.write, [shot(skew=1.0)], ["skew"]),
     ],
 )
 def test_a_lens_that_a_format_has_no_place_for_is_refused_and_named(write, camera, beyond):
@@ -298,7 +331,16 @@ def test_coefficients_that_are_zero_need_no_place():
     assert colmap.write([shot([0.1, 0.01, 0, 0] + [0] * 10)])
 
 
-@pytest.mark.parametrize("write", [opencv.write, opentrackio.write, soccernet.write, lambda one: colmap.write([one])])
+@pytest.mark.parametrize(
+    "write",
+    [
+        opencv.write,
+        opentrackio.write,
+        soccernet.write,
+        lambda one: colmap.write([one]),
+        lambda one: pose2sim.write([one]),
+    ],
+)
 def test_a_fisheye_is_refused_by_formats_that_know_no_such_lens(write):
     glass = shot([-0.02, 0.004, 0.0, 0.0])
     lens = glass.camera.intrinsics.model_copy(update={"model": "fisheye"})

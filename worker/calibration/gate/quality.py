@@ -122,8 +122,8 @@ class CameraResult(RefinedPose):
     segmentation; `evidence_before`: computes that at the stored pose, lazily, since a good answer needs none;
     `refusal`: why its pose must not replace the stored one, None when it may; `lens_found`: whether the camera's lens
     is not the stored one but what the lines say; `markings`: what is seen of each; `moved_in_all`: since its memory
-    began, None without one; `knocked`: whether it was found again farther from its stored pose than the gate allows, by
-    a search anywhere.
+    began, None without one; `knocked`: whether it was lost, searched for and found again farther from its stored pose
+    than the gate allows.
     """
 
     view: ViewCondition
