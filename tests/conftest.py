@@ -152,6 +152,7 @@ def engine(home, tmp_path):
     engine = connect(home.database_url(tmp_path))
     yield engine
     engine.dispose()
+    home.give_back(tmp_path)
 
 
 @pytest.fixture
@@ -161,3 +162,4 @@ def stock(home, tmp_path):
     stock = Stock(tmp_path, **home.settings(tmp_path))
     yield stock
     stock.engine.dispose()
+    home.give_back(tmp_path)

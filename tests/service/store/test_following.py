@@ -13,14 +13,6 @@ from tests.homes import in_both_homes
 from tests.worker.stock import Stock, anyway
 
 
-@pytest.fixture
-def stock(home, tmp_path):
-    home.make_database(tmp_path)
-    stock = Stock(tmp_path, **home.settings(tmp_path))
-    yield stock
-    stock.engine.dispose()
-
-
 def told(stock, venue="v", seen=0, kinds=()):
     """The types of the events after one."""
     return [one.event.type for one in stock.events.since(venue, seen, kinds, 100).events]
