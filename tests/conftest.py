@@ -37,7 +37,7 @@ PARTS = {
     "s3": "install the packages of the group dev (make setup), moto among them",
     "colmap": "install pycolmap, which the group dev has on machines that have a wheel of it (make setup)",
     "promtool": "install Prometheus (Debian: apt-get install prometheus)",
-    "browser": "install Chromium (Debian: apt-get install chromium)",
+    "browser": "install Chromium (Debian: apt-get install chromium-headless-shell, or chromium)",
     "nginx": "install nginx (Debian: apt-get install nginx)",
     "caddy": "install Caddy (Debian: apt-get install caddy)",
     "released": "fetch the whole history, which release 0.1.0 is built from (git fetch --unshallow)",
