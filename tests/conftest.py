@@ -37,7 +37,7 @@ PARTS = {
     "s3": "install the packages of the group dev (make setup), moto among them",
     "colmap": "install pycolmap, which the group dev has on machines that have a wheel of it (make setup)",
     "promtool": "install Prometheus (Debian: apt-get install prometheus)",
-    "browser": "install Chromium (Debian: apt-get install chromium)",
+    "browser": "install Chromium (Debian: apt-get install chromium-headless-shell, or chromium)",
     "nginx": "install nginx (Debian: apt-get install nginx)",
     "caddy": "install Caddy (Debian: apt-get install caddy)",
     "released": "fetch the whole history, which release 0.1.0 is built from (git fetch --unshallow)",
@@ -152,6 +152,7 @@ def engine(home, tmp_path):
     engine = connect(home.database_url(tmp_path))
     yield engine
     engine.dispose()
+    home.give_back(tmp_path)
 
 
 @pytest.fixture
@@ -161,3 +162,4 @@ def stock(home, tmp_path):
     stock = Stock(tmp_path, **home.settings(tmp_path))
     yield stock
     stock.engine.dispose()
+    home.give_back(tmp_path)

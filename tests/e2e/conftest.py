@@ -65,6 +65,7 @@ def start(home, tmp_path):
 
     def start(*arguments, **settings):
         folder = tmp_path / "esc"
+        home.make_database(folder)
         started.append(Service(folder, *arguments, **environment(home.settings(folder)) | settings))
         return started[-1]
 

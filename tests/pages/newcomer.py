@@ -19,7 +19,7 @@ TRUTH = {
     for camera, pose in json.loads((DEMO / "truth.json").read_text())["poses"].items()
 }
 # What can be clicked well: crossings of lines, on both sides of each frame.
-CLICKED = 7
+CLICKED = 5
 # Two cameras of which nothing is known take a minute and a half of a core, of which others may have a share.
 FINDING_MS = 600_000
 

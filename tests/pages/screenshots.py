@@ -32,7 +32,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     path = chromium()
     if path is None:
-        raise SystemExit("install Chromium (Debian: apt-get install chromium)")
+        raise SystemExit("install Chromium (Debian: apt-get install chromium-headless-shell, or chromium)")
     with tempfile.TemporaryDirectory(prefix="esc-pages-") as data, service(Path(data)) as url, browser_at(path) as one:
         with person(one, url) as somebody, tab(somebody) as page:
             search = newcomer.finds_the_cameras(page)

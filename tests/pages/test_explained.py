@@ -11,7 +11,7 @@ from service.pages import documents
 from service.pages.problem_pages import DOCUMENT_NAME, wants_page
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS
 from tests.e2e.running import Service, keys_in
-from tests.pages.browsing import grave, in_each_scheme, look, wait_until
+from tests.pages.browsing import grave, in_each_scheme, keep_one_path, look, wait_until
 
 CHROME = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,image/webp,*/*;q=0.8"
 
@@ -113,7 +113,9 @@ def test_the_interface_is_drawn_without_internet_has_a_way_back_and_speaks_of_no
 
 
 def test_the_interface_has_the_colours_that_the_browser_prefers(stub, visit):
-    page = visit(stub.url, "/docs")
+    page = visit(stub.url, "/livez")
+    keep_one_path(page, "/venues")
+    page.goto("/docs")
     expect(page.get_by_text("venues", exact=True).first).to_be_visible()
     for scheme in in_each_scheme(page):
         wait_until(page, f"document.querySelector('rapi-doc').getAttribute('theme') == '{scheme}'")
@@ -123,7 +125,9 @@ def test_the_interface_has_the_colours_that_the_browser_prefers(stub, visit):
 def test_the_interface_takes_a_key_where_one_is_asked_for(tmp_path, visit):
     keys_in(tmp_path).add("reader", "read")
     service = Service(tmp_path, "serve")
-    page = visit(service.url, "/docs", forgiven=("401",))
+    page = visit(service.url, "/livez", forgiven=("401",))
+    keep_one_path(page, "/venues")
+    page.goto("/docs")
     expect(page.get_by_text("No API key applied")).to_be_visible()
     page.close()
     service.kill()

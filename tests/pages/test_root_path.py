@@ -8,7 +8,7 @@ import pytest
 
 from tests.e2e.running import Service, png, venue
 from tests.e2e.test_proxies import Nginx
-from tests.pages.browsing import PATIENCE_MS, tab
+from tests.pages.browsing import PATIENCE_MS, keep_one_path, tab
 
 ROOT = "/esc"
 # Addresses of ours in a page: none may begin at the root of the host.
@@ -55,6 +55,7 @@ def test_a_venue_is_made_calibrated_and_looked_at_below_the_path(below, proxied)
     page.get_by_role("button", name="Again").click()
     page.wait_for_url(lambda url: url != first and urlsplit(url).path.startswith(f"{ROOT}/ui/jobs/"))
     page.locator(f"a[href$='/ui/venues/{name}']").first.click()
+    keep_one_path(page, "/venues/{venue_id}")
     for address in ("/ui/new-venue/by-hand", f"/ui/venues/{name}/settings", f"/ui/venues/{name}/ignore", "/docs"):
         page.goto(f"{proxied.url}{address}")
     page.locator("rapi-doc").get_by_text("PUT").first.wait_for()

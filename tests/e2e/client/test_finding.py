@@ -8,7 +8,7 @@ import pytest
 
 from tests.e2e.commands import esc_here
 from tests.e2e.running import FRAMES
-from tests.e2e.worker.test_real_engine import cameras, frames, venue
+from tests.e2e.worker.test_real_engine import SIZE, cameras, frames, venue
 from tests.once import made_once
 
 
@@ -67,13 +67,13 @@ def test_what_was_found_calibrates(answered, tmp_path):
 def test_each_candidate_has_a_picture(answered):
     folder, *_ = answered
     picture = cv2.imread(str(folder / "pictures" / "candidate_left_1.jpg"))
-    assert picture.shape == (720, 1280, 3)
+    assert picture.shape == (SIZE[1], SIZE[0], 3)
 
 
 def test_a_frame_that_shows_no_field_is_refused_with_why_and_writes_no_venue(tmp_path):
     lens = ("image_size", "intrinsics")
     write(tmp_path, site(left=lens, right=lens))
-    grey = np.full((720, 1280, 3), 128, np.uint8)
+    grey = np.full((SIZE[1], SIZE[0], 3), 128, np.uint8)
     for camera in ("left", "right"):
         cv2.imwrite(str(tmp_path / f"{camera}.jpg"), grey)
     answer = find(tmp_path)

@@ -57,7 +57,7 @@ def test_a_job_with_options_of_a_newer_version_waits_for_a_worker_of_that_versio
     # The others go on.
     assert service.end(plain)["status"] == "succeeded"
     wait_for(lambda: unreadable(service) == 1)
-    time.sleep(3 * TAKEOVER_S)
+    time.sleep(2 * TAKEOVER_S)
     assert (service.job(newer)["status"], service.job(newer)["attempt"]) == ("queued", 0)
     # It is told of once, however often it is met.
     assert log_of(service).count("job left to a worker of a newer version") == 1

@@ -14,7 +14,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.geometry.rotation import rotation_angles_deg
 
-SIZE = (1280, 720)
+SIZE = (960, 540)
 PITCH = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
 MOVED_M = np.array([0.06, -0.05, 0.04])
 TURNED = np.array([0.006, -0.005, 0.004])
@@ -22,7 +22,7 @@ TURNED = np.array([0.006, -0.005, 0.004])
 
 def cameras() -> list[Camera]:
     lens = Intrinsics(
-        np.array([[820.0, 0, 641.0], [0, 820.0, 357.0], [0, 0, 1]]), np.array([-0.3, 0.08, 0, 0, 0]), SIZE
+        np.array([[615.0, 0, 480.5], [0, 615.0, 267.5], [0, 0, 1]]), np.array([-0.3, 0.08, 0, 0, 0]), SIZE
     )
     return [
         Camera("left", lens, Pose.looking_at([-0.9, -48.0, 12.0], [-22.0, -12.0, 0.0])),

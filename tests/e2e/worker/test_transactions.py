@@ -6,10 +6,10 @@ import sqlalchemy as sa
 
 from tests.homes import on_servers
 
-IDLE_S = 10
+IDLE_S = 5
 # A worker looks into the queue twice a second, and its duties look every other second.
 IDLE_PER_S = 4
-A_JOB_S = 3
+A_JOB_S = 2
 # From the request to the end, and what the worker asks while it computes.
 PER_JOB = 20
 

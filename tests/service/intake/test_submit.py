@@ -29,6 +29,7 @@ def context(home, tmp_path):
     context = Context(Settings(data=tmp_path, **home.settings(tmp_path)))
     yield context
     context.close()
+    home.give_back(tmp_path)
 
 
 @pytest.fixture

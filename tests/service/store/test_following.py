@@ -3,7 +3,6 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
-import pytest
 import sqlalchemy as sa
 
 from service.schemas.events.webhooks import Webhook
@@ -11,14 +10,6 @@ from service.schemas.job import JobError
 from service.store import tables
 from tests.homes import in_both_homes
 from tests.worker.stock import Stock, anyway
-
-
-@pytest.fixture
-def stock(home, tmp_path):
-    home.make_database(tmp_path)
-    stock = Stock(tmp_path, **home.settings(tmp_path))
-    yield stock
-    stock.engine.dispose()
 
 
 def told(stock, venue="v", seen=0, kinds=()):

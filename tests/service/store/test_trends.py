@@ -1,4 +1,7 @@
-"""The trend of each camera: counted from its anchor, charted, bounded and undone, in both homes."""
+"""The trend of each camera: counted from its anchor, charted, bounded and undone, in both homes.
+
+What months of nights add up to is counted alike in both, and tested in one.
+"""
 
 from datetime import UTC, datetime, timedelta
 
@@ -117,7 +120,6 @@ def test_restoring_takes_the_trend_back_to_what_it_was_then(stock):
     assert stock.attempts.begin(stock.submitted("v")).anchors == {}
 
 
-@in_both_homes
 def test_a_quiet_camera_is_said_to_be_quiet(stock):
     nights(stock, 40, AUTUMN, noisy(5))
     found = trend(stock)
@@ -128,7 +130,6 @@ def test_a_quiet_camera_is_said_to_be_quiet(stock):
     assert not any(chart.beyond for point in found.points for chart in point.charts)
 
 
-@in_both_homes
 def test_a_step_is_told_with_its_size_and_its_day_and_rings_where_it_matters(stock):
     venue = stock.venue("v")
     stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.03)}), anyway)
@@ -144,7 +145,6 @@ def test_a_step_is_told_with_its_size_and_its_day_and_rings_where_it_matters(sto
     assert alarms[0].why == found.words
 
 
-@in_both_homes
 def test_a_shift_that_is_sure_but_small_drifts_and_rings_nothing(stock):
     venue = stock.venue("v")
     stock.venues.put(venue.model_copy(update={"alarms": Alarms(trend_m=0.2)}), anyway)
@@ -153,7 +153,6 @@ def test_a_shift_that_is_sure_but_small_drifts_and_rings_nothing(stock):
     assert stock.venues.health("v").alarms == []
 
 
-@in_both_homes
 def test_a_focal_length_that_creeps_is_named_with_what_it_moves(stock):
     nights(stock, 60, AUTUMN, noisy(2, focal=lambda number: 5e-5 * max(0, number - 20)))
     found = trend(stock)
@@ -186,7 +185,6 @@ def test_of_too_many_rows_the_last_of_each_day_and_the_newest_days_are_kept(stoc
     assert rows(stock) == 2 * 4
 
 
-@in_both_homes
 def test_what_is_usual_outlives_the_nights_that_it_was_learnt_from(stock, monkeypatch):
     monkeypatch.setattr(trends, "KEPT_ROWS", 25)
     nights(stock, 60, AUTUMN, noisy(3, lambda number: 0.0008 * number))

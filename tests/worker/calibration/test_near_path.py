@@ -82,7 +82,7 @@ def test_cameras_that_moved_far_are_searched_for():
 
 
 def test_what_a_search_would_refuse_is_not_accepted_nearby():
-    found = calibrated(frames={"left": [paint_frame(Field(92.0, 50.0), pair()[0])]}, generations=20)
+    found = calibrated(frames={"left": [paint_frame(Field(92.0, 50.0), pair()[0])]}, generations=20, recover="never")
     assert (found.path, found.verdict) == ("wide", "rejected")
 
 
@@ -138,7 +138,7 @@ def test_the_network_looks_in_full_at_a_camera_whose_lines_do_not_suffice():
     left, right = pair_frames()
     hidden = right.copy()
     hidden[:, : right.shape[1] * 3 // 4] = GRASS
-    found, shown = asked_of_network([left, hidden], generations=10)
+    found, shown = asked_of_network([left, hidden], generations=10, recover="never")
     assert found.in_full == ["right"]
     assert (hidden.shape[1], hidden.shape[0]) in shown
     assert found.cameras[0].accepted
@@ -149,7 +149,7 @@ def test_the_network_looks_in_full_where_an_overview_shows_most_lines_elsewhere(
     # White as the venue's lines: what is measured on those says nothing of it.
     for frame in striped:
         frame[frame.shape[0] // 2 :: 24] = 255
-    found, _ = asked_of_network(striped)
+    found, _ = asked_of_network(striped, recover="never")
     assert all(one.overlap.unexpected >= MUCH_UNEXPECTED for one in found.cameras)
     assert found.in_full == ["left", "right"]
 

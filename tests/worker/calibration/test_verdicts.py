@@ -21,7 +21,7 @@ from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.pairs import Pair
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.records import Calibration, Options
+from worker.calibration.records import Calibration, Options, Recover
 
 pytestmark = pytest.mark.slow
 
@@ -42,12 +42,12 @@ def pictures_of(rig) -> Pictures:
     return {one.id: paint_frame(pitch, one) for one in rig()}
 
 
-def run(rig, by: float = 1.0, **spoiled: NDArray[np.uint8]) -> Calibration:
+def run(rig, by: float = 1.0, recover: Recover = "never", **spoiled: NDArray[np.uint8]) -> Calibration:
     """Calibrate from outdated poses, some of the frames replaced."""
     outdated = [moved(one, tuple(by * np.array(TURN)), tuple(by * np.array(SHIFT))) for one in rig()]
     frames = {name: (spoiled.get(name, frame),) for name, frame in pictures_of(rig).items()}
     pitch = CROWNED if rig is chain else field("tennis")
-    return calibrate(pitch, outdated, frames, white_on_green, Options(seed=3))
+    return calibrate(pitch, outdated, frames, white_on_green, Options(seed=3, recover=recover))
 
 
 def verdicts(found: Calibration) -> dict[str, bool]:
@@ -105,7 +105,7 @@ def test_a_camera_that_sees_something_else_does_not_drag_the_others_along() -> N
 
 def test_two_good_cameras_of_four_are_accepted_whatever_the_others_see() -> None:
     other = {one.id: paint_frame(field("volleyball"), one) for one in court() if one.id in ("nw", "se")}
-    found = run(court, by=0.5, **other)
+    found = run(court, by=0.5, recover="propose", **other)
     assert verdicts(found) == {"sw": True, "se": False, "nw": False, "ne": True}
     off = off_m(found, court())
     assert max(off["sw"], off["ne"]) < 0.02

@@ -28,6 +28,8 @@ from worker.duties.scheduler import DEFER, Scheduler
 pytestmark = pytest.mark.slow
 
 LIMIT, VENUES = 3, 8
+# Several times as many as are fetched from at once.
+SILENT = 40
 
 
 def shows(cameras, _, frames=1, spacing_s=0, within_s=None):
@@ -38,12 +40,14 @@ def shows(cameras, _, frames=1, spacing_s=0, within_s=None):
 @pytest.fixture
 def home_of_schedules(home, tmp_path, monkeypatch):
     """A home whose queue is short; its cameras show something at once."""
+    home.make_database(tmp_path)
     made = ApplicationState(
         Settings(data=tmp_path, queue_limit=LIMIT, sources=["127.0.0.1"], **home.settings(tmp_path))
     )
     monkeypatch.setattr(made.snapshots, "take_of_all", shows)
     yield made
     made.close()
+    home.give_back(tmp_path)
 
 
 @pytest.fixture
@@ -350,18 +354,18 @@ def test_many_silent_cameras_of_a_host_hold_up_no_live_one_the_first_time(roomy,
     fetched_from, camera = quick_fetches(roomy, monkeypatch), NetworkCamera()
     with socket.create_server(("127.0.0.1", 0), backlog=1000) as silent:
         address = "http://{}:{}/".format(*silent.getsockname())
-        for number in range(100):
+        for number in range(SILENT):
             put(roomy, f"silent-{number}", source=f"{address}{number}")
         put(roomy, "z-live", source=camera.url("/ok"))
         fire_until_a_job_waits(roomy)
     camera.close()
-    # Those that were begun before the first had had their time, and of the other 90 and more none.
+    # Those that were begun before the first had had their time, and of the others none.
     assert len([source for source in fetched_from if source != camera.url("/ok")]) <= 2 * scheduler.AT_ONCE
 
 
 def test_from_cameras_that_cannot_be_connected_to_nothing_is_fetched_while_others_wait(roomy, monkeypatch):
     fetched_from, camera = quick_fetches(roomy, monkeypatch), NetworkCamera()
-    with hosts_that_accept_nobody(100) as addresses:
+    with hosts_that_accept_nobody(SILENT) as addresses:
         for number, address in enumerate(addresses):
             put(roomy, f"dead-{number}", source=address)
         put(roomy, "z-live", source=camera.url("/ok"))

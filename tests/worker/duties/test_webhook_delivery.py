@@ -58,6 +58,7 @@ def stock(home, tmp_path):
     yield stock
     for one in stocks:
         one.engine.dispose()
+    home.give_back(tmp_path)
 
 
 @pytest.fixture
