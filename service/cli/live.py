@@ -41,6 +41,9 @@ def live(
             "`video`. Of other cameras the stored pose is sent.",
         ),
     ] = None,
+    hold: Annotated[
+        bool, typer.Option("--hold", help="Send the stored poses alone, as is done where no stream is given.")
+    ] = False,
     follow_every: Annotated[
         int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
     ] = 1,
@@ -75,6 +78,8 @@ def live(
     a pose for each picture.
     """
     addresses = parse_by_camera(streams or [], "CAMERA=STREAM, for instance left=rtsp://10.1.0.7/main")
+    if hold and addresses:
+        fail("--hold sends stored poses alone: leave it out, or the streams", USAGE)
     beat = _parse_rate(rate)
     from service.live.destinations import UdpSocket
 

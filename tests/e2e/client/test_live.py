@@ -75,6 +75,7 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (["left=rtsp://10.1.0.7/main", "--hold"], "--hold sends stored poses alone"),
         (["--rate", "0"], "--rate 0: samples a second"),
         (["--freed", "10.1.0.20"], "--freed 10.1.0.20: expected HOST:PORT"),
         (["--opentrackio", "10.1.0.20:70000"], "expected HOST:PORT"),
