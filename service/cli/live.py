@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera
-from service.cli.printing import USAGE, fail, print_note
+from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
 from service.cli.service_client import load_venue
 
 if TYPE_CHECKING:
-    from service.cli.followed_cameras import FollowedCameras
+    from service.cli.tracked_streams import TrackedStreams
     from service.live.destinations import Destination, UdpSocket
-    from service.live.hold import HeldPoses
+    from service.live.stored_poses import StoredPoses
     from service.schemas.venue import Venue
 
 # Accepted jobs come every few minutes; a renderer may see the new pose so much later.
@@ -74,7 +74,7 @@ def live(
 ) -> None:
     """Send the poses of a venue to renderers until stopped, by OpenTrackIO and FreeD over UDP.
 
-    Stored poses at a steady rate, and new ones soon after a job is accepted; of cameras that are followed in a stream
+    Stored poses at a steady rate, and new ones soon after a job is accepted; of cameras that are tracked in a stream
     a pose for each picture.
     """
     addresses = parse_by_camera(streams or [], "CAMERA=STREAM, for instance left=rtsp://10.1.0.7/main")
@@ -98,46 +98,27 @@ def _send(
     service: tuple[str, str | None] | None,
 ) -> None:
     """Send poses until stopped; `service`: its address and key, where it is to be asked for new ones."""
-    from service.cli.followed_cameras import FollowedCameras
-    from service.live.destinations import Outlet
-    from service.live.hold import HeldPoses, send_held
+    from service.cli.tracked_streams import TrackedStreams
+    from service.live.destinations import PoseSender
+    from service.live.stored_poses import StoredPoses, send_stored_poses
 
-    poses, stop, complaints = HeldPoses(stored), threading.Event(), _Complaints()
-    outlet = Outlet(destinations, lambda error: complaints.say(f"Not sent: {error}"))
-    followed = FollowedCameras.of(stored, addresses, every, outlet)
+    poses, stop, trouble = StoredPoses(stored), threading.Event(), OngoingTrouble()
+    sender = PoseSender(destinations, lambda error: trouble.say(f"Not sent: {error}"))
+    streams = TrackedStreams.of(stored, addresses, every, sender)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     if service is not None:
-        threading.Thread(target=_follow_venue, args=(poses, followed, *service, stop), daemon=True).start()
+        threading.Thread(target=_ask_for_poses, args=(poses, streams, *service, stop), daemon=True).start()
     cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
     print_note(f"Sending the poses of venue {stored.id}, stored ones {float(beat):g} times a second: {cameras}")
-    followed.start()
-    send_held(poses, outlet, beat, stop, followed.is_followed)
-    followed.stop()
+    streams.start()
+    send_stored_poses(poses, sender, beat, stop, streams.is_tracked)
+    streams.stop()
     print_note("Stopped.")
 
 
-class _Complaints:
-    """What goes wrong again and again is said when it begins."""
-
-    def __init__(self) -> None:
-        self._said = ""
-
-    def say(self, words: str) -> None:
-        """Print it, unless it was the last thing said."""
-        if words != self._said:
-            print_note(words)
-        self._said = words
-
-    def over(self, words: str) -> None:
-        """Print that it is over, if anything was wrong."""
-        if self._said:
-            print_note(words)
-        self._said = ""
-
-
-def _follow_venue(
-    poses: HeldPoses, followed: FollowedCameras, url: str, api_key: str | None, stop: threading.Event
+def _ask_for_poses(
+    poses: StoredPoses, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event
 ) -> None:
     """Ask for the venue's poses again and again; where the service does not answer, the last ones hold."""
     import time
@@ -146,18 +127,18 @@ def _follow_venue(
 
     from service.client import Client, NotUnderstood, Refused
 
-    complaints, venue = _Complaints(), poses.venue.id
+    trouble, venue = OngoingTrouble(), poses.venue.id
     with Client(url, api_key) as client:
         while not stop.wait(LOOK_AGAIN_S):
             try:
                 now = client.venue(venue)
                 new = poses.replace(now, time.monotonic())
             except (Refused, NotUnderstood, httpx.HTTPError) as error:
-                complaints.say(f"Poses stay as they are, the service does not tell them: {error}")
+                trouble.say(f"Poses stay as they are, the service does not tell them: {error}")
                 continue
-            complaints.over("The service tells its poses again")
+            trouble.over("The service tells its poses again")
             if new:
-                followed.anchor([camera for camera in now.cameras if camera.id in new])
+                streams.anchor([camera for camera in now.cameras if camera.id in new])
                 print_note(f"New pose or lens: {', '.join(new)}")
 
 

@@ -34,6 +34,25 @@ def print_note(line: str) -> None:
     print(line, file=sys.stderr)
 
 
+class OngoingTrouble:
+    """Prints what goes wrong when it begins and when it is over, however often it is said in between."""
+
+    def __init__(self) -> None:
+        self._said = ""
+
+    def say(self, words: str) -> None:
+        """Print it, unless it was the last thing said."""
+        if words != self._said:
+            print_note(words)
+        self._said = words
+
+    def over(self, words: str) -> None:
+        """Print that it is over, if anything was wrong."""
+        if self._said:
+            print_note(words)
+        self._said = ""
+
+
 def print_json(what: BaseModel | dict[str, str]) -> None:
     """Print an answer, as JSON."""
     print(json.dumps(what, indent=2) if isinstance(what, dict) else what.model_dump_json(indent=2))

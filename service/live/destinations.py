@@ -127,7 +127,7 @@ class JsonLines:
         self.stream.flush()
 
 
-class Outlet:
+class PoseSender:
     """Sends samples to all `destinations`, those of each camera numbered from 0. Several threads may call it.
 
     What the network does not take is told to `failed`, and the next samples are sent all the same.

@@ -7,6 +7,7 @@ costs as much as thirty starts of a service.
 import json
 import re
 import sys
+from contextlib import contextmanager
 from functools import partial
 
 import pytest
@@ -60,18 +61,26 @@ def service(request, home):
 
 @pytest.fixture
 def start(home, tmp_path):
-    """Start services of one's own; all of them in one home unless told otherwise."""
+    """Start services of one's own; all of them in one home unless told otherwise, whose tables are there."""
+    with services_of_ones_own(home, tmp_path / "esc", home.make_database) as start:
+        yield start
+
+
+@contextmanager
+def services_of_ones_own(home, folder, prepare):
+    """What starts services in a home, which is prepared before each of them."""
     started = []
 
     def start(*arguments, **settings):
-        folder = tmp_path / "esc"
-        home.make_database(folder)
+        prepare(folder)
         started.append(Service(folder, *arguments, **environment(home.settings(folder)) | settings))
         return started[-1]
 
-    yield start
-    for one in started:
-        one.kill()
+    try:
+        yield start
+    finally:
+        for one in started:
+            one.kill()
 
 
 @pytest.fixture(scope="package")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.e2e.conftest import start as start
+from tests.e2e.conftest import services_of_ones_own
 from tests.released import Release, is_in_git, worker_beside
 
 
@@ -11,6 +11,13 @@ def release(missing, tmp_path_factory):
     if not is_in_git():
         missing("released")
     return Release(tmp_path_factory.mktemp("released"))
+
+
+@pytest.fixture
+def start(home, tmp_path):
+    """Start services of one's own in one home, whose tables the first of them makes: 0.1.0 reads no newer ones."""
+    with services_of_ones_own(home, tmp_path / "esc", lambda folder: None) as start:
+        yield start
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Cameras that are followed while they film: each stream by itself, its newest picture first, for months.
+"""Cameras that are tracked while they film: each stream by itself, its newest picture first, for months.
 
 A picture that comes while an earlier one is looked at takes the place of others that wait. A stream that breaks off, or
 whose pictures change their size, is opened again.
@@ -34,17 +34,17 @@ class LivePose:
     """A camera by one picture of its stream.
 
     `arrived_ns`: when the picture had been decoded, Unix time; `number`: of the picture, from 0 at the stream's first;
-    `rate`: of the stream; `followed`: pose, sigma and how it is known.
+    `rate`: of the stream; `tracked`: pose, sigma and how it is known.
     """
 
-    followed: TrackedPose
+    tracked: TrackedPose
     arrived_ns: int
     number: int
     rate: Fraction
 
 
 @dataclass(frozen=True)
-class _Arrived:
+class _ArrivedPicture:
     picture: Picture
     number: int
     at_ns: int
@@ -59,7 +59,7 @@ class _NewestPicture:
     def __init__(self, clip: Clip) -> None:
         self._clip = clip
         self._changed = threading.Condition()
-        self._newest: _Arrived | None = None
+        self._newest: _ArrivedPicture | None = None
         self._ended: BaseException | None = None
         self._over = self._unwanted = False
         self._thread = threading.Thread(target=self._read, name=f"read {clip.camera}", daemon=True)
@@ -72,7 +72,7 @@ class _NewestPicture:
         self._unwanted = True
         self._thread.join()
 
-    def __iter__(self) -> Iterator[_Arrived]:
+    def __iter__(self) -> Iterator[_ArrivedPicture]:
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._newest is not None or self._over)
@@ -89,7 +89,7 @@ class _NewestPicture:
                 if self._unwanted:
                     break
                 with self._changed:
-                    self._newest = _Arrived(shot.picture, number, time.time_ns())
+                    self._newest = _ArrivedPicture(shot.picture, number, time.time_ns())
                     self._changed.notify()
         except BaseException as error:
             self._ended = error
@@ -99,10 +99,10 @@ class _NewestPicture:
 
 
 @dataclass
-class LiveCamera:
-    """A camera that is followed in its stream at `address` by a thread of its own, from where it is `stored`.
+class StreamTracker:
+    """A camera that is tracked in its stream at `address` by a thread of its own, from where it is `stored`.
 
-    `every`: lines are measured in every so many-th picture. `report` takes each pose, `complain` what goes wrong, in
+    `every`: lines are measured in every so many-th picture. `report` takes each pose, `warn` what goes wrong, in
     words; both are called by that thread.
     """
 
@@ -111,12 +111,12 @@ class LiveCamera:
     address: str
     every: int
     report: Callable[[LivePose], None]
-    complain: Callable[[str], None]
+    warn: Callable[[str], None]
     _stop: threading.Event = field(default_factory=threading.Event, init=False)
 
     def start(self) -> None:
-        """Begin to follow it."""
-        threading.Thread(target=self._run, name=f"follow {self.stored.id}", daemon=True).start()
+        """Begin to track it."""
+        threading.Thread(target=self._run, name=f"track {self.stored.id}", daemon=True).start()
 
     def anchor(self, stored: Camera) -> None:
         """Begin anew from another stored pose, at the next picture."""
@@ -132,7 +132,7 @@ class LiveCamera:
             opened = time.monotonic()
             try:
                 with Clip.open(self.stored.id, self.address, opened) as clip:
-                    self._follow(clip)
+                    self._track(clip)
                 ended = f"camera {self.stored.id}: its stream has ended"
             except VideoError as error:
                 ended = str(error)
@@ -142,12 +142,12 @@ class LiveCamera:
             pause_s = (
                 FIRST_PAUSE_S if time.monotonic() - opened > LONGEST_PAUSE_S else min(2 * pause_s, LONGEST_PAUSE_S)
             )
-            self.complain(f"{ended}; it is opened again in {pause_s:.0f} s")
+            self.warn(f"{ended}; it is opened again in {pause_s:.0f} s")
             self._stop.wait(pause_s)
 
-    def _follow(self, clip: Clip) -> None:
-        """Follow the camera through a stream until that ends. Raises `VideoError`."""
-        tracked: _Tracked | None = None
+    def _track(self, clip: Clip) -> None:
+        """Track the camera through a stream until that ends. Raises `VideoError`."""
+        tracked: _Track | None = None
         tried_at = -LOST_PAUSE_S
         with _NewestPicture(clip) as pictures:
             for arrived in pictures:
@@ -157,9 +157,9 @@ class LiveCamera:
                     self.report(tracked.at(arrived))
                 elif time.monotonic() - tried_at >= LOST_PAUSE_S:
                     tried_at = time.monotonic()
-                    tracked = self._found(clip, arrived)
+                    tracked = self._locate(clip, arrived)
 
-    def _found(self, clip: Clip, arrived: _Arrived) -> _Tracked | None:
+    def _locate(self, clip: Clip, arrived: _ArrivedPicture) -> _Track | None:
         """Find the camera in a picture, near to where it is stored."""
         stored, rate = self.stored, clip.facts.rate
         camera = camera_for_clip(stored, clip)
@@ -167,19 +167,19 @@ class LiveCamera:
         try:
             tracker = CameraTracker(self.pitch, [camera], first, float(rate), self.every)
         except CalibrationError:
-            self.complain(
+            self.warn(
                 f"camera {camera.id}: its lines are not seen near where the stored pose expects them; its stored pose "
                 "is sent. Calibrate the venue, or look at the picture"
             )
             return None
-        found = _Tracked(tracker, stored, rate, arrived.number, time.monotonic())
+        found = _Track(tracker, stored, rate, arrived.number, time.monotonic())
         self.report(found.now(arrived))
         return found
 
 
 @dataclass
-class _Tracked:
-    """A camera that was found in a picture and is followed since, from where it was `stored`.
+class _Track:
+    """A camera that was found in a picture and is tracked since, from where it was `stored`.
 
     `number`: of the last picture that was looked at; `seen_s`: when its lines were last where they were expected.
     """
@@ -190,12 +190,12 @@ class _Tracked:
     number: int
     seen_s: float
 
-    def goes_on(self, arrived: _Arrived, stored: Camera) -> bool:
-        """Whether the camera can be followed from where it was: it was seen lately, and no new pose is stored."""
+    def goes_on(self, arrived: _ArrivedPicture, stored: Camera) -> bool:
+        """Whether the camera can be tracked from where it was: it was seen lately, and no new pose is stored."""
         gap_s = (arrived.number - self.number) / float(self.rate)
         return stored is self.stored and gap_s <= LONGEST_GAP_S and time.monotonic() - self.seen_s <= LOST_AFTER_S
 
-    def at(self, arrived: _Arrived) -> LivePose:
+    def at(self, arrived: _ArrivedPicture) -> LivePose:
         """The pose by a picture. Pictures that were left out pass as if they had shown nothing."""
         for _ in range(arrived.number - self.number - 1):
             self.tracker.see({})
@@ -203,10 +203,10 @@ class _Tracked:
         self.number = arrived.number
         return self.now(arrived)
 
-    def now(self, arrived: _Arrived) -> LivePose:
+    def now(self, arrived: _ArrivedPicture) -> LivePose:
         """The newest pose; what was before it is forgotten."""
-        (followed,) = self.tracker.now.cameras
+        (tracked,) = self.tracker.now.cameras
         self.tracker.settled()
-        if followed.how == "measured":
+        if tracked.how == "measured":
             self.seen_s = time.monotonic()
-        return LivePose(followed, arrived.at_ns, arrived.number, self.rate)
+        return LivePose(tracked, arrived.at_ns, arrived.number, self.rate)

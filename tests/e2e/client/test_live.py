@@ -88,7 +88,7 @@ def test_what_is_no_rate_or_address_is_a_usage_error(service, tmp_path, argument
 
 
 @pytest.mark.slow
-def test_a_camera_is_followed_in_its_stream_and_the_other_one_is_held(service, name, tmp_path):
+def test_a_camera_is_tracked_in_its_stream_and_of_the_other_one_the_stored_pose_is_sent(service, name, tmp_path):
     clip = film_shaking(tmp_path)["left"]
     service.http.put(f"/venues/{name}", json=document(name, pair())).raise_for_status()
     with live(service, name, f"left={clip}", "--json", "--rate", "5") as process:
@@ -97,7 +97,7 @@ def test_a_camera_is_followed_in_its_stream_and_the_other_one_is_held(service, n
         right = next(line for line in lines if line["camera"] == "right")
     assert 0 < left["sigma_position_m"] < 0.1
     assert left["position"] == pytest.approx(pair()[0].pose.position.tolist(), abs=0.04)
-    assert right["status"] == "held"
+    assert right["status"] == "stored"
     assert "sigma_position_m" not in right
 
 

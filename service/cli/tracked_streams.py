@@ -1,4 +1,4 @@
-"""Cameras that `esc live` follows in their streams, and what it sends of them."""
+"""Cameras that `esc live` tracks in their streams, and what it sends of them."""
 
 from __future__ import annotations
 
@@ -7,53 +7,55 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
-from service.cli.printing import USAGE, fail, print_note
+from service.cli.printing import USAGE, OngoingTrouble, fail
 from service.formats.lens import NumberedCamera
 
 if TYPE_CHECKING:
-    from service.live.destinations import Outlet
+    from service.live.destinations import PoseSender
     from service.schemas.venue import Camera, Venue
-    from worker.video.live_tracking import LiveCamera, LivePose
+    from worker.video.live_tracking import LivePose, StreamTracker
 
 # A camera of which no pose came for so long is sent as it is stored.
 SILENT_S = 1.0
 
 
 @dataclass
-class FollowedCameras:
-    """The cameras that are followed, by their ids."""
+class TrackedStreams:
+    """The cameras that are tracked, by their ids."""
 
     numbers: Mapping[str, int]
-    outlet: Outlet
-    cameras: dict[str, LiveCamera] = field(default_factory=dict, init=False)
+    sender: PoseSender
+    cameras: dict[str, StreamTracker] = field(default_factory=dict, init=False)
     _last_s: dict[str, float] = field(default_factory=dict, init=False)
+    _trouble: dict[str, OngoingTrouble] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, venue: Venue, addresses: Mapping[str, str], every: int, outlet: Outlet) -> Self:
+    def of(cls, venue: Venue, addresses: Mapping[str, str], every: int, sender: PoseSender) -> Self:
         """Those of a venue of which a stream is given. `every`: lines are measured in every so many-th picture."""
         numbers = {camera.id: number for number, camera in enumerate(venue.cameras, 1)}
         unknown = [camera for camera in addresses if camera not in numbers]
         if unknown:
             fail(f"The venue has no camera {', '.join(unknown)}; it has {', '.join(numbers)}", USAGE)
-        found = cls(numbers, outlet)
+        found = cls(numbers, sender)
         if addresses:
             from service.cli.local_engine import engine_settings
 
             engine_settings()
             from worker.jobs.from_schemas import camera_with_ignored_areas, pitch_of
-            from worker.video.live_tracking import LiveCamera
+            from worker.video.live_tracking import StreamTracker
 
             pitch = pitch_of(venue.field)
             for camera in venue.cameras:
                 if camera.id in addresses:
                     stored = camera_with_ignored_areas(camera, camera.ignore)
-                    found.cameras[camera.id] = LiveCamera(
-                        pitch, stored, addresses[camera.id], every, found._report, print_note
+                    trouble = found._trouble[camera.id] = OngoingTrouble()
+                    found.cameras[camera.id] = StreamTracker(
+                        pitch, stored, addresses[camera.id], every, found._report, trouble.say
                     )
         return found
 
     def start(self) -> None:
-        """Begin to follow them."""
+        """Begin to track them."""
         for camera in self.cameras.values():
             camera.start()
 
@@ -64,22 +66,23 @@ class FollowedCameras:
 
     def anchor(self, stored: Sequence[Camera]) -> None:
         """Begin anew from new stored poses."""
-        followed = [camera for camera in stored if camera.id in self.cameras]
-        if followed:
+        tracked = [camera for camera in stored if camera.id in self.cameras]
+        if tracked:
             from worker.jobs.from_schemas import camera_with_ignored_areas
 
-            for camera in followed:
+            for camera in tracked:
                 self.cameras[camera.id].anchor(camera_with_ignored_areas(camera, camera.ignore))
 
-    def is_followed(self, camera: str) -> bool:
+    def is_tracked(self, camera: str) -> bool:
         """Whether poses of a camera come from its pictures at the moment."""
         return time.monotonic() - self._last_s.get(camera, -SILENT_S) < SILENT_S
 
     def _report(self, pose: LivePose) -> None:
         from service.cli.tracked_poses import camera_document
 
-        followed = pose.followed
-        self._last_s[followed.camera.id] = time.monotonic()
-        shot = NumberedCamera(camera_document(followed.camera), self.numbers[followed.camera.id])
-        sigma = followed.sigma.rotation_deg, followed.sigma.position_m
-        self.outlet.send([shot], pose.arrived_ns, pose.rate, followed.how, sigma)
+        tracked = pose.tracked
+        self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
+        self._last_s[tracked.camera.id] = time.monotonic()
+        shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
+        sigma = tracked.sigma.rotation_deg, tracked.sigma.position_m
+        self.sender.send([shot], pose.arrived_ns, pose.rate, tracked.how, sigma)

@@ -13,8 +13,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from service.live.destinations import FreeD, JsonLines, OpenTrackIO, Outlet, UdpSocket
-from service.live.hold import HeldPoses, send_held
+from service.live.destinations import FreeD, JsonLines, OpenTrackIO, PoseSender, UdpSocket
+from service.live.stored_poses import StoredPoses, send_stored_poses
 from service.schemas.geometry import Pose
 from service.schemas.venue import VenueIn
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
@@ -55,11 +55,11 @@ class Sending:
     """What is sent while the block runs."""
 
     def __init__(self, destinations, poses=None, rate=FASTEST):
-        self.poses = poses or HeldPoses(demo())
+        self.poses = poses or StoredPoses(demo())
         self.errors = []
         self._stop = threading.Event()
-        outlet = Outlet(destinations, self.errors.append)
-        self._thread = threading.Thread(target=send_held, args=(self.poses, outlet, rate, self._stop))
+        sender = PoseSender(destinations, self.errors.append)
+        self._thread = threading.Thread(target=send_stored_poses, args=(self.poses, sender, rate, self._stop))
 
     def __enter__(self):
         self._thread.start()
@@ -78,7 +78,7 @@ def test_samples_hold_to_the_schema_and_have_all_that_unreal_asks_of_a_camera(ud
         validator.validate(sample)
         camera = sample["static"]["camera"]
         assert all(camera[part] for part in ("make", "model", "serialNumber", "label"))
-        assert sample["tracker"]["status"] == "held"
+        assert sample["tracker"]["status"] == "stored"
         assert len(sample["transforms"]) == 1
     assert [sample["sourceNumber"] for _, sample in samples] == [1, 2, 1, 2]
     assert [sequence for sequence, _ in samples] == [0, 0, 1, 1]
@@ -138,7 +138,7 @@ def test_samples_come_at_their_rate(udp):
 def test_a_pose_that_changes_a_little_is_moved_to_within_a_second():
     venue = demo()
     camera = venue.cameras[0].id
-    poses = HeldPoses(venue)
+    poses = StoredPoses(venue)
     target = turned(venue, camera, 0.002)
 
     assert poses.replace(target, now=100.0) == [camera]
@@ -150,7 +150,7 @@ def test_a_pose_that_changes_a_little_is_moved_to_within_a_second():
 
 def test_a_pose_that_was_wrong_is_right_at_once():
     venue = demo()
-    poses = HeldPoses(venue)
+    poses = StoredPoses(venue)
     poses.replace(turned(venue, venue.cameras[0].id, math.radians(3)), now=100.0)
     turn = poses.at(100.0)[0].camera.pose.rotation[0] - venue.cameras[0].pose.rotation[0]
     assert turn == pytest.approx(math.radians(3))
@@ -158,7 +158,7 @@ def test_a_pose_that_was_wrong_is_right_at_once():
 
 def test_a_new_pose_on_the_way_to_another_is_moved_to_from_there():
     venue = demo()
-    camera, poses = venue.cameras[0].id, HeldPoses(demo())
+    camera, poses = venue.cameras[0].id, StoredPoses(demo())
     poses.replace(turned(venue, camera, 0.004), now=100.0)
     poses.replace(turned(venue, camera, 0.0), now=100.5)
     first = venue.cameras[0].pose.rotation[0]
@@ -167,7 +167,7 @@ def test_a_new_pose_on_the_way_to_another_is_moved_to_from_there():
 
 
 def test_an_unchanged_venue_changes_nothing():
-    poses = HeldPoses(demo())
+    poses = StoredPoses(demo())
     assert poses.replace(demo(), now=5.0) == []
 
 

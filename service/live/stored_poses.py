@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from service.formats.lens import NumberedCamera
-from service.live.destinations import Outlet
+from service.live.destinations import PoseSender
 from service.schemas.geometry import Pose
 from service.schemas.venue import Camera, Venue
 
-HELD = "held"
+STORED = "stored"
 # A pose that changes by less is moved to over so many seconds, which nobody sees; what changes more was wrong, and is
 # right at once.
 SMALL_TURN_RAD, SMALL_MOVE_M, MOVED_IN_S = math.radians(0.5), 0.1, 1.0
@@ -23,7 +23,7 @@ MOST_MISSED_S = 1.0
 
 
 @dataclass(frozen=True)
-class _Approach:
+class _Transition:
     """A camera on its way from a pose to a newer one, since `begun`, of `time.monotonic`."""
 
     before: Camera
@@ -52,26 +52,26 @@ def _is_small_step(before: Camera, after: Camera) -> bool:
 
 
 @dataclass
-class HeldPoses:
+class StoredPoses:
     """The poses of a venue that hold at a time. `replace` may be called by another thread."""
 
     venue: Venue
-    _approaches: dict[str, _Approach] = field(default_factory=dict, init=False)
+    _transitions: dict[str, _Transition] = field(default_factory=dict, init=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     def __post_init__(self) -> None:
-        self._approaches = {camera.id: _Approach(camera, camera, 0.0) for camera in self.venue.cameras}
+        self._transitions = {camera.id: _Transition(camera, camera, 0.0) for camera in self.venue.cameras}
 
     def replace(self, venue: Venue, now: float) -> list[str]:
         """Move to the poses of a venue, from where the cameras are `now`. Return the cameras whose poses are new."""
         with self._lock:
-            before = {camera: approach.at(now) for camera, approach in self._approaches.items()}
-            stored = {camera: approach.after for camera, approach in self._approaches.items()}
+            before = {camera: transition.at(now) for camera, transition in self._transitions.items()}
+            stored = {camera: transition.after for camera, transition in self._transitions.items()}
             new = [camera.id for camera in venue.cameras if not _is_alike(stored.get(camera.id), camera)]
-            self._approaches = {
-                camera.id: _Approach(before.get(camera.id, camera), camera, now)
+            self._transitions = {
+                camera.id: _Transition(before.get(camera.id, camera), camera, now)
                 if camera.id in new
-                else self._approaches[camera.id]
+                else self._transitions[camera.id]
                 for camera in venue.cameras
             }
             return new
@@ -79,29 +79,29 @@ class HeldPoses:
     def at(self, now: float) -> list[NumberedCamera]:
         """The cameras at a time, of `time.monotonic`, in the order of the venue."""
         with self._lock:
-            return [NumberedCamera(one.at(now), number) for number, one in enumerate(self._approaches.values(), 1)]
+            return [NumberedCamera(one.at(now), number) for number, one in enumerate(self._transitions.values(), 1)]
 
 
 def _is_alike(stored: Camera | None, camera: Camera) -> bool:
     return stored is not None and stored.pose == camera.pose and stored.intrinsics == camera.intrinsics
 
 
-def send_held(
-    poses: HeldPoses,
-    outlet: Outlet,
+def send_stored_poses(
+    poses: StoredPoses,
+    sender: PoseSender,
     rate: Fraction,
     stop: threading.Event,
-    is_followed: Callable[[str], bool] = lambda _: False,
+    is_tracked: Callable[[str], bool] = lambda _: False,
 ) -> int:
     """Send a sample of each camera `rate` times a second until `stop`; return how many times it was so far.
 
-    The beat is that of the machine's clock and does not drift. A camera that is followed in its pictures is left out.
+    The beat is that of the machine's clock and does not drift. A camera that is tracked in its pictures is left out.
     """
     sent, begun, beats = 0, time.monotonic(), 0
     while not stop.is_set():
-        held = [shot for shot in poses.at(time.monotonic()) if not is_followed(shot.id)]
-        if held:
-            outlet.send(held, time.time_ns(), rate, HELD)
+        stored = [shot for shot in poses.at(time.monotonic()) if not is_tracked(shot.id)]
+        if stored:
+            sender.send(stored, time.time_ns(), rate, STORED)
         sent, beats = sent + 1, beats + 1
         wait_s = begun + float(beats / rate) - time.monotonic()
         if wait_s < -MOST_MISSED_S:
