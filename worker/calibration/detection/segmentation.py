@@ -78,6 +78,8 @@ class Segmenter:
         options.inter_op_num_threads = 1
         # Regions differ in size: memory planned for one does not fit the next.
         options.enable_mem_pattern = False
+        # Threads that wait for the next layer, or for the next frame, would keep their cores busy: half of an overview.
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         return ort.InferenceSession(self._model, options, providers=[self._provider])
 
     @cached_property
