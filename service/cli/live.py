@@ -47,6 +47,16 @@ def live(
     follow_every: Annotated[
         int, typer.Option("--follow-every", min=1, max=25, metavar="N", help="Measure in every Nth picture only.")
     ] = 1,
+    predict: Annotated[
+        float,
+        typer.Option(
+            "--predict",
+            min=0,
+            max=1000,
+            metavar="MS",
+            help="Send tracked poses as they will be so many milliseconds after their pictures.",
+        ),
+    ] = 0,
     rate: Annotated[
         str, typer.Option("--rate", metavar="FPS", help="Samples of stored poses a second: 25, 50 or 30000/1001.")
     ] = "25",
@@ -86,7 +96,8 @@ def live(
     with UdpSocket(interface) as socket:
         destinations = _destinations(socket, opentrackio or [], freed or [], as_json=as_json)
         stored = load_venue(venue, url, api_key)
-        _send(stored, destinations, beat, addresses, follow_every, None if Path(venue).is_file() else (url, api_key))
+        service = None if Path(venue).is_file() else (url, api_key)
+        _send(stored, destinations, beat, addresses, follow_every, predict / 1000, service)
 
 
 def _send(
@@ -95,6 +106,7 @@ def _send(
     beat: Fraction,
     addresses: Mapping[str, str],
     every: int,
+    ahead_s: float,
     service: tuple[str, str | None] | None,
 ) -> None:
     """Send poses until stopped; `service`: its address and key, where it is to be asked for new ones."""
@@ -104,7 +116,7 @@ def _send(
 
     poses, stop, trouble = StoredPoses(stored), threading.Event(), OngoingTrouble()
     sender = PoseSender(destinations, lambda error: trouble.say(f"Not sent: {error}"))
-    streams = TrackedStreams.of(stored, addresses, every, sender)
+    streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     if service is not None:

@@ -30,8 +30,12 @@ class TrackedStreams:
     _trouble: dict[str, OngoingTrouble] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, venue: Venue, addresses: Mapping[str, str], every: int, sender: PoseSender) -> Self:
-        """Those of a venue of which a stream is given. `every`: lines are measured in every so many-th picture."""
+    def of(cls, venue: Venue, addresses: Mapping[str, str], every: int, ahead_s: float, sender: PoseSender) -> Self:
+        """Those of a venue of which a stream is given.
+
+        `every`: lines are measured in every so many-th picture; `ahead_s`: poses are sent as they will be so long after
+        their pictures.
+        """
         numbers = {camera.id: number for number, camera in enumerate(venue.cameras, 1)}
         unknown = [camera for camera in addresses if camera not in numbers]
         if unknown:
@@ -50,7 +54,7 @@ class TrackedStreams:
                     stored = camera_with_ignored_areas(camera, camera.ignore)
                     trouble = found._trouble[camera.id] = OngoingTrouble()
                     found.cameras[camera.id] = StreamTracker(
-                        pitch, stored, addresses[camera.id], every, found._report, trouble.say
+                        pitch, stored, addresses[camera.id], every, found._report, trouble.say, ahead_s
                     )
         return found
 
@@ -79,10 +83,11 @@ class TrackedStreams:
 
     def _report(self, pose: LivePose) -> None:
         from service.cli.tracked_poses import camera_document
+        from service.live.destinations import Tracked
 
         tracked = pose.tracked
         self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
         self._last_s[tracked.camera.id] = time.monotonic()
         shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
-        sigma = tracked.sigma.rotation_deg, tracked.sigma.position_m
-        self.sender.send([shot], pose.arrived_ns, pose.rate, tracked.how, sigma)
+        known = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)
+        self.sender.send([shot], pose.at_ns, pose.rate, tracked.how, known)

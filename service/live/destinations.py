@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,12 +24,35 @@ MULTICAST_TTL = 1
 
 
 @dataclass(frozen=True)
+class Tracked:
+    """How a pose is known that is tracked in pictures.
+
+    `clock`: by which its time is told, the camera's (`rtcp`) or this machine's when the picture came (`arrival`);
+    `arrived_ns`: when the picture had been decoded, Unix time.
+    """
+
+    sigma_rotation_deg: float
+    sigma_position_m: float
+    clock: str
+    arrived_ns: int
+
+    def to_json(self) -> dict[str, object]:
+        """For who reads lines of JSON; the latency is from the picture's arrival until now."""
+        return {
+            "sigma_rotation_deg": round(self.sigma_rotation_deg, 6),
+            "sigma_position_m": round(self.sigma_position_m, 6),
+            "clock": self.clock,
+            "latency_ms": round((time.time_ns() - self.arrived_ns) / 1e6, 1),
+        }
+
+
+@dataclass(frozen=True)
 class Sample:
-    """A camera at a moment. `sigma`: of its rotation in degrees and its position in metres, if it was measured then."""
+    """A camera at a moment. `tracked`: how that is known, unless it is the stored pose."""
 
     shot: NumberedCamera
     moment: opentrackio.Moment
-    sigma: tuple[float, float] | None = None
+    tracked: Tracked | None = None
 
 
 class Destination(Protocol):
@@ -121,8 +145,8 @@ class JsonLines:
                 "rotation": list(camera.pose.rotation),
                 "position": list(camera.pose.position),
             }
-            if sample.sigma is not None:
-                line["sigma_rotation_deg"], line["sigma_position_m"] = (round(value, 6) for value in sample.sigma)
+            if sample.tracked is not None:
+                line |= sample.tracked.to_json()
             print(json.dumps(line, separators=(",", ":")), file=self.stream)
         self.stream.flush()
 
@@ -145,12 +169,13 @@ class PoseSender:
         unix_ns: int,
         rate: Fraction,
         status: str,
-        sigma: tuple[float, float] | None = None,
+        tracked: Tracked | None = None,
     ) -> None:
         """Send a sample of each of these cameras; the other arguments as of `Moment` and `Sample`."""
         with self._lock:
             samples = [
-                Sample(shot, opentrackio.Moment(unix_ns, self._numbers[shot.id], rate, status), sigma) for shot in shots
+                Sample(shot, opentrackio.Moment(unix_ns, self._numbers[shot.id], rate, status), tracked)
+                for shot in shots
             ]
             self._numbers.update(shot.id for shot in shots)
             for destination in self._destinations:

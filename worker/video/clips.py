@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Self
 
 from worker.calibration.geometry.camera import Camera
 from worker.video.errors import VideoError
+from worker.video.stream_clock import StreamClock
 from worker.video.yuv_planes import Picture, picture_of
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ EARLIER_S = 1.0
 SAME_ASPECT = 0.005
 # Streams that do not know their rate name that of their clock.
 USUAL_RATE, HIGHEST_RATE = Fraction(25), 1000
+# libav's AV_CODEC_FLAG_LOW_DELAY.
+LOW_DELAY = 1 << 19
 NO_PYAV = "Video needs PyAV: pip install 'esc-calibration[video]'"
 
 
@@ -42,13 +45,14 @@ class ClipPicture:
     """A picture of a clip at its time.
 
     `sound`: packets of the sound that came since the shot before; `broken`: frames since then that could not be
-    decoded.
+    decoded; `taken_ns`: when it was taken by the clock of its camera, Unix time, where a live stream tells.
     """
 
     time_s: float
     picture: Picture
     sound: Sequence[Packet[AudioStream]] = ()
     broken: int = 0
+    taken_ns: int | None = None
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,7 @@ class Clip:
     since: float
     broken: int = field(default=0, init=False)
     sound: AudioStream | None = field(default=None, init=False)
+    _clock: StreamClock = field(default_factory=StreamClock, init=False)
     _zero: float | None = field(default=None, init=False)
 
     @classmethod
@@ -114,6 +119,10 @@ class Clip:
         """Read the sound along with the pictures."""
         self.sound = self.container.streams.audio[0]
 
+    def decode_without_delay(self) -> None:
+        """Decode on one core unless pictures come in slices: several cores would hold back a picture each."""
+        self.video.codec_context.flags |= LOW_DELAY
+
     def shots(self, begin_s: float = 0.0) -> Iterator[ClipPicture]:
         """The pictures from about a time on, to the end; `VideoError` where a picture is not as the first one."""
         self._zero = self._enter(begin_s)
@@ -124,6 +133,7 @@ class Clip:
                 if packet.pts is not None:
                     sound.append(packet)
                 continue
+            self._clock.learn(packet)
             frames, lost = _decoded(packet)
             broken += lost
             for frame in frames:
@@ -138,7 +148,8 @@ class Clip:
                     self._zero = at - self._lateness()
                 self._check(frame, at - self._zero)
                 self.broken += broken
-                yield ClipPicture(at - self._zero, picture_of(frame), sound, broken)
+                taken_ns = self._clock.taken_ns(frame.pts, frame.time_base)
+                yield ClipPicture(at - self._zero, picture_of(frame), sound, broken, taken_ns)
                 sound, broken = [], 0
         self.broken += broken
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Self
+from typing import Literal, Self
 
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
@@ -27,17 +27,24 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S, LOST_PAUSE_S = 1.0, 30.0, 1.0
 LONGEST_GAP_S = 5.0
 # Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
 LOST_AFTER_S = 3.0
+# A picture that says it is from the future or older than this comes from a camera whose clock is wrong.
+EARLIEST_S, LATEST_S = -0.1, 10.0
+
+Clock = Literal["rtcp", "arrival"]
 
 
 @dataclass(frozen=True)
 class LivePose:
     """A camera by one picture of its stream.
 
-    `arrived_ns`: when the picture had been decoded, Unix time; `number`: of the picture, from 0 at the stream's first;
-    `rate`: of the stream; `tracked`: pose, sigma and how it is known.
+    `tracked`: pose, sigma and how it is known; `at_ns`: the time that the pose is of, Unix time, and by which `clock`
+    that is known: the camera's, told by RTCP, or the `arrival` of the picture; `arrived_ns`: when the picture had been
+    decoded; `number`: of the picture, from 0 at the stream's first; `rate`: of the stream.
     """
 
     tracked: TrackedPose
+    at_ns: int
+    clock: Clock
     arrived_ns: int
     number: int
     rate: Fraction
@@ -45,9 +52,18 @@ class LivePose:
 
 @dataclass(frozen=True)
 class _ArrivedPicture:
+    """`stream_s`: its time in the stream; `taken_ns`: by the camera's clock; `at_ns`: when it had been decoded."""
+
     picture: Picture
     number: int
+    stream_s: float
+    taken_ns: int | None
     at_ns: int
+
+    @property
+    def delay_s(self) -> float | None:
+        """From when it was taken until it had been decoded, if both clocks are right."""
+        return None if self.taken_ns is None else (self.at_ns - self.taken_ns) / 1e9
 
 
 class _NewestPicture:
@@ -89,7 +105,7 @@ class _NewestPicture:
                 if self._unwanted:
                     break
                 with self._changed:
-                    self._newest = _ArrivedPicture(shot.picture, number, time.time_ns())
+                    self._newest = _ArrivedPicture(shot.picture, number, shot.time_s, shot.taken_ns, time.time_ns())
                     self._changed.notify()
         except BaseException as error:
             self._ended = error
@@ -102,8 +118,8 @@ class _NewestPicture:
 class StreamTracker:
     """A camera that is tracked in its stream at `address` by a thread of its own, from where it is `stored`.
 
-    `every`: lines are measured in every so many-th picture. `report` takes each pose, `warn` what goes wrong, in
-    words; both are called by that thread.
+    `every`: lines are measured in every so many-th picture; `ahead_s`: poses are told as they will be so long after
+    their pictures. `report` takes each pose, `warn` what goes wrong, in words; both are called by that thread.
     """
 
     pitch: Field
@@ -112,7 +128,9 @@ class StreamTracker:
     every: int
     report: Callable[[LivePose], None]
     warn: Callable[[str], None]
+    ahead_s: float = 0.0
     _stop: threading.Event = field(default_factory=threading.Event, init=False)
+    _is_clock_right: bool = field(default=True, init=False)
 
     def start(self) -> None:
         """Begin to track it."""
@@ -132,6 +150,7 @@ class StreamTracker:
             opened = time.monotonic()
             try:
                 with Clip.open(self.stored.id, self.address, opened) as clip:
+                    clip.decode_without_delay()
                     self._track(clip)
                 ended = f"camera {self.stored.id}: its stream has ended"
             except VideoError as error:
@@ -154,10 +173,29 @@ class StreamTracker:
                 if self._stop.is_set():
                     return
                 if tracked is not None and tracked.goes_on(arrived, self.stored):
-                    self.report(tracked.at(arrived))
+                    self._report(tracked.at(arrived, self.ahead_s), arrived, clip.facts.rate)
                 elif time.monotonic() - tried_at >= LOST_PAUSE_S:
                     tried_at = time.monotonic()
                     tracked = self._locate(clip, arrived)
+
+    def _report(self, tracked: TrackedPose, arrived: _ArrivedPicture, rate: Fraction) -> None:
+        clock: Clock = "rtcp" if self._tells_time(arrived) else "arrival"
+        taken_ns = arrived.at_ns if arrived.taken_ns is None or clock == "arrival" else arrived.taken_ns
+        at_ns = taken_ns + int(self.ahead_s * 1e9)
+        self.report(LivePose(tracked, at_ns, clock, arrived.at_ns, arrived.number, rate))
+
+    def _tells_time(self, arrived: _ArrivedPicture) -> bool:
+        """Whether the camera says when the picture was taken, by a clock that can be right."""
+        if arrived.delay_s is None:
+            return False
+        was_right, self._is_clock_right = self._is_clock_right, EARLIEST_S <= arrived.delay_s <= LATEST_S
+        if was_right and not self._is_clock_right:
+            off, side = abs(arrived.delay_s), "behind" if arrived.delay_s > 0 else "ahead of"
+            self.warn(
+                f"camera {self.stored.id}: its clock is {off:.1f} s {side} this machine's, so its pictures count from "
+                "when they arrive. Let both keep time by NTP"
+            )
+        return self._is_clock_right
 
     def _locate(self, clip: Clip, arrived: _ArrivedPicture) -> _Track | None:
         """Find the camera in a picture, near to where it is stored."""
@@ -172,8 +210,8 @@ class StreamTracker:
                 "is sent. Calibrate the venue, or look at the picture"
             )
             return None
-        found = _Track(tracker, stored, rate, arrived.number, time.monotonic())
-        self.report(found.now(arrived))
+        found = _Track(tracker, stored, 1 / float(rate), arrived.number, arrived.stream_s, time.monotonic())
+        self._report(found.now(self.ahead_s), arrived, rate)
         return found
 
 
@@ -181,32 +219,38 @@ class StreamTracker:
 class _Track:
     """A camera that was found in a picture and is tracked since, from where it was `stored`.
 
-    `number`: of the last picture that was looked at; `seen_s`: when its lines were last where they were expected.
+    `interval_s`: between pictures, as the stream says; `number` and `stream_s`: of the last picture that was looked at;
+    `seen_s`: when its lines were last where they were expected.
     """
 
     tracker: CameraTracker
     stored: Camera
-    rate: Fraction
+    interval_s: float
     number: int
+    stream_s: float
     seen_s: float
 
     def goes_on(self, arrived: _ArrivedPicture, stored: Camera) -> bool:
         """Whether the camera can be tracked from where it was: it was seen lately, and no new pose is stored."""
-        gap_s = (arrived.number - self.number) / float(self.rate)
-        return stored is self.stored and gap_s <= LONGEST_GAP_S and time.monotonic() - self.seen_s <= LOST_AFTER_S
+        gap_s = arrived.stream_s - self.stream_s
+        return stored is self.stored and 0 <= gap_s <= LONGEST_GAP_S and time.monotonic() - self.seen_s <= LOST_AFTER_S
 
-    def at(self, arrived: _ArrivedPicture) -> LivePose:
+    def at(self, arrived: _ArrivedPicture, ahead_s: float) -> TrackedPose:
         """The pose by a picture. Pictures that were left out pass as if they had shown nothing."""
-        for _ in range(arrived.number - self.number - 1):
-            self.tracker.see({})
-        self.tracker.see({self.stored.id: arrived.picture.colours} if self.tracker.looks else {})
-        self.number = arrived.number
-        return self.now(arrived)
+        pictures = arrived.number - self.number
+        # Streams whose times stand still come evenly.
+        passed_s = (arrived.stream_s - self.stream_s) / pictures or self.interval_s
+        for _ in range(pictures - 1):
+            self.tracker.see({}, passed_s)
+        self.tracker.see({self.stored.id: arrived.picture.colours} if self.tracker.looks else {}, passed_s)
+        self.number, self.stream_s = arrived.number, arrived.stream_s
+        return self.now(ahead_s)
 
-    def now(self, arrived: _ArrivedPicture) -> LivePose:
-        """The newest pose; what was before it is forgotten."""
-        (tracked,) = self.tracker.now.cameras
+    def now(self, ahead_s: float) -> TrackedPose:
+        """The newest pose, or the one so long after it; what was before is forgotten."""
+        newest = self.tracker.predicted(ahead_s) if ahead_s else self.tracker.now
+        (tracked,) = newest.cameras
         self.tracker.settled()
         if tracked.how == "measured":
             self.seen_s = time.monotonic()
-        return LivePose(tracked, arrived.at_ns, arrived.number, self.rate)
+        return tracked

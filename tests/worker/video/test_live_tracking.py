@@ -16,6 +16,7 @@ from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.video import clips
 from worker.video.live_tracking import StreamTracker
+from worker.video.stream_clock import StreamClock
 
 pytestmark = pytest.mark.slow
 
@@ -31,9 +32,9 @@ def clip(tmp_path_factory):
 class Tracking:
     """A camera while it is tracked, with all that it reports."""
 
-    def __init__(self, address, stored=STORED):
+    def __init__(self, address, stored=STORED, ahead_s=0.0):
         self.poses, self.warnings = queue.Queue(), queue.Queue()
-        self.camera = StreamTracker(CROWNED, stored, address, 1, self.poses.put, self.warnings.put)
+        self.camera = StreamTracker(CROWNED, stored, address, 1, self.poses.put, self.warnings.put, ahead_s)
 
     def __enter__(self):
         self.camera.start()
@@ -57,10 +58,36 @@ def test_the_pose_of_each_picture_that_was_looked_at_is_reported(clip):
     numbers = [pose.number for pose in poses]
     assert numbers == sorted(set(numbers))
     for pose in poses:
-        swung = derivatives.moved(TRUE, np.array([*turn(pose.number, 0.0), 0, 0, 0]))
-        assert turned_deg(pose.tracked.camera, swung) < 0.02
+        assert turned_deg(pose.tracked.camera, swung(pose.number)) < 0.02
         assert abs(pose.arrived_ns / 1e9 - time.time()) < 60
+        assert (pose.at_ns, pose.clock) == (pose.arrived_ns, "arrival")
     assert {pose.rate for pose in poses} == {25}
+
+
+def swung(number):
+    return derivatives.moved(TRUE, np.array([*turn(number, 0.0), 0, 0, 0]))
+
+
+def test_a_pose_that_is_told_ahead_is_of_a_time_after_its_picture(clip):
+    with Tracking(clip, ahead_s=0.12) as tracking:
+        pose = tracking.poses.get(timeout=60)
+    assert pose.at_ns - pose.arrived_ns == 120_000_000
+
+
+def test_times_of_a_camera_whose_clock_is_wrong_are_not_taken_over(clip, monkeypatch):
+    monkeypatch.setattr(StreamClock, "taken_ns", lambda *_: time.time_ns() - 3600 * 10**9)
+    with Tracking(clip) as tracking:
+        pose = tracking.poses.get(timeout=60)
+        assert (pose.clock, pose.at_ns) == ("arrival", pose.arrived_ns)
+        assert "its clock is 3600" in tracking.warnings.get(timeout=60)
+
+
+def test_times_of_a_camera_whose_clock_is_right_are_those_of_its_poses(clip, monkeypatch):
+    monkeypatch.setattr(StreamClock, "taken_ns", lambda *_: time.time_ns() - 10**9)
+    with Tracking(clip) as tracking:
+        pose = tracking.poses.get(timeout=60)
+    assert pose.clock == "rtcp"
+    assert 1.0 <= (pose.arrived_ns - pose.at_ns) / 1e9 < 2.0
 
 
 def test_a_stream_that_has_ended_is_opened_again(clip):

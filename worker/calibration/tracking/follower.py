@@ -99,10 +99,13 @@ class CameraTracker:
         """Whether lines are measured in the frames that are next."""
         return self._taken % self._every == 0
 
-    def see(self, frames: Mapping[str, Frame]) -> Moment:
-        """Take the next frames; a camera that has none coasts, and so do all where nobody `looks`."""
+    def see(self, frames: Mapping[str, Frame], seconds: float | None = None) -> Moment:
+        """Take the next frames; a camera that has none coasts, and so do all where nobody `looks`.
+
+        `seconds`: since the frames before, where they do not come evenly.
+        """
         for track in self._tracks:
-            track.see(frames.get(track.lines.reference.id) if self.looks else None, self._seconds)
+            track.see(frames.get(track.lines.reference.id) if self.looks else None, seconds or self._seconds)
         self._taken += 1
         return self.now
 
@@ -110,6 +113,10 @@ class CameraTracker:
     def now(self) -> Moment:
         """The moment of the last frames, by all frames up to it."""
         return Moment(self._taken - 1, [track.newest() for track in self._tracks])
+
+    def predicted(self, seconds: float) -> Moment:
+        """The moment so long after the last frames, should the cameras go on as they go."""
+        return Moment(self._taken - 1, [track.predicted(seconds) for track in self._tracks])
 
     def settled(self) -> list[Moment]:
         """The moments that enough frames have been seen after, each of them once."""
@@ -149,6 +156,10 @@ class _Track:
     def newest(self) -> TrackedPose:
         """Where it is now."""
         return self._followed(self._last, self._how[-1])
+
+    def predicted(self, seconds: float) -> TrackedPose:
+        """Where it will be so long after, and how sure that is."""
+        return self._followed(self._last.after(seconds).drawn_back(seconds), self._how[-1])
 
     def oldest(self) -> TrackedPose:
         """The oldest moment that has not settled, by all frames so far; it is forgotten then."""

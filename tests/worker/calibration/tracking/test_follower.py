@@ -11,6 +11,7 @@ from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
 from worker.calibration.detection.frame_fusion import Sway
 from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.camera import inside
+from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import CalibrationError
 from worker.calibration.tracking.follower import CameraTracker, Moment
 
@@ -98,6 +99,20 @@ def test_its_motion_is_known_as_well_as_it_says():
     about_mean = np.array([error for error, _ in ratios]) - np.mean([error for error, _ in ratios], axis=0)
     squared = [e @ np.linalg.solve(cov, e) / 6 for e, (_, cov) in zip(about_mean, ratios, strict=True)]
     assert 0.1 < np.mean(squared) < 2.0
+
+
+def test_where_it_will_be_is_told_with_a_sigma_that_covers_it():
+    ahead = 3
+    follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND)
+    off_deg, sigma, still_deg = [], [], []
+    for number in range(1, 30):
+        now = follower.see({"left": frame(number)})
+        (later,) = follower.predicted(ahead / FRAMES_PER_SECOND).cameras
+        off_deg.append(rotation_angles_deg(later.camera.pose.rotation, true(number + ahead).pose.rotation))
+        still_deg.append(rotation_angles_deg(now.cameras[0].camera.pose.rotation, true(number + ahead).pose.rotation))
+        sigma.append(later.motion_sigma.rotation_deg)
+    assert np.mean(off_deg[10:]) < 0.3 * np.mean(still_deg[10:])
+    assert all(off < 3 * one for off, one in zip(off_deg[10:], sigma[10:], strict=True))
 
 
 def test_without_frames_it_coasts_with_a_sigma_that_grows_and_is_found_again():

@@ -1,0 +1,51 @@
+"""When the pictures of a live stream were taken, by the clock of its camera.
+
+A camera tells by RTCP's sender reports (RFC 3550, 6.4.1) which wall-clock time belongs to a time of its stream. FFmpeg
+counts on from the last report and attaches the wall-clock time to the packets of RTSP streams as `AV_PKT_DATA_PRFT`
+(`AVProducerReferenceTime`): microseconds since 1970, 64 bits, then 32 bits of flags. Before the first report, and in
+streams of other kinds, there is none.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from av.packet import Packet
+
+WALL_CLOCK_US = struct.Struct("=q")
+
+
+@dataclass
+class StreamClock:
+    """Relates the times of a stream to the wall clock, anew with each report."""
+
+    _begin_ns: int | None = None
+    """Wall clock of the stream's time 0, nanoseconds since 1970."""
+    _is_told: bool = False
+
+    def learn(self, packet: Packet[Any]) -> None:
+        """Take what a packet says of the wall clock, if it says anything."""
+        from av.packet import PacketSideData
+
+        told = bytes(PacketSideData.from_packet(packet, "prft"))
+        if len(told) < WALL_CLOCK_US.size or packet.pts is None:
+            return
+        # FFmpeg's parser ends a picture at the first piece of the next one: the first time that is told is that one's.
+        if self._is_told:
+            (wall_us,) = WALL_CLOCK_US.unpack_from(told)
+            self._begin_ns = wall_us * 1000 - _nanoseconds(packet.pts, packet.time_base)
+        self._is_told = True
+
+    def taken_ns(self, pts: int | None, time_base: Fraction | None) -> int | None:
+        """Return when a picture of this time of the stream was taken, ns since 1970; None if nothing was reported."""
+        if self._begin_ns is None or pts is None or time_base is None:
+            return None
+        return self._begin_ns + _nanoseconds(pts, time_base)
+
+
+def _nanoseconds(ticks: int, time_base: Fraction) -> int:
+    return int(ticks * time_base * 1_000_000_000)
