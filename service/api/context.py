@@ -9,7 +9,7 @@ from fastapi import Depends, Path, Request
 from pydantic import AfterValidator
 
 from service.api.auth import Authenticator
-from service.api.change_watch import ChangeWatch, ClientSlots
+from service.api.change_watch import FILE_INTERVAL_S, INTERVAL_S, ChangeWatch, ClientSlots
 from service.api.programs.camera_views import CameraViews
 from service.api.programs.clicked_pose import ClickedPoses
 from service.api.programs.drawings import Drawings
@@ -34,8 +34,9 @@ class Context(ApplicationState):
         super().__init__(settings)
         silence_s = settings.takeover_after_s
         self.reads = SharedReads(self.jobs.get)
-        self.job_watch = ChangeWatch(self.jobs.states)
-        self.venue_watch = ChangeWatch(self.events.newest)
+        interval_s = FILE_INTERVAL_S if settings.home_database_url.startswith("sqlite") else INTERVAL_S
+        self.job_watch = ChangeWatch(self.jobs.states, interval_s)
+        self.venue_watch = ChangeWatch(self.events.newest, interval_s)
         self.followers = ClientSlots(settings.followers, "clients follow venues", "ESC_FOLLOWERS")
         self.waiters = ClientSlots(settings.waiters, "clients wait for jobs", "ESC_WAITERS")
         self.metrics = Metrics(lambda: read_statistics(self.engine, settings.metrics_venues), self.disk, silence_s)

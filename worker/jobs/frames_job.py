@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -72,7 +73,7 @@ def solve(
     cv2.setNumThreads(means.threads)
     spent = StageTimings()
     with spent.timed("decode"):
-        frames = {c.id: [decode_frame(c.id, c.image_size, file) for file in files[c.id]] for c in venue.cameras}
+        frames = _decode(venue, files, means.threads)
     cameras = [camera_with_ignored_areas(camera, camera.ignore) for camera in venue.cameras]
     given = EngineInputs(pitch_of(venue.field), cameras, frames, segmenter)
     with engine_failures():
@@ -83,3 +84,14 @@ def solve(
         drawn = draw(given, answer)
     result = tell(answer, spent, provenance_of(means, segmenter, options.get("seed") or 0, options))
     return Solution(result, drawn.pictures, drawn.later, remember(answer))
+
+
+def _decode(venue: Venue | inputs.Venue, files: Mapping[str, Sequence[bytes]], threads: int) -> Frames:
+    """The frames of each camera, several at once: OpenCV decodes one on one core."""
+    numbered = [(camera, file) for camera in venue.cameras for file in files[camera.id]]
+    with ThreadPoolExecutor(threads) as pool:
+        decoded = list(pool.map(lambda given: decode_frame(given[0].id, given[0].image_size, given[1]), numbered))
+    frames: dict[str, list[Picture]] = {camera.id: [] for camera in venue.cameras}
+    for (camera, _), frame in zip(numbered, decoded, strict=True):
+        frames[camera.id].append(frame)
+    return frames
