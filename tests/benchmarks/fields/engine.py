@@ -42,6 +42,7 @@ class Answer:
             "why": self.why,
             "seconds": self.seconds,
             "core_seconds": self.core_seconds,
+            "in_full": 0 if self.said is None else len(self.said.in_full),
         }
 
 

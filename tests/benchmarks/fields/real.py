@@ -98,13 +98,14 @@ def _starts(chosen: Sequence[Case], options: argparse.Namespace, engine: Engine)
                 sources[case.source].append({**row, **row["cameras"][case.name], "case": case.name, "n": number})
     yield f"{options.starts} starts of each, {options.turn:g}° and {options.shift:g} cm off."
     yield ""
-    yield f"| source | starts | {' | '.join(OUTCOMES)} | s | core-s |"
-    yield "|---|---|---|---|---|---|---|---|"
+    yield f"| source | starts | {' | '.join(OUTCOMES)} | network in full | s | core-s |"
+    yield "|---" * (len(OUTCOMES) + 5) + "|"
     for source, rows in sources.items():
         ends = [outcome(row["accepted"], row["near"]) for row in rows]
         seconds, cores = (np.median([row[name] for row in rows]) for name in ("seconds", "core_seconds"))
         cells = " | ".join(share([end == name for end in ends]) for name in OUTCOMES)
-        yield f"| {source} | {len(rows)} | {cells} | {seconds:.1f} | {cores:.1f} |"
+        in_full = sum(row["in_full"] > 0 for row in rows)
+        yield f"| {source} | {len(rows)} | {cells} | {in_full} | {seconds:.1f} | {cores:.1f} |"
     yield ""
     for source, rows in sources.items():
         for name in OUTCOMES[2:]:
