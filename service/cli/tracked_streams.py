@@ -3,40 +3,46 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
 from service.cli.printing import USAGE, OngoingTrouble, fail
 from service.formats.lens import NumberedCamera
+from service.live.reports import SILENT_S, SentPose
 
 if TYPE_CHECKING:
     from service.live.destinations import PoseSender
     from service.schemas.venue import Camera, Venue
     from worker.video.live_tracking import LivePose, StreamTracker
 
-# A camera of which no pose came for so long is sent as it is stored.
-SILENT_S = 1.0
-
 
 @dataclass
 class TrackedStreams:
-    """The cameras that are tracked, by their ids."""
+    """The cameras that are tracked, by their ids. `sent` is told of each pose after it was sent."""
 
     numbers: Mapping[str, int]
     sender: PoseSender
+    sent: Callable[[SentPose], None]
     cameras: dict[str, StreamTracker] = field(default_factory=dict, init=False)
     _last_s: dict[str, float] = field(default_factory=dict, init=False)
     _trouble: dict[str, OngoingTrouble] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, venue: Venue, addresses: Mapping[str, str], every: int, sender: PoseSender) -> Self:
+    def of(
+        cls,
+        venue: Venue,
+        addresses: Mapping[str, str],
+        every: int,
+        sender: PoseSender,
+        sent: Callable[[SentPose], None],
+    ) -> Self:
         """Those of a venue of which a stream is given. `every`: lines are measured in every so many-th picture."""
         numbers = {camera.id: number for number, camera in enumerate(venue.cameras, 1)}
         unknown = [camera for camera in addresses if camera not in numbers]
         if unknown:
             fail(f"The venue has no camera {', '.join(unknown)}; it has {', '.join(numbers)}", USAGE)
-        found = cls(numbers, sender)
+        found = cls(numbers, sender, sent)
         if addresses:
             from service.cli.local_engine import engine_settings
 
@@ -86,3 +92,5 @@ class TrackedStreams:
         shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
         sigma = tracked.sigma.rotation_deg, tracked.sigma.position_m
         self.sender.send([shot], pose.arrived_ns, pose.rate, tracked.how, sigma)
+        at_ns = pose.arrived_ns
+        self.sent(SentPose(shot.camera, tracked.how, sigma, pose.number, at_ns, at_ns, "arrival"))

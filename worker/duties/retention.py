@@ -42,7 +42,7 @@ log = structlog.get_logger()
 
 
 class Retention:
-    """Deletes frames, pictures, jobs, revisions, deliveries, events and minutes after the time that settings keep them."""
+    """Deletes frames, pictures, jobs, revisions, deliveries, events and live minutes that are past their time."""
 
     def __init__(
         self,

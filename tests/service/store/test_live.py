@@ -8,6 +8,7 @@ import sqlalchemy as sa
 from service.schemas.health import Alarms as Rules
 from service.schemas.live import LiveReport, LiveState
 from service.store import tables
+from service.store.statistics.snapshot import read_statistics
 from tests.homes import in_both_homes
 from tests.worker.stock import anyway
 from worker.duties.alarms import AlarmTimer
@@ -150,6 +151,17 @@ def test_a_process_that_is_not_heard_of_rings_unless_it_was_told_to_end(watched)
     told(watched, stopped=True)
     time_passes(watched, seconds=31)
     assert rings(watched) == []
+
+
+def test_prometheus_reads_whether_it_runs_what_is_measured_and_how_late_poses_are(stock):
+    stock.venue("v")
+    told(stock, camera(measured=6, coasted=2), camera("right", status="stored", stream=None, measured=0))
+    (live,) = read_statistics(stock.engine, 10).live
+    assert (live.venue, live.running, live.measured_share, live.latency_p99_s) == ("v", True, 0.75, 0.06)
+    time_passes(stock, seconds=6)
+    (live,) = read_statistics(stock.engine, 10).live
+    assert (live.running, live.latency_p99_s) == (False, None)
+    assert read_statistics(stock.engine, 0).live == []
 
 
 def test_a_venue_without_the_rule_never_rings_and_is_looked_at_once(stock):
