@@ -16,11 +16,11 @@ from service.api import problems
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
-from service.api.request_log import QUIET, RequestLog
+from service.api.request_log import RequestLog, is_quiet
 from service.api.root_path import RootPath
 from service.pages import FOR_BROWSERS
 from service.pages import ROUTERS as PAGES
-from service.routes import docs, event_streams, health, jobs, pictures, snapshot, stitch, venues
+from service.routes import docs, event_streams, health, jobs, live, pictures, snapshot, stitch, venues
 from service.routes.contract import documented
 from service.routes.contract.introduction import DESCRIPTION, TAGS
 from service.routes.submissions import find, frames, intrinsics, locate, resubmit
@@ -48,7 +48,7 @@ def create_app(settings: Settings) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         # Spans, if tracing.configure() found out where to send them; figures and logs have ways of their own.
-        telemetry={"metrics": False, "logs": False, "exclude": lambda scope: scope.get("path") in QUIET},
+        telemetry={"metrics": False, "logs": False, "exclude": is_quiet},
         responses=documented.problem_responses(422, 503),
         # Generated clients call their functions by it.
         generate_unique_id_function=lambda route: route.name,
@@ -68,6 +68,7 @@ def create_app(settings: Settings) -> FastAPI:
     for routes in (
         venues,
         event_streams,
+        live,
         snapshot,
         stitch,
         frames,
@@ -89,7 +90,7 @@ def create_app(settings: Settings) -> FastAPI:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
-    duties = (context.job_watch.run, context.venue_watch.run, context.authenticator.run)
+    duties = (context.job_watch.run, context.venue_watch.run, context.live_watch.run, context.authenticator.run)
     beside = [asyncio.create_task(duty()) for duty in duties]
     yield
     for task in beside:

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from service.schemas.events.venue_event import Event
     from service.schemas.find import SoughtSite
     from service.schemas.job import Job
+    from service.schemas.live import LiveHistory, LiveReport, LiveState
     from service.schemas.trend import Trend
 
 # Longer than the longest poll.
@@ -70,6 +71,8 @@ SILENCE_S = 45.0
 AGAIN_S = 2.0
 # A view of 8192 pixels and many cameras takes minutes.
 PACKAGE_S = 180.0
+# What is reported is old by then.
+REPORT_S = 5.0
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -237,6 +240,25 @@ class AsyncClient:
                     raise
                 pause_s = pause_s_of(error, AGAIN_S)
             await self._pause(pause_s)
+
+    async def report_live(self, venue_id: str, report: LiveReport) -> None:
+        """Report how the live poses of a venue are doing; for the process that sends them."""
+        # A service need not know a field that has its default.
+        content = report.model_dump(mode="json", exclude_defaults=True)
+        await self._ask("PUT", f"/venues/{venue_id}/live", json=content, timeout=REPORT_S)
+
+    async def live(self, venue_id: str) -> LiveState:
+        """How the live poses of a venue are doing: the newest report of the process that sends them."""
+        from service.schemas.live import LiveState
+
+        return _read(LiveState, await self._ask("GET", f"/venues/{venue_id}/live"))
+
+    async def live_history(self, venue_id: str, minutes: int = 60) -> LiveHistory:
+        """How they were doing in the last so many minutes, by the minute."""
+        from service.schemas.live import LiveHistory
+
+        params = {"minutes": minutes}
+        return _read(LiveHistory, await self._ask("GET", f"/venues/{venue_id}/live/history", params=params))
 
     async def snapshot(self, venue_id: str, camera: str) -> bytes:
         """What a camera shows now, a JPEG or PNG from its source."""
@@ -445,6 +467,9 @@ class Client:
     venue_poses = Call(AsyncClient.venue_poses)
     venue_stitch = Call(AsyncClient.venue_stitch)
     venue_events = Stream(AsyncClient.venue_events)
+    report_live = Call(AsyncClient.report_live)
+    live = Call(AsyncClient.live)
+    live_history = Call(AsyncClient.live_history)
     snapshot = Call(AsyncClient.snapshot)
     calibrate = Call(AsyncClient.calibrate)
     fit_field = Call(AsyncClient.fit_field)

@@ -230,6 +230,9 @@ class Settings(BaseSettings):
     keep_events_days: float = Field(
         3, ge=2, description="Days that events of venues are kept: who follows a venue may come back within them."
     )
+    keep_live_days: float = Field(
+        7, ge=1, le=7, description="Days that it is kept by the minute how live poses were doing."
+    )
     min_free_mb: float = Field(
         500, ge=0, description="Free room on the disk below which uploads are answered with 507."
     )

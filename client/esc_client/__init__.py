@@ -19,6 +19,7 @@ from service.schemas.geometry import Intrinsics, Pose, PoseIn
 from service.schemas.health import Alarm, AlarmEvent, Alarms, VenueHealth
 from service.schemas.history import Revision
 from service.schemas.job import Job, JobEvent, Progress
+from service.schemas.live import LiveHistory, LiveReport, LiveState
 from service.schemas.options import Options
 from service.schemas.results import CameraResult, FindResult, Result
 from service.schemas.schedule import Schedule
@@ -43,6 +44,9 @@ __all__ = [
     "Intrinsics",
     "Job",
     "JobEvent",
+    "LiveHistory",
+    "LiveReport",
+    "LiveState",
     "NotUnderstood",
     "Options",
     "Pose",

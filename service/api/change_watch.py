@@ -29,7 +29,7 @@ class ChangeWatch(Generic[State]):
     def __init__(self, read: Callable[[Collection[str]], Mapping[str, State]], interval_s: float = INTERVAL_S) -> None:
         self._read = read
         self._interval_s = interval_s
-        self._waiting: dict[asyncio.Future[None], tuple[str, Callable[[State], bool]]] = {}
+        self._waiting: dict[asyncio.Future[State | None], tuple[str, Callable[[State], bool]]] = {}
         self._has_waiters = asyncio.Event()
         self._closed = False
 
@@ -38,16 +38,20 @@ class ChangeWatch(Generic[State]):
         """Whether the service is going down, so that nobody should wait again."""
         return self._closed
 
-    async def until(self, name: str, reached: Callable[[State], bool], timeout_s: float) -> None:
-        """Return when `reached` holds of what has this name, after `timeout_s`, or when the service goes down."""
+    async def until(self, name: str, reached: Callable[[State], bool], timeout_s: float) -> State | None:
+        """Return the state of what has this name once `reached` holds of it.
+
+        Return None after `timeout_s`, or when the service goes down.
+        """
         if self._closed:
-            return
-        future: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+            return None
+        future: asyncio.Future[State | None] = asyncio.get_running_loop().create_future()
         self._waiting[future] = (name, reached)
         self._has_waiters.set()
         try:
             with suppress(TimeoutError):
-                await asyncio.wait_for(future, timeout_s)
+                return await asyncio.wait_for(future, timeout_s)
+            return None
         finally:
             del self._waiting[future]
 
@@ -63,7 +67,7 @@ class ChangeWatch(Generic[State]):
             for future, (name, reached) in self._waiting.items():
                 state = states.get(name)
                 if state is not None and reached(state) and not future.done():
-                    future.set_result(None)
+                    future.set_result(state)
             if not self._waiting:
                 self._has_waiters.clear()
             await asyncio.sleep(self._interval_s)

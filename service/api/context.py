@@ -26,6 +26,9 @@ from service.settings import Settings
 from service.store.jobs.task import Origin
 from service.store.statistics.snapshot import read_statistics
 
+# As often as `esc live` reports.
+LIVE_INTERVAL_S = 0.5
+
 
 class Context(ApplicationState):
     """The application state of an API process, with what limits, caches and watches its requests."""
@@ -37,6 +40,7 @@ class Context(ApplicationState):
         interval_s = FILE_INTERVAL_S if settings.home_database_url.startswith("sqlite") else INTERVAL_S
         self.job_watch = ChangeWatch(self.jobs.states, interval_s)
         self.venue_watch = ChangeWatch(self.events.newest, interval_s)
+        self.live_watch = ChangeWatch(self.live.newest, LIVE_INTERVAL_S)
         self.followers = ClientSlots(settings.followers, "clients follow venues", "ESC_FOLLOWERS")
         self.waiters = ClientSlots(settings.waiters, "clients wait for jobs", "ESC_WAITERS")
         self.metrics = Metrics(lambda: read_statistics(self.engine, settings.metrics_venues), self.disk, silence_s)
@@ -57,6 +61,7 @@ class Context(ApplicationState):
         """Release every client that waits for a job or follows a venue."""
         self.job_watch.close()
         self.venue_watch.close()
+        self.live_watch.close()
 
 
 async def _context(request: Request) -> Context:

@@ -16,8 +16,8 @@ from service.schemas.addresses import ip_of
 from service.store.jobs.task import Origin
 
 REQUEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
-# Asked every few seconds by machines: not worth a line, nor a span.
 QUIET = {"/livez", "/readyz", "/metrics"}
+LIVE_REPORT = re.compile(r"/venues/[^/]+/live")
 # Others are counted as `other`: a caller may call a method what they like. HEAD arrives as GET.
 METHODS = {"GET", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"}
 log = structlog.get_logger()
@@ -64,9 +64,15 @@ class RequestLog:
         # An answer that waits for a job's end would hide how fast the others are.
         held = "?wait" if route == "/jobs/{job_id}" and "wait" in QueryParams(scope["query_string"]) else ""
         self._metrics.seconds.labels(method, route + held).observe(seconds)
-        say = log.debug if scope["path"] in QUIET else log.info
+        say = log.debug if is_quiet(scope) else log.info
         asked = {"method": scope["method"], "path": scope["path"], "address": origin.address}
         say("request", **asked, status=status, seconds=round(seconds, 4))
+
+
+def is_quiet(scope: Scope) -> bool:
+    """Whether a request is one of those that machines make every few seconds: not worth a line, nor a span."""
+    path: str = scope.get("path", "")
+    return path in QUIET or (scope.get("method") == "PUT" and LIVE_REPORT.fullmatch(path) is not None)
 
 
 def _address(scope: Scope) -> str | None:

@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 # Attributes of our pages that hold addresses. What others wrote cannot look like one: its quotes are escaped.
 ADDRESS = re.compile(
-    r'(\b(?:href|src|action|spec-url|data-(?:address|call|events|follows|history|seam|then))=")(?=/(?!/))'
+    r'(\b(?:href|src|action|spec-url|data-(?:address|call|curves|events|follows|history|reports|seam|then))=")(?=/(?!/))'
 )
 
 

@@ -20,11 +20,14 @@ from service.cli.service_client import load_venue
 if TYPE_CHECKING:
     from service.cli.tracked_streams import TrackedStreams
     from service.live.destinations import Destination, UdpSocket
+    from service.live.reports import LiveReporter
     from service.live.stored_poses import StoredPoses
     from service.schemas.venue import Venue
 
 # Accepted jobs come every few minutes; a renderer may see the new pose so much later.
 LOOK_AGAIN_S = 2.0
+# For the last report when it is stopped; a service that hangs is not waited for.
+LAST_REPORT_S = 2.0
 HIGHEST_RATE = 1000
 MULTICAST = "multicast"
 
@@ -85,7 +88,7 @@ def live(
     """Send the poses of a venue to renderers until stopped, by OpenTrackIO and FreeD over UDP.
 
     Stored poses at a steady rate, and new ones soon after a job is accepted; of cameras that are tracked in a stream
-    a pose for each picture.
+    a pose for each picture. The service that VENUE is from is told how they are doing.
     """
     addresses = parse_by_camera(streams or [], "CAMERA=STREAM, for instance left=rtsp://10.1.0.7/main")
     if hold and addresses:
@@ -93,40 +96,70 @@ def live(
     beat = _parse_rate(rate)
     from service.live.destinations import UdpSocket
 
+    if not (opentrackio or freed or as_json):
+        opentrackio = [MULTICAST]
+    words = [f"opentrackio {address}" for address in opentrackio or []]
+    words += [*(f"freed {address}" for address in freed or []), *(["json"] if as_json else [])]
     with UdpSocket(interface) as socket:
         destinations = _destinations(socket, opentrackio or [], freed or [], as_json=as_json)
         stored = load_venue(venue, url, api_key)
         service = None if Path(venue).is_file() else (url, api_key)
-        _send(stored, destinations, beat, addresses, follow_every, predict / 1000, service)
+        _send(stored, destinations, words, beat, addresses, follow_every, predict / 1000, service)
 
 
 def _send(
     stored: Venue,
     destinations: Sequence[Destination],
+    words: Sequence[str],
     beat: Fraction,
     addresses: Mapping[str, str],
     every: int,
     ahead_s: float,
     service: tuple[str, str | None] | None,
 ) -> None:
-    """Send poses until stopped; `service`: its address and key, where it is to be asked for new ones."""
+    """Send poses until stopped. `words`: of the destinations; `service`: its address and key, where there is one.
+
+    It is asked for new poses, and told how those that are sent are doing.
+    """
     from service.cli.tracked_streams import TrackedStreams
     from service.live.destinations import PoseSender
+    from service.live.reports import LiveReporter
     from service.live.stored_poses import StoredPoses, send_stored_poses
 
     poses, stop, trouble = StoredPoses(stored), threading.Event(), OngoingTrouble()
     sender = PoseSender(destinations, lambda error: trouble.say(f"Not sent: {error}"))
-    streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender)
+    reporter = LiveReporter(poses, addresses, words)
+    streams = TrackedStreams.of(stored, addresses, every, ahead_s, sender, reporter.sent)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
+    beside = []
     if service is not None:
         threading.Thread(target=_ask_for_poses, args=(poses, streams, *service, stop), daemon=True).start()
+        beside = [threading.Thread(target=_report, args=(reporter, *service, stop), daemon=True)]
     cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
     print_note(f"Sending the poses of venue {stored.id}, stored ones {float(beat):g} times a second: {cameras}")
     streams.start()
+    for thread in beside:
+        thread.start()
     send_stored_poses(poses, sender, beat, stop, streams.is_tracked)
     streams.stop()
+    for thread in beside:
+        thread.join(LAST_REPORT_S)
     print_note("Stopped.")
+
+
+def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threading.Event) -> None:
+    """Tell the service how the poses that are sent are doing, until stopped."""
+    from service.client import Client
+
+    trouble = OngoingTrouble()
+    with Client(url, api_key) as client:
+        reporter.run(
+            client,
+            stop,
+            lambda why: trouble.say(f"Poses are sent, but the service does not take reports of them: {why}"),
+            lambda: trouble.over("The service takes reports again"),
+        )
 
 
 def _ask_for_poses(
@@ -159,8 +192,6 @@ def _destinations(
 ) -> list[Destination]:
     from service.live.destinations import OPENTRACKIO_PORT, FreeD, JsonLines, OpenTrackIO
 
-    if not (opentrackio or freed or as_json):
-        opentrackio = [MULTICAST]
     found: list[Destination] = [
         OpenTrackIO(socket)
         if address == MULTICAST

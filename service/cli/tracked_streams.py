@@ -3,44 +3,51 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
 from service.cli.printing import USAGE, OngoingTrouble, fail
 from service.formats.lens import NumberedCamera
+from service.live.reports import SILENT_S, SentPose
 
 if TYPE_CHECKING:
     from service.live.destinations import PoseSender
     from service.schemas.venue import Camera, Venue
     from worker.video.live_tracking import LivePose, StreamTracker
 
-# A camera of which no pose came for so long is sent as it is stored.
-SILENT_S = 1.0
-
 
 @dataclass
 class TrackedStreams:
-    """The cameras that are tracked, by their ids."""
+    """The cameras that are tracked, by their ids. `sent` is told of each pose after it was sent."""
 
     numbers: Mapping[str, int]
     sender: PoseSender
+    sent: Callable[[SentPose], None]
     cameras: dict[str, StreamTracker] = field(default_factory=dict, init=False)
     _last_s: dict[str, float] = field(default_factory=dict, init=False)
     _trouble: dict[str, OngoingTrouble] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, venue: Venue, addresses: Mapping[str, str], every: int, ahead_s: float, sender: PoseSender) -> Self:
+    def of(
+        cls,
+        venue: Venue,
+        addresses: Mapping[str, str],
+        every: int,
+        ahead_s: float,
+        sender: PoseSender,
+        sent: Callable[[SentPose], None],
+    ) -> Self:
         """Those of a venue of which a stream is given.
 
         `every`: lines are measured in every so many-th picture; `ahead_s`: poses are sent as they will be so long after
-        their pictures.
+        their pictures; `sent` is told of each.
         """
         numbers = {camera.id: number for number, camera in enumerate(venue.cameras, 1)}
         unknown = [camera for camera in addresses if camera not in numbers]
         if unknown:
             fail(f"The venue has no camera {', '.join(unknown)}; it has {', '.join(numbers)}", USAGE)
-        found = cls(numbers, sender)
+        found = cls(numbers, sender, sent)
         if addresses:
             from service.cli.local_engine import engine_settings
 
@@ -91,3 +98,5 @@ class TrackedStreams:
         shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
         known = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)
         self.sender.send([shot], pose.at_ns, pose.rate, tracked.how, known)
+        sigma = known.sigma_rotation_deg, known.sigma_position_m
+        self.sent(SentPose(shot.camera, tracked.how, sigma, pose.number, pose.at_ns, pose.arrived_ns, pose.clock))

@@ -22,6 +22,7 @@ from service.store.alarms import BEGUN
 from service.store.database import DATABASE_OUTAGES
 from service.store.events.outbox import CALLBACKS
 from service.store.jobs.submission import PRIORITIES
+from service.store.live import LiveGauges
 from service.store.statistics.counters import DURATION, STAGE, STITCH_ERROR, WAIT, CounterKey, HistogramBuckets
 from service.store.statistics.job_outcome import (
     ENDED,
@@ -68,6 +69,23 @@ OF_CAMERAS: tuple[tuple[str, str, Callable[[CameraTrend], float | None]], ...] =
         "esc_camera_trend_beyond",
         "1 while a control chart, EWMA or CUSUM, says that its mean has moved.",
         lambda camera: float(camera.beyond),
+    ),
+)
+OF_LIVE_POSES: tuple[tuple[str, str, Callable[[LiveGauges], float | None]], ...] = (
+    (
+        "esc_live_running",
+        "1 while the process that sends the venue's live poses reports, of those that reported within a day.",
+        lambda live: float(live.running),
+    ),
+    (
+        "esc_live_measured_ratio",
+        "Pictures of its tracked cameras in which lines were measured, of those of the last one to two minutes.",
+        lambda live: live.measured_share,
+    ),
+    (
+        "esc_live_latency_p99_seconds",
+        "From the arrival of a picture until its pose was sent, over ten seconds: of its slowest camera.",
+        lambda live: live.latency_p99_s,
     ),
 )
 log = structlog.get_logger()
@@ -125,6 +143,7 @@ class _Stored(Collector):
         yield from _schedules(figures)
         yield from _venues(figures.venues)
         yield from _trends(figures.trends)
+        yield from _live(figures.live)
         yield from _alarms(figures)
         yield from _workers(figures.workers, self._silence_s)
         yield from _callbacks(figures)
@@ -225,6 +244,17 @@ def _trends(trends: list[CameraTrend]) -> Iterator[Metric]:
             value = figure(camera)
             if value is not None:
                 family.add_metric([camera.venue, camera.camera], value)
+        yield family
+
+
+def _live(venues: list[LiveGauges]) -> Iterator[Metric]:
+    """Of the venues whose live poses were reported last: how many at most is a setting."""
+    for name, meaning, figure in OF_LIVE_POSES:
+        family = GaugeMetricFamily(name, meaning, labels=["venue"])
+        for venue in venues:
+            value = figure(venue)
+            if value is not None:
+                family.add_metric([venue.venue], value)
         yield family
 
 

@@ -2,7 +2,18 @@
 
 from fastapi import APIRouter
 
-from service.pages import assets, calibrate, ignore, jobs, new_venue, problem_pages, signin, venue_settings, venues
+from service.pages import (
+    assets,
+    calibrate,
+    ignore,
+    jobs,
+    live,
+    new_venue,
+    problem_pages,
+    signin,
+    venue_settings,
+    venues,
+)
 
 # Before the routes of the interface: for browsers alone, at addresses that the interface has as well.
 FOR_BROWSERS: APIRouter = problem_pages.router
@@ -13,6 +24,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     signin.out,
     venues.router,
     venues.data,
+    live.data,
     calibrate.router,
     ignore.router,
     venue_settings.router,

@@ -16,6 +16,9 @@ ALARMS: dict[AlarmRule, str] = {
     "not-calibrated": "Overdue",
     "trend": "Drifting",
     "knocked": "Knocked",
+    "live-not-measured": "Live: not measured",
+    "live-late": "Live: late",
+    "live-silent": "Live: silent",
 }
 STEPS = ((60.0, 1.0, "s"), (3600.0, 60.0, "min"), (86400.0, 3600.0, "h"), (float("inf"), 86400.0, "d"))
 

@@ -11,6 +11,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.api import etags
 from service.api.context import InContext, VenueIdPath
+from service.pages.live import CLOCKS, STATUSES, live_card
 from service.pages.page_rendering import Page, render_page
 from service.pages.sparkline import Sparkline, sparkline
 from service.routes.contract.documented import needs_scope
@@ -108,6 +109,9 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         kept_jobs=kept_jobs(context, revisions, health),
         trends=[context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],
         active=context.jobs.get(active) if active else None,
+        live_poses=live_card(context, venue_id),
+        live_statuses=STATUSES,
+        live_clocks=CLOCKS,
         formats=get_args(FormatName),
         usual_view=ViewChoice(),
         previewed=context.past_calibrations.last_taken(venue_id) is not None,

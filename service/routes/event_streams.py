@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import AsyncIterable, AsyncIterator
+from collections.abc import AsyncIterable
 from typing import Annotated
 
 import structlog
@@ -13,6 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.api.context import InContext, VenueIdPath
 from service.routes.contract.documented import needs_scope, problem_responses
+from service.routes.contract.followed import FOLLOWER_SLOT, LONGEST_S
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.missing import no_such_venue
 from service.schemas.events.venue_event import FINAL_EVENT
@@ -24,17 +25,10 @@ log = structlog.get_logger()
 router = APIRouter(tags=["venues"], route_class=Guarded)
 # Events that are read at once.
 PAGE = 50
-# Then the client connects again, with a key that must be good still.
-LONGEST_S = 3600
 # Between two looks, should one that was waited for be missed; the stream itself says ": ping" every 15 s.
 LONGEST_POLL_INTERVAL_S = 30
 # Of 64 bits.
 LONGEST_NUMBER = 19
-
-
-async def _follower_place(context: InContext) -> AsyncIterator[None]:
-    with context.followers.taken():
-        yield
 
 
 def _last_seen_number(
@@ -60,7 +54,7 @@ def _followed_venue(venue_id: VenueIdPath, context: InContext, seen: LastSeenNum
     openapi_extra=needs_scope("read"),
     response_class=EventSourceResponse,
     responses=problem_responses(404),
-    dependencies=[Depends(_follower_place)],
+    dependencies=[FOLLOWER_SLOT],
 )
 async def venue_events(
     venue_id: Annotated[str, Depends(_followed_venue)],

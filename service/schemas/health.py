@@ -47,14 +47,35 @@ class Alarms(Schema):
     knocked: Flag = Field(
         False, description="A calibration finds a camera elsewhere, and nobody has accepted its pose there yet."
     )
+    live: Flag = Field(
+        False,
+        description="Of live poses: a tracked camera is not measured for 10 s, its poses are sent more than 1 s after "
+        "their pictures for a minute, or the process that sends them has not reported for 30 s.",
+    )
     callback_url: CallbackUrl | None = Field(
         None, description="Told when an alarm begins and when it is over, signed (Standard Webhooks)."
     )
 
 
-AlarmRule = Literal["moved-since-last", "moved-since-first", "rejected-in-a-row", "not-calibrated", "trend", "knocked"]
+AlarmRule = Literal[
+    "moved-since-last",
+    "moved-since-first",
+    "rejected-in-a-row",
+    "not-calibrated",
+    "trend",
+    "knocked",
+    "live-not-measured",
+    "live-late",
+    "live-silent",
+]
 AlarmSetting = Literal[
-    "moved_since_last_px", "moved_since_first_px", "rejected_in_a_row", "not_calibrated_for_h", "trend_m", "knocked"
+    "moved_since_last_px",
+    "moved_since_first_px",
+    "rejected_in_a_row",
+    "not_calibrated_for_h",
+    "trend_m",
+    "knocked",
+    "live",
 ]
 SETTINGS: dict[AlarmRule, AlarmSetting] = {
     "moved-since-last": "moved_since_last_px",
@@ -63,6 +84,9 @@ SETTINGS: dict[AlarmRule, AlarmSetting] = {
     "not-calibrated": "not_calibrated_for_h",
     "trend": "trend_m",
     "knocked": "knocked",
+    "live-not-measured": "live",
+    "live-late": "live",
+    "live-silent": "live",
 }
 
 

@@ -15,10 +15,11 @@ import sqlalchemy as sa
 from service.schemas.health import Alarm, AlarmRule, Alarms, CameraHealth, VenueAlarm, VenueHealth
 from service.schemas.history import Revision, RevisionCamera
 from service.schemas.venue import Venue
-from service.store import tables
+from service.store import live_alarms, tables
 from service.store.documents import stored_alarm
 from service.store.events.event_log import add_event
 from service.store.events.outbox import add_event_delivery
+from service.store.live_alarms import AlarmKey
 from service.store.revisions import CALIBRATION_CAUSES, newest_known, newest_revision, revision_at
 from service.store.schedules import schedule_of
 from service.store.statistics import counters
@@ -28,8 +29,6 @@ from service.store.trends import trends_of
 
 BEGUN = "alarms_begun"
 MINUTE = "%Y-%m-%d %H:%M"
-# Rule and camera, which is empty where the alarm is of the whole venue.
-AlarmKey = tuple[AlarmRule, str]
 a = tables.alarms.c
 q = tables.venue_quality.c
 
@@ -110,7 +109,16 @@ def _active_rules(
     courses = {camera.id: known.courses.get(camera.id, CameraHistory()) for camera in newest.cameras}
     overdue, due_at = _overdue(connection, venue, newest, quality, courses)
     moved = _moved(venue.alarms, newest) | _drifting(connection, venue) | _knocked(connection, venue, quality, newest)
-    return moved | _rejected(venue.alarms, known, courses) | overdue, due_at
+    rejected = _rejected(venue.alarms, known, courses)
+    return moved | rejected | overdue | _live(connection, quality, venue), due_at
+
+
+def _live(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> dict[AlarmKey, str]:
+    """What is wrong with the live poses of a venue, as far as their process has told."""
+    if venue.alarms is None or not venue.alarms.live:
+        return {}
+    watch = live_alarms.watch_of(connection, venue.id)
+    return {} if watch is None else watch.broken(quality.now)
 
 
 def _drifting(connection: sa.Connection, venue: Venue) -> dict[AlarmKey, str]:

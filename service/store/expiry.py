@@ -136,6 +136,15 @@ class ExpiryRepository(Repository):
                 connection.execute(sa.delete(tables.events).where(e.id <= past[-1]))
             return len(past)
 
+    def expire_live_minutes(self, before: datetime, limit: int) -> int:
+        """Forget some `limit` minutes of live poses from before a moment, the oldest of all venues; says how many."""
+        minute = tables.live_minutes.c.minute
+        with writing(self._engine) as connection:
+            oldest = connection.scalars(sa.select(minute).where(minute < before).order_by(minute).limit(limit)).all()
+            if not oldest:
+                return 0
+            return connection.execute(sa.delete(tables.live_minutes).where(minute <= oldest[-1])).rowcount
+
     def expire_deliveries(self, before: datetime, limit: int) -> Counter[str]:
         """Give up to `limit` deliveries up whose event is from before a moment; says how many of each receiver.
 

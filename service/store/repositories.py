@@ -13,6 +13,7 @@ from service.store.jobs.decisions import DecisionRepository
 from service.store.jobs.queries import JobRepository
 from service.store.jobs.submission import SubmissionRepository
 from service.store.keys import KeyRepository
+from service.store.live import LiveRepository
 from service.store.refined import RefinedPoseRepository
 from service.store.schedules import ScheduleRepository
 from service.store.sessions import SessionRepository
@@ -32,6 +33,7 @@ class Repositories:
         migrate(engine)
         self.venues = VenueRepository(engine)
         self.trends = TrendRepository(engine)
+        self.live = LiveRepository(engine)
         self.schedules = ScheduleRepository(engine)
         self.refined = RefinedPoseRepository(engine)
         self.adopted_fields = AdoptedFieldRepository(engine)

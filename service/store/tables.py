@@ -328,6 +328,34 @@ schedules = sa.Table(
     sa.Index("schedules_by_look", "look_at"),
 )
 
+# The newest report of the process that sends a venue's live poses, see live.py.
+live_reports = sa.Table(
+    "live_reports",
+    metadata,
+    sa.Column("venue", sa.String(64), primary_key=True),
+    # When it arrived.
+    sa.Column("reported_at", Instant, nullable=False),
+    # schemas.live.LiveState without what the service adds.
+    sa.Column("document", sa.JSON, nullable=False),
+    # By tracked camera live_alarms.WatchedCamera: since when it is not as it should be.
+    sa.Column("watched", sa.JSON, nullable=False),
+    # When an alarm of live poses may begin or end next; null: never, unless another report comes.
+    sa.Column("alarm_due_at", Instant),
+    sa.Index("live_reports_by_alarm", "alarm_due_at"),
+)
+
+# The reports of a venue, folded by the minute.
+live_minutes = sa.Table(
+    "live_minutes",
+    metadata,
+    sa.Column("venue", sa.String(64), primary_key=True),
+    # When the minute began.
+    sa.Column("minute", Instant, primary_key=True),
+    # schemas.live.LiveMinuteCamera by camera.
+    sa.Column("cameras", sa.JSON, nullable=False),
+    sa.Index("live_minutes_by_minute", "minute"),
+)
+
 # User and password of the sources of cameras, as they stand in a URL: the venue itself is shown to who may read.
 credentials = sa.Table(
     "credentials",

@@ -18,7 +18,7 @@ from service.schemas.names import OPEN_STATUSES
 from service.schemas.results import Result
 from service.schemas.source_urls import SourceSecrets, secrets_of
 from service.schemas.venue import Venue
-from service.store import tables
+from service.store import live_alarms, tables
 from service.store.alarms import health_of, update_alarms
 from service.store.database import Repository, advisory_lock, clock, reading, writing
 from service.store.documents import stored_venue, venue_columns, with_unknown_fields_of
@@ -47,6 +47,8 @@ OF_VENUES = (
     tables.venue_quality,
     tables.camera_anchors,
     tables.camera_trend,
+    tables.live_reports,
+    tables.live_minutes,
 )
 
 
@@ -156,13 +158,16 @@ class VenueRepository(Repository):
             if venue is not None:
                 with update_quality(connection, venue_id) as quality:
                     update_alarms(connection, quality, venue)
+                    live_alarms.plan_next(connection, venue_id, quality.now)
 
     def with_alarms_due(self, limit: int) -> list[str]:
         """Up to `limit` venues of which a time has passed that an alarm goes by."""
         due_at = tables.venue_quality.c.alarm_due_at
         with reading(self._engine) as connection:
-            query = sa.select(tables.venue_quality.c.venue).where(due_at <= clock(connection))
-            return list(connection.scalars(query.order_by(due_at).limit(limit)))
+            now = clock(connection)
+            query = sa.select(tables.venue_quality.c.venue).where(due_at <= now).order_by(due_at).limit(limit)
+            due = [*connection.scalars(query), *live_alarms.due(connection, now, limit)]
+            return list(dict.fromkeys(due))[:limit]
 
     def health(self, venue_id: str) -> VenueHealth | None:
         """How a venue is doing."""

@@ -19,7 +19,7 @@ from tests.demo.__main__ import service
 from tests.e2e.running import venue
 from tests.pages import newcomer
 from tests.pages.browsing import browser_at, chromium, person, tab
-from tests.pages.stocked import calibrations
+from tests.pages.stocked import LIVE, calibrations, live_minutes
 
 DESK, PHONE = (1280, 860), (390, 844)
 WEBP_QUALITY = 82
@@ -50,6 +50,7 @@ def stock(page: Page, data: Path) -> None:
     engine = connect(Settings(data=data).home_database_url)
     with writing(engine) as connection:
         calibrations(connection, "north", 200)
+        live_minutes(connection, "south", 25)
     engine.dispose()
 
 
@@ -59,6 +60,7 @@ def take_all(browser: Browser, url: str, job: str, search: str, scheme: str, fol
             ("venues", "/"),
             ("venue", "/ui/venues/newcomer"),
             ("history", "/ui/venues/north"),
+            ("live", "/ui/venues/south"),
             ("jobs", "/ui/jobs"),
             ("job", f"/ui/jobs/{job}"),
             ("found", f"/ui/jobs/{search}"),
@@ -67,6 +69,8 @@ def take_all(browser: Browser, url: str, job: str, search: str, scheme: str, fol
             ("settings", "/ui/venues/newcomer/settings"),
             ("refusal", "/refusals/residual"),
         ):
+            if name == "live":
+                page.request.put("/venues/south/live", data=LIVE)
             page.goto(address)
             page.wait_for_load_state("networkidle")
             if name == "calibrate":

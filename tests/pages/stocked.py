@@ -1,5 +1,6 @@
-"""A venue with years of calibrations, written into the store as a worker would have done."""
+"""A venue with years of calibrations and minutes of live poses, written into the store as a service would have done."""
 
+import math
 from datetime import UTC, datetime, timedelta
 
 import sqlalchemy as sa
@@ -60,3 +61,38 @@ def calibrations(connection: sa.Connection, venue_id: str, count: int) -> None:
                 quality.now = at
                 quality.ended("succeeded", found, dry_run=False)
     connection.execute(sa.insert(tables.jobs), rows)
+
+
+LIVE = {
+    "started_at": "2026-11-23T10:00:00Z",
+    "host": "truck-7",
+    "destinations": ["opentrackio multicast", "freed 10.1.0.21:40000"],
+    "cameras": [
+        {
+            "id": "left",
+            "status": "measured",
+            "stream": "rtsp://10.1.0.7/main",
+            "turned_deg": 0.031,
+            "moved_m": 0.004,
+            "clock": "arrival",
+            "pictures": 25,
+            "measured": 25,
+            "latency_ms": {"p50": 38.2, "p99": 61.4},
+        },
+        {"id": "right", "status": "stored"},
+    ],
+}
+
+
+def live_minutes(connection: sa.Connection, venue_id: str, count: int) -> None:
+    """So many before the one that goes on, in which the mast of the left camera swayed."""
+    now = datetime.now(UTC).replace(second=0, microsecond=0)
+    rows = [
+        {
+            "venue": venue_id,
+            "minute": now - timedelta(minutes=count - number),
+            "cameras": {"left": {"pictures": 1500, "measured": 1480, "turned_deg": 0.05 + 0.04 * math.sin(number / 2)}},
+        }
+        for number in range(count)
+    ]
+    connection.execute(sa.insert(tables.live_minutes), rows)

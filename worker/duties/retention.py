@@ -42,7 +42,7 @@ log = structlog.get_logger()
 
 
 class Retention:
-    """Deletes frames, pictures, jobs, revisions, deliveries and events after the time that the settings keep them."""
+    """Deletes frames, pictures, jobs, revisions, deliveries, events and live minutes that are past their time."""
 
     def __init__(
         self,
@@ -86,6 +86,7 @@ class Retention:
             "revisions": self._expiry.expire_revisions(now - keep.keep_revisions_years * YEAR, BATCH),
             "deliveries": self._expire_deliveries(now - timedelta(days=keep.callback_expires_days)),
             "events": self._expiry.expire_events(now - timedelta(days=keep.keep_events_days), EVENTS),
+            "live_minutes": self._expiry.expire_live_minutes(now - timedelta(days=keep.keep_live_days), EVENTS),
             "folders": self._sweep(now),
         }
         if any(counts.values()):
@@ -93,6 +94,7 @@ class Retention:
         most = dict.fromkeys(counts, BATCH) | {
             "deliveries": EVENTS,
             "events": EVENTS,
+            "live_minutes": EVENTS,
             "folders": FOLDERS_OF_A_JOB * BATCH,
         }
         return any(count >= most[name] for name, count in counts.items())

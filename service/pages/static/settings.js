@@ -33,7 +33,7 @@ onSubmit(alarms, () => {
   const rules = typed.map(([name, value]) => [name, value === "" ? null : name === "callback_url" ? value : Number(value.replace(",", "."))]);
   const unreadable = rules.find(([, value]) => Number.isNaN(value));
   if (unreadable) throw new Error(`“${alarms.elements[unreadable[0]].value}” is not a number.`);
-  rules.push(["knocked", alarms.elements.knocked.checked || null]);
+  for (const name of ["knocked", "live"]) rules.push([name, alarms.elements[name].checked || null]);
   return change({alarms: rules.some(([, value]) => value !== null) ? Object.fromEntries(rules) : null});
 });
 

@@ -11,6 +11,7 @@ import sqlalchemy as sa
 from service.schemas.names import OPEN_STATUSES
 from service.store import tables
 from service.store.database import clock, reading
+from service.store.live import LiveGauges, live_gauges
 from service.store.schedules import lateness_s
 from service.store.statistics import counters
 from service.store.statistics.counters import CounterKey
@@ -66,6 +67,7 @@ class StatisticsSnapshot:
     alarms: Mapping[str, int]
     ringing: list[ActiveAlarm]
     trends: list[CameraTrend]
+    live: list[LiveGauges]
     # Seconds that a schedule has been due at most: where its cameras answer, and where they are slow or gave no frame.
     schedules_late_s: tuple[float, float]
     counters: Mapping[CounterKey, float]
@@ -74,7 +76,7 @@ class StatisticsSnapshot:
 def read_statistics(engine: sa.Engine, most_venues: int) -> StatisticsSnapshot:
     """Read all statistics in one transaction; of the venues those with the worst stitch errors.
 
-    And of their cameras as many, those that have moved farthest.
+    And of their cameras as many, those that have moved farthest; of live poses those that reported last.
     """
     with reading(engine) as connection:
         now = clock(connection)
@@ -88,6 +90,7 @@ def read_statistics(engine: sa.Engine, most_venues: int) -> StatisticsSnapshot:
             alarms=_alarms(connection),
             ringing=_ringing(connection, most_venues),
             trends=most_moved(connection, most_venues),
+            live=live_gauges(connection, most_venues, now),
             schedules_late_s=lateness_s(connection, now),
             counters=counters.read(connection),
         )

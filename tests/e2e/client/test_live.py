@@ -12,7 +12,7 @@ import pytest
 from tests.e2e import warm
 from tests.e2e.client.test_stitching import document
 from tests.e2e.commands import esc_here
-from tests.e2e.running import venue
+from tests.e2e.running import venue, wait_for
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
 from tests.worker.calibration.synthetic import pair
 from tests.worker.video.shaking import film_shaking
@@ -66,8 +66,10 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
     ):
         opened.recv(64)
         service.stop()
-        while "Poses stay as they are" not in process.stderr.readline():
-            pass
+        unsaid = {"Poses stay as they are", "the service does not take reports"}
+        while unsaid:
+            line = process.stderr.readline()
+            unsaid = {words for words in unsaid if words not in line}
         number, _, _ = freed_packet(opened.recv(64))
         assert number in (1, 2)
 
@@ -95,10 +97,30 @@ def test_a_camera_is_tracked_in_its_stream_and_of_the_other_one_the_stored_pose_
         lines = (json.loads(line) for line in process.stdout)
         left = next(line for line in lines if line["camera"] == "left" and line["status"] == "measured")
         right = next(line for line in lines if line["camera"] == "right")
+        reported = wait_for(lambda: is_measured(state := live_state(service, name)) and state)
+        tracked, stored = reported["cameras"]
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=30)
+    assert not live_state(service, name)["running"]
+    assert reported["destinations"] == ["json"]
+    assert (tracked["clock"], tracked["stream"]) == ("arrival", str(clip))
+    assert 0 < tracked["latency_ms"]["p50"] <= tracked["latency_ms"]["p99"]
+    assert 0 <= tracked["turned_deg"] < 1
+    assert (stored["status"], stored["latency_ms"]) == ("stored", None)
+    minutes = service.http.get(f"/venues/{name}/live/history").json()["minutes"]
+    assert sum(minute["cameras"]["left"]["measured"] for minute in minutes) > 0
     assert 0 < left["sigma_position_m"] < 0.1
     assert left["position"] == pytest.approx(pair()[0].pose.position.tolist(), abs=0.04)
     assert right["status"] == "stored"
     assert "sigma_position_m" not in right
+
+
+def is_measured(state):
+    return state["running"] and state["cameras"][0]["status"] == "measured"
+
+
+def live_state(service, name):
+    return service.http.get(f"/venues/{name}/live").json()
 
 
 def test_a_stream_of_a_camera_that_the_venue_has_not_is_a_usage_error(esc, service, name):

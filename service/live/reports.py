@@ -1,0 +1,199 @@
+"""What `esc live` tells the service that its venue is from: how live poses are doing, twice a second.
+
+Reports are counted together by the threads that send poses, and sent by a thread of their own: poses never wait for the
+service.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import socket
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+
+import httpx
+
+from service.client import Client, NotUnderstood, Refused
+from service.live.stored_poses import StoredPoses
+from service.schemas.geometry import Pose, PoseIn
+from service.schemas.live import LatencyMs, LiveCameraIn, LiveClock, LiveReport, LiveSigma, LiveStatus
+from service.schemas.venue import Camera
+
+INTERVAL_S = 0.5
+# After a report that was not taken.
+AGAIN_S = 5.0
+# A camera of which no pose came for so long is sent as it is stored.
+SILENT_S = 1.0
+# Lines may be looked for in every 25th picture alone, which is measuring all the same.
+MEASURED_WITHIN_S = 2.0
+LATENCY_OVER_S = 10.0
+# Of pictures: what became of those that were looked at.
+OUTCOMES: tuple[LiveStatus, ...] = ("measured", "coasted", "refused")
+
+
+@dataclass(frozen=True)
+class SentPose:
+    """A tracked pose that has just been sent.
+
+    `how`: it is known, one of `OUTCOMES`; `sigma`: of its rotation in degrees and its position in metres; `number`: of
+    its picture in the stream; `taken_ns`: when that was taken, by `clock`, and `arrived_ns`: when it had arrived, both
+    Unix time in nanoseconds.
+    """
+
+    camera: Camera
+    how: LiveStatus
+    sigma: tuple[float, float]
+    number: int
+    taken_ns: int
+    arrived_ns: int
+    clock: LiveClock
+
+
+@dataclass
+class _TrackedCamera:
+    """What was sent of a camera: the last pose and when that was, and what has not been reported yet."""
+
+    last: SentPose | None = None
+    last_s: float = -math.inf
+    measured_s: float = -math.inf
+    counts: Counter[str] = field(default_factory=Counter)
+    # When each pose was sent, of `time.monotonic`, and how long after the arrival of its picture, in milliseconds.
+    latencies: deque[tuple[float, float]] = field(default_factory=deque)
+
+    def add(self, pose: SentPose, now: float) -> None:
+        """Count a pose that was sent `now`."""
+        # A stream that was opened again counts from 0.
+        left_out = max(0, pose.number - self.last.number - 1) if self.last is not None else 0
+        self.counts.update({"pictures": left_out + 1, "left_out": left_out, pose.how: 1})
+        self.latencies.append((now, max(0.0, (time.time_ns() - pose.arrived_ns) / 1e6)))
+        self.last, self.last_s = pose, now
+        if pose.how == "measured":
+            self.measured_s = now
+
+    def status(self, now: float) -> LiveStatus:
+        """How the camera is doing."""
+        if self.last is None or now - self.last_s >= SILENT_S:
+            return "silent"
+        return "measured" if now - self.measured_s < MEASURED_WITHIN_S else self.last.how
+
+    def latency_ms(self, now: float) -> LatencyMs | None:
+        """Of the poses that were sent lately; the others are forgotten."""
+        while self.latencies and now - self.latencies[0][0] > LATENCY_OVER_S:
+            self.latencies.popleft()
+        sorted_ms = sorted(latency for _, latency in self.latencies)
+        if not sorted_ms:
+            return None
+        p50, p99 = (round(sorted_ms[int(share * len(sorted_ms))], 1) for share in (0.5, 0.99))
+        return LatencyMs(p50=p50, p99=p99)
+
+
+class LiveReporter:
+    """Counts what is sent of a venue's cameras and reports it. Several threads may call `sent`.
+
+    `streams`: by camera the address that it is tracked in; `destinations`: where poses go, in words.
+    """
+
+    def __init__(self, poses: StoredPoses, streams: Mapping[str, str], destinations: Sequence[str]) -> None:
+        self._poses = poses
+        self._streams = streams
+        self._destinations = list(destinations)
+        self._started_at = datetime.now(UTC)
+        self._tracked = {camera: _TrackedCamera() for camera in streams}
+        self._lock = threading.Lock()
+
+    def sent(self, pose: SentPose) -> None:
+        """Count a tracked pose that has just been sent."""
+        with self._lock:
+            self._tracked[pose.camera.id].add(pose, time.monotonic())
+
+    def report(self, *, stopped: bool = False) -> LiveReport:
+        """Return the report of now, with all that was not yet answered. `stopped`: it is the last one."""
+        now = time.monotonic()
+        stored = [shot.camera for shot in self._poses.at(now)]
+        with self._lock:
+            cameras = [self._camera(camera, now) for camera in stored]
+        return LiveReport(
+            started_at=self._started_at,
+            host=socket.gethostname(),
+            pid=os.getpid(),
+            destinations=self._destinations,
+            stopped=stopped,
+            cameras=cameras,
+        )
+
+    def answered(self, report: LiveReport) -> None:
+        """What a report counted is not to be reported again."""
+        with self._lock:
+            for camera in report.cameras:
+                if camera.id in self._tracked:
+                    told = {name: getattr(camera, name) for name in ("pictures", "left_out", *OUTCOMES)}
+                    self._tracked[camera.id].counts.subtract(told)
+
+    def run(
+        self, client: Client, stop: threading.Event, failed: Callable[[str], None], taken: Callable[[], None]
+    ) -> None:
+        """Report until `stop`, and a last time then. `failed`: a report was not taken, and why; `taken`: one was."""
+        pause_s = INTERVAL_S
+        while not stop.wait(pause_s):
+            pause_s = INTERVAL_S if self._tell(client, failed, taken, stopped=False) else AGAIN_S
+        self._tell(client, failed, taken, stopped=True)
+
+    def _tell(self, client: Client, failed: Callable[[str], None], taken: Callable[[], None], *, stopped: bool) -> bool:
+        try:
+            report = self.report(stopped=stopped)
+            client.report_live(self._poses.venue.id, report)
+        # A pose that cannot be reported, far outside of the world, is a `ValueError`.
+        except (Refused, NotUnderstood, httpx.HTTPError, ValueError) as error:
+            failed(str(error))
+            return False
+        self.answered(report)
+        taken()
+        return True
+
+    def _camera(self, stored: Camera, now: float) -> LiveCameraIn:
+        tracked = self._tracked.get(stored.id)
+        if tracked is None:
+            return LiveCameraIn(id=stored.id, status="stored", pose=_pose_in(stored.pose))
+        status, last = tracked.status(now), tracked.last
+        known = {"status": status, "stream": self._streams[stored.id], "latency_ms": tracked.latency_ms(now)}
+        counts = {name: tracked.counts[name] for name in ("pictures", "left_out", *OUTCOMES)}
+        if last is None or status == "silent":
+            return LiveCameraIn(id=stored.id, pose=_pose_in(stored.pose), **known, **counts)
+        rotation_deg, position_m = last.sigma
+        return LiveCameraIn(
+            id=stored.id,
+            pose=_pose_in(last.camera.pose),
+            sigma=LiveSigma(rotation_deg=rotation_deg, position_m=position_m),
+            turned_deg=_turned_deg(stored.pose.rotation, last.camera.pose.rotation),
+            moved_m=math.dist(stored.pose.position, last.camera.pose.position),
+            taken_at=datetime.fromtimestamp(last.taken_ns / 1e9, UTC),
+            clock=last.clock,
+            **known,
+            **counts,
+        )
+
+
+def _pose_in(pose: Pose) -> PoseIn:
+    return PoseIn(rotation=pose.rotation, position=pose.position)
+
+
+def _turned_deg(before: Sequence[float], after: Sequence[float]) -> float:
+    """The angle between two rotations, Rodrigues vectors in rad."""
+    (w, *u), (v, *t) = _quaternion(before), _quaternion(after)
+    cosine = w * v + sum(a * b for a, b in zip(u, t, strict=True))
+    cross = (u[1] * t[2] - u[2] * t[1], u[2] * t[0] - u[0] * t[2], u[0] * t[1] - u[1] * t[0])
+    # From the sine: the cosine of a small angle says nothing about it.
+    sine = math.hypot(*(w * b - v * a - c for a, b, c in zip(u, t, cross, strict=True)))
+    return math.degrees(2 * math.atan2(sine, abs(cosine)))
+
+
+def _quaternion(rotation: Sequence[float]) -> tuple[float, float, float, float]:
+    angle = math.hypot(*rotation)
+    scale = math.sin(angle / 2) / angle if angle else 0.5
+    x, y, z = (scale * component for component in rotation)
+    return math.cos(angle / 2), x, y, z

@@ -1,0 +1,21 @@
+"""Streams of server-sent events that clients follow: how many at once, and for how long."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+from fastapi import Depends
+
+from service.api.context import InContext
+
+# Then the client connects again, with a key that must be good still.
+LONGEST_S = 3600
+
+
+async def _take_slot(context: InContext) -> AsyncIterator[None]:
+    with context.followers.taken():
+        yield
+
+
+# Of `dependencies=`: the stream takes one of the service's slots for as long as it is followed.
+FOLLOWER_SLOT = Depends(_take_slot)

@@ -1,0 +1,147 @@
+"""Live poses: the newest report of each venue's process, and its reports by the minute. All SQL about them.
+
+They are copied and backed up with all other tables: by the minutes it is seen what happened before, and the newest
+report says since when the process is missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+import sqlalchemy as sa
+
+from service.schemas.base import TOLERANTLY
+from service.schemas.live import LiveCamera, LiveMinute, LiveMinuteCamera, LiveReport, LiveState
+from service.schemas.venue import Venue
+from service.store import live_alarms, tables
+from service.store.database import Repository, advisory_lock, clock, reading, writing
+from service.store.documents import to_document
+from service.store.statistics.counters import INSERT
+from service.store.venues import find_venue, venue_lock
+
+RUNNING_WITHIN, LATELY = timedelta(seconds=5), timedelta(days=1)
+# Of the figures in /metrics: the minute that goes on, and the one before it.
+SHARE_OVER = timedelta(minutes=2)
+r = tables.live_reports.c
+m = tables.live_minutes.c
+
+
+@dataclass(frozen=True)
+class LiveGauges:
+    """How the live poses of a venue are doing; None: no camera of it is tracked, or none had a picture lately."""
+
+    venue: str
+    running: bool
+    measured_share: float | None
+    latency_p99_s: float | None
+
+
+class LiveRepository(Repository):
+    """The reports in the database."""
+
+    def report(self, venue_id: str, report: LiveReport, allow: Callable[[Venue | None], None]) -> None:
+        """Keep a report as the newest and add it to its minute, unless `allow` raises at the sight of the venue."""
+        with writing(self._engine) as connection:
+            advisory_lock(connection, venue_lock(venue_id))
+            allow(find_venue(connection, venue_id))
+            now = clock(connection)
+            _keep_newest(connection, venue_id, report, now)
+            _add_to_minute(connection, venue_id, report, now)
+
+    def state(self, venue_id: str) -> LiveState:
+        """The newest report of a venue; of one that has none, or is not there, an empty state."""
+        return self.newest([venue_id]).get(venue_id, LiveState())
+
+    def newest(self, venue_ids: Collection[str]) -> Mapping[str, LiveState]:
+        """The newest report of each of these venues that is there."""
+        v = tables.venues.c
+        query = (
+            sa.select(v.id, r.reported_at, r.document)
+            .select_from(tables.venues.outerjoin(tables.live_reports, r.venue == v.id))
+            .where(v.id.in_(venue_ids))
+        )
+        with reading(self._engine) as connection:
+            now = clock(connection)
+            return {row.id: _state(row, now) for row in connection.execute(query)}
+
+    def reported_lately(self, venue_id: str) -> LiveState | None:
+        """The newest report of a venue if it is not older than a day."""
+        state = self.state(venue_id)
+        return state if state.reported_at is not None and self.now() - state.reported_at <= LATELY else None
+
+    def history(self, venue_id: str, minutes: int) -> list[LiveMinute]:
+        """The reports of the last so many minutes by the minute, oldest first."""
+        with reading(self._engine) as connection:
+            since = clock(connection) - timedelta(minutes=minutes)
+            query = sa.select(tables.live_minutes).where(m.venue == venue_id, m.minute >= since).order_by(m.minute)
+            return [_minute(row) for row in connection.execute(query)]
+
+
+def live_gauges(connection: sa.Connection, most: int, now: datetime) -> list[LiveGauges]:
+    """The figures of up to `most` venues that have reported within a day, those that reported last."""
+    query = sa.select(tables.live_reports).where(r.reported_at >= now - LATELY)
+    rows = connection.execute(query.order_by(r.reported_at.desc()).limit(most)).all()
+    lately = sa.select(tables.live_minutes).where(
+        m.venue.in_([row.venue for row in rows]), m.minute >= now - SHARE_OVER
+    )
+    minutes: dict[str, list[LiveMinute]] = {}
+    for row in connection.execute(lately):
+        minutes.setdefault(row.venue, []).append(_minute(row))
+    return [_gauges(row, minutes.get(row.venue, []), now) for row in rows]
+
+
+def _keep_newest(connection: sa.Connection, venue_id: str, report: LiveReport, now: datetime) -> None:
+    row = connection.execute(sa.select(tables.live_reports).where(r.venue == venue_id)).one_or_none()
+    before = None if row is None else live_alarms.watch_in(row)
+    watch = live_alarms.watch_after(before, report, now)
+    cameras = [LiveCamera.from_input(camera) for camera in report.cameras]
+    values = {
+        "reported_at": now,
+        "document": to_document(report) | {"cameras": [to_document(camera) for camera in cameras]},
+        "watched": live_alarms.watched_column(watch),
+        "alarm_due_at": live_alarms.due_after(before, None if row is None else row.alarm_due_at, watch, now),
+    }
+    if row is None:
+        connection.execute(sa.insert(tables.live_reports).values(venue=venue_id, **values))
+    else:
+        connection.execute(sa.update(tables.live_reports).where(r.venue == venue_id).values(**values))
+
+
+def _add_to_minute(connection: sa.Connection, venue_id: str, report: LiveReport, now: datetime) -> None:
+    minute = now.replace(second=0, microsecond=0)
+    stored = connection.scalar(sa.select(m.cameras).where(m.venue == venue_id, m.minute == minute))
+    cameras = dict(stored or {})
+    for camera in report.cameras:
+        before = LiveMinuteCamera.model_validate(cameras.get(camera.id, {}), **TOLERANTLY)
+        cameras[camera.id] = to_document(before.with_report(camera))
+    insert = INSERT[connection.dialect.name](tables.live_minutes)
+    values = insert.values(venue=venue_id, minute=minute, cameras=cameras)
+    connection.execute(values.on_conflict_do_update(index_elements=["venue", "minute"], set_={"cameras": cameras}))
+
+
+def _state(row: Any, now: datetime) -> LiveState:
+    if row.reported_at is None:
+        return LiveState()
+    running = now - row.reported_at <= RUNNING_WITHIN and not row.document.get("stopped", False)
+    values = row.document | {"reported_at": row.reported_at, "running": running}
+    return LiveState.model_validate(values, **TOLERANTLY)
+
+
+def _minute(row: Any) -> LiveMinute:
+    return LiveMinute.model_validate({"at": row.minute, "cameras": row.cameras}, **TOLERANTLY)
+
+
+def _gauges(row: Any, minutes: list[LiveMinute], now: datetime) -> LiveGauges:
+    state = _state(row, now)
+    tracked = [camera for minute in minutes for camera in minute.cameras.values()]
+    pictures = sum(camera.pictures for camera in tracked)
+    latencies = [camera.latency_ms.p99 for camera in state.cameras if camera.latency_ms is not None]
+    return LiveGauges(
+        venue=row.venue,
+        running=state.running,
+        measured_share=sum(camera.measured for camera in tracked) / pictures if pictures else None,
+        latency_p99_s=max(latencies) / 1000 if latencies and state.running else None,
+    )
