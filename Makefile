@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: setup demo test test-fast test-long format check wheel bench bench-find bench-knocked bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-learned train lock clean
+.PHONY: setup demo test test-fast test-long format check wheel bench bench-find bench-knocked bench-real bench-cost bench-fields bench-segmentation bench-truth bench-service bench-faults bench-hostile bench-rate bench-versions bench-video bench-follow bench-live bench-learned train lock clean
 
 setup: $(VENV)/.installed
 
@@ -66,6 +66,10 @@ bench-find: setup
 # One BLAS thread, as the worker sets it.
 bench-knocked: setup
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.knocked
+
+# Needs GStreamer's RTSP server, as CONTRIBUTING.md says.
+bench-live: setup
+	$(BIN)/python -m tests.benchmarks.live
 
 bench-segmentation: $(VENV)/.train
 	$(BIN)/python -m tests.benchmarks.segmentation

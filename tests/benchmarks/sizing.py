@@ -42,7 +42,7 @@ class Measured:
     pictures: int = 2
     looked_at_mb: float = 8.62
     looked_at: int = 14
-    # `make bench-rate`, on the same cores: processor time at 11.1 submissions a second, bytes at 30, where they are more.
+    # `make bench-rate`, on the same cores: core-seconds at 11.1 submissions a second, bytes at 30, where they are more.
     transactions: float = 10
     wal_kb: float = 29
     database_kb: float = 15.5

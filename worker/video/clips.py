@@ -123,6 +123,10 @@ class Clip:
         """Decode on one core unless pictures come in slices: several cores would hold back a picture each."""
         self.video.codec_context.flags |= LOW_DELAY
 
+    def decode_whole_pictures_only(self, only: bool) -> None:
+        """Decode the pictures alone that need no earlier one, and pass by the others, which costs next to nothing."""
+        self.video.codec_context.skip_frame = "NONKEY" if only else "DEFAULT"
+
     def shots(self, begin_s: float = 0.0) -> Iterator[ClipPicture]:
         """The pictures from about a time on, to the end; `VideoError` where a picture is not as the first one."""
         self._zero = self._enter(begin_s)

@@ -19,6 +19,7 @@ from worker.calibration.records import CalibrationError
 from worker.calibration.tracking.follower import CameraTracker, TrackedPose
 from worker.video.clips import Clip, camera_for_clip
 from worker.video.errors import VideoError
+from worker.video.stream_clock import Lateness
 from worker.video.yuv_planes import Picture
 
 # Between two attempts to open a stream, and to find the lines of a camera in a picture.
@@ -29,6 +30,10 @@ LONGEST_GAP_S = 5.0
 LOST_AFTER_S = 3.0
 # A picture that says it is from the future or older than this comes from a camera whose clock is wrong.
 EARLIEST_S, LATEST_S = -0.1, 10.0
+
+# Pictures that come so much later than others before them wait somewhere: those that need others are passed by until
+# the rest has caught up.
+BEHIND_S, CAUGHT_UP_S = 1.0, 0.3
 
 Clock = Literal["rtcp", "arrival"]
 
@@ -100,10 +105,15 @@ class _NewestPicture:
             yield newest
 
     def _read(self) -> None:
+        lateness, is_behind = Lateness(), False
         try:
             for number, shot in enumerate(self._clip.shots()):
                 if self._unwanted:
                     break
+                late_s = lateness.of(shot.time_s, time.monotonic()) if self._clip.live else 0.0
+                if is_behind != (late_s > (CAUGHT_UP_S if is_behind else BEHIND_S)):
+                    is_behind = not is_behind
+                    self._clip.decode_whole_pictures_only(is_behind)
                 with self._changed:
                     self._newest = _ArrivedPicture(shot.picture, number, shot.time_s, shot.taken_ns, time.time_ns())
                     self._changed.notify()

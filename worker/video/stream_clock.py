@@ -8,6 +8,7 @@ streams of other kinds, there is none.
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,7 +17,24 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from av.packet import Packet
 
+# By so much the clocks of camera and machine may differ, as a part of time.
+CLOCKS_DIFFER = 1e-3
 WALL_CLOCK_US = struct.Struct("=q")
+
+
+class Lateness:
+    """How late pictures come beside the promptest ones before."""
+
+    def __init__(self) -> None:
+        self._promptest = math.inf
+        self._last_s = 0.0
+
+    def of(self, stream_s: float, now_s: float) -> float:
+        """Seconds that a picture of this time of the stream is late, if it comes `now_s`."""
+        self._promptest += CLOCKS_DIFFER * max(0.0, stream_s - self._last_s)
+        self._promptest = min(self._promptest, now_s - stream_s)
+        self._last_s = stream_s
+        return now_s - stream_s - self._promptest
 
 
 @dataclass

@@ -1,59 +1,55 @@
 """When pictures of a stream were taken: told by the RTCP reports of a real RTSP server, GStreamer's."""
 
-import subprocess
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.rtsp import encode, filming, has_server
 from worker.video.clips import Clip
+from worker.video.stream_clock import Lateness
 
-WIDTH, BITS = 256, 16
-# The Python that Debian's python3-gi is for.
-PYTHON = Path("/usr/bin/python3")
-HAS_SERVER = """
-import gi
-gi.require_version("GstRtspServer", "1.0")
-from gi.repository import Gst, GstRtspServer
-Gst.init(None)
-exit(not all(Gst.ElementFactory.find(name) for name in ("x264enc", "rtph264pay")))
-"""
-# A report comes every five seconds or sooner.
-REPORTED_AFTER = 150
+RATE, HEIGHT, BITS, STRIPE = 25, 64, 8, 16
+# The first report comes within some three seconds.
+COUNT = 150
 
 
-@pytest.fixture
-def server(missing):
-    if not PYTHON.exists() or subprocess.run([PYTHON, "-c", HAS_SERVER], capture_output=True).returncode:
-        missing("gstreamer")
-    program = Path(__file__).with_name("rtsp_server.py")
-    with subprocess.Popen([PYTHON, program, str(WIDTH), str(BITS)], stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
+def picture_of(number):
+    """It shows its number in stripes, the lowest bit first."""
+    stripes = np.array([255 * (number >> bit & 1) for bit in range(BITS)], np.uint8)
+    return np.broadcast_to(np.repeat(stripes, STRIPE)[None, :, None], (HEIGHT, BITS * STRIPE, 3)).copy()
 
 
 def number_shown(picture):
     luma, _, _ = picture.planes
-    stripes = np.median(luma, axis=0).reshape(BITS, WIDTH // BITS).mean(axis=1)
+    stripes = np.median(luma, axis=0).reshape(BITS, STRIPE).mean(axis=1)
     return int(sum(1 << bit for bit in np.flatnonzero(stripes > 126)))
 
 
-def test_a_stream_tells_when_its_pictures_were_taken_once_its_camera_has_reported(server):
-    port, shots = int(server.stdout.readline()), {}
-    with Clip.open("left", f"rtsp://127.0.0.1:{port}/camera", time.monotonic()) as clip:
-        clip.decode_without_delay()
-        for shot in clip.shots():
-            shots[number_shown(shot.picture)] = shot
-            if len(shots) == REPORTED_AFTER:
-                break
-    server.kill()
-    printed = (line.split() for line in server.stdout)
-    taken_ns = {int(number): int(time_ns) for number, time_ns in printed}
+def test_a_stream_tells_when_its_pictures_were_taken_once_its_camera_has_reported(tmp_path, missing):
+    if not has_server():
+        missing("gstreamer")
+    shots = {}
+    encode(map(picture_of, range(COUNT)), RATE, 500_000, tmp_path / "clip")
+    with filming([tmp_path / "clip"], RATE) as ((address,), server):
+        with Clip.open("left", address, time.monotonic()) as clip:
+            clip.decode_without_delay()
+            for shot in clip.shots():
+                shots[number_shown(shot.picture)] = shot
+                if len(shots) == COUNT:
+                    break
+        server.kill()
+        taken_ns = {int(number): int(at) for _, number, at in (line.split() for line in server.stdout)}
     off_ms = [abs(shot.taken_ns - taken_ns[number]) / 1e6 for number, shot in shots.items() if shot.taken_ns]
     assert shots[0].taken_ns is None
     assert len(off_ms) > 20
     assert np.median(off_ms) < 2
     assert max(off_ms) < 20
+
+
+@pytest.mark.parametrize("camera_runs", [1.0, 1.0005, 0.9995])
+def test_a_picture_is_late_beside_the_promptest_ones_whatever_clocks_do(camera_runs):
+    lateness, hours = Lateness(), np.arange(0.0, 3 * 3600.0, 1.0)
+    late = [lateness.of(camera_runs * at, at + 0.2) for at in hours]
+    assert max(late) < 0.01
+    assert lateness.of(camera_runs * 3 * 3600, 3 * 3600 + 2.2) == pytest.approx(2.0, abs=0.01)

@@ -1,0 +1,68 @@
+"""Starts the RTSP cameras of `tests/rtsp_cameras.py`, and encodes what they film."""
+
+from __future__ import annotations
+
+import io
+import struct
+import subprocess
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+# The Python that Debian's python3-gi is for.
+PYTHON = Path("/usr/bin/python3")
+HAS_SERVER = """
+import gi
+gi.require_version("GstRtspServer", "1.0")
+from gi.repository import Gst, GstRtspServer
+Gst.init(None)
+exit(not all(Gst.ElementFactory.find(name) for name in ("appsrc", "h264parse", "rtph264pay")))
+"""
+LENGTH = struct.Struct("<I")
+
+
+def has_server() -> bool:
+    """Whether GStreamer and its RTSP server are on this machine."""
+    return PYTHON.exists() and not subprocess.run([PYTHON, "-c", HAS_SERVER], capture_output=True).returncode
+
+
+def encode(pictures: Iterable[NDArray[np.uint8]], rate: int, bits: int, path: Path) -> None:
+    """Write a clip as the cameras take it, of pictures (H, W, 3): without pictures that are shown out of order."""
+    encoded, stream = io.BytesIO(), None
+    with av.open(encoded, "w", format="h264") as out:
+        for picture in pictures:
+            if stream is None:
+                options = {
+                    "preset": "veryfast",
+                    "tune": "zerolatency",
+                    "g": str(rate),
+                    "x264-params": "sliced-threads=0",
+                }
+                stream = out.add_stream("libx264", rate=rate, options=options)
+                stream.height, stream.width = picture.shape[:2]
+                stream.pix_fmt, stream.bit_rate = "yuv420p", bits
+            out.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
+        if stream is not None:
+            out.mux(stream.encode(None))
+    encoded.seek(0)
+    with av.open(encoded, format="h264") as clip, path.open("wb") as file:
+        for packet in clip.demux(video=0):
+            if packet.size:
+                file.write(LENGTH.pack(packet.size) + bytes(packet))
+
+
+@contextmanager
+def filming(clips: Sequence[Path], rate: float) -> Iterator[tuple[list[str], subprocess.Popen[str]]]:
+    """Cameras that film these clips: their addresses, and the process, which prints what it takes."""
+    command = [PYTHON, Path(__file__).with_name("rtsp_cameras.py"), str(rate), *clips]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            port = int(process.stdout.readline())
+            yield [f"rtsp://127.0.0.1:{port}/{number}" for number in range(len(clips))], process
+        finally:
+            process.kill()
