@@ -1,12 +1,14 @@
 """One browser for all, and services: one with the real engine, one whose venues' names say what happens."""
 
+import json
 import shutil
+import sys
 from contextlib import ExitStack
 from functools import cache
 
 import pytest
 
-from tests.demo.__main__ import service
+from service.settings import MODEL_BESIDE_THE_CODE
 from tests.e2e.running import Service, ready, wait_for
 from tests.once import made_once
 from tests.pages import newcomer
@@ -43,13 +45,20 @@ def stub(tmp_path_factory):
 def real(browser, tmp_path_factory):
     """The address of a service with the real engine, after a newcomer went the whole way on its page."""
 
+    def started(data):
+        program = json.dumps([sys.executable, "-m", "worker.jobs.program"])
+        return Service(data, ESC_JOB_PROGRAM=program, ESC_MODEL=str(MODEL_BESIDE_THE_CODE)).ready()
+
     def go(data):
-        with service(data) as url, person(browser, url) as somebody, tab(somebody) as page:
+        running = started(data)
+        with person(browser, running.url) as somebody, tab(somebody) as page:
             newcomer.goes_the_whole_way(page)
+        assert running.stop() == 0
 
     data = shutil.copytree(made_once(tmp_path_factory, "newcomer", go), tmp_path_factory.mktemp("real") / "data")
-    with service(data) as url:
-        yield url
+    running = started(data)
+    yield running.url
+    assert running.stop() == 0
 
 
 @pytest.fixture(scope="package")

@@ -1,10 +1,12 @@
 """Somebody with two frames and the numbers of two lenses, who has never seen the service before."""
 
 import json
+from functools import cache
 from pathlib import Path
 
+import cv2
 import numpy as np
-from playwright.sync_api import Page, expect
+from playwright.sync_api import FilePayload, Page, expect
 
 from service.schemas.geometry import Pose
 from service.schemas.venue import VenueIn
@@ -13,7 +15,25 @@ from worker.calibration.geometry.camera import Camera
 from worker.jobs.from_schemas import camera_of, pitch_of
 
 DEMO = Path(demo.__file__).parent
-VENUE = VenueIn.model_validate_json((DEMO / "venue.json").read_text()).to_venue()
+# Of the demo's frames, which are 4K: a quarter of the pixels to read, to send and to draw.
+SCALE = 0.5
+
+
+def scaled() -> VenueIn:
+    """The venue of the demo, with smaller frames."""
+    venue = json.loads((DEMO / "venue.json").read_text())
+    for camera in venue["cameras"]:
+        camera["image_size"] = [round(SCALE * side) for side in camera["image_size"]]
+        (fx, _, cx), (_, fy, cy), last = camera["intrinsics"]["matrix"]
+        camera["intrinsics"]["matrix"] = [
+            [SCALE * fx, 0, SCALE * (cx + 0.5) - 0.5],
+            [0, SCALE * fy, SCALE * (cy + 0.5) - 0.5],
+            last,
+        ]
+    return VenueIn.model_validate(venue)
+
+
+VENUE = scaled().to_venue()
 TRUTH = {
     camera: Pose.from_position(**pose)
     for camera, pose in json.loads((DEMO / "truth.json").read_text())["poses"].items()
@@ -22,6 +42,14 @@ TRUTH = {
 CLICKED = 5
 # Two cameras of which nothing is known take a minute and a half of a core, of which others may have a share.
 FINDING_MS = 600_000
+
+
+@cache
+def frame(camera: str) -> FilePayload:
+    """A file of what a camera shows."""
+    whole = cv2.imread(str(DEMO / f"{camera}.jpg"))
+    smaller = cv2.resize(whole, None, fx=SCALE, fy=SCALE, interpolation=cv2.INTER_AREA)
+    return {"name": f"{camera}.jpg", "mimeType": "image/jpeg", "buffer": cv2.imencode(".jpg", smaller)[1].tobytes()}
 
 
 def finds_the_cameras(page: Page) -> str:
@@ -42,7 +70,7 @@ def finds_the_cameras(page: Page) -> str:
 
 def drop_the_frames(page: Page) -> None:
     """One of each camera: football is what the page begins with, and the files are called as the cameras are to be."""
-    page.locator("#frames input[type=file]").set_input_files([DEMO / f"{camera.id}.jpg" for camera in VENUE.cameras])
+    page.locator("#frames input[type=file]").set_input_files([frame(camera.id) for camera in VENUE.cameras])
     expect(page.locator(".found-frames canvas")).to_have_count(len(VENUE.cameras))
 
 
@@ -78,7 +106,7 @@ def describe_a_camera(page: Page, number: int) -> None:
     camera = VENUE.cameras[number]
     step = page.locator(".camera-step").nth(number)
     step.get_by_label("Id", exact=True).fill(camera.id)
-    step.get_by_label("A frame of it").set_input_files(DEMO / f"{camera.id}.jpg")
+    step.get_by_label("A frame of it").set_input_files(frame(camera.id))
     (fx, _, cx), (_, fy, cy), _ = camera.intrinsics.matrix
     for name, value in (("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)):
         step.get_by_label(f"{name}, px").fill(str(value))

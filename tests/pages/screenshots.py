@@ -75,9 +75,7 @@ def take_all(browser: Browser, url: str, job: str, search: str, scheme: str, fol
             page.wait_for_load_state("networkidle")
             if name == "calibrate":
                 for camera in ("left", "right"):
-                    page.locator(f"[data-camera={camera}] input[type=file]").set_input_files(
-                        newcomer.DEMO / f"{camera}.jpg"
-                    )
+                    page.locator(f"[data-camera={camera}] input[type=file]").set_input_files(newcomer.frame(camera))
                 page.locator(".thumbs canvas").nth(1).wait_for()
             save(page, folder / f"{name}-{scheme}.webp")
         page.goto("/ui/new-venue")

@@ -14,7 +14,7 @@ OFF = [1.9, 0.3, -0.2]
 @pytest.fixture
 def demo(stub):
     """The venue of the demo, with poses that are wrong."""
-    venue = json.loads((newcomer.DEMO / "venue.json").read_text()) | {"id": "knocked"}
+    venue = newcomer.scaled().model_dump(mode="json") | {"id": "knocked"}
     for camera in venue["cameras"]:
         camera["pose"] = {"rotation": OFF, "position": [0, -60, 9]}
     stub.http.put("/venues/knocked", json=venue).raise_for_status()
@@ -31,7 +31,7 @@ def test_a_knocked_camera_gets_a_new_first_pose_and_the_others_keep_theirs(stub,
     store = page.get_by_role("button", name="Store first poses")
     expect(store).to_be_disabled()
     step = page.locator(".camera-step").first
-    step.get_by_label("A frame of it").set_input_files(newcomer.DEMO / "left.jpg")
+    step.get_by_label("A frame of it").set_input_files(newcomer.frame("left"))
     newcomer.click_points(page, 0, "left")
     expect(store).to_be_enabled()
     store.click()
@@ -46,7 +46,7 @@ def test_a_knocked_camera_gets_a_new_first_pose_and_the_others_keep_theirs(stub,
 def test_a_frame_of_another_size_is_refused_before_a_point_is_clicked(stub, visit):
     name = stub.venue("tiny")
     page = visit(stub.url, f"/ui/venues/{name}/first-pose")
-    page.locator(".camera-step").first.get_by_label("A frame of it").set_input_files(newcomer.DEMO / "left.jpg")
+    page.locator(".camera-step").first.get_by_label("A frame of it").set_input_files(newcomer.frame("left"))
     expect(page.get_by_text("this camera takes 64 × 48")).to_be_visible()
 
 

@@ -112,23 +112,16 @@ def test_the_interface_is_drawn_without_internet_has_a_way_back_and_speaks_of_no
     expect(page).to_have_url(f"{stub.url}/")
 
 
-def test_the_interface_has_the_colours_that_the_browser_prefers(stub, visit):
-    page = visit(stub.url, "/livez")
-    keep_one_path(page, "/venues")
-    page.goto("/docs")
-    expect(page.get_by_text("venues", exact=True).first).to_be_visible()
-    for scheme in in_each_scheme(page):
-        wait_until(page, f"document.querySelector('rapi-doc').getAttribute('theme') == '{scheme}'")
-        assert (np.median(look(page)) < 64) == (scheme == "dark")
-
-
-def test_the_interface_takes_a_key_where_one_is_asked_for(tmp_path, visit):
+def test_the_interface_takes_a_key_where_one_is_asked_for_and_has_the_colours_that_the_browser_prefers(tmp_path, visit):
     keys_in(tmp_path).add("reader", "read")
     service = Service(tmp_path, "serve")
     page = visit(service.url, "/livez", forgiven=("401",))
     keep_one_path(page, "/venues")
     page.goto("/docs")
     expect(page.get_by_text("No API key applied")).to_be_visible()
+    for scheme in in_each_scheme(page):
+        wait_until(page, f"document.querySelector('rapi-doc').getAttribute('theme') == '{scheme}'")
+        assert (np.median(look(page)) < 64) == (scheme == "dark")
     page.close()
     service.kill()
 

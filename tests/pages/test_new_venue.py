@@ -33,7 +33,7 @@ def page(stub, visit):
 
 def test_how_well_photos_know_a_lens_goes_with_it_until_somebody_changes_its_numbers(page):
     page.get_by_label("Photos of a board").check()
-    page.locator("[name=photos]").set_input_files(newcomer.DEMO / "left.jpg")
+    page.locator("[name=photos]").set_input_files(newcomer.frame("left"))
     with page.expect_request(POSE) as by_photos:
         page.get_by_role("button", name="Find the lens").click()
     assert by_photos.value.post_data_json["intrinsics"]["sigma"] == SIGMA

@@ -4,26 +4,22 @@ import io
 import json
 import re
 import zipfile
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
 
-from tests import demo
+from tests.pages import newcomer
 from tests.pages.browsing import differs, grave, look, wait_until
-
-DEMO = Path(demo.__file__).parent
-TRUTH = json.loads((DEMO / "truth.json").read_text())["poses"]
 
 
 @pytest.fixture(scope="package")
 def pitch(stub):
     """A venue with true poses whose frames show something."""
-    venue = json.loads((DEMO / "venue.json").read_text()) | {"id": "viewed", "name": "accept"}
+    venue = newcomer.scaled().model_dump(mode="json") | {"id": "viewed", "name": "accept"}
     for camera in venue["cameras"]:
-        camera["pose"] = TRUTH[camera["id"]]
+        camera["pose"] = newcomer.TRUTH[camera["id"]].model_dump(mode="json")
     stub.http.put("/venues/viewed", json=venue).raise_for_status()
-    frames = [(side, (f"{side}.jpg", (DEMO / f"{side}.jpg").read_bytes())) for side in ("left", "right")]
+    frames = [(side, (f"{side}.jpg", newcomer.frame(side)["buffer"])) for side in ("left", "right")]
     stub.end(stub.http.post("/venues/viewed/calibrate", files=frames).raise_for_status().json()["id"])
     # The program in place of the engine moves cameras.
     stub.http.put("/venues/viewed", json=venue).raise_for_status()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, camera, paint_markings, pair
-from tests.worker.calibration.test_calibrate import frames, outdated, run
+from tests.worker.calibration.test_calibrate import frames, outdated, result, run
 from worker.calibration.geometry.camera import Pose
 
 pytestmark = pytest.mark.slow
@@ -16,13 +16,14 @@ def reasons(found):
     return [one.refusal and one.refusal.reason for one in found.cameras]
 
 
-def test_exchanged_cameras_are_named_each_after_the_other():
+def test_exchanged_cameras_are_named_each_after_the_other_and_are_no_knock():
     found = run(pictures={"left": frames()["right"], "right": frames()["left"]})
     assert reasons(found) == [OTHER_CAMERA, OTHER_CAMERA]
     assert [one.view.cause for one in found.cameras] == [OTHER_CAMERA, OTHER_CAMERA]
     assert "camera left: the frame looks like camera right's" in found.rejected_because
     assert "camera right: the frame looks like camera left's" in found.rejected_because
     assert "are cables or addresses exchanged?" in found.cameras[0].rejected_because
+    assert not any(one.knocked for one in found.cameras)
     for one, before in zip(found.cameras, outdated(), strict=True):
         np.testing.assert_array_equal(one.camera.pose.position, before.pose.position)
 
@@ -34,8 +35,7 @@ def test_a_frame_that_was_sent_for_two_cameras_is_refused_for_the_one_it_is_not_
 
 
 def test_a_frame_that_its_own_camera_explains_is_never_called_anothers():
-    found = run()
-    assert reasons(found) == [None, None]
+    assert reasons(result()) == [None, None]
 
 
 @pytest.mark.parametrize("spoiled", [np.zeros_like, lambda frame: np.full_like(frame, 128)])
@@ -51,7 +51,7 @@ def test_a_camera_that_was_turned_to_where_its_neighbour_looks_is_not_called_the
     right = right.with_pose(Pose.looking_at((-0.2, -48.0, 10.0), (20.0, 0.0, 0.0)))
     turned = left.with_pose(Pose.looking_at(left.pose.position, (20.0, 0.0, 0.0)))
     pictures = {"left": (painted(turned),), "right": (painted(right),)}
-    found = run(cameras=[left, right], pictures=pictures)
+    found = run(cameras=[left, right], pictures=pictures, recover="never")
     assert found.cameras[0].refusal.reason != OTHER_CAMERA
     assert found.cameras[1].accepted
 
@@ -60,7 +60,7 @@ def test_cameras_of_other_frame_sizes_are_not_compared():
     left, _ = outdated()
     small = camera("right", (1.0, -48.0, 10.0), (20.0, 0.0), focal=400, size=(640, 360))
     pictures = {"left": frames()["right"], "right": (painted(small),)}
-    found = run(cameras=[left, small], pictures=pictures)
+    found = run(cameras=[left, small], pictures=pictures, recover="never")
     assert found.cameras[0].refusal.reason != OTHER_CAMERA
 
 

@@ -35,7 +35,7 @@ def test_the_pose_comes_with_the_field_as_it_sees_it_and_the_place_of_each_point
 
 
 def test_points_on_one_line_are_told_to_be_too_few():
-    line = {f"near touchline, {at} m from the left goal line": [1000 + 10 * at, 1500] for at in (10, 20, 30, 40)}
+    line = {f"near touchline, {at} m from the left goal line": [500 + 5 * at, 750] for at in (10, 20, 30, 40)}
     found = answer(clicked(line))
     assert found.result is None or not found.result.accepted
     assert found.error is None or found.error.type == "/problems/no-pose"

@@ -43,6 +43,12 @@ def frames():
     return tuple(pictures)
 
 
+@cache
+def found():
+    """How the camera is found to have turned in each of the frames."""
+    return sways(frames(), ON_A_MAST.intrinsics)
+
+
 def with_walker():
     """The same, but somebody walks past."""
     pictures = [picture.copy() for picture in frames()]
@@ -69,22 +75,21 @@ def brightness(pictures, swayed):
 
 
 def test_how_far_a_camera_turned_in_each_frame_is_found_to_a_twentieth_of_a_pixel():
-    found = sways(frames(), ON_A_MAST.intrinsics)
-    for sway, turn in zip(found, TURNS - TURNS.mean(axis=0), strict=True):
+    for sway, turn in zip(found(), TURNS - TURNS.mean(axis=0), strict=True):
         expected = Sway.from_turn(turn, ON_A_MAST.intrinsics).shift
         assert np.abs(sway.shift - expected).max() < 0.05
 
 
 def test_lines_thinner_than_the_shaking_stay_as_they_are_in_one_frame():
-    shaken = sways(frames(), ON_A_MAST.intrinsics)
     still = [Sway(None)] * len(frames())
     as_in_one = np.mean([far_line(brightness(frames()[:1], [])), far_line(of_mean_turn()[..., GREEN])])
-    assert far_line(brightness(frames(), shaken)) > 0.9 * as_in_one
+    assert far_line(brightness(frames(), found())) > 0.9 * as_in_one
     assert far_line(brightness(frames(), still)) < 0.75 * as_in_one
 
 
 def test_what_walks_by_vanishes_from_frames_that_shake():
-    without, walked = (brightness(each, sways(each, ON_A_MAST.intrinsics)) for each in (frames(), with_walker()))
+    without, walker = brightness(frames(), found()), with_walker()
+    walked = brightness(walker, sways(walker, ON_A_MAST.intrinsics))
     assert np.abs(walked - without)[150:330].mean() < 1.0
 
 

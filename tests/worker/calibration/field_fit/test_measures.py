@@ -115,10 +115,8 @@ def test_a_handball_court_that_is_narrower_than_said_is_found_though_it_has_fewe
     truth = Field(39.8, 19.6, 0.05, template=load("handball"))
     given = Field(40.0, 20.0, 0.05, template=load("handball"))
     assert len(truth.markings()) < len(given.markings())
-    opposite = [
-        camera(name, (x, y, 7.0), (0.5 * x, 0.0), focal=600.0) for name, x, y in (("a", -9.0, -15.0), ("b", 9.0, 15.0))
-    ]
-    refined, measures = fitted(truth, opposite, given)
+    whole = camera("whole", (0.0, -16.0, 9.0), (0.0, -1.0), focal=420.0)
+    refined, measures = fitted(truth, [whole], given)
     assert refined.pitch.length == pytest.approx(39.8, abs=0.03)
     assert refined.pitch.width == pytest.approx(19.6, abs=0.03)
     assert measures["width_m"].known

@@ -54,7 +54,7 @@ def corners_seen(lens, tilt, middle, noise_px=0.0, rng=None, board=BOARD):
 
 
 @cache
-def detections(model="opencv", noise_px=0.2, count=24, reach=0.36):
+def detections(model="opencv", noise_px=0.2, count=16, reach=0.36):
     lens, rng = (FISHEYE if model == "fisheye" else PINHOLE), np.random.default_rng(5)
     spread = reach * (2.0 if model == "fisheye" else 1.0)
     seen = [corners_seen(lens, *place, noise_px, rng) for place in places(count, spread)]

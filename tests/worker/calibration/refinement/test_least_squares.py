@@ -47,7 +47,7 @@ def test_the_offsets_change_with_lens_and_field_as_the_rows_say(of):
 
 def two_views():
     """The rows of two cameras that see many of the same line points, each with noise, and the ground under them."""
-    lines = CROWNED.line_points()
+    lines = CROWNED.line_points(0.5)
     cameras = [pinhole(), camera("right", (3.0, -46.0, 11.0), (-14.0, 0.0))]
     rng = np.random.default_rng(4)
     exact = [measured(lines, one) for one in cameras]

@@ -42,6 +42,12 @@ def true(number: int):
     return derivatives.moved(LEFT, np.append(turn(number), np.zeros(3)))
 
 
+@cache
+def followed_as_it_is(every: int, look_ahead: int) -> list[Moment]:
+    """The clip with none of its frames replaced."""
+    return followed(every=every, look_ahead=look_ahead)
+
+
 def followed(
     frames: Mapping[int, np.ndarray | None] | None = None, every: int = 1, look_ahead: int = 0
 ) -> list[Moment]:
@@ -75,7 +81,7 @@ def sigma_deg(moment: Moment) -> float:
 
 @pytest.mark.parametrize(("every", "look_ahead"), [(1, 0), (1, 10), (2, 10)])
 def test_a_shaking_camera_is_followed_to_a_fraction_of_a_pixel_and_every_frame_is_told_once(every, look_ahead):
-    moments = followed(every=every, look_ahead=look_ahead)
+    moments = followed_as_it_is(every, look_ahead)
     assert [moment.number for moment in moments] == list(range(COUNT))
     assert how(moments) == [("measured" if number % every == 0 else "coasted") for number in range(COUNT)]
     assert residual_px(moments) < 0.1
@@ -86,13 +92,13 @@ def test_a_shaking_camera_is_followed_to_a_fraction_of_a_pixel_and_every_frame_i
 def test_what_is_said_at_once_is_what_settles_without_looking_ahead():
     follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND)
     at_once = [follower.see({"left": frame(number)}) for number in range(1, 4)]
-    for now, settled in zip(at_once, followed(look_ahead=0)[1:4], strict=True):
+    for now, settled in zip(at_once, followed_as_it_is(1, 0)[1:4], strict=True):
         np.testing.assert_array_equal(now.cameras[0].camera.pose.rotation, settled.cameras[0].camera.pose.rotation)
 
 
 def test_its_motion_is_known_as_well_as_it_says():
     ratios = []
-    for moment in followed():
+    for moment in followed_as_it_is(1, 0):
         told = moment.cameras[0]
         error = derivatives.change_between(true(moment.number), told.camera)
         ratios.append((error, told.motion_covariance))
