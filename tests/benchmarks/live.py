@@ -1,9 +1,9 @@
 """`make bench-live`: poses that `esc live` sends of cameras that shake, beside where these really are.
 
-Two cameras of the demo on a mast in wind (`tests.benchmarks.shaking`) film two seconds of their motion again and again
-for an RTSP server, GStreamer's, which notes when it takes each picture. `esc live` tracks them, each line that it prints
-is stamped as it comes, and belongs to the picture that was taken at its time. What a line says before the first RTCP
-report counts as sent and not as right or wrong: nobody knows of which picture it is.
+Two cameras of the demo on a mast in wind (`tests.benchmarks.shaking`) film two seconds of their motion again and
+again for an RTSP server, GStreamer's, which notes when it takes each picture. `esc live` tracks them; each line that
+it prints is stamped as it comes, and belongs to the picture that was taken at its time. What a line says before the
+first RTCP report counts as sent and not as right or wrong: nobody knows of which picture it is.
 """
 
 from __future__ import annotations
@@ -63,9 +63,7 @@ def main() -> int:
     _, made = clips(options.size)
     made = made[: options.cameras]
     sent = send(made, options.size, options.seconds, options.follow_every)
-    print(
-        f"{options.size}, {options.seconds:g} s of {FRAMES_PER_SECOND:g} pictures, lines in every {options.follow_every}."
-    )
+    print(f"{options.size}, {options.seconds:g} s at {FRAMES_PER_SECOND:g} Hz, lines in every {options.follow_every}.")
     print("\n".join(table(made, sent)))
     return 0
 
