@@ -7,15 +7,15 @@ import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
-from pathlib import Path
 
 import structlog
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import ValidationError
 
 from service import child_process
 from service.intake import image_checks
 from service.schemas.problems import Problem
 from service.schemas.programs.fetching import SourceFetch
+from service.schemas.programs.sources import SourceAnswer, SourceTask, frame_file, longest_s
 from service.schemas.source_urls import SourceSecrets
 from service.schemas.venue import Camera
 from service.settings import Settings
@@ -27,29 +27,6 @@ AT_ONCE = 8
 # Of the time that a source had: what took as much of it was ended by it.
 LATE = 0.9
 log = structlog.get_logger()
-
-
-class SourceTask(BaseModel):
-    """What the program reads on its standard input."""
-
-    # By camera: the address as it is shown, and what is secret in it (see SourceSecrets).
-    sources: dict[str, tuple[str, str | None]]
-    allowed: list[str]
-    folder: str
-    seconds: float
-    most_bytes: int
-    most_pixels: int
-    # Of each camera, and from the beginning of one to the beginning of the next.
-    frames: int = 1
-    spacing_s: float = 0.0
-
-
-class SourceAnswer(BaseModel):
-    """A line that it prints for each camera; `why`: a frame is missing. Otherwise all are in their files."""
-
-    camera: str
-    why: str | None = None
-    seconds: float = Field(0.0, description="That it took, but for the time between frames.")
 
 
 class SourceLate(Problem):
@@ -158,16 +135,6 @@ class Snapshots:
         for data in files:
             image_checks.check(camera, data, self._settings)
         return files
-
-
-def frame_file(task: SourceTask, camera: str, number: int) -> Path:
-    """Where the program puts a frame of a camera."""
-    return Path(task.folder) / f"{camera}.{number}"
-
-
-def longest_s(task: SourceTask) -> float:
-    """After which the program gives up."""
-    return task.seconds + (task.frames - 1) * task.spacing_s
 
 
 def _without(credentials: Mapping[str, str], text: str) -> str:

@@ -18,8 +18,8 @@ import httpx
 import structlog
 
 from service import child_process
-from service.intake.snapshots import SourceAnswer, SourceTask, frame_file, longest_s
 from service.schemas import hosts
+from service.schemas.programs.sources import SourceAnswer, SourceTask, frame_file, longest_s
 from service.schemas.source_urls import SourceSecrets, with_parameters
 from worker.duties import outbound_guard
 from worker.sources import mjpeg

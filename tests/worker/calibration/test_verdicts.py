@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fields.template import load
 from tests.scenes import chain
 from tests.worker.calibration.detection.spoiling import fogged
 from tests.worker.calibration.synthetic import BARREL, CROWNED, camera, moved, paint_frame
@@ -20,7 +19,6 @@ from worker.calibration import solve, wide_path
 from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.pairs import Pair
 from worker.calibration.geometry.camera import Camera
-from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options, Recover
 
 pytestmark = pytest.mark.slow
@@ -61,11 +59,6 @@ def off_m(found: Calibration, truth: Sequence[Camera]) -> dict[str, float]:
     }
 
 
-def of_another_pitch(one: Camera) -> NDArray[np.uint8]:
-    """What the camera would see if there were other lines on the ground."""
-    return paint_frame(Field(90.0, 50.0, 0.12, template=load("handball")), one)
-
-
 def test_cameras_in_a_row_are_accepted_though_the_outer_two_share_hardly_anything() -> None:
     found = run(chain)
     assert (found.verdict, found.rejected_because) == ("accepted", None)
@@ -92,23 +85,15 @@ def test_where_no_frame_can_be_used_nothing_is_searched_and_all_are_rejected() -
     assert found.stitch_error_px is None
 
 
-def test_a_camera_that_sees_something_else_does_not_drag_the_others_along() -> None:
-    found = run(chain, east=of_another_pitch(chain()[2]))
-    assert verdicts(found) == {"west": True, "middle": True, "east": False}
-    assert "do not fit this pitch" in found.cameras[2].rejected_because
-    assert found.rejected_because.startswith("camera east: ")
-    alone = off_m(found, chain())
-    assert max(alone["west"], alone["middle"]) < 0.03
-    assert found.stitch_error_px is not None
-    assert found.stitch_error_px < 0.3
-
-
-def test_two_good_cameras_of_four_are_accepted_whatever_the_others_see() -> None:
+def test_two_good_cameras_of_four_are_accepted_and_the_others_that_see_something_else_do_not_drag_them_along() -> None:
     other = {one.id: paint_frame(field("volleyball"), one) for one in court() if one.id in ("nw", "se")}
     found = run(court, by=0.5, recover="propose", **other)
     assert verdicts(found) == {"sw": True, "se": False, "nw": False, "ne": True}
+    assert all("do not fit this pitch" in one.rejected_because for one in found.cameras if not one.accepted)
+    assert found.rejected_because.startswith("camera se: ")
     off = off_m(found, court())
     assert max(off["sw"], off["ne"]) < 0.02
+    assert found.stitch_error_px < 0.3
 
 
 def test_a_camera_that_the_others_contradict_is_finished_apart_from_them(monkeypatch) -> None:

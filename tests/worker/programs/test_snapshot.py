@@ -1,6 +1,8 @@
 """A frame of an RTSP stream, from cameras that speak it over real sockets."""
 
 import socket
+import subprocess
+import sys
 import threading
 import time
 
@@ -158,3 +160,11 @@ def test_what_does_not_speak_rtsp_is_called_so(tmp_path, says):
         threading.Thread(target=answer, daemon=True).start()
         said = refused(tmp_path, "rtsp://{}:{}/live".format(*listener.getsockname()), None)
     assert "what it says is not RTSP" in said
+
+
+def test_the_program_loads_no_models_of_venues_and_results():
+    """Every fetch starts it anew."""
+    modules = "import sys, worker.programs.snapshot; print(*sys.modules)"
+    told = subprocess.run([sys.executable, "-c", modules], capture_output=True, text=True, check=True)
+    assert "service.schemas.programs.sources" in told.stdout.split()
+    assert not {"service.intake", "service.schemas.venue", "service.schemas.results"} & set(told.stdout.split())
