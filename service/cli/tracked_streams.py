@@ -38,7 +38,7 @@ class TrackedStreams:
         sender: PoseSender,
         sent: Callable[[SentPose], None],
     ) -> Self:
-        """Those of a venue of which a stream is given.
+        """Return the cameras of a venue of which a stream is given.
 
         `every`: lines are measured in every so many-th picture; `ahead_s`: poses are sent as they will be so long after
         their pictures; `sent` is told of each.
@@ -98,5 +98,4 @@ class TrackedStreams:
         shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
         known = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)
         self.sender.send([shot], pose.at_ns, pose.rate, tracked.how, known)
-        sigma = known.sigma_rotation_deg, known.sigma_position_m
-        self.sent(SentPose(shot.camera, tracked.how, sigma, pose.number, pose.at_ns, pose.arrived_ns, pose.clock))
+        self.sent(SentPose(shot.camera, tracked.how, pose.number, pose.at_ns, known))

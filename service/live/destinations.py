@@ -16,6 +16,7 @@ from typing import IO, Protocol, Self
 from service.formats import freed, opentrackio
 from service.formats.lens import NumberedCamera
 from service.live.packets import datagrams
+from service.schemas.live import LiveClock
 
 # Groups of OpenTrackIO: 239.135.1.N is that of source number N.
 OPENTRACKIO_GROUP, OPENTRACKIO_PORT, MOST_SOURCES = "239.135.1.{number}", 55555, 200
@@ -33,8 +34,12 @@ class Tracked:
 
     sigma_rotation_deg: float
     sigma_position_m: float
-    clock: str
+    clock: LiveClock
     arrived_ns: int
+
+    def latency_ms(self) -> float:
+        """Return how long ago the picture arrived."""
+        return (time.time_ns() - self.arrived_ns) / 1e6
 
     def to_json(self) -> dict[str, object]:
         """For who reads lines of JSON; the latency is from the picture's arrival until now."""
@@ -42,7 +47,7 @@ class Tracked:
             "sigma_rotation_deg": round(self.sigma_rotation_deg, 6),
             "sigma_position_m": round(self.sigma_position_m, 6),
             "clock": self.clock,
-            "latency_ms": round((time.time_ns() - self.arrived_ns) / 1e6, 1),
+            "latency_ms": round(self.latency_ms(), 1),
         }
 
 

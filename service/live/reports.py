@@ -19,9 +19,10 @@ from datetime import UTC, datetime
 import httpx
 
 from service.client import Client, NotUnderstood, Refused
+from service.live.destinations import Tracked
 from service.live.stored_poses import StoredPoses
 from service.schemas.geometry import Pose, PoseIn
-from service.schemas.live import LatencyMs, LiveCameraIn, LiveClock, LiveReport, LiveSigma, LiveStatus
+from service.schemas.live import LatencyMs, LiveCameraIn, LiveReport, LiveSigma, LiveStatus
 from service.schemas.venue import Camera
 
 INTERVAL_S = 0.5
@@ -40,18 +41,15 @@ OUTCOMES: tuple[LiveStatus, ...] = ("measured", "coasted", "refused")
 class SentPose:
     """A tracked pose that has just been sent.
 
-    `how`: it is known, one of `OUTCOMES`; `sigma`: of its rotation in degrees and its position in metres; `number`: of
-    its picture in the stream; `taken_ns`: when that was taken, by `clock`, and `arrived_ns`: when it had arrived, both
-    Unix time in nanoseconds.
+    `how`: it is known, one of `OUTCOMES`, and by what (`tracked`); `number`: of its picture in the stream; `taken_ns`:
+    when that was taken, Unix time in nanoseconds.
     """
 
     camera: Camera
     how: LiveStatus
-    sigma: tuple[float, float]
     number: int
     taken_ns: int
-    arrived_ns: int
-    clock: LiveClock
+    tracked: Tracked
 
 
 @dataclass
@@ -70,7 +68,8 @@ class _TrackedCamera:
         # A stream that was opened again counts from 0.
         left_out = max(0, pose.number - self.last.number - 1) if self.last is not None else 0
         self.counts.update({"pictures": left_out + 1, "left_out": left_out, pose.how: 1})
-        self.latencies.append((now, max(0.0, (time.time_ns() - pose.arrived_ns) / 1e6)))
+        self.latencies.append((now, max(0.0, pose.tracked.latency_ms())))
+        self._forget_latencies(now)
         self.last, self.last_s = pose, now
         if pose.how == "measured":
             self.measured_s = now
@@ -82,14 +81,18 @@ class _TrackedCamera:
         return "measured" if now - self.measured_s < MEASURED_WITHIN_S else self.last.how
 
     def latency_ms(self, now: float) -> LatencyMs | None:
-        """Of the poses that were sent lately; the others are forgotten."""
-        while self.latencies and now - self.latencies[0][0] > LATENCY_OVER_S:
-            self.latencies.popleft()
+        """Return the latency of the poses that were sent lately."""
+        self._forget_latencies(now)
         sorted_ms = sorted(latency for _, latency in self.latencies)
         if not sorted_ms:
             return None
         p50, p99 = (round(sorted_ms[int(share * len(sorted_ms))], 1) for share in (0.5, 0.99))
         return LatencyMs(p50=p50, p99=p99)
+
+    def _forget_latencies(self, now: float) -> None:
+        """Forget those of a while ago: of a venue that is a file nobody asks for them, for months."""
+        while self.latencies and now - self.latencies[0][0] > LATENCY_OVER_S:
+            self.latencies.popleft()
 
 
 class LiveReporter:
@@ -127,7 +130,7 @@ class LiveReporter:
         )
 
     def answered(self, report: LiveReport) -> None:
-        """What a report counted is not to be reported again."""
+        """Count what a report said as told: it is not reported again."""
         with self._lock:
             for camera in report.cameras:
                 if camera.id in self._tracked:
@@ -164,15 +167,18 @@ class LiveReporter:
         counts = {name: tracked.counts[name] for name in ("pictures", "left_out", *OUTCOMES)}
         if last is None or status == "silent":
             return LiveCameraIn(id=stored.id, pose=_pose_in(stored.pose), **known, **counts)
-        rotation_deg, position_m = last.sigma
+        # Loads OpenCV, for which stored poses do not wait.
+        from service.store.movement import turned_deg
+
+        sigma = LiveSigma(rotation_deg=last.tracked.sigma_rotation_deg, position_m=last.tracked.sigma_position_m)
         return LiveCameraIn(
             id=stored.id,
             pose=_pose_in(last.camera.pose),
-            sigma=LiveSigma(rotation_deg=rotation_deg, position_m=position_m),
-            turned_deg=_turned_deg(stored.pose.rotation, last.camera.pose.rotation),
+            sigma=sigma,
+            turned_deg=turned_deg(stored, last.camera),
             moved_m=math.dist(stored.pose.position, last.camera.pose.position),
             taken_at=datetime.fromtimestamp(last.taken_ns / 1e9, UTC),
-            clock=last.clock,
+            clock=last.tracked.clock,
             **known,
             **counts,
         )
@@ -180,20 +186,3 @@ class LiveReporter:
 
 def _pose_in(pose: Pose) -> PoseIn:
     return PoseIn(rotation=pose.rotation, position=pose.position)
-
-
-def _turned_deg(before: Sequence[float], after: Sequence[float]) -> float:
-    """The angle between two rotations, Rodrigues vectors in rad."""
-    (w, *u), (v, *t) = _quaternion(before), _quaternion(after)
-    cosine = w * v + sum(a * b for a, b in zip(u, t, strict=True))
-    cross = (u[1] * t[2] - u[2] * t[1], u[2] * t[0] - u[0] * t[2], u[0] * t[1] - u[1] * t[0])
-    # From the sine: the cosine of a small angle says nothing about it.
-    sine = math.hypot(*(w * b - v * a - c for a, b, c in zip(u, t, cross, strict=True)))
-    return math.degrees(2 * math.atan2(sine, abs(cosine)))
-
-
-def _quaternion(rotation: Sequence[float]) -> tuple[float, float, float, float]:
-    angle = math.hypot(*rotation)
-    scale = math.sin(angle / 2) / angle if angle else 0.5
-    x, y, z = (scale * component for component in rotation)
-    return math.cos(angle / 2), x, y, z

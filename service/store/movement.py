@@ -30,15 +30,15 @@ WIDEST, STEP = 6.0, 0.02
 def moved(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> Moved:
     """From one state of a camera to another. `pixels`: None where no marking was in view, or sizes differ."""
     return Moved(
-        rotation_deg=_turned_deg(_rotation(before), _rotation(after)),
+        rotation_deg=turned_deg(before, after),
         position_m=math.dist(before.pose.position, after.pose.position),
         pixels=_shift_px(field, before, after) if before.image_size == after.image_size else None,
     )
 
 
-def _turned_deg(before: Array, after: Array) -> float:
-    """The angle between two rotation matrices (3, 3)."""
-    turn = after @ before.T
+def turned_deg(before: PosedCamera, after: PosedCamera) -> float:
+    """Return the angle by which a camera was turned from one state to another."""
+    turn = _rotation(after) @ _rotation(before).T
     # From the sine as well: the cosine of a small angle says nothing about it.
     twice_sine = np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     return math.degrees(math.atan2(twice_sine, np.trace(turn) - 1))

@@ -6,6 +6,8 @@ import time
 import httpx
 import pytest
 
+from service.live import reports
+from service.live.destinations import Tracked
 from service.live.reports import LiveReporter, SentPose
 from service.live.stored_poses import StoredPoses
 from service.schemas.geometry import Pose
@@ -23,7 +25,7 @@ def reporter():
 
 def sent(number, how="measured", camera=LEFT, late_ms=40):
     arrived_ns = time.time_ns() - late_ms * 1_000_000
-    return SentPose(camera, how, (0.004, 0.01), number, arrived_ns, arrived_ns, "arrival")
+    return SentPose(camera, how, number, arrived_ns, Tracked(0.004, 0.01, "arrival", arrived_ns))
 
 
 def test_pictures_are_counted_by_what_became_of_them_until_a_report_is_taken(reporter):
@@ -44,6 +46,13 @@ def test_pictures_are_counted_by_what_became_of_them_until_a_report_is_taken(rep
     # A stream that is opened again counts from 0, and nothing was left out.
     reporter.sent(sent(0))
     assert reporter.report().cameras[0].left_out == 0
+
+
+def test_latencies_do_not_pile_up_where_nobody_asks_for_a_report(reporter, monkeypatch):
+    monkeypatch.setattr(reports, "LATENCY_OVER_S", 0.0)
+    for number in range(100):
+        reporter.sent(sent(number))
+    assert len(reporter._tracked["left"].latencies) < 10
 
 
 def test_a_camera_is_as_far_turned_and_moved_as_its_pose_is_from_the_stored_one(reporter):
