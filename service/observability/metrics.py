@@ -6,8 +6,8 @@ so it is the same whichever API process is asked, however many workers there are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import get_args
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar, get_args
 
 import structlog
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
@@ -88,6 +88,8 @@ OF_LIVE_POSES: tuple[tuple[str, str, Callable[[LiveGauges], float | None]], ...]
         lambda live: live.latency_p99_s,
     ),
 )
+OF_A_VENUE: Mapping[str, Callable[[Any], str]] = {"venue": lambda figures: figures.venue}
+Figures = TypeVar("Figures", VenueGauges, CameraTrend, LiveGauges)
 log = structlog.get_logger()
 
 
@@ -141,9 +143,10 @@ class _Stored(Collector):
         yield from _queue(figures)
         yield from _jobs(figures.counters)
         yield from _schedules(figures)
-        yield from _venues(figures.venues)
-        yield from _trends(figures.trends)
-        yield from _live(figures.live)
+        # The worst of each, as many as a setting says.
+        yield from _gauges(OF_VENUES, figures.venues, OF_A_VENUE)
+        yield from _gauges(OF_CAMERAS, figures.trends, {**OF_A_VENUE, "camera": lambda trend: trend.camera})
+        yield from _gauges(OF_LIVE_POSES, figures.live, OF_A_VENUE)
         yield from _alarms(figures)
         yield from _workers(figures.workers, self._silence_s)
         yield from _callbacks(figures)
@@ -225,36 +228,18 @@ def _schedules(figures: StatisticsSnapshot) -> Iterator[Metric]:
     yield fetches
 
 
-def _venues(venues: list[VenueGauges]) -> Iterator[Metric]:
-    """Those with the worst stitch errors: how many at most is a setting."""
-    for name, meaning, figure in OF_VENUES:
-        family = GaugeMetricFamily(name, meaning, labels=["venue"])
-        for venue in venues:
-            value = figure(venue)
+def _gauges(
+    families: Sequence[tuple[str, str, Callable[[Figures], float | None]]],
+    figures: Sequence[Figures],
+    labels: Mapping[str, Callable[[Figures], str]],
+) -> Iterator[Metric]:
+    """Yield a gauge for each of these figures of venues or cameras; what has none is left out."""
+    for name, meaning, figure in families:
+        family = GaugeMetricFamily(name, meaning, labels=list(labels))
+        for one in figures:
+            value = figure(one)
             if value is not None:
-                family.add_metric([venue.venue], value)
-        yield family
-
-
-def _trends(trends: list[CameraTrend]) -> Iterator[Metric]:
-    """Of the cameras that have moved farthest: how many at most is a setting."""
-    for name, meaning, figure in OF_CAMERAS:
-        family = GaugeMetricFamily(name, meaning, labels=["venue", "camera"])
-        for camera in trends:
-            value = figure(camera)
-            if value is not None:
-                family.add_metric([camera.venue, camera.camera], value)
-        yield family
-
-
-def _live(venues: list[LiveGauges]) -> Iterator[Metric]:
-    """Of the venues whose live poses were reported last: how many at most is a setting."""
-    for name, meaning, figure in OF_LIVE_POSES:
-        family = GaugeMetricFamily(name, meaning, labels=["venue"])
-        for venue in venues:
-            value = figure(venue)
-            if value is not None:
-                family.add_metric([venue.venue], value)
+                family.add_metric([label(one) for label in labels.values()], value)
         yield family
 
 
