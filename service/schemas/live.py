@@ -133,7 +133,7 @@ CAMERA_EXAMPLE: dict[str, Any] = {
 
 
 class LiveReport(Schema):
-    """What a process that sends live poses tells of itself, twice a second."""
+    """A report of a process that sends live poses, made twice a second."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [PROCESS_EXAMPLE | {"cameras": [CAMERA_EXAMPLE]}]})
 
@@ -178,7 +178,7 @@ class LiveMinuteCamera(Schema):
     latency_ms: LatencyMs | None = Field(None, description="The worst of the minute's reports.")
 
     def with_report(self, camera: LiveCameraIn) -> LiveMinuteCamera:
-        """The same minute after one more report."""
+        """Return the minute with one more report counted in."""
         turns = [turn for turn in (self.turned_deg, camera.turned_deg) if turn is not None]
         latencies = [latency for latency in (self.latency_ms, camera.latency_ms) if latency is not None]
         worst = {name: max(getattr(latency, name) for latency in latencies) for name in ("p50", "p99") if latencies}

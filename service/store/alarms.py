@@ -114,7 +114,7 @@ def _active_rules(
 
 
 def _live(connection: sa.Connection, quality: VenueQuality, venue: Venue) -> dict[AlarmKey, str]:
-    """What is wrong with the live poses of a venue, as far as their process has told."""
+    """Return the rules that the live poses of a venue break, with their reasons, as far as their process has told."""
     if venue.alarms is None or not venue.alarms.live:
         return {}
     watch = live_alarms.watch_of(connection, venue.id)

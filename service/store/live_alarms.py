@@ -34,7 +34,7 @@ class WatchedCamera(Schema):
     late_since: datetime | None = None
 
     def after(self, camera: LiveCameraIn, now: datetime) -> WatchedCamera:
-        """The same camera after a report."""
+        """Return what is watched of the camera after a report."""
         # A camera that is measured in every tenth picture is measured, whatever the last picture was.
         is_measured = camera.status == "measured" or camera.measured > 0
         is_late = camera.latency_ms is not None and camera.latency_ms.p99 > LATE_MS
@@ -79,19 +79,19 @@ class LiveWatch:
 
 
 def watch_of(connection: sa.Connection, venue_id: str) -> LiveWatch | None:
-    """What is watched of a venue; None: it never had live poses."""
+    """Return what is watched of a venue, None if it never had live poses."""
     row = connection.execute(sa.select(tables.live_reports).where(r.venue == venue_id)).one_or_none()
     return None if row is None else watch_in(row)
 
 
 def watch_in(row: Any) -> LiveWatch:
-    """What a row of `live_reports` says is watched."""
+    """Return what is watched of a venue by its row of `live_reports`."""
     cameras = {camera: WatchedCamera.model_validate(one, **TOLERANTLY) for camera, one in row.watched.items()}
     return LiveWatch(row.document["host"], row.reported_at, row.document.get("stopped", False), cameras)
 
 
 def watch_after(before: LiveWatch | None, report: LiveReport, now: datetime) -> LiveWatch:
-    """What is watched after a report that arrives `now`."""
+    """Return what is watched of a venue after a report that arrives `now`."""
     known = {} if before is None else before.cameras
     tracked = [camera for camera in report.cameras if camera.stream is not None]
     cameras = {camera.id: known.get(camera.id, WatchedCamera()).after(camera, now) for camera in tracked}
@@ -99,7 +99,7 @@ def watch_after(before: LiveWatch | None, report: LiveReport, now: datetime) -> 
 
 
 def watched_column(watch: LiveWatch) -> dict[str, Any]:
-    """What is watched of the cameras, as it is stored."""
+    """Return the column `watched` of a row of `live_reports`."""
     return {camera: to_document(one) for camera, one in watch.cameras.items()}
 
 

@@ -57,18 +57,13 @@ class LivePose:
 
 @dataclass(frozen=True)
 class _ArrivedPicture:
-    """`stream_s`: its time in the stream; `taken_ns`: by the camera's clock; `at_ns`: when it had been decoded."""
+    """A picture, its time in the stream (s), by its camera's clock and when it had been decoded (ns, Unix time)."""
 
     picture: Picture
     number: int
     stream_s: float
     taken_ns: int | None
-    at_ns: int
-
-    @property
-    def delay_s(self) -> float | None:
-        """From when it was taken until it had been decoded, if both clocks are right."""
-        return None if self.taken_ns is None else (self.at_ns - self.taken_ns) / 1e9
+    arrived_ns: int
 
 
 class _NewestPicture:
@@ -189,18 +184,18 @@ class StreamTracker:
                     tracked = self._locate(clip, arrived)
 
     def _report(self, tracked: TrackedPose, arrived: _ArrivedPicture, rate: Fraction) -> None:
-        clock: Clock = "rtcp" if self._tells_time(arrived) else "arrival"
-        taken_ns = arrived.at_ns if arrived.taken_ns is None or clock == "arrival" else arrived.taken_ns
-        at_ns = taken_ns + int(self.ahead_s * 1e9)
-        self.report(LivePose(tracked, at_ns, clock, arrived.at_ns, arrived.number, rate))
+        clock: Clock = "arrival"
+        at_ns = arrived.arrived_ns
+        if arrived.taken_ns is not None and self._is_clock_plausible((arrived.arrived_ns - arrived.taken_ns) / 1e9):
+            clock, at_ns = "rtcp", arrived.taken_ns
+        ahead_ns = int(self.ahead_s * 1e9)
+        self.report(LivePose(tracked, at_ns + ahead_ns, clock, arrived.arrived_ns, arrived.number, rate))
 
-    def _tells_time(self, arrived: _ArrivedPicture) -> bool:
-        """Whether the camera says when the picture was taken, by a clock that can be right."""
-        if arrived.delay_s is None:
-            return False
-        was_right, self._is_clock_right = self._is_clock_right, EARLIEST_S <= arrived.delay_s <= LATEST_S
+    def _is_clock_plausible(self, delay_s: float) -> bool:
+        """Whether the camera's clock can be right, by which a picture arrived so long after it was taken."""
+        was_right, self._is_clock_right = self._is_clock_right, EARLIEST_S <= delay_s <= LATEST_S
         if was_right and not self._is_clock_right:
-            off, side = abs(arrived.delay_s), "behind" if arrived.delay_s > 0 else "ahead of"
+            off, side = abs(delay_s), "behind" if delay_s > 0 else "ahead of"
             self.warn(
                 f"camera {self.stored.id}: its clock is {off:.1f} s {side} this machine's, so its pictures count from "
                 "when they arrive. Let both keep time by NTP"
