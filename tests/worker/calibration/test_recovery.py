@@ -175,7 +175,7 @@ def test_a_request_to_stop_ends_a_search_anywhere(monkeypatch):
 
 
 def found_as(one):
-    return Relocalisation([Candidate(one, 0.9, 0.9, None, None, 1.0, None)], None)
+    return Relocalisation([Candidate(one, 0.9, 0.9, None, None, 1.0, None, None)], None)
 
 
 def on_its_side(stored, found):

@@ -47,6 +47,11 @@ def lens_slopes(camera: Camera, points: Array) -> Array:
     return camera.intrinsics.slopes_by_numbers(_rays(_in_camera(camera, points)))
 
 
+def pixel_slopes_of_all(camera: Camera, points: Array) -> Array:
+    """How they move by pose and lens: (..., 2, 12), per rad, metre and unit of `LENS_NUMBERS`."""
+    return np.concatenate([pixel_slopes(camera, points), lens_slopes(camera, points)], axis=-1)
+
+
 def ground_slopes(camera: Camera, points: Array) -> Array:
     """How far (..., 2) off the camera puts points (..., 3) that it sees on the ground when its pose is a little wrong.
 
@@ -60,11 +65,11 @@ def ground_slopes(camera: Camera, points: Array) -> Array:
 
 def ground_slopes_of_all(camera: Camera, points: Array) -> Array:
     """The same for pose and lens: (..., 2, 12), per rad, metre and unit of `LENS_NUMBERS`."""
-    by_pose, by_lens = pixel_slopes(camera, points), lens_slopes(camera, points)
+    by_all = pixel_slopes_of_all(camera, points)
     # A camera that is shifted along the ground puts all of it there.
-    by_ground = by_pose[..., 3:5]
+    by_ground = by_all[..., 3:5]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.linalg.inv(by_ground) @ np.concatenate([by_pose, by_lens], axis=-1))
+        return np.asarray(np.linalg.inv(by_ground) @ by_all)
 
 
 def _in_camera(camera: Camera, points: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,11 +45,16 @@ LEVELS = (
 
 
 def climb(
-    field: FieldMap, view: LineView, start: Hypotheses, frees_focal: bool, rng: np.random.Generator
+    field: FieldMap,
+    view: LineView,
+    start: Hypotheses,
+    frees_focal: bool,
+    rng: np.random.Generator,
+    levels: Sequence[ClimbingRound] = LEVELS,
 ) -> tuple[Hypotheses, Array]:
     """Return the best hypotheses that lie apart, and their agreements at the last tolerance, best first."""
     cameras, scores = start, np.zeros(len(start))
-    for level in LEVELS:
+    for level in levels:
         scores = agreement(field, view, cameras, level.tolerance_px)
         for generation in range(level.generations):
             scale = level.scale * COOLING**generation

@@ -11,12 +11,13 @@ from worker.calibration.geometry.camera import Array, Pose
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.rotation import rotation_vectors
 from worker.calibration.relocalisation.agreement import agreement
-from worker.calibration.relocalisation.climbing import climb
+from worker.calibration.relocalisation.climbing import LEVELS, climb
 from worker.calibration.relocalisation.drawing import draw, draw_at
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import HALF_TURN, Hypotheses
 from worker.calibration.relocalisation.line_assignment import positions
 from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.repeated_markings import slid_along_field
 from worker.calibration.relocalisation.rotation_voting import Direction, focal_lengths, vote
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
 
@@ -28,6 +29,7 @@ CLIMBING_KNOWN, CLIMBING_UNKNOWN = 60, 160
 CLEARLY_FOUND = 0.45
 """Agreement from which nothing is drawn at random: what was found from lines is better than any draw."""
 DRAWN, DRAWN_AT_PLACE, CLIMBING_DRAWN = 20000, 6000, 120
+CLIMBING_SLID = 6
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,8 @@ def _through(
         drawn = _drawn(field, focal, place, rng)
         by_draws = _best(field, view, drawn, DRAWN_TOLERANCE_PX, CLIMBING_DRAWN)
         found, scores = climb(field, view, Hypotheses.joined([by_draws, found]), not known, rng)
+    slid = _best(field, view, _at(place, field, slid_along_field(field, found)), LEVELS[-2].tolerance_px, CLIMBING_SLID)
+    found, scores = climb(field, view, Hypotheses.joined([found, slid]), not known, rng, LEVELS[-2:])
     return [
         Proposal(_zoomed(lens.lens, focal / view.focal_px), Pose(rotation_vectors(rotation), position), float(score))
         for rotation, position, focal, score in zip(

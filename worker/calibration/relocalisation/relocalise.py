@@ -18,7 +18,7 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.diagnostics.overlap import Overlap, overlap_of
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.geometry.camera import Camera, Pose, inside
-from worker.calibration.geometry.derivatives import POSE_NUMBERS
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_of_all
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.geometry.parameters import LensParameter
@@ -44,10 +44,15 @@ of the frame, on mean."""
 LEAST_FOUND = 0.7
 """Of the expected lines, beyond chance. Right poses on real frames find 0.86 and more, wrong ones up to 0.9."""
 RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, MORE_EXPLAINED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.05, 0.15
-OWN_PAINT = 0.02
+OWN_PAINT, MUCH_MORE_EXPLAINED = 0.02, 0.2
 """A different pose may be the true one that agrees little less both ways, and which misses no more than so many times
 as much of its lines and a few more, or explains more of the paint, or alone explains so much of it and overlaps with
-the lines by this part of what the best does."""
+the lines by this part of what the best does. It is not where the best explains all that it does and more: a little if
+it misses as much as the best does, much if it misses less."""
+LEAST_SURE = 0.00125
+"""How far the markings in view may be from where the best pose and lens put them, of the width of the frame: rms, one
+standard deviation. Lens and pose that both slide, one to make up for the other, pass every limit of a pose alone.
+Right ones on rendered views are sure to 0.0012 and better, wrong ones to 0.006 and worse."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
@@ -61,7 +66,8 @@ class Candidate:
 
     `agreement` 0..1: the harmonic mean of how much of the lines that it expects is seen beyond chance, as `evidence`
     has it, and of how much of the paint in the frame is `explained`; `explains` (n,): which places on paint lie on such
-    a line; `residual_px`: rms of its lines, None where too few were measured, as `sigma`.
+    a line; `residual_px`: rms of its lines, None where too few were measured, as `sigma` of the pose and `shift_px`,
+    how far off the markings in view may be for all that the lines leave open of pose and lens (rms, one sigma).
     """
 
     camera: Camera
@@ -71,6 +77,7 @@ class Candidate:
     overlap: Overlap
     residual_px: float | None
     sigma: Sigma | None
+    shift_px: float | None
 
     @property
     def explained(self) -> float:
@@ -162,7 +169,8 @@ class _Sight:
         both = 2 * seen * explained / max(seen + explained, 1e-9)
         sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
         overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
-        return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma)
+        shift_px = _shift_sigma_px(self.field, found)
+        return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, shift_px)
 
 
 def _distinct(field: Field, markings: FieldMap, sought: SoughtCamera, proposals: Sequence[Proposal]) -> list[Camera]:
@@ -187,6 +195,17 @@ def _with_sigmas(found: RefinedPose) -> Camera:
     return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known))
 
 
+def _shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
+    """How far off the markings in view may be: rms of one standard deviation each; None where none were measured."""
+    lines = field.line_points().position
+    in_view = lines[inside(found.camera.project(lines), found.camera.intrinsics.size)]
+    if found.refined is None or len(in_view) == 0:
+        return None
+    slopes = pixel_slopes_of_all(found.camera, in_view)
+    variances = np.einsum("nij,jk,nik->n", slopes, found.refined.covariance, slopes)
+    return float(np.sqrt(np.nanmean(variances)))
+
+
 def _why_not_taken(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> NotFound | None:
     """Why the best candidate is not taken. Whether it is exact enough a calibration says that begins with it."""
     if not candidates:
@@ -201,6 +220,14 @@ def _why_not_taken(field: Field, markings: FieldMap, candidates: Sequence[Candid
         )
     if best.residual_px is None or best.sigma is None:
         return NotFound("few-lines", "too few points of lines could be measured; is the view free and lit?")
+    width = best.camera.intrinsics.size[0]
+    if best.shift_px is not None and best.shift_px > LEAST_SURE * width:
+        return NotFound(
+            "few-lines",
+            f"the lines in view do not tell lens and pose apart: the markings may lie {best.shift_px:.1f} pixels from "
+            f"where the best pose puts them (at most {LEAST_SURE * width:.1f} allowed); say what the lens or its field "
+            "of view is, or let the camera see more of the field",
+        )
     if not films_a_field(best.camera.pose):
         return NotFound("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
     for other in others:
@@ -218,11 +245,16 @@ def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
     if other.agreement < best.agreement - LESS_AGREEMENT:
         return False
     missed, its = (1 - one.evidence.agreement for one in (best, other))
+    has_paint_of_its_own = share(other.explains & ~best.explains) > OWN_PAINT
+    if not has_paint_of_its_own and best.explained > other.explained + (
+        MORE_EXPLAINED if its >= missed else MUCH_MORE_EXPLAINED
+    ):
+        return False
     return (
         its < MORE_MISSED * missed + FEW_MISSED
         or other.explained > best.explained + MORE_EXPLAINED
         # What misses clearly more, and explains nothing that the best does not explain, is a worse reading of the same.
-        or (share(other.explains & ~best.explains) > OWN_PAINT and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)
+        or (has_paint_of_its_own and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)
     )
 
 

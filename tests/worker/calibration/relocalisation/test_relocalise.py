@@ -70,6 +70,23 @@ def test_a_camera_stands_where_it_may():
     assert answer.candidates[0].camera.pose.position[1] > 0
 
 
+def test_three_lines_do_not_tell_a_lens_and_are_refused_with_the_pixels_that_it_leaves_open():
+    # One line along padel's service boxes, and what of the lines across it is seen between two markings.
+    court = field("padel")
+    corner = camera("one", (5.3, -8.8, 7.2), (-1.0, 4.0), focal=700.0)
+    answer = search(court, corner, paint_frame(court, corner), lens_is_known=False)
+    assert answer.candidates[0].shift_px > 1.2
+    assert answer.refusal.reason == "few-lines"
+    assert "do not tell lens and pose apart" in answer.refusal.words
+
+
+def test_a_yard_line_too_far_is_left_for_the_true_one():
+    pitch = field("american-football")
+    truth = camera("one", (15.0, -44.0, 22.0), (35.0, -10.0), focal=900.0)
+    answer = search(pitch, truth, paint_frame(pitch, truth))
+    assert off_px(pitch, truth, answer.candidates[0].camera) < 0.5
+
+
 def test_a_frame_without_lines_finds_nothing_and_says_so():
     answer = search(PITCH, SIDELINE, GREEN)
     assert answer.refusal.reason in ("no-lines", "lines", "few-lines")
@@ -88,7 +105,7 @@ def candidate(found_of_100, explained_of_100, iou):
     seen = Evidence(np.arange(100), np.zeros(100, int), np.ones(100), np.arange(100) < found_of_100, np.zeros(100))
     explains = np.isin(np.arange(100), explained_of_100)
     agreement = 2 / (1 / seen.agreement + 1 / explains.mean())
-    return Candidate(SIDELINE, agreement, explains, seen, Overlap(iou, found_of_100 / 100, 0.0), 0.4, None)
+    return Candidate(SIDELINE, agreement, explains, seen, Overlap(iou, found_of_100 / 100, 0.0), 0.4, None, None)
 
 
 def test_a_pose_that_misses_more_and_explains_nothing_of_its_own_is_no_rival():
@@ -100,3 +117,12 @@ def test_a_pose_that_misses_more_and_explains_nothing_of_its_own_is_no_rival():
 def test_a_pose_that_explains_paint_that_the_best_does_not_is_a_rival():
     best, other = candidate(99, range(90), iou=0.91), candidate(90, range(5, 93), iou=0.81)
     assert explains_nearly_as_well(other, best)
+
+
+def test_a_pose_is_no_rival_of_one_that_explains_all_that_it_does_and_more():
+    # Tennis: a court half as far along, whose expected lines are rather seen, but whose paint is a third of nothing.
+    best, shifted = candidate(76, range(95), iou=0.62), candidate(85, range(68), iou=0.71)
+    assert not explains_nearly_as_well(shifted, best)
+    # American football: yard lines farther on, with less of its lines seen and less of the paint explained.
+    best, shifted = candidate(96, range(99), iou=0.85), candidate(93, range(92), iou=0.78)
+    assert not explains_nearly_as_well(shifted, best)

@@ -1,0 +1,41 @@
+"""Cameras slid along a field whose markings repeat: the same lines, each taken for another one.
+
+Yard lines that lie evenly explain a view from every place that is so many yards farther on, and a search that climbs
+does not leave the one it ends at. What tells those places apart are the lines at their ends, which few pixels show.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.hypotheses import Hypotheses
+
+ALIKE_M = 0.05
+"""Distances between parallel markings that differ by less are one."""
+LARGEST_SHARE = 0.75
+"""Of the length or width of the field: slides farther than this leave too few of the lines in common."""
+
+
+def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
+    """Each camera moved along x and along y by every distance between two parallel markings, both ways."""
+    slides = np.concatenate(
+        [
+            _slides(field.lines_along_y, np.array([1.0, 0.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[0])),
+            _slides(field.lines_along_x, np.array([0.0, 1.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[1])),
+        ]
+    )
+    of_each = len(slides)
+    return Hypotheses(
+        np.repeat(cameras.rotations, of_each, axis=0),
+        (cameras.positions[:, None] + slides).reshape(-1, 3),
+        np.repeat(cameras.focal_px, of_each),
+    )
+
+
+def _slides(places: Array, axis: Array, longest: float) -> Array:
+    """The distances between any two of the places (n,) of parallel lines as moves (m, 3) along an axis."""
+    apart = np.unique(np.round((places[:, None] - places).ravel() / ALIKE_M)) * ALIKE_M
+    apart = apart[(np.abs(apart) > ALIKE_M) & (np.abs(apart) <= longest)]
+    return np.asarray(apart[:, None] * axis)
