@@ -56,6 +56,9 @@ Right ones on rendered views are sure to 0.0012 and better, wrong ones to 0.006 
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
+FARTHEST_CENTRE = 3.03 * FREE_CENTRE
+"""One lens of a hundred has its principal point farther from where it was proposed, part of the frame's width. A lens
+that is found bends to meet a field whose measures are wrong, and its principal point says so first."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
@@ -131,7 +134,7 @@ def relocalise(
             pulse()
             candidates.append(sight.with_lens_and_pose(camera) if sought.is_lens_sought else sight.with_pose(camera))
         candidates.sort(key=lambda one: -one.agreement)
-        found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, candidates))
+        found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, sought, candidates))
         if found.refusal is None or found.refusal.reason not in BEGUN_ANEW:
             break
     return found
@@ -206,7 +209,9 @@ def _shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
     return float(np.sqrt(np.nanmean(variances)))
 
 
-def _why_not_taken(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> NotFound | None:
+def _why_not_taken(
+    field: Field, markings: FieldMap, sought: SoughtCamera, candidates: Sequence[Candidate]
+) -> NotFound | None:
     """Why the best candidate is not taken. Whether it is exact enough a calibration says that begins with it."""
     if not candidates:
         return NotFound("no-lines", "no lines of a field are seen in the frame; is the view free and lit?")
@@ -227,6 +232,14 @@ def _why_not_taken(field: Field, markings: FieldMap, candidates: Sequence[Candid
             f"the lines in view do not tell lens and pose apart: the markings may lie {best.shift_px:.1f} pixels from "
             f"where the best pose puts them (at most {LEAST_SURE * width:.1f} allowed); say what the lens or its field "
             "of view is, or let the camera see more of the field",
+        )
+    off_centre = float(np.linalg.norm(best.camera.intrinsics.matrix[:2, 2] - sought.lenses[0].lens.matrix[:2, 2]))
+    if off_centre > FARTHEST_CENTRE * width:
+        return NotFound(
+            "implausible",
+            f"the lens that fits the lines best has its principal point {off_centre:.0f} pixels from where it was "
+            f"expected (at most {FARTHEST_CENTRE * width:.0f} allowed): the measures of the field are most likely not "
+            "quite these, or the frame is part of a larger picture; put them right, or say what the lens is",
         )
     if not films_a_field(best.camera.pose):
         return NotFound("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
