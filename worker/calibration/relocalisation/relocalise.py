@@ -44,15 +44,17 @@ of the frame, on mean."""
 LEAST_FOUND = 0.7
 """Of the expected lines, beyond chance. Right poses on real frames find 0.86 and more, wrong ones up to 0.9."""
 RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, MORE_EXPLAINED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.05, 0.15
-OWN_PAINT, MUCH_MORE_EXPLAINED = 0.02, 0.2
+OWN_PAINT, MUCH_MORE_EXPLAINED, MORE_SEEN, ALIKE_EXPLAINED = 0.02, 0.2, 0.04, 0.01
 """A different pose may be the true one that agrees little less both ways, and which misses no more than so many times
 as much of its lines and a few more, or explains more of the paint, or alone explains so much of it and overlaps with
-the lines by this part of what the best does. It is not where the best explains all that it does and more: a little if
-it misses as much as the best does, much if it misses less."""
-LEAST_SURE = 0.00125
-"""How far the markings in view may be from where the best pose and lens put them, of the width of the frame: rms, one
-standard deviation. Lens and pose that both slide, one to make up for the other, pass every limit of a pose alone.
-Right ones on rendered views are sure to 0.0012 and better, wrong ones to 0.006 and worse."""
+the lines by this part of what the best does. It is not where it explains nothing that the best does not explain, and
+the best explains more: a little if it misses as much, much if it misses less; or where the best explains as much and
+misses so much less: yard lines farther on, one of them where there is none."""
+LEAST_SURE, LEAST_SURE_OF_LENS = 0.0025, 0.00125
+"""How far the markings in view may be from where the best pose puts them, of the width of the frame (rms, one standard
+deviation), through a lens that is known and one that is found. Pose and lens that slide together, one to make up for
+the other, keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the lens
+is found, wrong ones to 0.006 and worse."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
@@ -226,12 +228,13 @@ def _why_not_taken(
     if best.residual_px is None or best.sigma is None:
         return NotFound("few-lines", "too few points of lines could be measured; is the view free and lit?")
     width = best.camera.intrinsics.size[0]
-    if best.shift_px is not None and best.shift_px > LEAST_SURE * width:
+    least_sure_px = width * (LEAST_SURE_OF_LENS if sought.is_lens_sought else LEAST_SURE)
+    if best.shift_px is not None and best.shift_px > least_sure_px:
         return NotFound(
             "few-lines",
             f"the lines in view do not tell lens and pose apart: the markings may lie {best.shift_px:.1f} pixels from "
-            f"where the best pose puts them (at most {LEAST_SURE * width:.1f} allowed); say what the lens or its field "
-            "of view is, or let the camera see more of the field",
+            f"where the best pose puts them (at most {least_sure_px:.1f} allowed); say what the lens or its field of "
+            "view is, or let the camera see more of the field",
         )
     off_centre = float(np.linalg.norm(best.camera.intrinsics.matrix[:2, 2] - sought.lenses[0].lens.matrix[:2, 2]))
     if off_centre > FARTHEST_CENTRE * width:
@@ -259,9 +262,7 @@ def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
         return False
     missed, its = (1 - one.evidence.agreement for one in (best, other))
     has_paint_of_its_own = share(other.explains & ~best.explains) > OWN_PAINT
-    if not has_paint_of_its_own and best.explained > other.explained + (
-        MORE_EXPLAINED if its >= missed else MUCH_MORE_EXPLAINED
-    ):
+    if not has_paint_of_its_own and _is_outdone(other, best):
         return False
     return (
         its < MORE_MISSED * missed + FEW_MISSED
@@ -269,6 +270,15 @@ def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
         # What misses clearly more, and explains nothing that the best does not explain, is a worse reading of the same.
         or (has_paint_of_its_own and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)
     )
+
+
+def _is_outdone(other: Candidate, best: Candidate) -> bool:
+    """Whether the best of two that explain the same paint explains more of it, or sees more of its lines."""
+    misses_more = best.evidence.agreement - other.evidence.agreement
+    explains_less = best.explained - other.explained
+    if misses_more > MORE_SEEN:
+        return explains_less > -ALIKE_EXPLAINED
+    return explains_less > (MORE_EXPLAINED if misses_more >= 0 else MUCH_MORE_EXPLAINED)
 
 
 def twin(camera: Camera) -> Camera:

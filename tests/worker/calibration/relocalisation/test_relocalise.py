@@ -134,3 +134,11 @@ def test_a_pose_is_no_rival_of_one_that_explains_all_that_it_does_and_more():
     # American football: yard lines farther on, with less of its lines seen and less of the paint explained.
     best, shifted = candidate(96, range(99), iou=0.85), candidate(93, range(92), iou=0.78)
     assert not explains_nearly_as_well(shifted, best)
+
+
+def test_a_pose_is_no_rival_of_one_that_explains_the_same_and_sees_more_of_its_lines():
+    # American football: yard lines farther on, one of them where there is none.
+    best, shifted = candidate(95, range(98), iou=0.86), candidate(88, range(98), iou=0.78)
+    assert not explains_nearly_as_well(shifted, best)
+    alike = candidate(93, range(98), iou=0.84)
+    assert explains_nearly_as_well(alike, best)
