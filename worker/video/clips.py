@@ -139,7 +139,10 @@ class Clip:
         self.video.codec_context.skip_frame = "NONKEY" if only else "DEFAULT"
 
     def shots(self, begin_s: float = 0.0) -> Iterator[ClipPicture]:
-        """The pictures from about a time on, to the end; `VideoError` where a picture is not as the first one."""
+        """The pictures from about a time on, to the end; `VideoError` where a picture is not as the first one.
+
+        A live stream goes on from where it was read to.
+        """
         self._zero = self._enter(begin_s)
         sound: list[Packet[AudioStream]] = []
         broken, at = 0, 0.0
@@ -188,7 +191,9 @@ class Clip:
 
     def _enter(self, begin_s: float) -> float | None:
         """Go to a time of a file; when it begins in its own time, None where only its first picture tells."""
-        if self.live or self.video.start_time is None or self.video.time_base is None:
+        if self.live:
+            return self._zero
+        if self.video.start_time is None or self.video.time_base is None:
             return None
         start = float(self.video.start_time * self.video.time_base)
         if begin_s > EARLIER_S:

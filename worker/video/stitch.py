@@ -2,7 +2,7 @@
 
 Decoders, the making of views and the encoder run beside each other. At any moment each camera holds five pictures
 beside what its decoder keeps, and three views wait for the encoder. Live streams are in time by the clocks of their
-cameras, where all of them tell these by RTCP.
+cameras, where all of them tell these by RTCP, and else, as files are, by what moves in their pictures.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -30,7 +31,14 @@ from worker.video.encoding import Encoding, Sound, Writer
 from worker.video.errors import VideoError
 from worker.video.frame_timing import ClipTrack, FrameReader
 from worker.video.renderer import Renderer
-from worker.video.synchronisation import FARTHEST_S, LOOKED_AT_S, CoarseView, OffsetEstimate, chain_offsets
+from worker.video.synchronisation import (
+    FARTHEST_S,
+    LOOKED_AT_S,
+    CoarseView,
+    MotionSignal,
+    OffsetEstimate,
+    chain_offsets,
+)
 from worker.video.yuv_planes import Picture, planes_of
 
 if TYPE_CHECKING:
@@ -347,24 +355,23 @@ def _offsets(
     wanting = [camera for camera in clips if camera not in offsets]
     if not wanting:
         return offsets, {}
-    live = [camera for camera, clip in clips.items() if clip.live]
     if not plan.offsets and all(clip.reports_clock for clip in clips.values()):
         clocks = CameraClocks(clips)
         for clip in clips.values():
             clip.use_clocks(clocks)
         return dict.fromkeys(clips, 0.0), {}
-    if live:
+    live = [camera for camera, clip in clips.items() if clip.live]
+    places = CoarseView(scene.pitch, [fitted[camera] for camera in clips])
+    if len(live) == len(clips):
+        told("sync", 0.0)
+        motions = _live_motions(clips, places)
+    elif live:
         raise VideoError(
-            f"camera {live[0]} is a live stream, which cannot be read twice: say with --offset how much later "
+            f"camera {live[0]} is a live stream and others are files: say with --offset how much later "
             f"{' and '.join(wanting)} comes; --offset {wanting[0]}=0 takes pictures as they arrive"
         )
-    places = CoarseView(scene.pitch, [fitted[camera] for camera in clips])
-    motions = {}
-    for number, (camera, clip) in enumerate(clips.items()):
-        told(f"sync {camera}", number / len(clips))
-        begin_s = max(0.0, (plan.begin_s or 0.0) - offsets.get(camera, 0.0))
-        with Clip.open(camera, clip.address) as again:
-            motions[camera] = places.motion(camera, _until(begin_s + LOOKED_AT_S, again.shots(begin_s)))
+    else:
+        motions = _motions(clips, places, offsets, plan.begin_s or 0.0, told)
     offsets, found = chain_offsets(places, motions, offsets)
     for camera, answer in found.items():
         if answer.second_s is None:
@@ -374,6 +381,29 @@ def _offsets(
                 f"much later its clip began, --offset {camera}=0.120, or --offset {camera}=0 if they began together"
             )
     return offsets, found
+
+
+def _motions(
+    clips: Mapping[str, Clip], places: CoarseView, offsets: Mapping[str, float], from_s: float, told: Report
+) -> dict[str, MotionSignal]:
+    """What moves in files, which are opened once more for that."""
+    motions = {}
+    for number, (camera, clip) in enumerate(clips.items()):
+        told(f"sync {camera}", number / len(clips))
+        begin_s = max(0.0, from_s - offsets.get(camera, 0.0))
+        with Clip.open(camera, clip.address) as again:
+            motions[camera] = places.motion(camera, _until(begin_s + LOOKED_AT_S, again.shots(begin_s)))
+    return motions
+
+
+def _live_motions(clips: Mapping[str, Clip], places: CoarseView) -> dict[str, MotionSignal]:
+    """What moves in live streams, which are read on from there."""
+
+    def look(clip: Clip) -> MotionSignal:
+        return places.motion(clip.camera, _until(time.monotonic() - clip.since + LOOKED_AT_S, clip.shots()))
+
+    with ThreadPoolExecutor(len(clips)) as pool:
+        return dict(zip(clips, pool.map(look, clips.values()), strict=True))
 
 
 def _until(end_s: float, shots: Iterator[ClipPicture]) -> Iterator[ClipPicture]:
