@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import yaml
 
 from service.cli.tracked_poses import camera_document
 from service.formats import colmap, metropolis, plain, pose2sim
@@ -137,3 +138,14 @@ def test_pictures_without_distortion_are_those_of_the_camera_matrix_of_metropoli
         on_line = picture[rows[within], columns[within]].mean(axis=1)
         beside = picture[rows[within], np.clip(columns[within] + 12, 0, picture.shape[1] - 1)].mean(axis=1)
         assert np.median(on_line) > np.median(beside) + 30
+
+
+def test_configurations_of_other_tools_are_yaml_that_says_what_it_seems_to_say():
+    blocks = [yaml.safe_load(block) for block in re.findall(r"^```yaml\n(.*?)^```", DOCUMENT, re.MULTILINE | re.DOTALL)]
+    still, on_demand, named, frigate = blocks
+    assert still["streams"]["left"].endswith("/snapshot#header=Authorization: Bearer esc_...")
+    assert on_demand["streams"]["demo"].startswith("exec:esc stitch demo left=rtsp://")
+    assert on_demand["streams"]["demo"].endswith("-o {output}#starttimeout=60")
+    assert named == frigate["go2rtc"] == {"streams": {"demo": None}}
+    (source,) = frigate["cameras"]["demo"]["ffmpeg"]["inputs"]
+    assert source["path"] == "rtsp://127.0.0.1:8554/demo"
