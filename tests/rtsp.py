@@ -1,4 +1,4 @@
-"""Starts the RTSP cameras of `tests/rtsp_cameras.py`, and encodes what they film."""
+"""Starts the RTSP cameras of `tests/rtsp_cameras.py` and the recorder beside it, and encodes what cameras film."""
 
 from __future__ import annotations
 
@@ -64,5 +64,17 @@ def filming(clips: Sequence[Path], rate: float) -> Iterator[tuple[list[str], sub
             assert process.stdout is not None
             port = int(process.stdout.readline())
             yield [f"rtsp://127.0.0.1:{port}/{number}" for number in range(len(clips))], process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def recording(file: Path) -> Iterator[str]:
+    """The address of a server that records what is published there, as MPEG-TS."""
+    command = [PYTHON, Path(__file__).with_name("rtsp_recorder.py"), file]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            yield f"rtsp://127.0.0.1:{int(process.stdout.readline())}/view"
         finally:
             process.kill()

@@ -114,6 +114,22 @@ def test_every_secret_is_asked_for_and_none_has_a_default():
     assert {value for _, value in asked} == {""}
 
 
+def test_live_poses_leave_a_container_that_may_write_nowhere_and_is_on_the_network_of_the_machine():
+    (its,) = yaml.safe_load((DOCKER / "compose.live.yaml").read_text())["services"].values()
+    assert its["command"][0] == "live"
+    assert its["network_mode"] == "host"
+    assert its["environment"]["ESC_URL"] == "http://127.0.0.1:8000"
+    assert (its["read_only"], its["cap_drop"], its["init"]) == (True, ["ALL"], True)
+    assert its["security_opt"] == ["no-new-privileges:true"]
+    assert "volumes" not in its
+    assert all("127.0.0.1:8000:8000" in service["ports"] for _, service in published())
+
+
+def published():
+    """The services of the other files that take requests from this machine, with the file of each."""
+    return [(name, its) for name, file in COMPOSE.items() for its in file["services"].values() if "ports" in its]
+
+
 def test_secrets_that_are_filled_in_stay_out_of_the_repository():
     assert "/docker/.env" in (ROOT / ".gitignore").read_text().split()
 

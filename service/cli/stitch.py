@@ -20,12 +20,15 @@ from service.schemas.names import Projection
 
 if TYPE_CHECKING:
     from service.schemas.venue import Venue
+    from worker.calibration.stitching.coverage import Unseen
     from worker.calibration.stitching.views import ViewChoice
     from worker.video.stitch import Offset, StitchReport, StitchScene
     from worker.video.tracking import MotionSummary
 
 # In place of a number: as it suits the cameras, whatever the venue keeps.
 AUTO = "auto"
+# Less of the view that no camera sees is not worth a line.
+LEAST_UNSEEN = 0.001
 
 
 def stitch(
@@ -56,7 +59,7 @@ def stitch(
             "--offset",
             metavar="CAMERA=SECONDS",
             help="How much later a camera's clip began than the first one: right=0.120, or in frames of its own, "
-            "right=3f. Otherwise found by what moves where both see.",
+            "right=3f. Otherwise found by what moves where both see, or told by the clocks of cameras (RTSP).",
         ),
     ] = None,
     audio: Annotated[
@@ -157,7 +160,7 @@ def stitch(
             follows = stack.enter_context(tracking(stored, follow_every, poses_out, settings.freed_axes))
             show = stack.enter_context(progress_bar())
             geometry = follows if follow else StaticGeometry
-            made = stitched(_stitch_inputs(stored, chosen), addresses, plan, show, geometry)
+            made = stitched(_stitch_inputs(stored, chosen), addresses, plan, show, geometry, _print_unseen)
     except VideoError as fault:
         fail(str(fault), FAILED)
     _print_summary(made)
@@ -231,6 +234,15 @@ def _stored_view(venue: Venue) -> ViewChoice:
     from worker.jobs.from_schemas import choice_of
 
     return choice_of(venue.view or Kept())
+
+
+def _print_unseen(unseen: Unseen) -> None:
+    """Say at the beginning what will be dark, which in a live stream nobody would learn at its end."""
+    if unseen.share >= LEAST_UNSEEN:
+        print_note(
+            f"{100 * unseen.share:.1f} % of the view is seen by no camera: {', '.join(unseen.places)}. "
+            "--height auto and --field-of-view auto show what cameras see"
+        )
 
 
 def _print_summary(made: StitchReport) -> None:

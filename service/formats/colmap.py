@@ -19,29 +19,39 @@ MODELS = {
 
 
 def write(shots: Sequence[NumberedCamera]) -> bytes:
-    """The three files. Images are named as their cameras, with `.jpg`: the frames to put beside them."""
-    cameras = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]", *(_camera(shot) for shot in shots)]
+    """The three files. Images are named as their cameras, with `.jpg`: the frames to put beside them.
+
+    Ids follow the names, as those of `feature_extractor` do: `point_triangulator` takes no model whose ids differ from
+    those of its database.
+    """
+    numbered = list(enumerate(sorted(shots, key=_name), start=1))
+    cameras = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]", *(_camera(number, shot) for number, shot in numbered)]
     images = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; then a line of POINTS2D[]"]
-    for shot in shots:
-        images += [_image(shot), ""]
+    for number, shot in numbered:
+        images += [_image(number, shot), ""]
     points = ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]"]
     files = {"cameras.txt": cameras, "images.txt": images, "points3D.txt": points}
     return archive({name: "\n".join([*lines, ""]).encode() for name, lines in files.items()})
 
 
-def _camera(shot: NumberedCamera) -> str:
+def _name(shot: NumberedCamera) -> str:
+    """The file of the camera's frame."""
+    return f"{shot.id}.jpg"
+
+
+def _camera(number: int, shot: NumberedCamera) -> str:
     shot.require_support("colmap", {*RADIAL, *TANGENTIAL})
     coefficients = shot.coefficients
     enough = not any(coefficients[name] for name in RADIAL if name not in MODELS["OPENCV"])
     model = "OPENCV" if enough else "FULL_OPENCV"
     centre = [value + 0.5 for value in shot.principal]
     parameters = [*shot.focal, *centre, *(coefficients[name] for name in MODELS[model])]
-    return _line(shot.number, model, *shot.size, *map(float, parameters))
+    return _line(number, model, *shot.size, *map(float, parameters))
 
 
-def _image(shot: NumberedCamera) -> str:
+def _image(number: int, shot: NumberedCamera) -> str:
     pose = shot.camera.pose
-    return _line(shot.number, *quaternion(pose.rotation), *pose.translation, shot.number, f"{shot.id}.jpg")
+    return _line(number, *quaternion(pose.rotation), *pose.translation, number, _name(shot))
 
 
 def quaternion(rotation: Sequence[float]) -> list[float]:

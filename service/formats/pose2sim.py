@@ -1,4 +1,4 @@
-"""Pose2Sim's and aniposelib's TOML: one file with a table for each camera, as Caliscope and anipose write and read it.
+"""Pose2Sim's and aniposelib's TOML: one file with a table for each camera, as anipose reads and Caliscope exports it.
 
 Their camera is OpenCV's (`cv2.projectPoints`), their world is metres with z up, as ours. `fisheye` is in the file, but
 Pose2Sim does not read it: a fisheye lens is refused.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
-from service.formats import colmap, freed, opencv, opentrackio, plain, pose2sim, soccernet, stmap
+from service.formats import colmap, freed, metropolis, opencv, opentrackio, plain, pose2sim, soccernet, stmap
 from service.formats.archive import archive
 from service.formats.lens import NumberedCamera
 from service.schemas.names import FormatName
@@ -28,6 +28,7 @@ def export_formats(settings: Settings) -> Mapping[FormatName, Format]:
         "colmap": AllCamerasFormat(ZIP, "zip", colmap.write),
         "soccernet": FilePerCameraFormat(JSON, "json", soccernet.write),
         "pose2sim": AllCamerasFormat("application/toml", "toml", pose2sim.write),
+        "metropolis": AllCamerasFormat(JSON, "json", metropolis.write),
         "st-map": OneCameraFormat(ZIP, "zip", partial(maps, origin="bottom-left")),
         "st-map-unreal": OneCameraFormat(ZIP, "zip", partial(maps, origin="top-left")),
     }

@@ -14,7 +14,16 @@ SITE_PART = "site"
 LensModel = Literal["opencv", "fisheye"]
 # Of files that poses leave in; `service.formats.table` has what is behind the names.
 FormatName = Literal[
-    "json", "opencv", "opentrackio", "freed", "colmap", "soccernet", "pose2sim", "st-map", "st-map-unreal"
+    "json",
+    "opencv",
+    "opentrackio",
+    "freed",
+    "colmap",
+    "soccernet",
+    "pose2sim",
+    "metropolis",
+    "st-map",
+    "st-map-unreal",
 ]
 # What a list says of each of its entries.
 ListFields = Literal["all", "summary"]

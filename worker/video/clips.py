@@ -1,7 +1,7 @@
 """Clips of one camera each, files or live streams: opened, looked over, and read as pictures at rising times.
 
 A clip's time is in seconds and 0 at its first picture; that of a live stream counts from `since`, by when its first
-picture arrives.
+picture arrives, or is that of `CameraClocks`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from worker.calibration.geometry.camera import Camera
+from worker.video.camera_clocks import CameraClocks
 from worker.video.errors import VideoError
 from worker.video.stream_clock import StreamClock
 from worker.video.yuv_planes import Picture, picture_of
@@ -76,6 +77,7 @@ class Clip:
     since: float
     broken: int = field(default=0, init=False)
     sound: AudioStream | None = field(default=None, init=False)
+    _clocks: CameraClocks | None = field(default=None, init=False)
     _clock: StreamClock = field(default_factory=StreamClock, init=False)
     _zero: float | None = field(default=None, init=False)
 
@@ -111,6 +113,11 @@ class Clip:
         return is_live(self.address)
 
     @property
+    def reports_clock(self) -> bool:
+        """Whether its camera may tell when pictures were taken: by RTCP, which belongs to RTSP."""
+        return self.address.startswith(("rtsp://", "rtsps://"))
+
+    @property
     def has_sound(self) -> bool:
         """Whether it can be listened to."""
         return bool(self.container.streams.audio)
@@ -118,6 +125,10 @@ class Clip:
     def listen(self) -> None:
         """Read the sound along with the pictures."""
         self.sound = self.container.streams.audio[0]
+
+    def use_clocks(self, clocks: CameraClocks) -> None:
+        """Give pictures the times of their camera's clock, from when all cameras have reported theirs."""
+        self._clocks = clocks
 
     def decode_without_delay(self) -> None:
         """Decode on one core unless pictures come in slices: several cores would hold back a picture each."""
@@ -128,7 +139,10 @@ class Clip:
         self.video.codec_context.skip_frame = "NONKEY" if only else "DEFAULT"
 
     def shots(self, begin_s: float = 0.0) -> Iterator[ClipPicture]:
-        """The pictures from about a time on, to the end; `VideoError` where a picture is not as the first one."""
+        """The pictures from about a time on, to the end; `VideoError` where a picture is not as the first one.
+
+        A live stream goes on from where it was read to.
+        """
         self._zero = self._enter(begin_s)
         sound: list[Packet[AudioStream]] = []
         broken, at = 0, 0.0
@@ -148,12 +162,14 @@ class Clip:
                 if frame.is_corrupt:
                     broken += 1
                     continue
-                if self._zero is None:
-                    self._zero = at - self._lateness()
-                self._check(frame, at - self._zero)
-                self.broken += broken
                 taken_ns = self._clock.taken_ns(frame.pts, frame.time_base)
-                yield ClipPicture(at - self._zero, picture_of(frame), sound, broken, taken_ns)
+                time_s = self._time(at, taken_ns)
+                if time_s is None:
+                    sound, broken = [], 0
+                    continue
+                self._check(frame, time_s)
+                self.broken += broken
+                yield ClipPicture(time_s, picture_of(frame), sound, broken, taken_ns)
                 sound, broken = [], 0
         self.broken += broken
 
@@ -175,12 +191,26 @@ class Clip:
 
     def _enter(self, begin_s: float) -> float | None:
         """Go to a time of a file; when it begins in its own time, None where only its first picture tells."""
-        if self.live or self.video.start_time is None or self.video.time_base is None:
+        if self.live:
+            return self._zero
+        if self.video.start_time is None or self.video.time_base is None:
             return None
         start = float(self.video.start_time * self.video.time_base)
         if begin_s > EARLIER_S:
             self.container.seek(int((start + begin_s - EARLIER_S) / self.video.time_base), stream=self.video)
         return start
+
+    def _time(self, at: float, taken_ns: int | None) -> float | None:
+        """The clip's time of a picture, `at` in its own; None while cameras have not reported their clocks."""
+        if self._clocks is None:
+            self._zero = at - self._lateness() if self._zero is None else self._zero
+            return at - self._zero
+        if not self._clocks.report(self.camera, taken_ns) or taken_ns is None:
+            return None
+        time_s = self._clocks.time_s(taken_ns)
+        # Of sound, which has no clock of its own.
+        self._zero = at - time_s
+        return time_s
 
     def _lateness(self) -> float:
         """Live streams that are opened one after the other are in time by when their pictures arrive."""

@@ -1,7 +1,8 @@
 """From a clip of each camera to one clip of the view: the whole way, in bounded memory.
 
 Decoders, the making of views and the encoder run beside each other. At any moment each camera holds five pictures
-beside what its decoder keeps, and three views wait for the encoder.
+beside what its decoder keeps, and three views wait for the encoder. Live streams are in time by the clocks of their
+cameras, where all of them tell these by RTCP, and else, as files are, by what moves in their pictures.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -18,16 +20,25 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
+from worker.calibration.stitching.coverage import Unseen, unseen_part
 from worker.calibration.stitching.panorama import Panorama, panorama
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import View, ViewChoice, chosen_view
+from worker.video.camera_clocks import CameraClocks
 from worker.video.clips import Clip, ClipPicture, camera_for_clip
 from worker.video.encoding import Encoding, Sound, Writer
 from worker.video.errors import VideoError
 from worker.video.frame_timing import ClipTrack, FrameReader
 from worker.video.renderer import Renderer
-from worker.video.synchronisation import FARTHEST_S, LOOKED_AT_S, CoarseView, OffsetEstimate, chain_offsets
+from worker.video.synchronisation import (
+    FARTHEST_S,
+    LOOKED_AT_S,
+    CoarseView,
+    MotionSignal,
+    OffsetEstimate,
+    chain_offsets,
+)
 from worker.video.yuv_planes import Picture, planes_of
 
 if TYPE_CHECKING:
@@ -39,6 +50,7 @@ SILENT = "none"
 EARLY_S = 0.25
 ROUNDING_S = 1e-6
 Report = Callable[[str, float], None]
+Begun = Callable[[Unseen], None]
 
 
 @dataclass(frozen=True)
@@ -159,9 +171,17 @@ class StitchReport:
 
 
 def stitch(
-    scene: StitchScene, addresses: Mapping[str, str], plan: Plan, told: Report, follow: GeometryFactory = StaticGeometry
+    scene: StitchScene,
+    addresses: Mapping[str, str],
+    plan: Plan,
+    told: Report,
+    follow: GeometryFactory = StaticGeometry,
+    begun: Begun = lambda _: None,
 ) -> StitchReport:
-    """Make the clip; `VideoError` says why there is none. `told`: what is done, and which part of it is."""
+    """Make the clip; `VideoError` says why there is none.
+
+    `told`: what is done, and which part of it is. `begun`: what no camera sees of the first picture, once it is made.
+    """
     started = time.monotonic()
     _check_cameras(scene, addresses, plan)
     with ExitStack() as stack:
@@ -174,7 +194,7 @@ def stitch(
         fitted = {camera.id: camera_for_clip(camera, clips.get(camera.id)) for camera in scene.cameras}
         offsets, found = _offsets(scene, clips, fitted, plan, told)
         rate = plan.rate or next(iter(clips.values())).facts.rate
-        tracks = {camera: _track(stack, clip, offsets[camera], plan.begin_s, rate) for camera, clip in clips.items()}
+        tracks = _tracks(stack, clips, offsets, plan.begin_s, rate)
         moments = ClipMoments(tracks, rate, plan.begin_s, plan.end_s, plan.allow_missing)
         first = moments.first()
         view = chosen_view(scene.pitch, list(fitted.values()), scene.choice, follow.border)
@@ -191,8 +211,10 @@ def stitch(
         expected = _expected(ends, moments.begin_s, rate, plan)
         sound = None if heard is None else Sound(heard, moments.begin_s - offsets[heard.camera])
         with Writer(plan.output, view.size, rate, plan.encoding, sound) as writer:
-            for count in _rendered(moments, geometry, view.size, writer, plan.threads):
-                told(f"{count / (time.monotonic() - started):.1f} fps", min(1.0, count / expected))
+            for made in _rendered(moments, geometry, view.size, writer, plan.threads):
+                if moments.count == 1:
+                    begun(unseen_part(made.seen))
+                told(f"{moments.count / (time.monotonic() - started):.1f} fps", min(1.0, moments.count / expected))
     return StitchReport(
         view.size,
         rate,
@@ -208,8 +230,8 @@ def stitch(
 
 def _rendered(
     moments: ClipMoments, geometry: Geometry, size: tuple[int, int], writer: Writer, threads: int
-) -> Iterator[int]:
-    """Make and write the view of each moment; how many there are so far."""
+) -> Iterator[Panorama]:
+    """Make and write the view of each moment, which `moments` counts; what each one was made by."""
     import av
 
     renderer: Renderer | None = None
@@ -229,7 +251,7 @@ def _rendered(
             renderer.render(pictures, planes_of(frame))
             moments.count += 1
             writer.put(frame, moments.sound())
-            yield moments.count
+            yield now
     finally:
         if renderer is not None:
             renderer.close()
@@ -333,19 +355,23 @@ def _offsets(
     wanting = [camera for camera in clips if camera not in offsets]
     if not wanting:
         return offsets, {}
+    if not plan.offsets and all(clip.reports_clock for clip in clips.values()):
+        clocks = CameraClocks(clips)
+        for clip in clips.values():
+            clip.use_clocks(clocks)
+        return dict.fromkeys(clips, 0.0), {}
     live = [camera for camera, clip in clips.items() if clip.live]
-    if live:
+    places = CoarseView(scene.pitch, [fitted[camera] for camera in clips])
+    if len(live) == len(clips):
+        told("sync", 0.0)
+        motions = _live_motions(clips, places)
+    elif live:
         raise VideoError(
-            f"camera {live[0]} is a live stream, which cannot be read twice: say with --offset how much later "
+            f"camera {live[0]} is a live stream and others are files: say with --offset how much later "
             f"{' and '.join(wanting)} comes; --offset {wanting[0]}=0 takes pictures as they arrive"
         )
-    places = CoarseView(scene.pitch, [fitted[camera] for camera in clips])
-    motions = {}
-    for number, (camera, clip) in enumerate(clips.items()):
-        told(f"sync {camera}", number / len(clips))
-        begin_s = max(0.0, (plan.begin_s or 0.0) - offsets.get(camera, 0.0))
-        with Clip.open(camera, clip.address) as again:
-            motions[camera] = places.motion(camera, _until(begin_s + LOOKED_AT_S, again.shots(begin_s)))
+    else:
+        motions = _motions(clips, places, offsets, plan.begin_s or 0.0, told)
     offsets, found = chain_offsets(places, motions, offsets)
     for camera, answer in found.items():
         if answer.second_s is None:
@@ -357,14 +383,48 @@ def _offsets(
     return offsets, found
 
 
+def _motions(
+    clips: Mapping[str, Clip], places: CoarseView, offsets: Mapping[str, float], from_s: float, told: Report
+) -> dict[str, MotionSignal]:
+    """What moves in files, which are opened once more for that."""
+    motions = {}
+    for number, (camera, clip) in enumerate(clips.items()):
+        told(f"sync {camera}", number / len(clips))
+        begin_s = max(0.0, from_s - offsets.get(camera, 0.0))
+        with Clip.open(camera, clip.address) as again:
+            motions[camera] = places.motion(camera, _until(begin_s + LOOKED_AT_S, again.shots(begin_s)))
+    return motions
+
+
+def _live_motions(clips: Mapping[str, Clip], places: CoarseView) -> dict[str, MotionSignal]:
+    """What moves in live streams, which are read on from there."""
+
+    def look(clip: Clip) -> MotionSignal:
+        return places.motion(clip.camera, _until(time.monotonic() - clip.since + LOOKED_AT_S, clip.shots()))
+
+    with ThreadPoolExecutor(len(clips)) as pool:
+        return dict(zip(clips, pool.map(look, clips.values()), strict=True))
+
+
 def _until(end_s: float, shots: Iterator[ClipPicture]) -> Iterator[ClipPicture]:
     return takewhile(lambda shot: shot.time_s < end_s, shots)
 
 
-def _track(stack: ExitStack, clip: Clip, offset_s: float, begin_s: float | None, rate: Fraction) -> ClipTrack:
-    reading = FrameReader(clip, max(0.0, (begin_s or 0.0) - offset_s))
-    stack.callback(reading.close)
-    return ClipTrack(clip.camera, iter(reading), offset_s, max(float(1 / clip.facts.rate), float(1 / rate)), clip.live)
+def _tracks(
+    stack: ExitStack, clips: Mapping[str, Clip], offsets: Mapping[str, float], begin_s: float | None, rate: Fraction
+) -> dict[str, ClipTrack]:
+    readers = {
+        camera: FrameReader(clip, max(0.0, (begin_s or 0.0) - offsets[camera])) for camera, clip in clips.items()
+    }
+    for reader in readers.values():
+        stack.callback(reader.close)
+    # All are read by now: a track waits for its first picture, which may wait for what other streams report.
+    return {
+        camera: ClipTrack(
+            camera, iter(readers[camera]), offsets[camera], max(float(1 / clip.facts.rate), float(1 / rate)), clip.live
+        )
+        for camera, clip in clips.items()
+    }
 
 
 def _ends(clips: Mapping[str, Clip], offsets: Mapping[str, float]) -> dict[str, float]:

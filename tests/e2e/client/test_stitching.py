@@ -1,14 +1,16 @@
 """`esc stitch`, as somebody calls it who has clips of a venue."""
 
 import json
+import re
 
 import av
 import pytest
 
 from service.schemas.venue import VenueIn
-from tests.worker.calibration.synthetic import pair
+from tests.rtsp import encode, filming, has_server, recording
+from tests.worker.calibration.synthetic import pair, pair_frames
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film
-from tests.worker.video.shaking import COUNT, film_shaking
+from tests.worker.video.shaking import COUNT, film_shaking, shaken
 from worker.video import clips as clips_of
 
 SHOWN = ("--width", "320", "--preset", "ultrafast")
@@ -162,3 +164,31 @@ def test_poses_are_those_of_followed_cameras(esc, venue_file, clips):
     answer = esc("stitch", venue_file, *clips, "-o", "pano.mp4", "--poses-out", "poses")
     assert answer.returncode == 2
     assert "--poses-out and --follow-every go with --follow" in answer.stderr
+
+
+def test_live_cameras_are_followed_and_their_view_is_published(esc, tmp_path, missing):
+    if not has_server():
+        missing("gstreamer")
+    films = [tmp_path / "left", tmp_path / "right"]
+    for film_path, phase, camera, picture in zip(films, (0.0, 1.5), pair(), pair_frames(), strict=True):
+        encode(shaken(camera, picture, phase, 50), 10, 3_000_000, film_path)
+    (tmp_path / "venue.json").write_text(json.dumps(document("windy", pair())))
+    with filming(films, 10) as ((left, right), _), recording(tmp_path / "received.ts") as published:
+        options = ("--follow", "--rate", "10", "--to", "9", "--json", *SHOWN)
+        answer = esc("stitch", "venue.json", f"left={left}", f"right={right}", "-o", published, *options)
+        assert answer.returncode == 0, answer.stderr
+    made = json.loads(answer.stdout)
+    assert made["frames"] > 10
+    for camera in made["cameras"].values():
+        assert camera["followed"]["measured"] > 0.8 * made["frames"]
+    assert "seen by no camera" not in answer.stderr
+    with av.open(str(tmp_path / "received.ts")) as clip:
+        assert clip.streams.video[0].width == 320
+        assert sum(1 for _ in clip.decode(video=0)) > 0.8 * made["frames"]
+
+
+def test_what_no_camera_sees_of_the_view_is_said(esc, venue_file, clips):
+    square = ("--width", "320", "--height", "320", "--preset", "ultrafast", "--to", "0.5", "--offset", "right=0")
+    answer = esc("stitch", venue_file, *clips, "-o", "pano.mp4", *square)
+    assert answer.returncode == 0
+    assert re.search(r"\d\d\.\d % of the view is seen by no camera: .*(top|bottom)", answer.stderr)

@@ -26,6 +26,7 @@ def poses(service, path, form, **more):
         ("colmap", "application/zip", "colmap.zip"),
         ("soccernet", "application/zip", "soccernet.zip"),
         ("pose2sim", "application/toml", "pose2sim.toml"),
+        ("metropolis", "application/json", "metropolis.json"),
     ],
 )
 def test_the_poses_that_hold_are_a_file_in_each_format(service, name, form, media_type, file):

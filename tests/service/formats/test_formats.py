@@ -11,7 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from service.formats import colmap, freed, opencv, opentrackio, plain, pose2sim, soccernet
+from service.formats import colmap, freed, metropolis, opencv, opentrackio, plain, pose2sim, soccernet
 from service.formats.lens import NumberedCamera
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera
@@ -296,6 +296,65 @@ def test_a_camera_called_metadata_stays_a_camera_for_pose2sim():
     ]
 
 
+# NVIDIA Metropolis
+
+
+def project_by_metropolis(sensor, points):
+    """Pixels (N, 2) of world points (N, 3), as `load_calib_into_dict` of spatialai-data-utils composes them."""
+    intrinsic, extrinsic = np.eye(4), np.eye(4)
+    intrinsic[:3, :3], extrinsic[:3] = sensor["intrinsicMatrix"], sensor["extrinsicMatrix"]
+    x, y, depth, _ = intrinsic @ extrinsic @ np.column_stack([points, np.ones(len(points))]).T
+    return np.stack([x, y], axis=1) / depth[:, None]
+
+
+def undistorted(camera):
+    """The camera that takes the pictures that `cv2.undistort` makes of those of another one."""
+    lens = camera.camera.intrinsics.model_copy(update={"distortion": []})
+    return NumberedCamera(camera.camera.model_copy(update={"intrinsics": lens}), camera.number)
+
+
+@pytest.mark.parametrize("distortion", [[], RADIAL, WITH_TILT])
+def test_metropolis_reprojects_into_the_picture_without_distortion(distortion):
+    shots = [shot(distortion, number=number, focal=(2122.4, 2011.1)) for number in (1, 2)]
+    sensors = json.loads(metropolis.write(shots))["sensors"]
+    assert [sensor["id"] for sensor in sensors] == ["camera-1", "camera-2"]
+    for camera, sensor in zip(shots, sensors, strict=True):
+        world, pixels = seen_points(undistorted(camera))
+        assert farthest(project_by_metropolis(sensor, world), pixels) < 1e-6
+        x, y, depth = np.array(sensor["cameraMatrix"]) @ np.column_stack([world, np.ones(len(world))]).T
+        assert farthest(np.stack([x / depth, y / depth], axis=1), pixels) < 1e-6
+
+
+def test_metropolis_has_pixels_of_the_ground_for_readers_that_make_their_own_homography():
+    camera = shot(RADIAL)
+    (sensor,) = json.loads(metropolis.write([camera]))["sensors"]
+    pixels = np.array([[point["x"], point["y"]] for point in sensor["imageCoordinates"]], dtype=float)
+    ground = np.array([[point["x"], point["y"], point["z"]] for point in sensor["globalCoordinates"]])
+    assert len(pixels) > 10
+    assert not ground[:, 2].any()
+    assert farthest(project_by_metropolis(sensor, ground), pixels) < 1e-6
+    found, _ = cv2.findHomography(pixels, ground[:, :2], cv2.RANSAC, 3)
+    np.testing.assert_allclose(cv2.perspectiveTransform(pixels[None], found)[0], ground[:, :2], atol=1e-3)
+
+
+def test_metropolis_has_every_field_that_its_schema_requires_and_none_that_it_does_not_know():
+    document = json.loads(metropolis.write([shot()]))
+    assert set(document) == {"version", "osmURL", "calibrationType", "sensors"}
+    (sensor,) = document["sensors"]
+    required = {"type", "id", "origin", "geoLocation", "coordinates", "scaleFactor", "attributes", "place"}
+    required |= {"imageCoordinates", "globalCoordinates"}
+    known = {"translationToGlobalCoordinates", "intrinsicMatrix", "extrinsicMatrix", "cameraMatrix"}
+    assert set(sensor) == required | known
+    assert sensor["coordinates"] == pytest.approx({"x": -1.611377, "y": -49.405109, "z": 7.886158})
+    assert sensor["attributes"] == [{"name": "frameWidth", "value": "3072"}, {"name": "frameHeight", "value": "1728"}]
+
+
+def test_a_camera_that_sees_no_ground_is_refused_by_metropolis():
+    with pytest.raises(Problem, match="camera-1 has 0") as refused:
+        metropolis.write([shot(rotation=(0.0, 0.0, 0.0))])
+    assert refused.value.kind == "format-cannot-hold"
+
+
 # Ours
 
 
@@ -317,6 +376,7 @@ def test_our_json_gives_cameras_back_as_they_are():
         (opencv.write, shot(skew=1.0), ["skew"]),
         (colmap.write, [shot(skew=1.0)], ["skew"]),
         (pose2sim.write, [shot(skew=1.0)], ["skew"]),
+        (metropolis.write, [shot(skew=1.0)], ["skew"]),
     ],
 )
 def test_a_lens_that_a_format_has_no_place_for_is_refused_and_named(write, camera, beyond):
@@ -339,6 +399,7 @@ def test_coefficients_that_are_zero_need_no_place():
         soccernet.write,
         lambda one: colmap.write([one]),
         lambda one: pose2sim.write([one]),
+        lambda one: metropolis.write([one]),
     ],
 )
 def test_a_fisheye_is_refused_by_formats_that_know_no_such_lens(write):

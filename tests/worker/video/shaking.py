@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
 import av
 import numpy as np
+from numpy.typing import NDArray
 
 from tests.worker.calibration.synthetic import pair, pair_frames
 from worker.calibration.detection.frame_fusion import Sway
-from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.camera import Array, Camera
 
 RATE = 25
 COUNT = 24
@@ -20,6 +22,12 @@ def turn(number: int, phase: float) -> Array:
     """0.3 degrees at 0.5 Hz about each axis, from where the camera stands in its first picture on."""
     phases = phase + np.array([0.0, 1.0, 2.0])
     return np.radians(0.3) * (np.sin(np.pi * number / RATE + phases) - np.sin(phases))
+
+
+def shaken(camera: Camera, picture: NDArray[np.uint8], phase: float, count: int = COUNT) -> Iterator[NDArray[np.uint8]]:
+    """What a camera of the pair sees while it sways; 50 pictures are a whole sway."""
+    for number in range(count):
+        yield Sway.from_turn(-turn(number, phase), camera.intrinsics).rows(picture, 0, len(picture))
 
 
 def film_shaking(folder: Path) -> dict[str, str]:
@@ -32,9 +40,8 @@ def film_shaking(folder: Path) -> dict[str, str]:
             stream.width, stream.height = camera.intrinsics.size
             stream.pix_fmt, stream.thread_count = "yuv420p", 1
             stream.codec_context.time_base = Fraction(1, 12800)
-            for number in range(COUNT):
-                shaken = Sway.from_turn(-turn(number, phase), camera.intrinsics).rows(picture, 0, len(picture))
-                frame = av.VideoFrame.from_ndarray(shaken, format="bgr24")
+            for number, seen in enumerate(shaken(camera, picture, phase)):
+                frame = av.VideoFrame.from_ndarray(seen, format="bgr24")
                 frame.pts, frame.time_base = number * 12800 // RATE, Fraction(1, 12800)
                 out.mux(stream.encode(frame))
             out.mux(stream.encode(None))

@@ -408,6 +408,40 @@ def test_a_receiver_of_udp_sees_the_view(tmp_path, pair):
     assert min(off(pictures[0], expected(number / 25)) for number in range(0, 50, 10)) <= 4
 
 
+def test_live_streams_that_tell_no_time_are_put_in_time_by_what_moves(tmp_path, monkeypatch):
+    monkeypatch.setattr("worker.video.stitch.LOOKED_AT_S", 5.0)
+    port = 40000 + os.getpid() % 20000
+    films = {
+        "left": film(tmp_path / "l.ts", LEFT, 12.0, rate=10),
+        "right": film(tmp_path / "r.ts", RIGHT, 12.0, begun_s=0.7, rate=10),
+    }
+    addresses = {camera: f"tcp://127.0.0.1:{port + number}" for number, camera in enumerate(films)}
+    senders = [
+        subprocess.Popen(
+            ["ffmpeg", "-v", "error", "-re", "-i", path, "-c", "copy", "-f", "mpegts", f"{addresses[camera]}?listen=1"]
+        )
+        for camera, path in films.items()
+    ]
+    try:
+        wait_for(lambda: all(f":{port + one:04X} " in Path("/proc/net/tcp").read_text() for one in (0, 1)))
+        plan = Plan(str(tmp_path / "pano.mp4"), rate=Fraction(10), encoding=FINE)
+        made = stitch(SCENE, addresses, plan, told)
+    finally:
+        for sender in senders:
+            sender.kill()
+            sender.wait()
+    assert made.found["right"].strength > 0.6
+    assert made.frames > 20
+    # Whatever the world's time of the first picture: both cameras show the same one.
+    picture = frames_of(tmp_path / "pano.mp4")[10]
+    times = np.arange(4.0, 12.0, 0.1)
+    seen = [player_seen(picture, expected(at)) for at in times]
+    apart = panorama(PITCH, VIEW, cameras).picture(
+        {"left": frame_at(LEFT, times[np.argmin(seen)]), "right": frame_at(RIGHT, times[np.argmin(seen)] + 0.7)}
+    )
+    assert min(seen) < player_seen(picture, apart)
+
+
 def test_a_live_stream_needs_an_offset_and_is_read_as_it_comes(tmp_path, pair):
     port = 40000 + os.getpid() % 20000
     address = f"udp://127.0.0.1:{port}"
@@ -430,7 +464,10 @@ def test_a_live_stream_needs_an_offset_and_is_read_as_it_comes(tmp_path, pair):
         ]
     )
     try:
-        with pytest.raises(VideoError, match=r"camera right is a live stream.*--offset right=0 takes pictures as they"):
+        with pytest.raises(
+            VideoError,
+            match=r"camera right is a live stream and others are files.*--offset right=0 takes pictures as they",
+        ):
             stitch(SCENE, clips, Plan(str(tmp_path / "pano.mp4")), told)
         alone = {"right": clips["right"]}
         plan = Plan(str(tmp_path / "pano.mp4"), allow_missing=True, encoding=FINE)

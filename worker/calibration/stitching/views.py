@@ -24,8 +24,6 @@ AROUND_SIDES, AROUND_ABOVE, AROUND_BELOW = 0.03, 0.8, 0.15
 AROUND_PITCH_M = 3.0
 # Least and largest height of a view in widths.
 HEIGHT_TO_WIDTH = 0.15, 1.0
-# A row or column at the edge of a view stays if no more than this part of it is unseen.
-UNSEEN_AT_EDGE = 0.03
 # Widest field of view of each projection; beyond it the picture is mostly its own corners.
 WIDEST_DEG: dict[LevelProjection, float] = {"pannini": 270.0, "cylinder": 340.0, "rectilinear": 140.0}
 # Of a view that is panned away from all of the pitch.
@@ -292,7 +290,8 @@ def _window(
         inside(camera.project(points), size, border * size[0]) for camera, size in zip(cameras, sizes, strict=True)
     ]
     unseen = ~np.any(in_view, axis=0)
-    # Peel off the emptiest side until none is too empty.
+    # Peel off the emptiest side until cameras see all of each: a wedge of backdrop between two of them is the first
+    # thing that anybody sees of a view.
     x0, x1, y0, y1 = 0, len(columns) - 1, 0, len(rows) - 1
     while x1 - x0 > 1 and y1 - y0 > 1:
         sides = np.array(
@@ -304,7 +303,7 @@ def _window(
             ]
         )
         worst = int(sides.argmax())
-        if sides[worst] <= UNSEEN_AT_EDGE:
+        if sides[worst] == 0:
             break
         x0, x1, y0, y1 = np.array([x0, x1, y0, y1]) + np.eye(4, dtype=int)[worst] * [1, -1, 1, -1]
     # Inwards: beyond, there is less to be seen.

@@ -1,0 +1,103 @@
+"""NVIDIA Metropolis' calibration.json: a sensor for each camera, as VSS and the AI City Challenge read it.
+
+Fields and their types are those of the calibration schema of NVIDIA's Video Search and Summarization (VSS) 3.3,
+https://docs.nvidia.com/vss/system-components/calibration/calibration-schema; what the matrices mean is what
+`loaders/calibration.py` of its `spatialai-data-utils` makes of them. Their world is ours, in metres (`cartesian`):
+origin in the middle of the field, z up. `extrinsicMatrix` (3, 4) takes the world to OpenCV's camera, and
+`cameraMatrix` (3, 4) is intrinsic times extrinsic, in whose product the third number is the depth in metres.
+
+There is no place for distortion: the matrices are for the picture without it, of the same size and with the same
+intrinsic matrix, as `cv2.undistort(frame, matrix, distortion)` makes it.
+
+`homography`, which need not be there, is left out: in the data of the AI City Challenge it takes the ground to pixels,
+in the calibrations that come with VSS pixels to the ground. Readers that miss it compute it from `imageCoordinates`
+and `globalCoordinates`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from service.formats.lens import COEFFICIENTS, NumberedCamera, product, transposed
+from service.schemas.problems import Problem
+
+# Pixels and the ground behind them are told at so many columns and rows of the picture, where the ground is no farther
+# off: next to the horizon a pixel is many metres.
+COLUMNS, ROWS = 5, 9
+FARTHEST_M = 150.0
+# A homography has four points.
+LEAST_POINTS = 4
+# The schema wants a place on the globe, which a field does not have; `cartesian` does not read it.
+NOWHERE = {"lat": 0.0, "lng": 0.0}
+
+
+def write(shots: Sequence[NumberedCamera]) -> bytes:
+    """All cameras in one object. Raises `Problem` for a fisheye, a skew and a camera that sees no ground."""
+    sensors = [_sensor(shot) for shot in shots]
+    document = {"version": "1.0", "osmURL": "", "calibrationType": "cartesian", "sensors": sensors}
+    return (json.dumps(document, indent=2) + "\n").encode()
+
+
+def _sensor(shot: NumberedCamera) -> dict[str, Any]:
+    # Coefficients are not held, but taken off the picture before.
+    shot.require_support("metropolis", COEFFICIENTS)
+    pose = shot.camera.pose
+    intrinsic = [[float(value) for value in row] for row in shot.camera.intrinsics.matrix]
+    extrinsic = [[*row, moved] for row, moved in zip(shot.rotation, pose.translation, strict=True)]
+    pairs = list(_ground_points(shot))
+    if len(pairs) < LEAST_POINTS:
+        raise Problem(
+            "format-cannot-hold",
+            f"metropolis wants {LEAST_POINTS} pixels with the ground behind them, within {FARTHEST_M:g} m, and camera "
+            f"{shot.id} has {len(pairs)}.",
+            camera=shot.id,
+            got=["no ground in view"],
+        )
+    return {
+        "type": "camera",
+        "id": shot.id,
+        "origin": NOWHERE,
+        "geoLocation": NOWHERE,
+        "coordinates": dict(zip("xyz", map(float, pose.position), strict=True)),
+        # A pixel of a floor plan is (world + translation) * scale: for a plan with a pixel for each metre, until there
+        # is another one.
+        "scaleFactor": 1.0,
+        "translationToGlobalCoordinates": {"x": 0.0, "y": 0.0},
+        "attributes": [
+            {"name": name, "value": str(pixels)}
+            for name, pixels in zip(("frameWidth", "frameHeight"), shot.size, strict=True)
+        ],
+        "place": [{"name": "building", "value": "field"}],
+        "imageCoordinates": [{"x": column, "y": row} for (column, row), _ in pairs],
+        "globalCoordinates": [{"x": x, "y": y, "z": 0.0} for _, (x, y) in pairs],
+        "intrinsicMatrix": intrinsic,
+        "extrinsicMatrix": extrinsic,
+        "cameraMatrix": product(intrinsic, extrinsic),
+    }
+
+
+def _ground_points(shot: NumberedCamera) -> Iterator[tuple[tuple[int, int], tuple[float, float]]]:
+    """Pixels (column, row) of the picture without distortion, and x, y of the ground (z = 0) that they show."""
+    width, height = shot.size
+    for row in (round(height * (number + 0.5) / ROWS) for number in range(ROWS)):
+        for column in (round(width * (number + 0.5) / COLUMNS) for number in range(COLUMNS)):
+            ground = _ground_behind(shot, column, row)
+            if ground is not None:
+                yield (column, row), ground
+
+
+def _ground_behind(shot: NumberedCamera, column: int, row: int) -> tuple[float, float] | None:
+    """x, y of the ground (z = 0) that a pixel of the picture without distortion shows; None for the sky and far off."""
+    (fx, fy), (cx, cy) = shot.focal, shot.principal
+    in_camera = [[(column - cx) / fx], [(row - cy) / fy], [1.0]]
+    (right,), (ahead,), (up,) = product(transposed(shot.rotation), in_camera)
+    x, y, height = shot.camera.pose.position
+    if up == 0 or height / -up <= 0:
+        return None
+    distance = height / -up
+    if distance * math.hypot(right, ahead) > FARTHEST_M:
+        return None
+    return x + distance * right, y + distance * ahead

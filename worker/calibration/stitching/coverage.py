@@ -1,0 +1,38 @@
+"""What of a stitched view no camera sees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+# The names of the ninths of a view, row by row.
+NINTHS = (
+    ("top left", "top", "top right"),
+    ("left", "middle", "right"),
+    ("bottom left", "bottom", "bottom right"),
+)
+# A ninth is named if so much of what is unseen lies in it.
+LEAST_OF_UNSEEN = 0.15
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """What no camera sees: its `share` of the view, 0 to 1, and the ninths that hold most of it, the emptiest first."""
+
+    share: float
+    places: Sequence[str]
+
+
+def unseen_part(seen: NDArray[np.bool_]) -> Unseen:
+    """What of a view is unseen, by where it is `seen` (H, W)."""
+    counts = {
+        name: np.count_nonzero(~cell)
+        for names, band in zip(NINTHS, np.array_split(seen, 3), strict=True)
+        for name, cell in zip(names, np.array_split(band, 3, axis=1), strict=True)
+    }
+    total = sum(counts.values())
+    told = [name for name in sorted(counts, key=lambda name: -counts[name]) if counts[name] > LEAST_OF_UNSEEN * total]
+    return Unseen(total / seen.size, told)
