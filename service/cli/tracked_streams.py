@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
-from service.cli.printing import USAGE, OngoingTrouble, fail
+from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
 from service.formats.lens import NumberedCamera
 from service.live.reports import SILENT_S, SentPose
 
@@ -61,7 +61,7 @@ class TrackedStreams:
                     stored = camera_with_ignored_areas(camera, camera.ignore)
                     trouble = found._trouble[camera.id] = OngoingTrouble()
                     found.cameras[camera.id] = StreamTracker(
-                        pitch, stored, addresses[camera.id], every, found._report, trouble.say, ahead_s
+                        pitch, stored, addresses[camera.id], every, found._report, trouble.say, print_note, ahead_s
                     )
         return found
 
@@ -93,7 +93,8 @@ class TrackedStreams:
         from service.live.destinations import Tracked
 
         tracked = pose.tracked
-        self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
+        if tracked.how == "measured":
+            self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
         self._last_s[tracked.camera.id] = time.monotonic()
         shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
         known = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)

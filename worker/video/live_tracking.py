@@ -19,6 +19,7 @@ from worker.calibration.records import CalibrationError
 from worker.calibration.tracking.follower import CameraTracker, TrackedPose
 from worker.video.clips import Clip, camera_for_clip
 from worker.video.errors import VideoError
+from worker.video.stillness import Stillness
 from worker.video.stream_clock import Lateness
 from worker.video.yuv_planes import Picture
 
@@ -28,8 +29,10 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S, LOST_PAUSE_S = 1.0, 30.0, 1.0
 LONGEST_GAP_S = 5.0
 # Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
 LOST_AFTER_S = 3.0
-# A picture that says it is from the future or older than this comes from a camera whose clock is wrong.
+# A prompt picture that says it is from the future or older than this comes from a camera whose clock is wrong.
 EARLIEST_S, LATEST_S = -0.1, 10.0
+# By so much a clock does not go astray between two pictures: it was set.
+CLOCK_WAS_SET_S = 0.25
 
 # Pictures that come so much later than others before them wait somewhere: those that need others are passed by until
 # the rest has caught up.
@@ -57,13 +60,27 @@ class LivePose:
 
 @dataclass(frozen=True)
 class _ArrivedPicture:
-    """A picture, its time in the stream (s), by its camera's clock and when it had been decoded (ns, Unix time)."""
+    """A picture, its time in the stream (s), by its camera's clock and when it had been decoded (ns, Unix time).
+
+    `late_s`: how late it came beside the promptest ones of the stream.
+    """
 
     picture: Picture
     number: int
     stream_s: float
+    late_s: float
     taken_ns: int | None
     arrived_ns: int
+
+    @property
+    def delay_s(self) -> float | None:
+        """How long after it was taken a prompt picture arrives, by both clocks."""
+        return None if self.taken_ns is None else (self.arrived_ns - self.taken_ns) / 1e9 - self.late_s
+
+    @property
+    def clock_offset_s(self) -> float | None:
+        """The camera's clock less the time in its stream: the same for all pictures unless that clock is set."""
+        return None if self.taken_ns is None else self.taken_ns / 1e9 - self.stream_s
 
 
 class _NewestPicture:
@@ -109,8 +126,9 @@ class _NewestPicture:
                 if is_behind != (late_s > (CAUGHT_UP_S if is_behind else BEHIND_S)):
                     is_behind = not is_behind
                     self._clip.decode_whole_pictures_only(is_behind)
+                arrived = _ArrivedPicture(shot.picture, number, shot.time_s, late_s, shot.taken_ns, time.time_ns())
                 with self._changed:
-                    self._newest = _ArrivedPicture(shot.picture, number, shot.time_s, shot.taken_ns, time.time_ns())
+                    self._newest = arrived
                     self._changed.notify()
         except BaseException as error:
             self._ended = error
@@ -124,7 +142,8 @@ class StreamTracker:
     """A camera that is tracked in its stream at `address` by a thread of its own, from where it is `stored`.
 
     `every`: lines are measured in every so many-th picture; `ahead_s`: poses are told as they will be so long after
-    their pictures. `report` takes each pose, `warn` what goes wrong, in words; both are called by that thread.
+    their pictures. `report` takes each pose, `warn` why there are none, in words, and `remark` what is odd about those
+    that there are; all are called by that thread.
     """
 
     pitch: Field
@@ -133,9 +152,11 @@ class StreamTracker:
     every: int
     report: Callable[[LivePose], None]
     warn: Callable[[str], None]
+    remark: Callable[[str], None]
     ahead_s: float = 0.0
     _stop: threading.Event = field(default_factory=threading.Event, init=False)
     _is_clock_right: bool = field(default=True, init=False)
+    _clock_offset_s: float | None = field(default=None, init=False)
 
     def start(self) -> None:
         """Begin to track it."""
@@ -172,33 +193,50 @@ class StreamTracker:
     def _track(self, clip: Clip) -> None:
         """Track the camera through a stream until that ends. Raises `VideoError`."""
         tracked: _Track | None = None
-        tried_at = -LOST_PAUSE_S
+        tried_at, stillness = -LOST_PAUSE_S, Stillness()
+        self._clock_offset_s = None
         with _NewestPicture(clip) as pictures:
             for arrived in pictures:
                 if self._stop.is_set():
                     return
+                shows_new = stillness.shows_new(arrived.picture.planes[0], arrived.stream_s)
                 if tracked is not None and tracked.goes_on(arrived, self.stored):
-                    self._report(tracked.at(arrived, self.ahead_s), arrived, clip.facts.rate)
-                elif time.monotonic() - tried_at >= LOST_PAUSE_S:
+                    self._report(tracked.at(arrived, self.ahead_s, shows_new), arrived, clip.facts.rate)
+                elif shows_new and time.monotonic() - tried_at >= LOST_PAUSE_S:
                     tried_at = time.monotonic()
                     tracked = self._locate(clip, arrived)
+                if stillness.is_frozen:
+                    self.warn(f"camera {self.stored.id}: its picture is frozen, each one is the same as the one before")
 
     def _report(self, tracked: TrackedPose, arrived: _ArrivedPicture, rate: Fraction) -> None:
         clock: Clock = "arrival"
         at_ns = arrived.arrived_ns
-        if arrived.taken_ns is not None and self._is_clock_plausible((arrived.arrived_ns - arrived.taken_ns) / 1e9):
+        if arrived.taken_ns is not None and self._is_clock_plausible(arrived):
             clock, at_ns = "rtcp", arrived.taken_ns
         ahead_ns = int(self.ahead_s * 1e9)
         self.report(LivePose(tracked, at_ns + ahead_ns, clock, arrived.arrived_ns, arrived.number, rate))
 
-    def _is_clock_plausible(self, delay_s: float) -> bool:
-        """Whether the camera's clock can be right, by which a picture arrived so long after it was taken."""
+    def _is_clock_plausible(self, arrived: _ArrivedPicture) -> bool:
+        """Whether the camera's clock can be right, by what it says of a picture."""
+        delay_s, offset_s = arrived.delay_s, arrived.clock_offset_s
+        if delay_s is None or offset_s is None:
+            return False
         was_right, self._is_clock_right = self._is_clock_right, EARLIEST_S <= delay_s <= LATEST_S
+        set_by_s = 0.0 if self._clock_offset_s is None else offset_s - self._clock_offset_s
+        self._clock_offset_s = offset_s
         if was_right and not self._is_clock_right:
-            off, side = abs(delay_s), "behind" if delay_s > 0 else "ahead of"
-            self.warn(
-                f"camera {self.stored.id}: its clock is {off:.1f} s {side} this machine's, so its pictures count from "
-                "when they arrive. Let both keep time by NTP"
+            side = "behind" if delay_s > 0 else "ahead of"
+            self.remark(
+                f"camera {self.stored.id}: its clock is {abs(delay_s):.1f} s {side} this machine's, so its pictures "
+                "count from when they arrive. Let both keep time by NTP"
+            )
+        elif self._is_clock_right and not was_right:
+            self.remark(f"camera {self.stored.id}: its clock is right again, so its pictures count by it")
+        elif self._is_clock_right and abs(set_by_s) > CLOCK_WAS_SET_S:
+            side = "forward" if set_by_s > 0 else "back"
+            self.remark(
+                f"camera {self.stored.id}: its clock was set {side} by {abs(set_by_s):.1f} s, and the times of its "
+                "poses with it"
             )
         return self._is_clock_right
 
@@ -240,14 +278,15 @@ class _Track:
         gap_s = arrived.stream_s - self.stream_s
         return stored is self.stored and 0 <= gap_s <= LONGEST_GAP_S and time.monotonic() - self.seen_s <= LOST_AFTER_S
 
-    def at(self, arrived: _ArrivedPicture, ahead_s: float) -> TrackedPose:
-        """The pose by a picture. Pictures that were left out pass as if they had shown nothing."""
+    def at(self, arrived: _ArrivedPicture, ahead_s: float, shows_new: bool) -> TrackedPose:
+        """The pose by a picture. Pictures that were left out, and one that shows nothing new, pass unseen."""
         pictures = arrived.number - self.number
         # Streams whose times stand still come evenly.
         passed_s = (arrived.stream_s - self.stream_s) / pictures or self.interval_s
         for _ in range(pictures - 1):
             self.tracker.see({}, passed_s)
-        self.tracker.see({self.stored.id: arrived.picture.colours} if self.tracker.looks else {}, passed_s)
+        is_seen = shows_new and self.tracker.looks
+        self.tracker.see({self.stored.id: arrived.picture.colours} if is_seen else {}, passed_s)
         self.number, self.stream_s = arrived.number, arrived.stream_s
         return self.now(ahead_s)
 

@@ -22,8 +22,8 @@ def turn(number: int, phase: float) -> Array:
     return np.radians(0.3) * (np.sin(np.pi * number / RATE + phases) - np.sin(phases))
 
 
-def film_shaking(folder: Path) -> dict[str, str]:
-    """A clip of each camera, by its name."""
+def film_shaking(folder: Path, frozen_for: int = 0) -> dict[str, str]:
+    """A clip of each camera, by its name; its last picture comes so many times more."""
     paths = {}
     for phase, camera, picture in zip((0.0, 1.5), pair(), pair_frames(), strict=True):
         path = folder / f"{camera.id}.mp4"
@@ -32,8 +32,9 @@ def film_shaking(folder: Path) -> dict[str, str]:
             stream.width, stream.height = camera.intrinsics.size
             stream.pix_fmt, stream.thread_count = "yuv420p", 1
             stream.codec_context.time_base = Fraction(1, 12800)
-            for number in range(COUNT):
-                shaken = Sway.from_turn(-turn(number, phase), camera.intrinsics).rows(picture, 0, len(picture))
+            for number in range(COUNT + frozen_for):
+                there = turn(min(number, COUNT - 1), phase)
+                shaken = Sway.from_turn(-there, camera.intrinsics).rows(picture, 0, len(picture))
                 frame = av.VideoFrame.from_ndarray(shaken, format="bgr24")
                 frame.pts, frame.time_base = number * 12800 // RATE, Fraction(1, 12800)
                 out.mux(stream.encode(frame))

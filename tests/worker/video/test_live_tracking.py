@@ -34,7 +34,10 @@ class Tracking:
 
     def __init__(self, address, stored=STORED, ahead_s=0.0):
         self.poses, self.warnings = queue.Queue(), queue.Queue()
-        self.camera = StreamTracker(CROWNED, stored, address, 1, self.poses.put, self.warnings.put, ahead_s)
+        self.remarks = queue.Queue()
+        self.camera = StreamTracker(
+            CROWNED, stored, address, 1, self.poses.put, self.warnings.put, self.remarks.put, ahead_s
+        )
 
     def __enter__(self):
         self.camera.start()
@@ -79,7 +82,7 @@ def test_times_of_a_camera_whose_clock_is_wrong_are_not_taken_over(clip, monkeyp
     with Tracking(clip) as tracking:
         pose = tracking.poses.get(timeout=60)
         assert (pose.clock, pose.at_ns) == ("arrival", pose.arrived_ns)
-        assert "its clock is 3600" in tracking.warnings.get(timeout=60)
+        assert "its clock is 3600" in tracking.remarks.get(timeout=60)
 
 
 def test_times_of_a_camera_whose_clock_is_right_are_those_of_its_poses(clip, monkeypatch):
@@ -88,6 +91,28 @@ def test_times_of_a_camera_whose_clock_is_right_are_those_of_its_poses(clip, mon
         pose = tracking.poses.get(timeout=60)
     assert pose.clock == "rtcp"
     assert 1.0 <= (pose.arrived_ns - pose.at_ns) / 1e9 < 2.0
+
+
+def test_a_clock_that_is_set_is_said(clip, monkeypatch):
+    begin_ns = time.time_ns() - 5 * 10**9
+
+    def taken_ns(_, pts, time_base):
+        stream_s = float(pts * time_base)
+        return begin_ns + int(1e9 * (stream_s - 2 * (stream_s > 0.4)))
+
+    monkeypatch.setattr(StreamClock, "taken_ns", taken_ns)
+    with Tracking(clip) as tracking:
+        assert "its clock was set back by 2.0 s" in tracking.remarks.get(timeout=60)
+
+
+def test_a_frozen_picture_is_said_and_measured_once(tmp_path):
+    clip = film_shaking(tmp_path, frozen_for=150)[TRUE.id]
+    with Tracking(clip) as tracking:
+        assert "its picture is frozen" in tracking.warnings.get(timeout=60)
+        poses = list(tracking.poses.queue)
+    # The first of them is the last that shows something new.
+    frozen = [pose.tracked.how for pose in poses if pose.number >= COUNT - 1][1:]
+    assert set(frozen) == {"coasted"}
 
 
 def test_a_stream_that_has_ended_is_opened_again(clip):
