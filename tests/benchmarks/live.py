@@ -78,7 +78,7 @@ def table(run: LiveRun) -> list[str]:
         "|---" * 10 + "|",
     ]
     for name in run.names:
-        own = [sent for sent in run.sent if sent.camera == name]
+        own = run.of(name)
         how = Counter(sent.status for sent in own)
         judged = run.judged(name)
         errors = np.array([[one.turn_deg, one.turn_in_sigma, one.shift_m, one.shift_in_sigma] for one in judged])

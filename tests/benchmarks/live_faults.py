@@ -7,11 +7,13 @@ then sees, with the demo's picture mirrored where it ends.
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import cycle
 from pathlib import Path
 
 import cv2
@@ -24,11 +26,9 @@ from worker.calibration.geometry.camera import Camera, Pose
 
 # Until both cameras are measured and have reported their clocks; between two faults; until one is measured again.
 START_S, QUIET_S, AGAIN_S = 40.0, 4.0, 25.0
-# A camera that sends what is wrong by more of its sigmas, while it says that it measures, lies. Twice what the largest
-# of some hundred errors, each of six numbers, is by chance.
-LIE_SIGMA = 6.0
 ZOOM, KNOCKED_DEG, NUDGED_DEG = 1.02, 5.0, 0.3
-SOAK_EVERY_S = 60.0
+# Of a soak: how long nothing happens between two faults, as a part of all of it and at most; memory is looked at.
+QUIET_SHARE, LONGEST_QUIET_S, MEMORY_EVERY_S = 1 / 30, 60.0, 60.0
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,88 @@ def run_faults(size: str, every: int) -> None:
 
 def run_soak(size: str, every: int, minutes: float) -> None:
     """Have faults happen at intervals for so long, and print what was sent of each phase and the memory."""
+    quiet_s = max(QUIET_S, min(LONGEST_QUIET_S, 60 * minutes * QUIET_SHARE))
+    phases: list[Phase] = []
+    memory_mb: list[float] = []
+    over = threading.Event()
+    with filmed(size, every) as (run, listed):
+        threading.Thread(target=note_memory, args=(run, memory_mb, over), daemon=True).start()
+        first, other = run.names
+        ends_at = time.monotonic() + 60 * minutes
+        for fault in cycle(listed):
+            begun_ns = time.time_ns()
+            time.sleep(quiet_s)
+            phases += [Phase("nothing", name, begun_ns, time.time_ns()) for name in run.names]
+            if time.monotonic() > ends_at:
+                break
+            scene = play(run, fault)
+            phases.append(Phase(fault.name, first, scene.begun_ns, scene.end_ns, scene.mended_ns))
+            phases.append(Phase("something, to the other camera", other, scene.begun_ns, scene.end_ns))
+        over.set()
+        core_s = run.core_s()
+    print(f"\n{minutes:g} minutes, {quiet_s:g} s without a fault between two of them.\n")
+    print("\n".join(soak_table(run, phases)))
+    pictures = sum(map(len, run.taken.values()))
+    print(f"\n{1000 * core_s / pictures:.1f} core-ms for each picture taken. Resident memory at the beginning and then")
+    print(f"every minute, MB: {', '.join(f'{each:.0f}' for each in memory_mb)}")
+    said = Counter(words for _, words in run.warnings)
+    print("\nSaid, and how often:")
+    print("\n".join(f"  {times} x {words}" for words, times in said.most_common()), flush=True)
+
+
+@dataclass(frozen=True)
+class Phase:
+    """What happened to a camera in a time, Unix time in ns; `mended_ns`: when that was over, if it was a fault."""
+
+    what: str
+    camera: str
+    begun_ns: int
+    end_ns: int
+    mended_ns: int | None = None
+
+
+def note_memory(run: LiveRun, memory_mb: list[float], over: threading.Event) -> None:
+    """Note the memory of `esc live` at once and every minute, until it is over."""
+    memory_mb.append(run.memory_mb())
+    while not over.wait(MEMORY_EVERY_S):
+        memory_mb.append(run.memory_mb())
+
+
+def soak_table(run: LiveRun, phases: Sequence[Phase]) -> list[str]:
+    """Markdown: a row for all phases in which the same happened."""
+    lines = [
+        "| what happens | times | pictures taken | sent: measured, coasted, refused, stored | left out "
+        "| turn while measured, ° rms | its error/sigma: rms, largest | taken to sent, ms: p50, p99 "
+        "| measured again after, s: median, most |",
+        "|---" * 9 + "|",
+    ]
+    for what in dict.fromkeys(phase.what for phase in phases):
+        alike = [phase for phase in phases if phase.what == what]
+        spans = [(phase.camera, phase.begun_ns, phase.end_ns) for phase in alike]
+        how = Counter(sent.status for span in spans for sent in run.of(*span))
+        judged = [one for span in spans for one in run.judged(*span)]
+        measured = [one for one in judged if one.sent.status == "measured"]
+        turn, ratio = (
+            np.array([[one.turn_deg, one.turn_in_sigma] for one in measured]).T if measured else np.full((2, 1), np.nan)
+        )
+        late = np.percentile([one.late_ms for one in judged] or [np.nan], [50, 99])
+        taken = sum(
+            begun_ns <= picture.at_ns < end_ns for camera, begun_ns, end_ns in spans for picture in run.taken[camera]
+        )
+        tracked = how["measured"] + how["coasted"] + how["refused"]
+        again = [
+            ((measured_again_ns(run, phase.mended_ns) or phase.end_ns) - phase.mended_ns) / 1e9
+            for phase in alike
+            if phase.mended_ns is not None
+        ]
+        found_again = f"{np.median(again):.1f}, {max(again):.1f}" if again else "-"
+        lines.append(
+            f"| {what} | {len(alike)} | {taken} "
+            f"| {', '.join(str(how[status]) for status in ('measured', 'coasted', 'refused', 'stored'))} "
+            f"| {max(0, taken - tracked)} | {np.sqrt(np.mean(turn**2)):.4f} "
+            f"| {np.sqrt(np.mean(ratio**2)):.2f}, {np.max(ratio):.1f} | {late[0]:.0f}, {late[1]:.0f} | {found_again} |"
+        )
+    return lines
 
 
 @contextmanager
@@ -147,15 +229,9 @@ def play(run: LiveRun, fault: Fault) -> Scene:
 
 
 def measured_again_ns(run: LiveRun, since_ns: int) -> int | None:
-    """When the first camera was measured after a time."""
-    own = (sent for sent in reversed(run.sent) if sent.camera == run.names[0])
-    found = None
-    for sent in own:
-        if sent.at_ns < since_ns:
-            break
-        if sent.status == "measured":
-            found = sent.at_ns
-    return found
+    """When the first camera was first measured after a time."""
+    own = (sent.at_ns for sent in list(run.sent) if sent.camera == run.names[0] and sent.status == "measured")
+    return next((at_ns for at_ns in own if at_ns >= since_ns), None)
 
 
 def wait_until(is_so: Callable[[], bool], seconds: float) -> None:
@@ -196,7 +272,7 @@ def table(run: LiveRun, scenes: Sequence[Scene]) -> list[str]:
 
 def statuses(run: LiveRun, camera: str, begin_ns: int, end_ns: int) -> str:
     """How many poses of each status were sent in a time."""
-    how = Counter(sent.status for sent in run.sent if sent.camera == camera and begin_ns <= sent.at_ns < end_ns)
+    how = Counter(sent.status for sent in run.of(camera, begin_ns, end_ns))
     return ", ".join(str(how[status]) for status in ("measured", "coasted", "refused", "stored"))
 
 

@@ -105,13 +105,18 @@ class LiveRun:
         pictures = list(self.taken.get(camera, ()))
         times = np.array([picture.at_ns for picture in pictures])
         found = []
-        for sent in list(self.sent):
-            if sent.camera != camera or not begin_ns <= sent.at_ns < end_ns or sent.line.get("clock") != "rtcp":
+        for sent in self.of(camera, begin_ns, end_ns):
+            if sent.line.get("clock") != "rtcp" or not pictures:
                 continue
-            nearest = int(np.argmin(abs(times - sent.time_ns)))
+            later = min(int(np.searchsorted(times, sent.time_ns)), len(times) - 1)
+            nearest = min((max(later - 1, 0), later), key=lambda number: abs(times[number] - sent.time_ns))
             if abs(times[nearest] - sent.time_ns) < SAME_MS * 1e6:
                 found.append(self._judge(sent, pictures[nearest]))
         return found
+
+    def of(self, camera: str, begin_ns: float = 0, end_ns: float = math.inf) -> list[SentPose]:
+        """The poses of a camera that were sent in a time."""
+        return [sent for sent in list(self.sent) if sent.camera == camera and begin_ns <= sent.at_ns < end_ns]
 
     def _judge(self, sent: SentPose, taken: Taken) -> JudgedPose:
         true, line = self.truths[taken.clip](taken.picture).pose, sent.line

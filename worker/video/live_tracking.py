@@ -13,7 +13,10 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, Self
 
-from worker.calibration.geometry.camera import Camera
+import cv2
+import numpy as np
+
+from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import CalibrationError
 from worker.calibration.tracking.follower import CameraTracker, TrackedPose
@@ -30,7 +33,11 @@ LONGEST_GAP_S = 5.0
 # Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
 LOST_AFTER_S = 3.0
 # A prompt picture that says it is from the future or older than this comes from a camera whose clock is wrong.
-EARLIEST_S, LATEST_S = -0.1, 10.0
+EARLIEST_S, LATEST_S = -0.1, 2.0
+# A picture that is older is not where the camera looks now.
+NEWEST_S = 2.0
+# A pose that is known no better than this is found by lines that do not fit: zoom or focus are others than stored.
+UNSURE_DEG = 0.2
 # By so much a clock does not go astray between two pictures: it was set.
 CLOCK_WAS_SET_S = 0.25
 
@@ -62,7 +69,8 @@ class LivePose:
 class _ArrivedPicture:
     """A picture, its time in the stream (s), by its camera's clock and when it had been decoded (ns, Unix time).
 
-    `late_s`: how late it came beside the promptest ones of the stream.
+    `late_s`: how late it came beside the promptest ones of the stream; `shows_new`: it, or one that it took the place
+    of, is not the same as the one before; `is_frozen`: nearly all before it were.
     """
 
     picture: Picture
@@ -71,6 +79,8 @@ class _ArrivedPicture:
     late_s: float
     taken_ns: int | None
     arrived_ns: int
+    shows_new: bool
+    is_frozen: bool
 
     @property
     def delay_s(self) -> float | None:
@@ -117,7 +127,7 @@ class _NewestPicture:
             yield newest
 
     def _read(self) -> None:
-        lateness, is_behind = Lateness(), False
+        lateness, stillness, is_behind = Lateness(), Stillness(), False
         try:
             for number, shot in enumerate(self._clip.shots()):
                 if self._unwanted:
@@ -126,9 +136,18 @@ class _NewestPicture:
                 if is_behind != (late_s > (CAUGHT_UP_S if is_behind else BEHIND_S)):
                     is_behind = not is_behind
                     self._clip.decode_whole_pictures_only(is_behind)
-                arrived = _ArrivedPicture(shot.picture, number, shot.time_s, late_s, shot.taken_ns, time.time_ns())
+                shows_new = stillness.shows_new(shot.picture.planes[0], shot.time_s)
                 with self._changed:
-                    self._newest = arrived
+                    self._newest = _ArrivedPicture(
+                        shot.picture,
+                        number,
+                        shot.time_s,
+                        late_s,
+                        shot.taken_ns,
+                        time.time_ns(),
+                        shows_new or (self._newest is not None and self._newest.shows_new),
+                        stillness.is_frozen,
+                    )
                     self._changed.notify()
         except BaseException as error:
             self._ended = error
@@ -157,6 +176,8 @@ class StreamTracker:
     _stop: threading.Event = field(default_factory=threading.Event, init=False)
     _is_clock_right: bool = field(default=True, init=False)
     _clock_offset_s: float | None = field(default=None, init=False)
+    _newest: _ArrivedPicture | None = field(default=None, init=False)
+    _unseen_since: float | None = field(default=None, init=False)
 
     def start(self) -> None:
         """Begin to track it."""
@@ -165,6 +186,26 @@ class StreamTracker:
     def anchor(self, stored: Camera) -> None:
         """Begin anew from another stored pose, at the next picture."""
         self.stored = stored
+        self._unseen_since = None
+
+    @property
+    def unseen_s(self) -> float:
+        """For how long its pictures have come without its lines where they are expected, as well as they should fit."""
+        unseen_since = self._unseen_since
+        return 0.0 if unseen_since is None or self._is_old(self._newest) else time.monotonic() - unseen_since
+
+    def newest_frame(self) -> Frame | None:
+        """Its newest picture in the size of its lens; None where that is old or frozen."""
+        newest = self._newest
+        if newest is None or self._is_old(newest):
+            return None
+        size = self.stored.intrinsics.size
+        frame = newest.picture.colours
+        return frame if newest.picture.size == size else np.asarray(cv2.resize(frame, size), np.uint8)
+
+    @staticmethod
+    def _is_old(newest: _ArrivedPicture | None) -> bool:
+        return newest is None or time.time_ns() - newest.arrived_ns > NEWEST_S * 1e9
 
     def stop(self) -> None:
         """End after the picture that is looked at."""
@@ -193,19 +234,21 @@ class StreamTracker:
     def _track(self, clip: Clip) -> None:
         """Track the camera through a stream until that ends. Raises `VideoError`."""
         tracked: _Track | None = None
-        tried_at, stillness = -LOST_PAUSE_S, Stillness()
+        tried_at = -LOST_PAUSE_S
         self._clock_offset_s = None
         with _NewestPicture(clip) as pictures:
             for arrived in pictures:
                 if self._stop.is_set():
                     return
-                shows_new = stillness.shows_new(arrived.picture.planes[0], arrived.stream_s)
+                if arrived.shows_new:
+                    self._newest = arrived
+                    self._unseen_since = self._unseen_since or time.monotonic()
                 if tracked is not None and tracked.goes_on(arrived, self.stored):
-                    self._report(tracked.at(arrived, self.ahead_s, shows_new), arrived, clip.facts.rate)
-                elif shows_new and time.monotonic() - tried_at >= LOST_PAUSE_S:
+                    self._report(tracked.at(arrived, self.ahead_s), arrived, clip.facts.rate)
+                elif arrived.shows_new and time.monotonic() - tried_at >= LOST_PAUSE_S:
                     tried_at = time.monotonic()
                     tracked = self._locate(clip, arrived)
-                if stillness.is_frozen:
+                if arrived.is_frozen:
                     self.warn(f"camera {self.stored.id}: its picture is frozen, each one is the same as the one before")
 
     def _report(self, tracked: TrackedPose, arrived: _ArrivedPicture, rate: Fraction) -> None:
@@ -213,6 +256,8 @@ class StreamTracker:
         at_ns = arrived.arrived_ns
         if arrived.taken_ns is not None and self._is_clock_plausible(arrived):
             clock, at_ns = "rtcp", arrived.taken_ns
+        if tracked.how == "measured" and tracked.sigma.rotation_deg < UNSURE_DEG:
+            self._unseen_since = None
         ahead_ns = int(self.ahead_s * 1e9)
         self.report(LivePose(tracked, at_ns + ahead_ns, clock, arrived.arrived_ns, arrived.number, rate))
 
@@ -253,6 +298,12 @@ class StreamTracker:
                 "is sent. Calibrate the venue, or look at the picture"
             )
             return None
+        sigma_deg = tracker.now.cameras[0].sigma.rotation_deg
+        if sigma_deg >= UNSURE_DEG:
+            self.remark(
+                f"camera {camera.id}: its lines do not fit well, its pose is known to {sigma_deg:.1f} degrees. "
+                "Have zoom or focus changed? Calibrate the venue"
+            )
         found = _Track(tracker, stored, 1 / float(rate), arrived.number, arrived.stream_s, time.monotonic())
         self._report(found.now(self.ahead_s), arrived, rate)
         return found
@@ -278,14 +329,14 @@ class _Track:
         gap_s = arrived.stream_s - self.stream_s
         return stored is self.stored and 0 <= gap_s <= LONGEST_GAP_S and time.monotonic() - self.seen_s <= LOST_AFTER_S
 
-    def at(self, arrived: _ArrivedPicture, ahead_s: float, shows_new: bool) -> TrackedPose:
+    def at(self, arrived: _ArrivedPicture, ahead_s: float) -> TrackedPose:
         """The pose by a picture. Pictures that were left out, and one that shows nothing new, pass unseen."""
         pictures = arrived.number - self.number
         # Streams whose times stand still come evenly.
         passed_s = (arrived.stream_s - self.stream_s) / pictures or self.interval_s
         for _ in range(pictures - 1):
             self.tracker.see({}, passed_s)
-        is_seen = shows_new and self.tracker.looks
+        is_seen = arrived.shows_new and self.tracker.looks
         self.tracker.see({self.stored.id: arrived.picture.colours} if is_seen else {}, passed_s)
         self.number, self.stream_s = arrived.number, arrived.stream_s
         return self.now(ahead_s)

@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from worker.video.yuv_planes import Plane
+Plane = NDArray[np.uint8]
 
 # A share of pictures that change, averaged over about so long: frozen below the one, working above the other. An
 # encoder that hangs on one picture still changes it a little with each whole picture, once or twice a second.
