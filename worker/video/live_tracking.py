@@ -272,8 +272,9 @@ class StreamTracker:
         if was_right and not self._is_clock_right:
             side = "behind" if delay_s > 0 else "ahead of"
             self.remark(
-                f"camera {self.stored.id}: its clock is {abs(delay_s):.1f} s {side} this machine's, so its pictures "
-                "count from when they arrive. Let both keep time by NTP"
+                f"camera {self.stored.id}: its clock is {abs(delay_s):.1f} s {side} this machine's"
+                f"{', or its pictures are so long on their way' if delay_s > 0 else ''}, so they count from when they "
+                "arrive. Let both keep time by NTP"
             )
         elif self._is_clock_right and not was_right:
             self.remark(f"camera {self.stored.id}: its clock is right again, so its pictures count by it")
