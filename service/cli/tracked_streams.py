@@ -100,13 +100,22 @@ class TrackedStreams:
         """Those whose pictures come, and have not shown their lines where they are expected for so long."""
         return [name for name, camera in self.cameras.items() if camera.unseen_s > for_s]
 
-    def frames(self) -> dict[str, bytes]:
-        """JPEGs of the newest pictures, by camera, in the sizes of their lenses; none unless all of the venue have."""
+    def frames(self) -> dict[str, bytes] | None:
+        """JPEGs of the newest pictures, by camera, in the sizes of their lenses.
+
+        None at all unless the whole venue is tracked, None while there is no picture of a camera.
+        """
         from worker.jobs.from_schemas import encode_jpeg
 
-        newest = {name: camera.newest_frame() for name, camera in self.cameras.items()}
-        frames = {name: encode_jpeg(frame, FRAME_QUALITY) for name, frame in newest.items() if frame is not None}
-        return frames if frames.keys() == self.numbers.keys() else {}
+        if self.cameras.keys() != self.numbers.keys():
+            return {}
+        frames = {}
+        for name, camera in self.cameras.items():
+            frame = camera.newest_frame()
+            if frame is None:
+                return None
+            frames[name] = encode_jpeg(frame, FRAME_QUALITY)
+        return frames
 
     def _report(self, pose: LivePose) -> None:
         from service.cli.tracked_poses import camera_document

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 LOOK_EVERY_S = 1.0
 # A camera whose lines were not seen for so long is lost; players and a hand before the lens are gone by then.
 LOST_AFTER_S = 10.0
+# A camera of which no picture comes is waited for: its stream may have broken off for a moment.
+FRAMES_WITHIN_S = 30.0
 # From the end of a calibration until the next one begins, doubled each time that a camera is lost still.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 180.0, 3600.0
 
@@ -37,8 +39,11 @@ class LiveCameras(Protocol):
     def lost(self, for_s: float) -> Sequence[str]:
         """Those whose pictures come, and have not shown their lines where they are expected for so long."""
 
-    def frames(self) -> Mapping[str, bytes]:
-        """Files of the newest pictures, by camera; of a venue with other cameras than these, none."""
+    def frames(self) -> Mapping[str, bytes] | None:
+        """Files of the newest pictures, by camera; none where not all cameras of the venue are tracked.
+
+        None while there is none of a camera that is tracked.
+        """
 
 
 class RecoveryLog(Protocol):
@@ -64,22 +69,30 @@ class Recovery:
 
     def run(self, client: Client, stop: threading.Event) -> None:
         """Look after them until `stop`."""
-        ended_s, pause_s = -math.inf, FIRST_PAUSE_S
+        ended_s, pause_s, lost_s = -math.inf, FIRST_PAUSE_S, math.inf
         while not stop.wait(LOOK_EVERY_S):
-            rested = time.monotonic() - ended_s >= pause_s
-            if rested and (lost := self.cameras.lost(LOST_AFTER_S)):
-                again = ended_s > -math.inf
-                self._calibrate(client, lost)
-                ended_s, pause_s = time.monotonic(), min(2 * pause_s, LONGEST_PAUSE_S) if again else pause_s
-            elif rested:
+            now = time.monotonic()
+            if now - ended_s < pause_s:
+                continue
+            lost = self.cameras.lost(LOST_AFTER_S)
+            if not lost:
                 # Nothing was lost when the pause was over: it begins anew.
-                ended_s, pause_s = -math.inf, FIRST_PAUSE_S
+                ended_s, pause_s, lost_s = -math.inf, FIRST_PAUSE_S, math.inf
+                continue
+            lost_s = min(lost_s, now)
+            frames = self.cameras.frames()
+            if frames is None and now - lost_s < FRAMES_WITHIN_S:
+                continue
+            if ended_s > -math.inf:
+                pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+            self._calibrate(client, lost, frames or {})
+            ended_s, lost_s = time.monotonic(), math.inf
 
-    def _calibrate(self, client: Client, lost: Sequence[str]) -> None:
+    def _calibrate(self, client: Client, lost: Sequence[str], frames: Mapping[str, bytes]) -> None:
         try:
             with tempfile.TemporaryDirectory() as folder:
                 files = {}
-                for camera, content in self.cameras.frames().items():
+                for camera, content in frames.items():
                     files[camera] = Path(folder, f"{camera}.jpg")
                     files[camera].write_bytes(content)
                 # Without frames the service fetches them from the sources of the cameras, if they have any.

@@ -96,8 +96,11 @@ class _ArrivedPicture:
 class _NewestPicture:
     """The pictures of a clip as they arrive, decoded in a thread; who comes late gets the newest.
 
-    To be used as a context: it lets go of the clip before that is closed.
+    To be used as a context: it lets go of the clip before that is closed. `latest`: the last one that showed something
+    new, whoever looks at it.
     """
+
+    latest: _ArrivedPicture | None = None
 
     def __init__(self, clip: Clip) -> None:
         self._clip = clip
@@ -148,6 +151,8 @@ class _NewestPicture:
                         shows_new or (self._newest is not None and self._newest.shows_new),
                         stillness.is_frozen,
                     )
+                    if shows_new:
+                        self.latest = self._newest
                     self._changed.notify()
         except BaseException as error:
             self._ended = error
@@ -176,7 +181,7 @@ class StreamTracker:
     _stop: threading.Event = field(default_factory=threading.Event, init=False)
     _is_clock_right: bool = field(default=True, init=False)
     _clock_offset_s: float | None = field(default=None, init=False)
-    _newest: _ArrivedPicture | None = field(default=None, init=False)
+    _pictures: _NewestPicture | None = field(default=None, init=False)
     _unseen_since: float | None = field(default=None, init=False)
 
     def start(self) -> None:
@@ -192,20 +197,21 @@ class StreamTracker:
     def unseen_s(self) -> float:
         """For how long its pictures have come without its lines where they are expected, as well as they should fit."""
         unseen_since = self._unseen_since
-        return 0.0 if unseen_since is None or self._is_old(self._newest) else time.monotonic() - unseen_since
+        return 0.0 if unseen_since is None or self._latest() is None else time.monotonic() - unseen_since
 
     def newest_frame(self) -> Frame | None:
         """Its newest picture in the size of its lens; None where that is old or frozen."""
-        newest = self._newest
-        if newest is None or self._is_old(newest):
+        latest = self._latest()
+        if latest is None:
             return None
         size = self.stored.intrinsics.size
-        frame = newest.picture.colours
-        return frame if newest.picture.size == size else np.asarray(cv2.resize(frame, size), np.uint8)
+        frame = latest.picture.colours
+        return frame if latest.picture.size == size else np.asarray(cv2.resize(frame, size), np.uint8)
 
-    @staticmethod
-    def _is_old(newest: _ArrivedPicture | None) -> bool:
-        return newest is None or time.time_ns() - newest.arrived_ns > NEWEST_S * 1e9
+    def _latest(self) -> _ArrivedPicture | None:
+        """The newest picture that shows something new, unless that is old. Not the one that is looked at."""
+        latest = None if self._pictures is None else self._pictures.latest
+        return None if latest is None or time.time_ns() - latest.arrived_ns > NEWEST_S * 1e9 else latest
 
     def stop(self) -> None:
         """End after the picture that is looked at."""
@@ -237,11 +243,11 @@ class StreamTracker:
         tried_at = -LOST_PAUSE_S
         self._clock_offset_s = None
         with _NewestPicture(clip) as pictures:
+            self._pictures = pictures
             for arrived in pictures:
                 if self._stop.is_set():
                     return
                 if arrived.shows_new:
-                    self._newest = arrived
                     self._unseen_since = self._unseen_since or time.monotonic()
                 if tracked is not None and tracked.goes_on(arrived, self.stored):
                     self._report(tracked.at(arrived, self.ahead_s), arrived, clip.facts.rate)

@@ -28,6 +28,7 @@ class Site:
     frames_sent: list = field(default_factory=list)
     log: list = field(default_factory=list)
     hours: float = 1
+    pictures_from: float = 0
 
     def wait(self, seconds):
         self.now += seconds
@@ -38,7 +39,7 @@ class Site:
         return ["left"] if self.is_lost(self) else []
 
     def frames(self):
-        return {"left": b"a picture"}
+        return {"left": b"a picture"} if self.now - 1000 >= self.pictures_from else None
 
     def calibrate(self, venue, files, options, key):
         self.asked_at.append(self.now - 1000)
@@ -84,6 +85,16 @@ def test_a_lost_camera_is_calibrated_at_once_by_the_newest_pictures(run):
     assert site.asked_at == [1.0]
     assert site.frames_sent == [{"left": b"a picture"}]
     assert site.log == [("asked", ["left"], 1), ("ended", ["left"], 1)]
+
+
+def test_pictures_that_are_missing_are_waited_for(run):
+    site = run(Site(lambda site: not site.asked_at, pictures_from=12))
+    assert (site.asked_at, site.frames_sent) == ([12.0], [{"left": b"a picture"}])
+
+
+def test_without_pictures_for_long_the_service_is_to_fetch_them(run):
+    site = run(Site(lambda site: not site.asked_at, pictures_from=HOUR_S))
+    assert (site.asked_at, site.frames_sent) == ([31.0], [{}])
 
 
 def test_the_pause_doubles_up_to_an_hour_while_the_camera_stays_lost(run):
