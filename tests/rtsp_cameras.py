@@ -87,7 +87,9 @@ class Camera(GstRtspServer.RTSPMediaFactory):
         if self._is_frozen:
             picture = max((whole for whole in film.whole if whole <= picture), default=film.whole[-1])
         self._next = picture if self._is_frozen else picture + 1
-        print(self._number, number, time.time_ns(), picture, film.path, flush=True)
+        # At once: the first picture of a camera is taken in a thread of its own.
+        sys.stdout.write(f"{self._number} {number} {time.time_ns()} {picture} {film.path}\n")
+        sys.stdout.flush()
         return source.emit("push-buffer", Gst.Buffer.new_wrapped(film.pictures[picture])) == Gst.FlowReturn.OK
 
     def _tell_time(self, media: GstRtspServer.RTSPMedia) -> None:

@@ -181,6 +181,7 @@ class StreamTracker:
     _stop: threading.Event = field(default_factory=threading.Event, init=False)
     _is_clock_right: bool = field(default=True, init=False)
     _clock_offset_s: float | None = field(default=None, init=False)
+    _do_lines_fit: bool = field(default=True, init=False)
     _pictures: _NewestPicture | None = field(default=None, init=False)
     _unseen_since: float | None = field(default=None, init=False)
 
@@ -306,7 +307,8 @@ class StreamTracker:
             )
             return None
         sigma_deg = tracker.now.cameras[0].sigma.rotation_deg
-        if sigma_deg >= UNSURE_DEG:
+        did_fit, self._do_lines_fit = self._do_lines_fit, sigma_deg < UNSURE_DEG
+        if did_fit and not self._do_lines_fit:
             self.remark(
                 f"camera {camera.id}: its lines do not fit well, its pose is known to {sigma_deg:.1f} degrees. "
                 "Have zoom or focus changed? Calibrate the venue"

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from tests.worker.video.shaking import COUNT, film_shaking, turn
 from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.video import clips, live_tracking
-from worker.video.live_tracking import StreamTracker
+from worker.video.live_tracking import UNSURE_DEG, StreamTracker
 from worker.video.stream_clock import StreamClock
 
 pytestmark = pytest.mark.slow
@@ -126,6 +127,19 @@ def test_a_stream_that_has_ended_is_opened_again(clip):
         while again.number != 0:
             again = tracking.poses.get(timeout=60)
     assert again.tracked.how == "measured"
+
+
+def test_lines_that_do_not_fit_the_stored_lens_are_said_and_the_pose_counts_as_lost(clip):
+    with Tracking(clip, stored=zoomed(STORED, 1 / 1.02)) as tracking:
+        assert "its lines do not fit well" in tracking.remarks.get(timeout=60)
+        assert tracking.poses.get(timeout=60).tracked.sigma.rotation_deg > UNSURE_DEG
+        assert tracking.camera.unseen_s > 0
+
+
+def zoomed(camera, by):
+    matrix = camera.intrinsics.matrix.copy()
+    matrix[[0, 1], [0, 1]] *= by
+    return camera.with_lens(replace(camera.intrinsics, matrix=matrix))
 
 
 def test_a_camera_whose_lines_are_elsewhere_is_not_told_of(clip):
