@@ -113,8 +113,8 @@ def test_a_frozen_picture_is_said_and_measured_once(tmp_path):
     with Tracking(clip) as tracking:
         assert "its picture is frozen" in tracking.warnings.get(timeout=60)
         poses = list(tracking.poses.queue)
-    # The first of them may have taken the place of one that showed something new, and the encoder mends its last picture
-    # for a while.
+    # The first of them may have taken the place of one that showed something new, and the encoder mends its
+    # last picture for a while.
     frozen = [pose.tracked.how for pose in poses if pose.number >= COUNT + 25][1:]
     assert set(frozen) <= {"coasted"}
 
