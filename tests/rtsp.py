@@ -7,6 +7,7 @@ import struct
 import subprocess
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import av
@@ -55,15 +56,46 @@ def encode(pictures: Iterable[NDArray[np.uint8]], rate: int, bits: int, path: Pa
                 file.write(LENGTH.pack(packet.size) + bytes(packet))
 
 
+@dataclass(frozen=True)
+class Cameras:
+    """Cameras that film. `addresses`: where; `process`: prints what they take, as `tests/rtsp_cameras.py` says."""
+
+    addresses: list[str]
+    process: subprocess.Popen[str]
+
+    def happen(self, what: str, camera: int, *more: object) -> None:
+        """Have something happen to a camera, as `tests/rtsp_cameras.py` says."""
+        assert self.process.stdin is not None
+        print(what, camera, *more, file=self.process.stdin, flush=True)
+
+    def taken(self) -> Iterator[Taken]:
+        """What they take, as they take it, until they are killed."""
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            camera, number, at_ns, picture, clip = line.split(maxsplit=4)
+            yield Taken(int(camera), int(number), int(at_ns), int(picture), Path(clip.strip()))
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A picture that a camera took: its `number` since somebody looks, when (Unix time), which `picture` of a clip."""
+
+    camera: int
+    number: int
+    at_ns: int
+    picture: int
+    clip: Path
+
+
 @contextmanager
-def filming(clips: Sequence[Path], rate: float) -> Iterator[tuple[list[str], subprocess.Popen[str]]]:
-    """Cameras that film these clips: their addresses, and the process, which prints what it takes."""
+def filming(clips: Sequence[Path], rate: float) -> Iterator[Cameras]:
+    """Cameras that film these clips."""
     command = [PYTHON, Path(__file__).with_name("rtsp_cameras.py"), str(rate), *clips]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
-            port = int(process.stdout.readline())
-            yield [f"rtsp://127.0.0.1:{port}/{number}" for number in range(len(clips))], process
+            ports = process.stdout.readline().split()
+            yield Cameras([f"rtsp://127.0.0.1:{port}/main" for port in ports], process)
         finally:
             process.kill()
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera
-from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
+from service.cli.printing import USAGE, OngoingTrouble, fail, outcome_text, print_note
 from service.cli.service_client import load_venue
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from service.live.destinations import Destination, UdpSocket
     from service.live.reports import LiveReporter
     from service.live.stored_poses import StoredPoses
+    from service.schemas.job import Job
     from service.schemas.venue import Venue
 
 # Accepted jobs come every few minutes; a renderer may see the new pose so much later.
@@ -82,6 +83,14 @@ def live(
         str | None,
         typer.Option("--interface", metavar="IP", help="Address of the network interface that multicast leaves by."),
     ] = None,
+    recover: Annotated[
+        bool,
+        typer.Option(
+            "--recover",
+            help="Have the service calibrate the venue where a tracked camera is lost, by the newest pictures. Needs a "
+            "key of scope `calibrate`.",
+        ),
+    ] = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -93,6 +102,8 @@ def live(
     addresses = parse_by_camera(streams or [], "CAMERA=STREAM, for instance left=rtsp://10.1.0.7/main")
     if hold and addresses:
         fail("--hold sends stored poses alone: leave it out, or the streams", USAGE)
+    if recover and (Path(venue).is_file() or not addresses):
+        fail("--recover has the service calibrate a venue of its own whose cameras are tracked in streams", USAGE)
     beat = _parse_rate(rate)
     from service.live.destinations import UdpSocket
 
@@ -104,7 +115,7 @@ def live(
         destinations = _destinations(socket, opentrackio or [], freed or [], as_json=as_json)
         stored = load_venue(venue, url, api_key)
         service = None if Path(venue).is_file() else (url, api_key)
-        _send(stored, destinations, words, beat, addresses, follow_every, predict / 1000, service)
+        _send(stored, destinations, words, beat, addresses, follow_every, predict / 1000, service, recover=recover)
 
 
 def _send(
@@ -116,10 +127,12 @@ def _send(
     every: int,
     ahead_s: float,
     service: tuple[str, str | None] | None,
+    *,
+    recover: bool,
 ) -> None:
     """Send poses until stopped. `words`: of the destinations; `service`: its address and key, where there is one.
 
-    It is asked for new poses, and told how those that are sent are doing.
+    It is asked for new poses, told how those that are sent are doing, and with `recover` asked for calibrations.
     """
     from service.cli.tracked_streams import TrackedStreams
     from service.live.destinations import PoseSender
@@ -136,6 +149,8 @@ def _send(
     if service is not None:
         threading.Thread(target=_ask_for_poses, args=(poses, streams, *service, stop), daemon=True).start()
         beside = [threading.Thread(target=_report, args=(reporter, *service, stop), daemon=True)]
+        if recover:
+            threading.Thread(target=_recover, args=(stored.id, streams, *service, stop), daemon=True).start()
     cameras = ", ".join(f"{camera.id} (source {n})" for n, camera in enumerate(stored.cameras, 1))
     print_note(f"Sending the poses of venue {stored.id}, stored ones {float(beat):g} times a second: {cameras}")
     streams.start()
@@ -185,6 +200,38 @@ def _ask_for_poses(
             if new:
                 streams.anchor([camera for camera in now.cameras if camera.id in new])
                 print_note(f"New pose or lens: {', '.join(new)}")
+
+
+def _recover(venue: str, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event) -> None:
+    """Have the service calibrate the venue where cameras are lost, until stopped."""
+    from service.client import Client
+    from service.live.recovery import Recovery
+
+    with Client(url, api_key) as client:
+        Recovery(venue, streams, _RecoveryNotes()).run(client, stop)
+
+
+class _RecoveryNotes:
+    """Prints how calibrations of lost cameras go; why they change nothing, once for each reason."""
+
+    def __init__(self) -> None:
+        self._trouble = OngoingTrouble()
+
+    def asked(self, lost: Sequence[str], job: Job) -> None:
+        """Print which job was submitted."""
+        print_note(f"Lost: camera {', '.join(lost)}. Job {job.id} calibrates the venue by the newest pictures")
+
+    def ended(self, lost: Sequence[str], job: Job) -> None:
+        """Print what became of it."""
+        if job.venue_revision is None:
+            self._trouble.say(f"The stored pose of {', '.join(lost)} stays, {outcome_text(job)}")
+        else:
+            self._trouble.over("A calibration has found lost cameras")
+            print_note(f"Job {job.id}: {outcome_text(job)}")
+
+    def failed(self, lost: Sequence[str], error: Exception) -> None:
+        """Print why there is no job."""
+        self._trouble.say(f"Lost: camera {', '.join(lost)}, and the service does not calibrate the venue: {error}")
 
 
 def _destinations(

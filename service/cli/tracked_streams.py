@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
-from service.cli.printing import USAGE, OngoingTrouble, fail
+from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
 from service.formats.lens import NumberedCamera
 from service.live.reports import SILENT_S, SentPose
 
@@ -16,12 +17,15 @@ if TYPE_CHECKING:
     from service.schemas.venue import Camera, Venue
     from worker.video.live_tracking import LivePose, StreamTracker
 
+# Of a JPEG that a calibration is asked for with.
+FRAME_QUALITY = 95
+
 
 @dataclass
 class TrackedStreams:
-    """The cameras that are tracked, by their ids. `sent` is told of each pose after it was sent."""
+    """The cameras of a `venue` that are tracked, by their ids. `sent` is told of each pose after it was sent."""
 
-    numbers: Mapping[str, int]
+    venue: Venue
     sender: PoseSender
     sent: Callable[[SentPose], None]
     cameras: dict[str, StreamTracker] = field(default_factory=dict, init=False)
@@ -43,11 +47,10 @@ class TrackedStreams:
         `every`: lines are measured in every so many-th picture; `ahead_s`: poses are sent as they will be so long after
         their pictures; `sent` is told of each.
         """
-        numbers = {camera.id: number for number, camera in enumerate(venue.cameras, 1)}
-        unknown = [camera for camera in addresses if camera not in numbers]
+        found = cls(venue, sender, sent)
+        unknown = [camera for camera in addresses if camera not in found.numbers]
         if unknown:
-            fail(f"The venue has no camera {', '.join(unknown)}; it has {', '.join(numbers)}", USAGE)
-        found = cls(numbers, sender, sent)
+            fail(f"The venue has no camera {', '.join(unknown)}; it has {', '.join(found.numbers)}", USAGE)
         if addresses:
             from service.cli.local_engine import engine_settings
 
@@ -61,9 +64,14 @@ class TrackedStreams:
                     stored = camera_with_ignored_areas(camera, camera.ignore)
                     trouble = found._trouble[camera.id] = OngoingTrouble()
                     found.cameras[camera.id] = StreamTracker(
-                        pitch, stored, addresses[camera.id], every, found._report, trouble.say, ahead_s
+                        pitch, stored, addresses[camera.id], every, found._report, trouble.say, print_note, ahead_s
                     )
         return found
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """The place in the venue of each camera, from 1."""
+        return {camera.id: number for number, camera in enumerate(self.venue.cameras, 1)}
 
     def start(self) -> None:
         """Begin to track them."""
@@ -88,12 +96,34 @@ class TrackedStreams:
         """Whether poses of a camera come from its pictures at the moment."""
         return time.monotonic() - self._last_s.get(camera, -SILENT_S) < SILENT_S
 
+    def lost(self, for_s: float) -> list[str]:
+        """Those whose pictures come, and have not shown their lines where they are expected for so long."""
+        return [name for name, camera in self.cameras.items() if camera.unseen_s > for_s]
+
+    def frames(self) -> dict[str, bytes] | None:
+        """JPEGs of the newest pictures, by camera, in the sizes of their lenses.
+
+        None at all unless the whole venue is tracked, None while there is no picture of a camera.
+        """
+        from worker.jobs.from_schemas import encode_jpeg
+
+        if self.cameras.keys() != self.numbers.keys():
+            return {}
+        frames = {}
+        for name, camera in self.cameras.items():
+            frame = camera.newest_frame()
+            if frame is None:
+                return None
+            frames[name] = encode_jpeg(frame, FRAME_QUALITY)
+        return frames
+
     def _report(self, pose: LivePose) -> None:
         from service.cli.tracked_poses import camera_document
         from service.live.destinations import Tracked
 
         tracked = pose.tracked
-        self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
+        if tracked.how == "measured":
+            self._trouble[tracked.camera.id].over(f"camera {tracked.camera.id} is tracked again")
         self._last_s[tracked.camera.id] = time.monotonic()
         shot = NumberedCamera(camera_document(tracked.camera), self.numbers[tracked.camera.id])
         known = Tracked(tracked.sigma.rotation_deg, tracked.sigma.position_m, pose.clock, pose.arrived_ns)

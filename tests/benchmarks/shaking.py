@@ -42,7 +42,12 @@ PLAYERS, PLAYER_M, PLAYER_M_S = 16, (0.6, 1.85), 3.0
 STEP_PX = 8
 FAR_M = 300.0
 # Frames relative to 4K, columns of the panorama, bits a second of a clip.
-SIZES = {"1080p": (0.5, 1920, 12_000_000), "4k": (1.0, 3840, 40_000_000), "real": (1.0, 3072, 30_000_000)}
+SIZES = {
+    "540p": (0.25, 960, 4_000_000),
+    "1080p": (0.5, 1920, 12_000_000),
+    "4k": (1.0, 3840, 40_000_000),
+    "real": (1.0, 3072, 30_000_000),
+}
 FOLDER = Path("build/shaking")
 # So many-th frames are rendered to be read: no multiple of those in which lines are measured.
 READ_EVERY = 3
@@ -68,10 +73,22 @@ class Swing:
 
 
 class Clip:
-    """Frames of a shaking camera, and where it really was."""
+    """Frames of a shaking camera, and where it really was.
 
-    def __init__(self, pitch: Field, still: Camera, picture: Frame, rng: np.random.Generator) -> None:
+    `picture`: what the camera `taken_by` showed; it is the one that films, unless `still` is another one.
+    """
+
+    def __init__(
+        self,
+        pitch: Field,
+        taken_by: Camera,
+        picture: Frame,
+        rng: np.random.Generator,
+        still: Camera | None = None,
+    ) -> None:
+        still = still or taken_by
         self.still = still
+        self._taken_by = taken_by
         self._pitch = pitch
         self._picture = picture
         self._swing = Swing(rng.uniform(0, 2 * np.pi, (6, 2)))
@@ -94,7 +111,7 @@ class Clip:
         """What it shows then, as its sensor has it."""
         now = self.camera(number)
         behind = self._behind(now)
-        source = self.still.project(behind).astype(np.float32)
+        source = self._taken_by.project(behind).astype(np.float32)
         fine = cv2.resize(source, None, fx=STEP_PX, fy=STEP_PX, interpolation=cv2.INTER_LINEAR)
         width, height = now.intrinsics.size
         place = fine[STEP_PX : STEP_PX + height, STEP_PX : STEP_PX + width]

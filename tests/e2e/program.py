@@ -16,6 +16,8 @@ from service import child_process
 JPEG = b"\xff\xd8\xff\xd9"
 # Where cameras end, of the way from the middle of the pitch to where they were. Their translation shrinks alike.
 NEARER = 0.875
+# About which they have turned then, in venues of this name, rad about their first axis.
+TURNED = 0.05
 # From the anchor of each camera, as it is told after every job.
 DISPLACEMENT = {
     "at": [-20, 34],
@@ -102,7 +104,8 @@ def main() -> None:
                 task.get("anchors", {}).get(camera["id"]),
                 accepted=number < good,
                 # Of another camera's frame no pose is sought.
-                nearer=1 if behaviour == "swapped" else NEARER,
+                nearer=1 if behaviour in ("swapped", "turn") else NEARER,
+                turned=TURNED if behaviour == "turn" else 0,
             )
             | (refined(camera, memories) if behaviour == "refine" else {})
             | (knocked(camera) if behaviour == "knock" and number >= good else {})
@@ -249,14 +252,15 @@ def contradicted(field: dict) -> dict:
     }
 
 
-def found(camera: dict, anchor: dict | None, *, accepted: bool, nearer: float = NEARER) -> dict:
+def found(camera: dict, anchor: dict | None, *, accepted: bool, nearer: float = NEARER, turned: float = 0) -> dict:
     pose = camera["pose"]
+    first, *others = pose["rotation"]
     moved = {place: [nearer * component for component in pose[place]] for place in ("position", "translation")}
     return {
         "id": camera["id"],
         "accepted": accepted,
         "rejected_because": None if accepted else "the lines do not fit",
-        "pose": pose | moved,
+        "pose": pose | moved | {"rotation": [first + turned, *others]},
         "sigma": None,
         "moved": {"rotation_deg": 0, "position_m": 6.4, "pixels": 1.0},
         "iou": 0.9,

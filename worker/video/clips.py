@@ -221,7 +221,14 @@ class Clip:
 
         streams = (self.video,) if self.sound is None else (self.video, self.sound)
         try:
-            yield from self.container.demux(*streams)  # type: ignore[misc]
+            packets = iter(self.container.demux(*streams))
+            while True:
+                asked_s = time.monotonic()
+                packet = next(packets, None)
+                # When a stream is silent for too long FFmpeg hands out what it had held back, and would wait once more.
+                if packet is None or (self.live and time.monotonic() - asked_s > WAITING_S):
+                    return
+                yield packet  # type: ignore[misc]
         except av.EOFError:
             return
         except (av.FFmpegError, OSError) as error:

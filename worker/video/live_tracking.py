@@ -13,12 +13,16 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, Self
 
-from worker.calibration.geometry.camera import Camera
+import cv2
+import numpy as np
+
+from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import CalibrationError
 from worker.calibration.tracking.follower import CameraTracker, TrackedPose
 from worker.video.clips import Clip, camera_for_clip
 from worker.video.errors import VideoError
+from worker.video.stillness import Stillness
 from worker.video.stream_clock import Lateness
 from worker.video.yuv_planes import Picture
 
@@ -28,8 +32,14 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S, LOST_PAUSE_S = 1.0, 30.0, 1.0
 LONGEST_GAP_S = 5.0
 # Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
 LOST_AFTER_S = 3.0
-# A picture that says it is from the future or older than this comes from a camera whose clock is wrong.
-EARLIEST_S, LATEST_S = -0.1, 10.0
+# A prompt picture that says it is from the future or older than this comes from a camera whose clock is wrong.
+EARLIEST_S, LATEST_S = -0.1, 2.0
+# A picture that is older is not where the camera looks now.
+NEWEST_S = 2.0
+# A pose that is known no better than this is found by lines that do not fit: zoom or focus are others than stored.
+UNSURE_DEG = 0.2
+# By so much a clock does not go astray between two pictures: it was set.
+CLOCK_WAS_SET_S = 0.25
 
 # Pictures that come so much later than others before them wait somewhere: those that need others are passed by until
 # the rest has caught up.
@@ -57,20 +67,40 @@ class LivePose:
 
 @dataclass(frozen=True)
 class _ArrivedPicture:
-    """A picture, its time in the stream (s), by its camera's clock and when it had been decoded (ns, Unix time)."""
+    """A picture, its time in the stream (s), by its camera's clock and when it had been decoded (ns, Unix time).
+
+    `late_s`: how late it came beside the promptest ones of the stream; `shows_new`: it, or one that it took the place
+    of, is not the same as the one before; `is_frozen`: nearly all before it were.
+    """
 
     picture: Picture
     number: int
     stream_s: float
+    late_s: float
     taken_ns: int | None
     arrived_ns: int
+    shows_new: bool
+    is_frozen: bool
+
+    @property
+    def delay_s(self) -> float | None:
+        """How long after it was taken a prompt picture arrives, by both clocks."""
+        return None if self.taken_ns is None else (self.arrived_ns - self.taken_ns) / 1e9 - self.late_s
+
+    @property
+    def clock_offset_s(self) -> float | None:
+        """The camera's clock less the time in its stream: the same for all pictures unless that clock is set."""
+        return None if self.taken_ns is None else self.taken_ns / 1e9 - self.stream_s
 
 
 class _NewestPicture:
     """The pictures of a clip as they arrive, decoded in a thread; who comes late gets the newest.
 
-    To be used as a context: it lets go of the clip before that is closed.
+    To be used as a context: it lets go of the clip before that is closed. `latest`: the last one that showed something
+    new, whoever looks at it.
     """
+
+    latest: _ArrivedPicture | None = None
 
     def __init__(self, clip: Clip) -> None:
         self._clip = clip
@@ -100,7 +130,7 @@ class _NewestPicture:
             yield newest
 
     def _read(self) -> None:
-        lateness, is_behind = Lateness(), False
+        lateness, stillness, is_behind = Lateness(), Stillness(), False
         try:
             for number, shot in enumerate(self._clip.shots()):
                 if self._unwanted:
@@ -109,8 +139,20 @@ class _NewestPicture:
                 if is_behind != (late_s > (CAUGHT_UP_S if is_behind else BEHIND_S)):
                     is_behind = not is_behind
                     self._clip.decode_whole_pictures_only(is_behind)
+                shows_new = stillness.shows_new(shot.picture.planes[0], shot.time_s)
                 with self._changed:
-                    self._newest = _ArrivedPicture(shot.picture, number, shot.time_s, shot.taken_ns, time.time_ns())
+                    self._newest = _ArrivedPicture(
+                        shot.picture,
+                        number,
+                        shot.time_s,
+                        late_s,
+                        shot.taken_ns,
+                        time.time_ns(),
+                        shows_new or (self._newest is not None and self._newest.shows_new),
+                        stillness.is_frozen,
+                    )
+                    if shows_new:
+                        self.latest = self._newest
                     self._changed.notify()
         except BaseException as error:
             self._ended = error
@@ -124,7 +166,8 @@ class StreamTracker:
     """A camera that is tracked in its stream at `address` by a thread of its own, from where it is `stored`.
 
     `every`: lines are measured in every so many-th picture; `ahead_s`: poses are told as they will be so long after
-    their pictures. `report` takes each pose, `warn` what goes wrong, in words; both are called by that thread.
+    their pictures. `report` takes each pose, `warn` why there are none, in words, and `remark` what is odd about those
+    that there are; all are called by that thread.
     """
 
     pitch: Field
@@ -133,9 +176,14 @@ class StreamTracker:
     every: int
     report: Callable[[LivePose], None]
     warn: Callable[[str], None]
+    remark: Callable[[str], None]
     ahead_s: float = 0.0
     _stop: threading.Event = field(default_factory=threading.Event, init=False)
     _is_clock_right: bool = field(default=True, init=False)
+    _clock_offset_s: float | None = field(default=None, init=False)
+    _do_lines_fit: bool = field(default=True, init=False)
+    _pictures: _NewestPicture | None = field(default=None, init=False)
+    _unseen_since: float | None = field(default=None, init=False)
 
     def start(self) -> None:
         """Begin to track it."""
@@ -144,6 +192,27 @@ class StreamTracker:
     def anchor(self, stored: Camera) -> None:
         """Begin anew from another stored pose, at the next picture."""
         self.stored = stored
+        self._unseen_since = None
+
+    @property
+    def unseen_s(self) -> float:
+        """For how long its pictures have come without its lines where they are expected, as well as they should fit."""
+        unseen_since = self._unseen_since
+        return 0.0 if unseen_since is None or self._latest() is None else time.monotonic() - unseen_since
+
+    def newest_frame(self) -> Frame | None:
+        """Its newest picture in the size of its lens; None where that is old or frozen."""
+        latest = self._latest()
+        if latest is None:
+            return None
+        size = self.stored.intrinsics.size
+        frame = latest.picture.colours
+        return frame if latest.picture.size == size else np.asarray(cv2.resize(frame, size), np.uint8)
+
+    def _latest(self) -> _ArrivedPicture | None:
+        """The newest picture that shows something new, unless that is old. Not the one that is looked at."""
+        latest = None if self._pictures is None else self._pictures.latest
+        return None if latest is None or time.time_ns() - latest.arrived_ns > NEWEST_S * 1e9 else latest
 
     def stop(self) -> None:
         """End after the picture that is looked at."""
@@ -173,32 +242,54 @@ class StreamTracker:
         """Track the camera through a stream until that ends. Raises `VideoError`."""
         tracked: _Track | None = None
         tried_at = -LOST_PAUSE_S
+        self._clock_offset_s = None
         with _NewestPicture(clip) as pictures:
+            self._pictures = pictures
             for arrived in pictures:
                 if self._stop.is_set():
                     return
+                if arrived.shows_new:
+                    self._unseen_since = self._unseen_since or time.monotonic()
                 if tracked is not None and tracked.goes_on(arrived, self.stored):
                     self._report(tracked.at(arrived, self.ahead_s), arrived, clip.facts.rate)
-                elif time.monotonic() - tried_at >= LOST_PAUSE_S:
+                elif arrived.shows_new and time.monotonic() - tried_at >= LOST_PAUSE_S:
                     tried_at = time.monotonic()
                     tracked = self._locate(clip, arrived)
+                if arrived.is_frozen:
+                    self.warn(f"camera {self.stored.id}: its picture is frozen, each one is the same as the one before")
 
     def _report(self, tracked: TrackedPose, arrived: _ArrivedPicture, rate: Fraction) -> None:
         clock: Clock = "arrival"
         at_ns = arrived.arrived_ns
-        if arrived.taken_ns is not None and self._is_clock_plausible((arrived.arrived_ns - arrived.taken_ns) / 1e9):
+        if arrived.taken_ns is not None and self._is_clock_plausible(arrived):
             clock, at_ns = "rtcp", arrived.taken_ns
+        if tracked.how == "measured" and tracked.sigma.rotation_deg < UNSURE_DEG:
+            self._unseen_since = None
         ahead_ns = int(self.ahead_s * 1e9)
         self.report(LivePose(tracked, at_ns + ahead_ns, clock, arrived.arrived_ns, arrived.number, rate))
 
-    def _is_clock_plausible(self, delay_s: float) -> bool:
-        """Whether the camera's clock can be right, by which a picture arrived so long after it was taken."""
+    def _is_clock_plausible(self, arrived: _ArrivedPicture) -> bool:
+        """Whether the camera's clock can be right, by what it says of a picture."""
+        delay_s, offset_s = arrived.delay_s, arrived.clock_offset_s
+        if delay_s is None or offset_s is None:
+            return False
         was_right, self._is_clock_right = self._is_clock_right, EARLIEST_S <= delay_s <= LATEST_S
+        set_by_s = 0.0 if self._clock_offset_s is None else offset_s - self._clock_offset_s
+        self._clock_offset_s = offset_s
         if was_right and not self._is_clock_right:
-            off, side = abs(delay_s), "behind" if delay_s > 0 else "ahead of"
-            self.warn(
-                f"camera {self.stored.id}: its clock is {off:.1f} s {side} this machine's, so its pictures count from "
-                "when they arrive. Let both keep time by NTP"
+            side = "behind" if delay_s > 0 else "ahead of"
+            self.remark(
+                f"camera {self.stored.id}: its clock is {abs(delay_s):.1f} s {side} this machine's"
+                f"{', or its pictures are so long on their way' if delay_s > 0 else ''}, so they count from when they "
+                "arrive. Let both keep time by NTP"
+            )
+        elif self._is_clock_right and not was_right:
+            self.remark(f"camera {self.stored.id}: its clock is right again, so its pictures count by it")
+        elif self._is_clock_right and abs(set_by_s) > CLOCK_WAS_SET_S:
+            side = "forward" if set_by_s > 0 else "back"
+            self.remark(
+                f"camera {self.stored.id}: its clock was set {side} by {abs(set_by_s):.1f} s, and the times of its "
+                "poses with it"
             )
         return self._is_clock_right
 
@@ -215,6 +306,13 @@ class StreamTracker:
                 "is sent. Calibrate the venue, or look at the picture"
             )
             return None
+        sigma_deg = tracker.now.cameras[0].sigma.rotation_deg
+        did_fit, self._do_lines_fit = self._do_lines_fit, sigma_deg < UNSURE_DEG
+        if did_fit and not self._do_lines_fit:
+            self.remark(
+                f"camera {camera.id}: its lines do not fit well, its pose is known to {sigma_deg:.1f} degrees. "
+                "Have zoom or focus changed? Calibrate the venue"
+            )
         found = _Track(tracker, stored, 1 / float(rate), arrived.number, arrived.stream_s, time.monotonic())
         self._report(found.now(self.ahead_s), arrived, rate)
         return found
@@ -241,13 +339,14 @@ class _Track:
         return stored is self.stored and 0 <= gap_s <= LONGEST_GAP_S and time.monotonic() - self.seen_s <= LOST_AFTER_S
 
     def at(self, arrived: _ArrivedPicture, ahead_s: float) -> TrackedPose:
-        """The pose by a picture. Pictures that were left out pass as if they had shown nothing."""
+        """The pose by a picture. Pictures that were left out, and one that shows nothing new, pass unseen."""
         pictures = arrived.number - self.number
         # Streams whose times stand still come evenly.
         passed_s = (arrived.stream_s - self.stream_s) / pictures or self.interval_s
         for _ in range(pictures - 1):
             self.tracker.see({}, passed_s)
-        self.tracker.see({self.stored.id: arrived.picture.colours} if self.tracker.looks else {}, passed_s)
+        is_seen = arrived.shows_new and self.tracker.looks
+        self.tracker.see({self.stored.id: arrived.picture.colours} if is_seen else {}, passed_s)
         self.number, self.stream_s = arrived.number, arrived.stream_s
         return self.now(ahead_s)
 

@@ -7,15 +7,20 @@ import sys
 from contextlib import contextmanager
 from subprocess import PIPE
 
+import numpy as np
 import pytest
 
 from tests.e2e import warm
 from tests.e2e.client.test_stitching import document
 from tests.e2e.commands import esc_here
+from tests.e2e.program import TURNED
 from tests.e2e.running import venue, wait_for
+from tests.rtsp import encode, filming, has_server
 from tests.service.live.receiving import freed_packet, listening, opentrackio_sample, port_of
-from tests.worker.calibration.synthetic import pair
+from tests.worker.calibration.synthetic import pair, pair_frames
 from tests.worker.video.shaking import film_shaking
+
+FRAMES_PER_SECOND = 5
 
 
 @contextmanager
@@ -78,6 +83,7 @@ def test_poses_go_on_when_the_service_is_gone(start, name):
     ("arguments", "said"),
     [
         (["left=rtsp://10.1.0.7/main", "--hold"], "--hold sends stored poses alone"),
+        (["--recover"], "--recover has the service calibrate a venue of its own whose cameras are tracked"),
         (["--rate", "0"], "--rate 0: samples a second"),
         (["--freed", "10.1.0.20"], "--freed 10.1.0.20: expected HOST:PORT"),
         (["--opentrackio", "10.1.0.20:70000"], "expected HOST:PORT"),
@@ -113,6 +119,59 @@ def test_a_camera_is_tracked_in_its_stream_and_of_the_other_one_the_stored_pose_
     assert left["position"] == pytest.approx(pair()[0].pose.position.tolist(), abs=0.04)
     assert right["status"] == "stored"
     assert "sigma_position_m" not in right
+
+
+@pytest.fixture(scope="module")
+def filmed(tmp_path_factory):
+    """What two cameras film that do not move."""
+    folder, rng = tmp_path_factory.mktemp("filmed"), np.random.default_rng(0)
+    for camera, picture in zip(pair(), pair_frames(), strict=True):
+        pictures = (np.clip(picture + rng.normal(0, 2, picture.shape), 0, 255).astype(np.uint8) for _ in range(10))
+        encode(pictures, FRAMES_PER_SECOND, 8_000_000, folder / camera.id)
+    return [folder / camera.id for camera in pair()]
+
+
+@contextmanager
+def recovering(service, name, filmed, behaviour):
+    """`esc live --recover` of cameras that have turned, by as much as the stub of the engine turns them if asked to."""
+    stored = document(name, pair()) | {"name": behaviour}
+    for camera in stored["cameras"]:
+        camera["pose"]["rotation"][0] -= TURNED
+    service.http.put(f"/venues/{name}", json=stored).raise_for_status()
+    with filming(filmed, FRAMES_PER_SECOND) as cameras:
+        streams = [f"{camera.id}={address}" for camera, address in zip(pair(), cameras.addresses, strict=True)]
+        with live(service, name, *streams, "--json", "--rate", "2", "--recover") as process:
+            yield process
+
+
+@pytest.mark.slow
+def test_lost_cameras_are_calibrated_by_their_newest_pictures_and_tracked_from_there(service, name, filmed, missing):
+    if not has_server():
+        missing("gstreamer")
+    with recovering(service, name, filmed, "turn") as process:
+        lines = (json.loads(line) for line in process.stdout)
+        left = next(line for line in lines if line["camera"] == "left" and line["status"] == "measured")
+        process.send_signal(signal.SIGTERM)
+        told = process.communicate(timeout=30)[1]
+    assert left["position"] == pytest.approx(pair()[0].pose.position.tolist(), abs=0.04)
+    (job,) = service.http.get("/jobs", params={"venue": name}).json()["jobs"]
+    assert (job["status"], sorted(job["frames"])) == ("succeeded", ["left", "right"])
+    assert f"Job {job['id']} calibrates the venue by the newest pictures" in told
+    assert "New pose or lens: left, right" in told
+
+
+@pytest.mark.slow
+def test_a_calibration_of_lost_cameras_that_is_refused_changes_nothing_and_says_why(service, name, filmed, missing):
+    if not has_server():
+        missing("gstreamer")
+    with recovering(service, name, filmed, "reject") as process:
+        before = service.http.get(f"/venues/{name}").json()
+        told = next(line for line in process.stderr if "stays" in line)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=30)
+    # Which of them are lost by then is a matter of a second.
+    assert told.endswith("stays, rejected: the lines do not fit\n")
+    assert service.http.get(f"/venues/{name}").json() == before
 
 
 def is_measured(state):

@@ -173,7 +173,8 @@ def test_live_cameras_are_followed_and_their_view_is_published(esc, tmp_path, mi
     for film_path, phase, camera, picture in zip(films, (0.0, 1.5), pair(), pair_frames(), strict=True):
         encode(shaken(camera, picture, phase, 50), 10, 3_000_000, film_path)
     (tmp_path / "venue.json").write_text(json.dumps(document("windy", pair())))
-    with filming(films, 10) as ((left, right), _), recording(tmp_path / "received.ts") as published:
+    with filming(films, 10) as cameras, recording(tmp_path / "received.ts") as published:
+        left, right = cameras.addresses
         options = ("--follow", "--rate", "10", "--to", "9", "--json", *SHOWN)
         answer = esc("stitch", "venue.json", f"left={left}", f"right={right}", "-o", published, *options)
         assert answer.returncode == 0, answer.stderr

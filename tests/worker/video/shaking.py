@@ -24,14 +24,17 @@ def turn(number: int, phase: float) -> Array:
     return np.radians(0.3) * (np.sin(np.pi * number / RATE + phases) - np.sin(phases))
 
 
-def shaken(camera: Camera, picture: NDArray[np.uint8], phase: float, count: int = COUNT) -> Iterator[NDArray[np.uint8]]:
-    """What a camera of the pair sees while it sways; 50 pictures are a whole sway."""
-    for number in range(count):
-        yield Sway.from_turn(-turn(number, phase), camera.intrinsics).rows(picture, 0, len(picture))
+def shaken(
+    camera: Camera, picture: NDArray[np.uint8], phase: float, count: int = COUNT, frozen_for: int = 0
+) -> Iterator[NDArray[np.uint8]]:
+    """What a camera of the pair sees while it sways, 50 pictures a sway; the last comes so many times more."""
+    for number in range(count + frozen_for):
+        there = turn(min(number, count - 1), phase)
+        yield Sway.from_turn(-there, camera.intrinsics).rows(picture, 0, len(picture))
 
 
-def film_shaking(folder: Path) -> dict[str, str]:
-    """A clip of each camera, by its name."""
+def film_shaking(folder: Path, frozen_for: int = 0) -> dict[str, str]:
+    """A clip of each camera, by its name; its last picture comes so many times more."""
     paths = {}
     for phase, camera, picture in zip((0.0, 1.5), pair(), pair_frames(), strict=True):
         path = folder / f"{camera.id}.mp4"
@@ -40,7 +43,7 @@ def film_shaking(folder: Path) -> dict[str, str]:
             stream.width, stream.height = camera.intrinsics.size
             stream.pix_fmt, stream.thread_count = "yuv420p", 1
             stream.codec_context.time_base = Fraction(1, 12800)
-            for number, seen in enumerate(shaken(camera, picture, phase)):
+            for number, seen in enumerate(shaken(camera, picture, phase, frozen_for=frozen_for)):
                 frame = av.VideoFrame.from_ndarray(seen, format="bgr24")
                 frame.pts, frame.time_base = number * 12800 // RATE, Fraction(1, 12800)
                 out.mux(stream.encode(frame))

@@ -68,15 +68,12 @@ def clip(tmp_path, missing):
 @pytest.mark.slow
 def test_each_moment_has_the_pictures_that_cameras_took_at_one_time(clip, tmp_path):
     watched = Watched()
-    with filming([clip, clip], RATE) as (addresses, server):
-        clips = dict(zip(("left", "right"), addresses, strict=True))
+    with filming([clip, clip], RATE) as cameras:
+        clips = dict(zip(("left", "right"), cameras.addresses, strict=True))
         plan = Plan(str(tmp_path / "pano.ts"), end_s=UNTIL_S, encoding=QUICK)
         made = stitch(SCENE, clips, plan, lambda *_: None, watched)
-        server.kill()
-        taken_s = {
-            (int(number), int(picture)): int(at) / 1e9
-            for number, picture, at in (line.split() for line in server.stdout)
-        }
+        cameras.process.kill()
+        taken_s = {(taken.camera, taken.number): taken.at_ns / 1e9 for taken in cameras.taken()}
     assert made.offsets == {"left": 0.0, "right": 0.0}
     assert made.frames == len(watched.moments) > 10
     # The second camera is asked later, so that pictures of one number are not of one time.
@@ -91,8 +88,8 @@ def test_each_moment_has_the_pictures_that_cameras_took_at_one_time(clip, tmp_pa
 @pytest.mark.slow
 def test_a_stream_that_says_nothing_of_its_clock_needs_an_offset(clip, tmp_path, monkeypatch):
     monkeypatch.setattr(camera_clocks, "REPORTED_WITHIN_S", 0.5)
-    with filming([clip, clip], RATE) as (addresses, _):
-        clips = dict(zip(("left", "right"), addresses, strict=True))
+    with filming([clip, clip], RATE) as cameras:
+        clips = dict(zip(("left", "right"), cameras.addresses, strict=True))
         with pytest.raises(VideoError, match=r"its stream does not say when .* within 0.5 s.*--offset (left|right)=0"):
             stitch(SCENE, clips, Plan(str(tmp_path / "pano.ts"), encoding=QUICK), lambda *_: None)
 

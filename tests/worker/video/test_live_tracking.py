@@ -6,6 +6,7 @@ import socket
 import subprocess
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,8 +15,8 @@ from tests.worker.calibration.synthetic import CROWNED, moved, pair
 from tests.worker.video.shaking import COUNT, film_shaking, turn
 from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.rotation import rotation_angles_deg
-from worker.video import clips
-from worker.video.live_tracking import StreamTracker
+from worker.video import clips, live_tracking
+from worker.video.live_tracking import UNSURE_DEG, StreamTracker
 from worker.video.stream_clock import StreamClock
 
 pytestmark = pytest.mark.slow
@@ -34,7 +35,10 @@ class Tracking:
 
     def __init__(self, address, stored=STORED, ahead_s=0.0):
         self.poses, self.warnings = queue.Queue(), queue.Queue()
-        self.camera = StreamTracker(CROWNED, stored, address, 1, self.poses.put, self.warnings.put, ahead_s)
+        self.remarks = queue.Queue()
+        self.camera = StreamTracker(
+            CROWNED, stored, address, 1, self.poses.put, self.warnings.put, self.remarks.put, ahead_s
+        )
 
     def __enter__(self):
         self.camera.start()
@@ -79,7 +83,7 @@ def test_times_of_a_camera_whose_clock_is_wrong_are_not_taken_over(clip, monkeyp
     with Tracking(clip) as tracking:
         pose = tracking.poses.get(timeout=60)
         assert (pose.clock, pose.at_ns) == ("arrival", pose.arrived_ns)
-        assert "its clock is 3600" in tracking.warnings.get(timeout=60)
+        assert "its clock is 3600" in tracking.remarks.get(timeout=60)
 
 
 def test_times_of_a_camera_whose_clock_is_right_are_those_of_its_poses(clip, monkeypatch):
@@ -88,6 +92,31 @@ def test_times_of_a_camera_whose_clock_is_right_are_those_of_its_poses(clip, mon
         pose = tracking.poses.get(timeout=60)
     assert pose.clock == "rtcp"
     assert 1.0 <= (pose.arrived_ns - pose.at_ns) / 1e9 < 2.0
+
+
+def test_a_clock_that_is_set_is_said(clip, monkeypatch):
+    # A file is not read at the rate of its pictures.
+    monkeypatch.setattr(live_tracking, "LATEST_S", 1000.0)
+    begin_ns = time.time_ns() - 5 * 10**9
+
+    def taken_ns(_, pts, time_base):
+        stream_s = float(pts * time_base)
+        return begin_ns + int(1e9 * (stream_s - 2 * (stream_s > 0.4)))
+
+    monkeypatch.setattr(StreamClock, "taken_ns", taken_ns)
+    with Tracking(clip) as tracking:
+        assert "its clock was set back by 2.0 s" in tracking.remarks.get(timeout=60)
+
+
+def test_a_frozen_picture_is_said_and_measured_once(tmp_path):
+    clip = film_shaking(tmp_path, frozen_for=150)[TRUE.id]
+    with Tracking(clip) as tracking:
+        assert "its picture is frozen" in tracking.warnings.get(timeout=60)
+        poses = list(tracking.poses.queue)
+    # The first of them may have taken the place of one that showed something new, and the encoder mends its
+    # last picture for a while.
+    frozen = [pose.tracked.how for pose in poses if pose.number >= COUNT + 25][1:]
+    assert set(frozen) <= {"coasted"}
 
 
 def test_a_stream_that_has_ended_is_opened_again(clip):
@@ -99,6 +128,19 @@ def test_a_stream_that_has_ended_is_opened_again(clip):
         while again.number != 0:
             again = tracking.poses.get(timeout=60)
     assert again.tracked.how == "measured"
+
+
+def test_lines_that_do_not_fit_the_stored_lens_are_said_and_the_pose_counts_as_lost(clip):
+    with Tracking(clip, stored=zoomed(STORED, 1 / 1.02)) as tracking:
+        assert "its lines do not fit well" in tracking.remarks.get(timeout=60)
+        assert tracking.poses.get(timeout=60).tracked.sigma.rotation_deg > UNSURE_DEG
+        assert tracking.camera.unseen_s > 0
+
+
+def zoomed(camera, by):
+    matrix = camera.intrinsics.matrix.copy()
+    matrix[[0, 1], [0, 1]] *= by
+    return camera.with_lens(replace(camera.intrinsics, matrix=matrix))
 
 
 def test_a_camera_whose_lines_are_elsewhere_is_not_told_of(clip):

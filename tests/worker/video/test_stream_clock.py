@@ -31,15 +31,15 @@ def test_a_stream_tells_when_its_pictures_were_taken_once_its_camera_has_reporte
         missing("gstreamer")
     shots = {}
     encode(map(picture_of, range(COUNT)), RATE, 500_000, tmp_path / "clip")
-    with filming([tmp_path / "clip"], RATE) as ((address,), server):
-        with Clip.open("left", address, time.monotonic()) as clip:
+    with filming([tmp_path / "clip"], RATE) as cameras:
+        with Clip.open("left", *cameras.addresses, time.monotonic()) as clip:
             clip.decode_without_delay()
             for shot in clip.shots():
                 shots[number_shown(shot.picture)] = shot
                 if len(shots) == COUNT:
                     break
-        server.kill()
-        taken_ns = {int(number): int(at) for _, number, at in (line.split() for line in server.stdout)}
+        cameras.process.kill()
+        taken_ns = {taken.number: taken.at_ns for taken in cameras.taken()}
     off_ms = [abs(shot.taken_ns - taken_ns[number]) / 1e6 for number, shot in shots.items() if shot.taken_ns]
     assert shots[0].taken_ns is None
     assert len(off_ms) > 20

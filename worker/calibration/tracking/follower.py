@@ -148,6 +148,7 @@ class _Track:
 
     def see(self, frame: Frame | None, seconds: float) -> None:
         """Take the next frame, so long after the one before; None: it is not looked at, or not there."""
+        self.lines.forget(seconds)
         expected = self._last.after(seconds).drawn_back(seconds)
         how, self._last = self._known(frame, expected)
         self._steps.append(FilterStep(seconds, self._last))

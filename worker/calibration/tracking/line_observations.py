@@ -20,6 +20,7 @@ from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.visibility import VisibleLines
 from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.robust import huber_weights, tukey_weights
+from worker.calibration.tracking.learned_offsets import LearnedOffsets
 from worker.calibration.tracking.motion_filter import PoseObservation
 
 APART_PX = 12.0
@@ -77,9 +78,7 @@ class TrackedLines:
         self._some = np.arange(0, len(chosen), COARSELY)
         self._patch = chosen // CLUSTER_POINTS
         self._usual = 0.0
-        self._unknown_weight = (BESIDE_PX * self._scale) ** -2
-        self._beside_weight = np.full(len(chosen), self._unknown_weight)
-        self._beside_sum = np.zeros(len(chosen))
+        self._beside = LearnedOffsets(len(chosen), BESIDE_PX * self._scale, NOISE_PX)
 
     def _shown(self, lines: LinePoints, first: Frame) -> NDArray[np.intp]:
         """Which of the line points: some of each marking that the first frame shows."""
@@ -125,7 +124,7 @@ class TrackedLines:
         """What they say of the pose: robust least squares, with what pieces of one patch err together."""
         seen = self._known(seen)
         sigma = self._sigma(seen)
-        rows, values = seen.slope / sigma[:, None], (seen.offset - self._beside[seen.piece]) / sigma
+        rows, values = seen.slope / sigma[:, None], (seen.offset - self._beside.mean[seen.piece]) / sigma
         prior = np.diag(np.repeat([PRIOR_RAD, PRIOR_M], 3) ** -2.0)
         change = np.zeros(POSE_NUMBERS)
         for weigh in (*STEPS * [huber_weights], *STEPS * [tukey_weights]):
@@ -147,26 +146,24 @@ class TrackedLines:
         A whole line that a wrong lens puts at the end of what is looked at comes into it when the pose stirs, and would
         pull the pose by as much as it lies beside its place.
         """
-        known = self._beside_weight[seen.piece] > self._unknown_weight
+        known = self._beside.are_known[seen.piece]
         return seen[known] if known.sum() >= FEWEST_PIECES else seen
 
     def learn(self, seen: LineObservations, now: Camera) -> None:
         """Keep how far beside their places the pieces lie when the camera is where it is `now` known to be."""
         left = seen.offset - seen.slope @ change_between(seen.expected, now)
-        counted = tukey_weights((left - self._beside[seen.piece]) / self._sigma(seen)) > 0
+        counted = tukey_weights((left - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
         which = seen.piece[counted]
         self._usual += (len(seen.piece) - self._usual) * (NOVELTY if self._usual else 1.0)
-        self._beside_weight[which] += NOISE_PX**-2
-        self._beside_sum[which] += left[counted] * NOISE_PX**-2
+        self._beside.learn(which, left[counted])
 
-    @property
-    def _beside(self) -> Array:
-        """How far, in px along its normal, each piece lies beside its place."""
-        return self._beside_sum / self._beside_weight
+    def forget(self, seconds: float) -> None:
+        """Let what was learned of the pieces fade by the time that passes."""
+        self._beside.forget(seconds)
 
     def _sigma(self, seen: LineObservations) -> Array:
         """Expected error (M,) in px of where the pieces are seen, and of what is known of where they lie."""
-        return np.sqrt(NOISE_PX**2 + 1 / self._beside_weight[seen.piece])
+        return np.sqrt(NOISE_PX**2 + self._beside.variance[seen.piece])
 
     def _spread(self, seen: LineObservations, pulls: Array) -> Array:
         """How the sum of pulls (M, 6) varies, (6, 6), those of a patch taken as one."""

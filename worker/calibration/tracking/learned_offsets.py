@@ -1,0 +1,54 @@
+"""How far each piece of line lies beside where the model has it, as its sights have taught it and time has faded it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+
+FORGOTTEN_IN_S = 3600.0
+"""What a sight teaches counts 1/e after so long: the sun and the ground move a line's place within a day."""
+FADED = 0.01
+"""Pieces of which less is known than this share of one fresh sight count as never seen."""
+
+
+class LearnedOffsets:
+    """Offsets (N,) in px across their lines, each around zero by `beside_px` before it was seen.
+
+    A sight is off by `noise_px`. Information fades exponentially with the time that passes, whether the piece is seen
+    or not: a piece that is seen all the time has the mean of about the last hour, one that is not seen is known less
+    and less, back to `beside_px` around zero.
+    """
+
+    def __init__(self, count: int, beside_px: float, noise_px: float) -> None:
+        self._unknown = beside_px**-2
+        self._by_sight = noise_px**-2
+        self._information = np.zeros(count)
+        self._sum = np.zeros(count)
+
+    @property
+    def mean(self) -> Array:
+        """Of each piece (N,), px."""
+        return self._sum / (self._unknown + self._information)
+
+    @property
+    def variance(self) -> Array:
+        """Of each piece (N,), px²."""
+        return 1 / (self._unknown + self._information)
+
+    @property
+    def are_known(self) -> NDArray[np.bool_]:
+        """Which pieces (N,) have been seen, not too long ago."""
+        return self._information > FADED * self._by_sight
+
+    def learn(self, pieces: NDArray[np.intp], offsets: Array) -> None:
+        """Take how far these pieces (M,), each named once, were seen (M,) beside their places, px."""
+        self._information[pieces] += self._by_sight
+        self._sum[pieces] += offsets * self._by_sight
+
+    def forget(self, seconds: float) -> None:
+        """Let time pass."""
+        kept = np.exp(-seconds / FORGOTTEN_IN_S)
+        self._information *= kept
+        self._sum *= kept
