@@ -247,7 +247,7 @@ class _Track:
         passed_s = (arrived.stream_s - self.stream_s) / pictures or self.interval_s
         for _ in range(pictures - 1):
             self.tracker.see({}, passed_s)
-        self.tracker.see({self.stored.id: arrived.picture.colours} if self.tracker.looks else {}, passed_s)
+        self.tracker.see({self.stored.id: arrived.picture} if self.tracker.looks else {}, passed_s)
         self.number, self.stream_s = arrived.number, arrived.stream_s
         return self.now(ahead_s)
 
