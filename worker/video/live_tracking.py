@@ -24,8 +24,9 @@ from worker.video.yuv_planes import Picture
 
 # Between two attempts to open a stream, and to find the lines of a camera in a picture.
 FIRST_PAUSE_S, LONGEST_PAUSE_S, LOST_PAUSE_S = 1.0, 30.0, 1.0
-# A camera that was not looked at for longer is not where the filter takes it to be.
-LONGEST_GAP_S = 5.0
+# A camera that was not looked at for longer is looked for anew. On a busy machine that takes seconds itself, and the
+# picture after the one that it was found in comes as much later.
+LONGEST_GAP_S = 30.0
 # Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
 LOST_AFTER_S = 3.0
 # A picture that says it is from the future or older than this comes from a camera whose clock is wrong.

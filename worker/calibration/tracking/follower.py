@@ -85,7 +85,7 @@ class CameraTracker:
         self._seconds = 1 / frames_per_second
         self._every = every
         self._look_ahead = look_ahead
-        self._taken = 1
+        self._taken = self._since_look = 1
         self._settled = 0
 
     @property
@@ -95,16 +95,18 @@ class CameraTracker:
 
     @property
     def looks(self) -> bool:
-        """Whether lines are measured in the frames that are next."""
-        return self._taken % self._every == 0
+        """Whether lines are measured in the frames that are next: where frames were missing, in the first that come."""
+        return self._since_look >= self._every
 
     def see(self, pictures: Mapping[str, PixelReader], seconds: float | None = None) -> Moment:
         """Take the next pictures; a camera that has none coasts, and so do all where nobody `looks`.
 
         `seconds`: since the pictures before, where they do not come evenly.
         """
+        looked_at = pictures if self.looks else {}
         for track in self._tracks:
-            track.see(pictures.get(track.lines.reference.id) if self.looks else None, seconds or self._seconds)
+            track.see(looked_at.get(track.lines.reference.id), seconds or self._seconds)
+        self._since_look = 1 if looked_at else self._since_look + 1
         self._taken += 1
         return self.now
 

@@ -132,6 +132,11 @@ def test_without_frames_it_coasts_with_a_sigma_that_grows_and_is_found_again():
     assert residual_px(moments[:12] + moments[24:]) < 0.1
 
 
+def test_where_a_frame_is_missing_in_which_lines_were_due_they_are_measured_in_the_next_one():
+    moments = followed({2: None, 3: frame(3)}, every=2)
+    assert how(moments)[:8] == ["measured", "coasted", "coasted", "measured", *2 * ["coasted", "measured"]]
+
+
 def test_who_looks_ahead_bridges_a_short_gap():
     gap = dict.fromkeys(range(12, 16))
     blind, ahead = followed(gap), followed(gap, look_ahead=8)
