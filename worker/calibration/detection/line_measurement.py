@@ -231,13 +231,9 @@ class LineProfiles:
     def _to_border(self, seen: VisibleLines, shift: Array, matches: Matches) -> Array:
         """Pixels (N,) from what was read of each line to the border of the picture, negative beyond it."""
         width, height = self._camera.intrinsics.size
-        reach = np.abs(shift) + matches.offsets[-1]
-        nearest = np.full(len(seen), np.inf)
-        for sign in (1, -1):
-            end = seen.pixel + sign * reach[:, None] * seen.normal
-            for axis, last in ((0, width - 1), (1, height - 1)):
-                nearest = np.minimum(nearest, np.minimum(end[:, axis], last - end[:, axis]))
-        return nearest
+        outward = (np.abs(shift) + matches.offsets[-1])[:, None] * np.abs(seen.normal)
+        to_last = np.array([width - 1, height - 1]) - (seen.pixel + outward)
+        return np.asarray(np.minimum(seen.pixel - outward, to_last).min(axis=1))
 
 
 def measure_lines(
@@ -273,11 +269,11 @@ class _Centred:
 
 def _peaks(values: Array, begun: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the columns (N,) of the local maxima in rows of values (N, S) that lie uphill of columns `begun` (N,)."""
-    rows, last = np.arange(len(values)), values.shape[1] - 1
+    rows, last, height = np.arange(len(values)), values.shape[1] - 1, without_nan(values, -np.inf)
     here = begun
     for _ in range(MOST_UPHILL):
-        around = np.stack([np.clip(here + by, 0, last) for by in (0, -1, 1)])
-        higher = np.argmax(without_nan(values[rows, around], -np.inf), axis=0)
+        around = np.clip(here + np.array([[0], [-1], [1]]), 0, last)
+        higher = np.argmax(height[rows, around], axis=0)
         if not higher.any():
             break
         here = around[higher, rows]
@@ -299,10 +295,12 @@ def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) ->
     windows = without_nan(windows) * inside
     sides = np.array([1.0, -1.0])[:, None, None]
     centre, move = np.zeros(len(windows)), np.zeros((len(windows), len(offsets)))
+    model = np.empty((len(windows), 4, len(offsets)))
     for _ in range(1 + CENTRE_STEPS):
         edges = offsets - centre[:, None] + sides * width_px[:, None] / 2
         first, second = blurred_step(edges, LENS_BLUR_PX)
-        model = np.stack([1 - first, first - second, second, move], axis=1) * inside[:, None]
+        model[:, 0], model[:, 1], model[:, 2], model[:, 3] = 1 - first, first - second, second, move
+        model *= inside[:, None]
         normal = np.einsum("nak,nbk->nab", model, model) + RIDGE * np.eye(4)
         before, paint, behind, by = np.linalg.solve(normal, np.einsum("nak,nk->na", model, windows)[..., None])[
             ..., 0
