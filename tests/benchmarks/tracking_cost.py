@@ -33,7 +33,7 @@ from worker.calibration.tracking.motion_filter import State
 from worker.video.yuv_planes import Picture, picture_of
 
 COUNT = 100
-PARTS = {
+PARTS: dict[str, list[tuple[Any, str]]] = {
     "reading pixels": [(Picture, "read")],
     "matching profiles": [(LineProfiles, "read_known")],
     "centres of lines": [(LineProfiles, "measure")],
