@@ -118,6 +118,7 @@ bench-follow: setup
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking --lens usual
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.shaking --size 4k --seconds 4
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.tracking_cost $(if $(BEFORE),--before $(BEFORE))
 
 bench-video: setup
 	$(BIN)/python -m tests.benchmarks.stitch_video

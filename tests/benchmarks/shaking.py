@@ -30,6 +30,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.moving_panorama import MovingPanorama
 from worker.calibration.stitching.views import View, ViewChoice, chosen_view
 from worker.calibration.tracking.follower import CameraTracker, Moment
+from worker.video.yuv_planes import Picture, picture_of
 
 SWING_DEG, SWING_HZ = 0.3, 0.5
 TREMBLE_DEG, TREMBLE_HZ = 0.03, 3.0
@@ -265,14 +266,16 @@ class Film:
         return film
 
     def frames(self) -> Iterator[dict[str, Frame]]:
-        """The frames of one moment after the other, by camera."""
+        """The frames of one moment after the other in colours, by camera."""
+        for pictures in self.pictures():
+            yield {camera: picture.frame.to_ndarray(format="bgr24") for camera, picture in pictures.items()}
+
+    def pictures(self) -> Iterator[dict[str, Picture]]:
+        """The same as the decoder left them."""
         with ExitStack() as stack:
             files = [stack.enter_context(av.open(str(path))) for path in self.paths]
             for moment in zip(*(file.decode(video=0) for file in files), strict=True):
-                yield {
-                    clip.still.id: frame.to_ndarray(format="bgr24")
-                    for clip, frame in zip(self.clips, moment, strict=True)
-                }
+                yield {clip.still.id: picture_of(frame) for clip, frame in zip(self.clips, moment, strict=True)}
 
 
 def encode(clip: Clip, count: int, path: Path, bits: int) -> None:
@@ -291,14 +294,15 @@ def followed(film: Film, run: Run, lens: str) -> Told:
     stored = [stored_camera(clip.still, number, lens) for number, clip in enumerate(film.clips)]
     moments, spent = [], 0.0
     follower = None
-    for frames in film.frames():
+    for pictures in film.pictures():
         if follower is None:
-            follower = CameraTracker(film.pitch, stored, frames, FRAMES_PER_SECOND, run.every, run.look_ahead)
+            first = {camera: picture.colours for camera, picture in pictures.items()}
+            follower = CameraTracker(film.pitch, stored, first, FRAMES_PER_SECOND, run.every, run.look_ahead)
             continue
-        begun = time.process_time()
-        follower.see(frames)
+        begun = time.thread_time()
+        follower.see(pictures)
         moments += follower.settled()
-        spent += time.process_time() - begun
+        spent += time.thread_time() - begun
     assert follower is not None
     return Told(run, moments + follower.rest(), follower, 1000 * spent / (film.count - 1) / len(stored))
 

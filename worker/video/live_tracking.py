@@ -28,8 +28,9 @@ from worker.video.yuv_planes import Picture
 
 # Between two attempts to open a stream, and to find the lines of a camera in a picture.
 FIRST_PAUSE_S, LONGEST_PAUSE_S, LOST_PAUSE_S = 1.0, 30.0, 1.0
-# A camera that was not looked at for longer is not where the filter takes it to be.
-LONGEST_GAP_S = 5.0
+# A camera that was not looked at for longer is looked for anew. On a busy machine that takes seconds itself, and the
+# picture after the one that it was found in comes as much later.
+LONGEST_GAP_S = 30.0
 # Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
 LOST_AFTER_S = 3.0
 # A prompt picture that says it is from the future or older than this comes from a camera whose clock is wrong.
@@ -346,7 +347,7 @@ class _Track:
         for _ in range(pictures - 1):
             self.tracker.see({}, passed_s)
         is_seen = arrived.shows_new and self.tracker.looks
-        self.tracker.see({self.stored.id: arrived.picture.colours} if is_seen else {}, passed_s)
+        self.tracker.see({self.stored.id: arrived.picture} if is_seen else {}, passed_s)
         self.number, self.stream_s = arrived.number, arrived.stream_s
         return self.now(ahead_s)
 

@@ -90,7 +90,7 @@ class _TrackedGeometry:
             self._follower = self._begun(pictures)
         else:
             looked = pictures if self._follower.looks else {}
-            self._follower.see({camera: picture.colours for camera, picture in looked.items()})
+            self._follower.see(looked)
         self._tell(self._follower, self._follower.settled())
         return self._panorama(self._follower, frozenset(pictures))
 

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from worker.calibration.detection.contrast import LUMA, LUMA_SHARES
+from worker.calibration.detection.sampling import read_bytes
 from worker.calibration.geometry.camera import Array, Frame
 
 if TYPE_CHECKING:
@@ -28,16 +30,17 @@ BT709, UNTOLD, RANGE_LIMITED, RANGE_FULL = 1, 2, 1, 2
 PAL_ROWS, BT601 = 576, 5
 # swscale's bilinear, rounded properly and with all of the chroma: without these it darkens by up to five levels.
 EXACT = 0x2 | 0x40000 | 0x2000 | 0x4000
-# Shares of red, green and blue in luma.
-RED, GREEN, BLUE = 0.2126, 0.7152, 0.0722
+# Levels from the darkest luma to the brightest.
+LUMA_LEVELS = 219
 
 
 def _to_planes() -> Array:
     """Luma and both chroma of blue, green, red, 1: (3, 4)."""
-    luma = np.array([BLUE, GREEN, RED])
-    of_blue = (np.array([1.0, 0, 0]) - luma) / (2 * (1 - BLUE))
-    of_red = (np.array([0, 0, 1.0]) - luma) / (2 * (1 - RED))
-    rows = np.stack([219 * luma, 224 * of_blue, 224 * of_red]) / 255
+    luma = np.array(LUMA_SHARES)
+    blue, _, red = LUMA_SHARES
+    of_blue = (np.array([1.0, 0, 0]) - luma) / (2 * (1 - blue))
+    of_red = (np.array([0, 0, 1.0]) - luma) / (2 * (1 - red))
+    rows = np.stack([LUMA_LEVELS * luma, 224 * of_blue, 224 * of_red]) / 255
     return np.column_stack([rows, [BLACK, NO_COLOUR, NO_COLOUR]])
 
 
@@ -79,6 +82,24 @@ class Picture:
             interpolation=EXACT,
         )
         return np.asarray(shown.to_ndarray(), np.uint8)
+
+    def read(self, channel: int, column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Brightness (P, N) 0..255 in one channel at columns and rows (P, N), NaN outside; the rest is not converted.
+
+        A `worker.calibration.detection.contrast.PixelReader`.
+        """
+        luma, blue, red = self.planes
+        brightness = read_bytes(luma, column, row)
+        if channel == LUMA:
+            brightness = (brightness - BLACK) * np.float32(255 / LUMA_LEVELS)
+        else:
+            by_luma, by_blue, by_red, constant = FROM_PLANES[channel].astype(np.float32)
+            there = column / np.float32(2), (row - np.float32(0.5)) / np.float32(2)
+            brightness = by_luma * brightness + constant
+            brightness += by_blue * read_bytes(blue, *there) + by_red * read_bytes(red, *there)
+        width, height = self.size
+        brightness[(column < 0) | (column > width - 1) | (row < 0) | (row > height - 1)] = np.nan
+        return brightness
 
 
 def picture_of(frame: av.VideoFrame) -> Picture:

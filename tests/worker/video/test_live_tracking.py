@@ -15,6 +15,7 @@ from tests.worker.calibration.synthetic import CROWNED, moved, pair
 from tests.worker.video.shaking import COUNT, film_shaking, turn
 from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.rotation import rotation_angles_deg
+from worker.calibration.tracking.follower import CameraTracker
 from worker.video import clips, live_tracking
 from worker.video.live_tracking import UNSURE_DEG, StreamTracker
 from worker.video.stream_clock import StreamClock
@@ -66,6 +67,20 @@ def test_the_pose_of_each_picture_that_was_looked_at_is_reported(clip):
         assert abs(pose.arrived_ns / 1e9 - time.time()) < 60
         assert (pose.at_ns, pose.clock) == (pose.arrived_ns, "arrival")
     assert {pose.rate for pose in poses} == {25}
+
+
+def test_a_camera_that_took_long_to_be_found_is_tracked_on_from_there(clip, monkeypatch):
+    found, shots = [], clips.Clip.shots
+    monkeypatch.setattr(
+        clips.Clip, "shots", lambda *at: (replace(shot, time_s=10 * shot.time_s) for shot in shots(*at))
+    )
+    monkeypatch.setattr(live_tracking, "CameraTracker", lambda *of: found.append(of) or CameraTracker(*of))
+    with Tracking(clip) as tracking:
+        while (pose := tracking.poses.get(timeout=60)).number < COUNT - 1:
+            pass
+    assert len(found) == 1
+    assert pose.tracked.how == "measured"
+    assert turned_deg(pose.tracked.camera, swung(pose.number)) < 0.02
 
 
 def swung(number):

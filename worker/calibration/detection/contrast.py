@@ -8,6 +8,7 @@ be as bright in green as their ground.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -15,9 +16,12 @@ from numpy.typing import NDArray
 
 from fields.shapes import WHITE
 from worker.calibration.detection.frame_fusion import Sway, median
+from worker.calibration.detection.sampling import read_planes
 from worker.calibration.geometry.camera import Frame
 
-BLUE, GREEN, RED = range(3)
+BLUE, GREEN, RED, LUMA = range(4)
+LUMA_SHARES = (0.0722, 0.7152, 0.2126)
+"""Of blue, green and red in luma, the brightness that video carries for each pixel (BT.709): mostly green."""
 CONTRASTS = tuple((channel, sign) for channel in (GREEN, RED, BLUE) for sign in (1, -1))
 """A marking is brighter (1) or darker (-1) than its ground in a channel; the first that its paint allows is usual."""
 PAINT = {
@@ -37,6 +41,14 @@ OPPOSES = 0.33
 """What stands out so much, beside how it stands out where it does most, as its paint cannot is of another paint."""
 
 
+class PixelReader(Protocol):
+    """A picture that is read between its pixels, at the places that are asked for."""
+
+    def read(self, channel: int, column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Brightness (P, N) 0..255 in one channel, or `LUMA`, at columns and rows (P, N); NaN outside the picture."""
+        ...
+
+
 class Channels:
     """The colour channels of the frames of one camera: of several frames their median, without what walks by.
 
@@ -54,9 +66,15 @@ class Channels:
             self._read[channel] = median([_plane(frame, channel) for frame in self._frames], self._swayed)
         return self._read[channel]
 
+    def read(self, channel: int, column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Brightness (P, N) between the pixels, see `PixelReader`."""
+        return read_planes(self[channel], column, row, outside=np.nan)
+
 
 def _plane(frame: Frame, channel: int) -> NDArray[np.uint8]:
     """One channel (H, W) of a frame, its pixels beside each other."""
+    if channel == LUMA:
+        return np.asarray(cv2.transform(frame, np.array([LUMA_SHARES])), dtype=np.uint8)
     return np.asarray(cv2.extractChannel(frame, channel), dtype=np.uint8)
 
 

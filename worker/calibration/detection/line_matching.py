@@ -6,7 +6,7 @@ in the channel in which the marking stands out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,13 +18,14 @@ from worker.calibration.detection.contrast import (
     CLEARLY,
     CONTRASTS,
     GREEN,
+    LUMA,
     OPPOSES,
     RED,
     Channels,
+    PixelReader,
     possible_signs,
 )
-from worker.calibration.detection.line_profile import blurred_line
-from worker.calibration.detection.sampling import read_planes
+from worker.calibration.detection.line_profile import blurred_line, without_nan
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.visibility import VisibleLines
 
@@ -40,6 +41,8 @@ GRID_PX = 16.0
 """Between the points of the picture from which places to sample are counted."""
 TOGETHER_PX = 40.0
 """Length of line, in pixels of a 4K frame, over which a ridge has to go on to be one."""
+LUMA_WEAKER = 0.05
+"""By so much less mean correlation a marking may stand out in luma than in green and be read there."""
 LEAST_ALONG = 0.5
 """Mean correlation with the expected profile, over that length, from which a ridge is a line for itself."""
 
@@ -67,6 +70,10 @@ class Matches:
     base: Array
     sampling_px: float
 
+    def signed(self, sign: int) -> Matches:
+        """As lines that are brighter (1) or darker (-1) than their ground; nothing is known of other paint."""
+        return self if sign == 1 else replace(self, correlation=-self.correlation, along=-self.along)
+
     def where(self, chosen: NDArray[np.bool_], sign: int) -> Matches:
         """Those of some pieces, as lines that are brighter (1) or darker (-1) than their ground."""
         return replace(
@@ -93,23 +100,72 @@ def match_lines(seen: VisibleLines, channels: Channels, reach_px: float, relativ
     Each marking is looked for where it stands out most: in another channel than green only if green does not show it.
     What has another colour than a marking that is known not to be white is no match.
     """
-    everywhere, bend = np.ones(len(seen), dtype=bool), _bend(seen)
-    looked = {GREEN: _matches_in(channels[GREEN], seen, bend, everywhere, reach_px, relative_size)}
-    strength = _strengths(looked, seen)
-    wanted = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
-    if wanted.any():
-        looked |= {c: _matches_in(channels[c], seen, bend, wanted, reach_px, relative_size) for c in (RED, BLUE)}
-        looked = _without_other_paint(looked, seen.points.colour)
-        strength = _strengths(looked, seen)
-    usual = np.argmax(strength > -np.inf, axis=0)
-    strength[usual, np.arange(strength.shape[1])] += CLEARLY
-    chosen = np.argmax(strength, axis=0)[seen.points.marking]
+    looked, strength = _looked_for(seen, channels, reach_px, relative_size)
+    chosen = _strongest(strength)[seen.points.marking]
     return [
         of_class.where(chosen[of_class.which] == number, sign)
         for number, (channel, sign) in enumerate(CONTRASTS)
         if number == 0 or number in chosen
         for of_class in looked[channel]
     ]
+
+
+def known_contrasts(seen: VisibleLines, channels: Channels, reach_px: float, relative_size: float) -> NDArray[np.intp]:
+    """Where each marking stands out in one picture, (K, 2): the channel, and 1 for brighter or -1 for darker there.
+
+    That is luma in place of green for all that luma shows as well.
+    """
+    _, strength = _looked_for(seen, channels, reach_px, relative_size)
+    chosen = _strongest(strength)
+    everywhere = np.ones(len(seen), dtype=bool)
+    in_luma = {GREEN: _matches_in(channels, LUMA, seen, _bend(seen), everywhere, reach_px, relative_size)}
+    by_luma = _strengths(in_luma, seen)
+    contrasts = np.array(CONTRASTS)[chosen]
+    of_marking = np.arange(len(chosen))
+    as_well = by_luma[chosen, of_marking] >= strength[chosen, of_marking] - LUMA_WEAKER
+    contrasts[as_well & (contrasts[:, 0] == GREEN), 0] = LUMA
+    return contrasts
+
+
+def match_known(
+    seen: VisibleLines, picture: PixelReader, contrasts: NDArray[np.intp], reach_px: float, relative_size: float
+) -> list[Matches]:
+    """The matches of lines whose markings have known `contrasts` (K, 2) (see `known_contrasts`), by class of width."""
+    bend, of_lines = _bend(seen), contrasts[seen.points.marking]
+    matches = []
+    for channel, sign in np.unique(of_lines, axis=0).tolist():
+        for of_class, which in _by_width(seen, (of_lines == (channel, sign)).all(axis=1)):
+            if which.any():
+                rows = np.flatnonzero(which)
+                found = _matches_of(of_class, rows, picture, channel, seen, bend, reach_px, relative_size)
+                matches.append(found.signed(sign))
+    return matches
+
+
+def _looked_for(
+    seen: VisibleLines, channels: Channels, reach_px: float, relative_size: float
+) -> tuple[dict[int, list[Matches]], Array]:
+    """The matches by channel, in other channels than green where they are wanted, and the strengths (see `_strengths`).
+
+    Wanted they are for markings that green does not show, and for those that are known not to be white.
+    """
+    everywhere, bend = np.ones(len(seen), dtype=bool), _bend(seen)
+    looked = {GREEN: _matches_in(channels, GREEN, seen, bend, everywhere, reach_px, relative_size)}
+    strength = _strengths(looked, seen)
+    wanted = (strength.max(axis=0) < LEAST_ALONG)[seen.points.marking] | (seen.points.colour != WHITE)
+    if wanted.any():
+        looked |= {c: _matches_in(channels, c, seen, bend, wanted, reach_px, relative_size) for c in (RED, BLUE)}
+        looked = _without_other_paint(looked, seen.points.colour)
+        strength = _strengths(looked, seen)
+    return looked, strength
+
+
+def _strongest(strength: Array) -> NDArray[np.intp]:
+    """Which of `CONTRASTS` each marking (K,) has: the usual one unless another one is clearly stronger."""
+    favoured = strength.copy()
+    usual = np.argmax(strength > -np.inf, axis=0)
+    favoured[usual, np.arange(strength.shape[1])] += CLEARLY
+    return np.asarray(np.argmax(favoured, axis=0))
 
 
 def _without_other_paint(looked: Mapping[int, list[Matches]], colour: NDArray[np.str_]) -> dict[int, list[Matches]]:
@@ -153,7 +209,8 @@ def _strengths(looked: Mapping[int, Sequence[Matches]], seen: VisibleLines) -> A
 
 
 def _matches_in(
-    brightness: NDArray[np.float32],
+    picture: PixelReader,
+    channel: int,
     seen: VisibleLines,
     bend: Array,
     wanted: NDArray[np.bool_],
@@ -161,24 +218,46 @@ def _matches_in(
     relative_size: float,
 ) -> list[Matches]:
     """The matches of the `wanted` lines (N,), which `bend` (N,) so, in one channel, by class of width."""
-    classes = []
+    return [
+        _matches_of(of_class, np.flatnonzero(which), picture, channel, seen, bend, reach_px, relative_size)
+        for of_class, which in _by_width(seen, wanted)
+    ]
+
+
+def _by_width(
+    seen: VisibleLines, wanted: NDArray[np.bool_]
+) -> Iterator[tuple[tuple[float, float, float], NDArray[np.bool_]]]:
+    """Each of `WIDTH_CLASSES_PX` and which of the `wanted` lines (N,) have such a width."""
     for low, high, sampling in WIDTH_CLASSES_PX:
-        which = np.flatnonzero(wanted & (seen.width_px >= low) & (seen.width_px < high))
-        pieces = seen[which]
-        half_filter = int(np.ceil((high * 0.85 + BESIDE_PX) / sampling))
-        half_search = int(np.ceil(reach_px / sampling)) + 1
-        reach = half_filter + half_search
-        base = _beside_grid(pieces, sampling)
-        samples = base[:, None] + sampling * np.arange(-reach, reach + 1, dtype=float)
-        across = _profiles(brightness, pieces, bend[which], samples)
-        offsets = sampling * np.arange(-half_filter, half_filter + 1, dtype=float)
-        expected = expected_profiles(pieces.width_px, offsets)
-        correlation = sliding_correlation(across, expected)
-        along = _mean_along(correlation, pieces, TOGETHER_PX * relative_size)
-        shifts = sampling * np.arange(-half_search, half_search + 1, dtype=float)
-        free = np.zeros(correlation.shape, dtype=bool)
-        classes.append(Matches(which, across, expected, offsets, correlation, along, free, shifts, base, sampling))
-    return classes
+        yield (low, high, sampling), wanted & (seen.width_px >= low) & (seen.width_px < high)
+
+
+def _matches_of(
+    of_class: tuple[float, float, float],
+    which: NDArray[np.intp],
+    picture: PixelReader,
+    channel: int,
+    seen: VisibleLines,
+    bend: Array,
+    reach_px: float,
+    relative_size: float,
+) -> Matches:
+    """The matches of the lines `which` (M,), all of one of `WIDTH_CLASSES_PX`."""
+    _, high, sampling = of_class
+    pieces = seen[which]
+    half_filter = int(np.ceil((high * 0.85 + BESIDE_PX) / sampling))
+    half_search = int(np.ceil(reach_px / sampling)) + 1
+    reach = half_filter + half_search
+    base = _beside_grid(pieces, sampling)
+    samples = base[:, None] + sampling * np.arange(-reach, reach + 1, dtype=float)
+    across = _profiles(picture, channel, pieces, bend[which], samples)
+    offsets = sampling * np.arange(-half_filter, half_filter + 1, dtype=float)
+    expected = expected_profiles(pieces.width_px, offsets)
+    correlation = sliding_correlation(across, expected)
+    along = _mean_along(correlation, pieces, TOGETHER_PX * relative_size)
+    shifts = sampling * np.arange(-half_search, half_search + 1, dtype=float)
+    free = np.zeros(correlation.shape, dtype=bool)
+    return Matches(which, across, expected, offsets, correlation, along, free, shifts, base, sampling)
 
 
 def _beside_grid(pieces: VisibleLines, sampling_px: float) -> Array:
@@ -200,7 +279,7 @@ def _mean_along(correlation: Array, pieces: VisibleLines, length_px: float) -> A
     last = np.searchsorted(stretch, stretch, side="right")
     at = np.arange(len(pieces))
     low, high = np.maximum(at - half, first), np.minimum(at + half + 1, last)
-    total = np.concatenate([np.zeros((1, correlation.shape[1])), np.cumsum(np.nan_to_num(correlation), axis=0)])
+    total = np.concatenate([np.zeros((1, correlation.shape[1])), np.cumsum(without_nan(correlation), axis=0)])
     return np.asarray((total[high] - total[low]) / (high - low)[:, None])
 
 
@@ -230,7 +309,7 @@ def sliding_correlation(profiles: Array, filters: Array) -> Array:
     windows = np.lib.stride_tricks.sliding_window_view(profiles, filters.shape[1], axis=1)
     product = np.einsum("nsk,nk->ns", windows, filters)
     first, count = (filters != 0).argmax(axis=1), (filters != 0).sum(axis=1)
-    values = np.nan_to_num(profiles)
+    values = without_nan(profiles)
     total, squares = (_window_sums(of, first, count, product.shape[1]) for of in (values, values**2))
     spread = np.sqrt(np.maximum(squares - total**2 / count[:, None], 1e-6))
     return product / np.maximum(spread, np.sqrt(count)[:, None])
@@ -245,20 +324,21 @@ def _window_sums(values: Array, first: NDArray[np.intp], count: NDArray[np.intp]
     return np.asarray(np.take_along_axis(up_to, end, axis=1) - np.take_along_axis(up_to, begin, axis=1))
 
 
-def _profiles(image: NDArray[np.float32], seen: VisibleLines, bend: Array, offsets: Array) -> Array:
+def _profiles(picture: PixelReader, channel: int, seen: VisibleLines, bend: Array, offsets: Array) -> Array:
     """Brightness (N, S) across the lines at `offsets` (N, S) px, averaged along them; NaN outside the picture.
 
     `bend` (N,): 1 / radius of the lines in the picture, in 1 / px, positive where they turn towards their normals.
     """
     along = np.stack([seen.normal[:, 1], -seen.normal[:, 0]], axis=1)
-    total = np.zeros(offsets.shape)
+    shift = np.array(ALONG_PX)[:, None, None]
+    on_line = (seen.pixel + shift * along + (bend[:, None] * shift**2 / 2) * seen.normal).astype(np.float32)
     # As exact as pictures are read: a float32 tells a 4000th of a pixel.
-    across = [(offsets * seen.normal[:, axis : axis + 1]).astype(np.float32) for axis in (0, 1)]
-    for shift in ALONG_PX:
-        on_line = (seen.pixel + shift * along + (bend * shift**2 / 2)[:, None] * seen.normal).astype(np.float32)
-        column, row = (on_line[:, axis : axis + 1] + across[axis] for axis in (0, 1))
-        total += read_planes(image, column, row, outside=np.nan)
-    return total / len(ALONG_PX)
+    column, row = (
+        on_line[:, :, axis : axis + 1] + (offsets * seen.normal[:, axis : axis + 1]).astype(np.float32)
+        for axis in (0, 1)
+    )
+    read = picture.read(channel, column.reshape(-1, offsets.shape[1]), row.reshape(-1, offsets.shape[1]))
+    return np.asarray(read.reshape(column.shape).sum(axis=0, dtype=float) / len(ALONG_PX))
 
 
 def _bend(seen: VisibleLines) -> Array:

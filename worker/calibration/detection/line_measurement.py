@@ -6,14 +6,23 @@ the line as noise and things beside the line do not.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.detection.contrast import Channels
-from worker.calibration.detection.line_matching import LEAST_ALONG, LENS_BLUR_PX, Matches, filter_reach, match_lines
-from worker.calibration.detection.line_profile import blurred_point, blurred_step
+from worker.calibration.detection.contrast import Channels, PixelReader
+from worker.calibration.detection.line_matching import (
+    LEAST_ALONG,
+    LENS_BLUR_PX,
+    Matches,
+    filter_reach,
+    match_known,
+    match_lines,
+)
+from worker.calibration.detection.line_profile import blurred_point, blurred_step, without_nan
 from worker.calibration.detection.sampling import bilinear
 from worker.calibration.geometry.camera import Array, Camera, Plane
 from worker.calibration.geometry.derivatives import lens_slopes, pixel_slopes
@@ -126,20 +135,41 @@ class LineProfiles:
 
     def __init__(
         self,
-        lines: LinePoints,
+        seen: VisibleLines,
         camera: Camera,
-        channels: Channels,
-        response: NDArray[np.float32],
+        matches: Sequence[Matches],
+        response: NDArray[np.float32] | None,
         reach_px: float,
     ) -> None:
+        """Take `matches` of lines that were read where `camera` has `seen` them; see `read` and `read_known`."""
+        self._camera, self._response, self._reach_px, self._seen = camera, response, reach_px, seen
+        self._classes = [_Centred(of_class, seen.width_px[of_class.which]) for of_class in matches]
+
+    @classmethod
+    def read(
+        cls, lines: LinePoints, camera: Camera, channels: Channels, response: NDArray[np.float32], reach_px: float
+    ) -> Self:
         """Read it up to `reach_px` to each side of where `camera` expects the `lines`.
 
         `channels` of the frame; `response` (H, W) the segmentation in 0..1.
         """
-        self._camera, self._response, self._reach_px = camera, response, reach_px
-        self._seen = VisibleLines.from_camera(lines, camera)
-        matches = match_lines(self._seen, channels, reach_px, camera.intrinsics.relative_size)
-        self._classes = [_Centred(of_class, self._seen.width_px[of_class.which]) for of_class in matches]
+        seen = VisibleLines.from_camera(lines, camera)
+        matches = match_lines(seen, channels, reach_px, camera.intrinsics.relative_size)
+        return cls(seen, camera, matches, response, reach_px)
+
+    @classmethod
+    def read_known(
+        cls, lines: LinePoints, camera: Camera, picture: PixelReader, contrasts: NDArray[np.intp], reach_px: float
+    ) -> Self:
+        """The same where the `contrasts` (K, 2) of all markings are known (see `known_contrasts`); no network."""
+        seen = VisibleLines.from_camera(lines, camera)
+        matches = match_known(seen, picture, contrasts, reach_px, camera.intrinsics.relative_size)
+        return cls(seen, camera, matches, None, reach_px)
+
+    @property
+    def any(self) -> bool:
+        """Whether any line was read."""
+        return bool(self._classes)
 
     def measure(self, camera: Camera, lines: LinePoints, search_px: float) -> Measurements:
         """The lines within `search_px` of where `camera` expects them: `lines` are those that were read.
@@ -186,7 +216,9 @@ class LineProfiles:
         best, seen = best[row], self._seen[matches.which[row]]
         shift = shifts[row, best] + centred.at(row, best)
         pixel = seen.pixel + shift[:, None] * seen.normal
-        marking = np.maximum(_ramp(bilinear(self._response, pixel), *RESPONSE), _ramp(matches.along[row, best], *ALONG))
+        marking = _ramp(matches.along[row, best], *ALONG)
+        if self._response is not None:
+            marking = np.maximum(marking, _ramp(bilinear(self._response, pixel), *RESPONSE))
         trust = (
             marking
             * _ramp(matches.correlation[row, best], *CORRELATION)
@@ -199,13 +231,9 @@ class LineProfiles:
     def _to_border(self, seen: VisibleLines, shift: Array, matches: Matches) -> Array:
         """Pixels (N,) from what was read of each line to the border of the picture, negative beyond it."""
         width, height = self._camera.intrinsics.size
-        reach = np.abs(shift) + matches.offsets[-1]
-        nearest = np.full(len(seen), np.inf)
-        for sign in (1, -1):
-            end = seen.pixel + sign * reach[:, None] * seen.normal
-            for axis, last in ((0, width - 1), (1, height - 1)):
-                nearest = np.minimum(nearest, np.minimum(end[:, axis], last - end[:, axis]))
-        return nearest
+        outward = (np.abs(shift) + matches.offsets[-1])[:, None] * np.abs(seen.normal)
+        to_last = np.array([width - 1, height - 1]) - (seen.pixel + outward)
+        return np.asarray(np.minimum(seen.pixel - outward, to_last).min(axis=1))
 
 
 def measure_lines(
@@ -216,7 +244,7 @@ def measure_lines(
     search_px: float,
 ) -> Measurements:
     """The lines of `camera` found within `search_px` of where its pose expects them (see `LineProfiles`)."""
-    return LineProfiles(lines, camera, channels, response, search_px).measure(camera, lines, search_px)
+    return LineProfiles.read(lines, camera, channels, response, search_px).measure(camera, lines, search_px)
 
 
 class _Centred:
@@ -241,11 +269,11 @@ class _Centred:
 
 def _peaks(values: Array, begun: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the columns (N,) of the local maxima in rows of values (N, S) that lie uphill of columns `begun` (N,)."""
-    rows, last = np.arange(len(values)), values.shape[1] - 1
+    rows, last, height = np.arange(len(values)), values.shape[1] - 1, without_nan(values, -np.inf)
     here = begun
     for _ in range(MOST_UPHILL):
-        around = np.stack([np.clip(here + by, 0, last) for by in (0, -1, 1)])
-        higher = np.argmax(np.nan_to_num(values[rows, around], nan=-np.inf), axis=0)
+        around = np.clip(here + np.array([[0], [-1], [1]]), 0, last)
+        higher = np.argmax(height[rows, around], axis=0)
         if not higher.any():
             break
         here = around[higher, rows]
@@ -254,7 +282,7 @@ def _peaks(values: Array, begun: NDArray[np.intp]) -> NDArray[np.intp]:
 
 def _ramp(value: Plane, low: float, high: float) -> Array:
     """0 below `low`, 1 above `high`, straight between them; 0 for NaN."""
-    return np.nan_to_num(np.clip((np.asarray(value, dtype=float) - low) / (high - low), 0.0, 1.0))
+    return without_nan(np.clip((np.asarray(value, dtype=float) - low) / (high - low), 0.0, 1.0))
 
 
 def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) -> Array:
@@ -264,18 +292,21 @@ def _centre(windows: Array, width_px: Array, offsets: Array, reach_px: float) ->
     other, and that must not pull the line.
     """
     inside = np.abs(offsets) <= filter_reach(width_px)[:, None]
-    windows = np.nan_to_num(windows) * inside
+    windows = without_nan(windows) * inside
+    sides = np.array([1.0, -1.0])[:, None, None]
     centre, move = np.zeros(len(windows)), np.zeros((len(windows), len(offsets)))
+    model = np.empty((len(windows), 4, len(offsets)))
     for _ in range(1 + CENTRE_STEPS):
-        begin, end = (offsets - centre[:, None] + side * width_px[:, None] / 2 for side in (1, -1))
-        first, second = blurred_step(begin, LENS_BLUR_PX), blurred_step(end, LENS_BLUR_PX)
-        model = np.stack([1 - first, first - second, second, move], axis=1) * inside[:, None]
+        edges = offsets - centre[:, None] + sides * width_px[:, None] / 2
+        first, second = blurred_step(edges, LENS_BLUR_PX)
+        model[:, 0], model[:, 1], model[:, 2], model[:, 3] = 1 - first, first - second, second, move
+        model *= inside[:, None]
         normal = np.einsum("nak,nbk->nab", model, model) + RIDGE * np.eye(4)
         before, paint, behind, by = np.linalg.solve(normal, np.einsum("nak,nk->na", model, windows)[..., None])[
             ..., 0
         ].T
         centre = np.clip(centre + by, -reach_px, reach_px)
-        edges = [blurred_point(edge, LENS_BLUR_PX) for edge in (begin, end)]
+        rise, fall = blurred_point(edges, LENS_BLUR_PX)
         # How the brightness changes when the line moves, which the first time round is not yet known.
-        move = (before - paint)[:, None] * edges[0] + (paint - behind)[:, None] * edges[1]
+        move = (before - paint)[:, None] * rise + (paint - behind)[:, None] * fall
     return centre

@@ -32,3 +32,8 @@ def blurred_step(offset_px: Array, sigma_px: float) -> Array:
 def blurred_point(offset_px: Array, sigma_px: float) -> Array:
     """The derivative of `blurred_step`, per px."""
     return np.asarray(np.exp(-0.5 * (offset_px / sigma_px) ** 2) / (sqrt(2 * pi) * sigma_px))
+
+
+def without_nan(values: Array, instead: float = 0.0) -> Array:
+    """The same with another number where there is none: outside the picture."""
+    return np.where(np.isnan(values), instead, values)

@@ -45,3 +45,11 @@ def read_planes(
         for some in (slice(first, first + MOST_ROWS) for first in range(0, len(column), MOST_ROWS))
     ]
     return np.asarray(parts[0] if len(parts) == 1 else np.concatenate(parts), dtype=np.float32)
+
+
+def read_bytes(image: NDArray[np.uint8], column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The same of a plane of bytes as it is, to whole grey levels; beyond its border what is at the border."""
+    if column.size == 0:
+        return np.empty(column.shape, dtype=np.float32)
+    read = cv2.remap(image, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(read, dtype=np.float32)

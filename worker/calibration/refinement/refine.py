@@ -98,7 +98,7 @@ class LineReader:
             profiles = self._read.get(number)
             if profiles is None or not profiles.cover(camera, lines, search):
                 channels, response = self._sight.channels[number], self._sight.responses[number]
-                profiles = LineProfiles(lines, camera, channels, response, search + SPARE_PX)
+                profiles = LineProfiles.read(lines, camera, channels, response, search + SPARE_PX)
                 self._read[number] = profiles
             measured.append(profiles.measure(camera, lines, search))
         return measured

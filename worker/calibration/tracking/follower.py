@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.contrast import Channels, PixelReader
 from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.derivatives import moved
 from worker.calibration.geometry.field import Field
@@ -16,14 +16,13 @@ from worker.calibration.records import CalibrationError
 from worker.calibration.refinement.refine import SEARCH_PX as REFINEMENT_SEARCH_PX
 from worker.calibration.refinement.refine import Observations, refine
 from worker.calibration.refinement.uncertainty import Sigma
-from worker.calibration.tracking.line_observations import LineObservations, TrackedLines
+from worker.calibration.tracking.line_observations import Sighting, TrackedLines
 from worker.calibration.tracking.motion_filter import GATE, FilterStep, State, smoothed
 
 FIRST_SEARCH_PX = (28.0, *REFINEMENT_SEARCH_PX)
 """Round by round, in pixels of a 4K frame: the first frame may be taken at the end of a swing."""
-SEARCH_PX, LOST_SEARCH_PX = (8.0, 3.0), (28.0, 14.0)
-"""The same for later frames, and before that where lines may be farther off than `KNOWN` of the first of it."""
-KNOWN = 0.5
+KNOWN_PX = 4.0
+"""Lines that may be farther off in later frames, one standard deviation, are searched for step by step."""
 
 LEAST_AGREEMENT = 0.3
 """Of the lines that the first frame has to show where the cameras are found, beyond what chance would."""
@@ -86,7 +85,7 @@ class CameraTracker:
         self._seconds = 1 / frames_per_second
         self._every = every
         self._look_ahead = look_ahead
-        self._taken = 1
+        self._taken = self._since_look = 1
         self._settled = 0
 
     @property
@@ -96,16 +95,18 @@ class CameraTracker:
 
     @property
     def looks(self) -> bool:
-        """Whether lines are measured in the frames that are next."""
-        return self._taken % self._every == 0
+        """Whether lines are measured in the frames that are next: where frames were missing, in the first that come."""
+        return self._since_look >= self._every
 
-    def see(self, frames: Mapping[str, Frame], seconds: float | None = None) -> Moment:
-        """Take the next frames; a camera that has none coasts, and so do all where nobody `looks`.
+    def see(self, pictures: Mapping[str, PixelReader], seconds: float | None = None) -> Moment:
+        """Take the next pictures; a camera that has none coasts, and so do all where nobody `looks`.
 
-        `seconds`: since the frames before, where they do not come evenly.
+        `seconds`: since the pictures before, where they do not come evenly.
         """
+        looked_at = pictures if self.looks else {}
         for track in self._tracks:
-            track.see(frames.get(track.lines.reference.id) if self.looks else None, seconds or self._seconds)
+            track.see(looked_at.get(track.lines.reference.id), seconds or self._seconds)
+        self._since_look = 1 if looked_at else self._since_look + 1
         self._taken += 1
         return self.now
 
@@ -138,19 +139,19 @@ class _Track:
     def __init__(self, pitch: Field, reference: Camera, covariance: Array, first: Frame) -> None:
         self.lines = TrackedLines(pitch, reference, first)
         self._covariance = covariance
-        seen = self.lines.sighted(first, reference, SEARCH_PX[-1:])
-        if seen is None:
+        sighting = self.lines.sighted(Channels([first]), reference)
+        if sighting is None:
             raise _not_seen(reference)
-        self.lines.learn(seen, reference)
-        self._last = State.at_reference(self.lines.observed(seen).information)
+        self.lines.learn(sighting.seen, reference)
+        self._last = State.at_reference(self.lines.observed(sighting.seen).information)
         self._steps = [FilterStep(0.0, self._last)]
         self._how: list[How] = ["measured"]
 
-    def see(self, frame: Frame | None, seconds: float) -> None:
-        """Take the next frame, so long after the one before; None: it is not looked at, or not there."""
+    def see(self, picture: PixelReader | None, seconds: float) -> None:
+        """Take the next picture, so long after the one before; None: it is not looked at, or not there."""
         self.lines.forget(seconds)
         expected = self._last.after(seconds).drawn_back(seconds)
-        how, self._last = self._known(frame, expected)
+        how, self._last = self._known(picture, expected)
         self._steps.append(FilterStep(seconds, self._last))
         self._how.append(how)
 
@@ -172,24 +173,24 @@ class _Track:
         motion = state.change_covariance
         return TrackedPose(moved(self.lines.reference, state.change), how, motion, self._covariance + motion)
 
-    def _known(self, frame: Frame | None, expected: State) -> tuple[How, State]:
-        if frame is None:
+    def _known(self, picture: PixelReader | None, expected: State) -> tuple[How, State]:
+        if picture is None:
             return "coasted", expected
-        seen = self._sighted(frame, expected)
-        if seen is None:
+        sighting = self._sighted(picture, expected)
+        if sighting is None:
             return "coasted", expected
-        observed = self.lines.observed(seen)
-        if expected.surprise(observed) > GATE:
+        if expected.surprise(sighting.observed) > GATE:
             return "refused", expected
-        known = expected.with_observed(observed)
-        self.lines.learn(seen, moved(self.lines.reference, known.change))
+        known = expected.with_observed(sighting.observed)
+        self.lines.learn(sighting.seen, moved(self.lines.reference, known.change))
         return "measured", known
 
-    def _sighted(self, frame: Frame, expected: State) -> LineObservations | None:
+    def _sighted(self, picture: PixelReader, expected: State) -> Sighting | None:
         """The lines, from where the camera is expected; step by step where that is hardly known."""
-        hardly = self._off_px(expected) > KNOWN * SEARCH_PX[0]
-        searches = (*LOST_SEARCH_PX, *SEARCH_PX) if hardly else SEARCH_PX
-        return self.lines.sighted(frame, moved(self.lines.reference, expected.change), searches)
+        camera = moved(self.lines.reference, expected.change)
+        if self._off_px(expected) > KNOWN_PX:
+            return self.lines.searched(picture, camera)
+        return self.lines.sighted(picture, camera)
 
     def _off_px(self, expected: State) -> float:
         """How far lines may be from where they are expected, one standard deviation in pixels of a 4K frame."""

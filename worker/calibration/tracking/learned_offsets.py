@@ -42,6 +42,10 @@ class LearnedOffsets:
         """Which pieces (N,) have been seen, not too long ago."""
         return self._information > FADED * self._by_sight
 
+    def are_seen_as_often(self, share: float) -> NDArray[np.bool_]:
+        """Which pieces (N,) have been seen of late by this share, 0..1, as often as the one that was seen most."""
+        return self._information >= share * self._information.max()
+
     def learn(self, pieces: NDArray[np.intp], offsets: Array) -> None:
         """Take how far these pieces (M,), each named once, were seen (M,) beside their places, px."""
         self._information[pieces] += self._by_sight

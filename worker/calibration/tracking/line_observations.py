@@ -6,14 +6,14 @@ is learned, piece by piece, while the clip runs: otherwise the pose would jump w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.detection.contrast import Channels
-from worker.calibration.detection.line_measurement import Measurements, measure_lines
+from worker.calibration.detection.contrast import Channels, PixelReader
+from worker.calibration.detection.line_matching import known_contrasts
+from worker.calibration.detection.line_measurement import LineProfiles
 from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.derivatives import POSE_NUMBERS, change_between, moved, pixel_slopes
 from worker.calibration.geometry.field import Field, LinePoints
@@ -22,11 +22,21 @@ from worker.calibration.refinement.least_squares import CLUSTER_POINTS
 from worker.calibration.robust import huber_weights, tukey_weights
 from worker.calibration.tracking.learned_offsets import LearnedOffsets
 from worker.calibration.tracking.motion_filter import PoseObservation
+from worker.calibration.tracking.telling_pieces import most_telling
 
 APART_PX = 12.0
 """Pieces of line are looked at about so far apart, in pixels of a 4K frame."""
 COARSELY = 3
-"""All rounds but the last look at every so many-th piece."""
+"""Where a camera is hardly known, every so many-th piece is looked for at first."""
+FEW, LEARNING, ALL_EVERY = 200, 25, 50
+"""So many pieces are looked at once so many looks have been at all of them, and all again in every so many-th look."""
+OFTEN = 0.5
+"""Pieces that are seen less often than this share of the most that one is seen are not among the few."""
+SEARCH_PX, NEAR_PX, LOST_SEARCH_PX = 8.0, 3.0, (28.0, 14.0)
+"""How near, in pixels of a 4K frame, pieces are looked for: at first, again from where the camera is then found, and
+before that, round by round, where it is hardly known."""
+NEARBY_PX = 2.0
+"""Lines that lie so near to where they were expected, in the median and pixels of a 4K frame, are measured once."""
 FEWEST_PIECES, FEWEST_SHARE = 20, 0.3
 """With fewer pieces of line, or with less than this share of those that are usually found, a frame says nothing."""
 SHOWN, AT_REFERENCE_PX = 0.5, 3.0
@@ -39,8 +49,9 @@ NOISE_PX = 0.1
 """Least error of the measurement of a piece, in pixels of the frame."""
 PICTURE_PX = 0.04
 """Error that all pieces of a frame have in common: what a codec and the grid of pixels do to every line alike."""
-PRIOR_RAD, PRIOR_M = 0.03, 1.0
-"""Holds the directions of which lines say nothing; much wider than anything that is followed."""
+PRIOR = np.diag(np.repeat([0.03, 1.0], 3) ** -2.0)
+"""Information (6, 6) without any line, standard deviations of 0.03 rad and a metre: it holds the directions of which
+lines say nothing; much wider than anything that is followed."""
 STEPS = 3
 
 
@@ -49,41 +60,65 @@ class LineObservations:
     """Pieces of line as one frame shows them, M of them.
 
     `expected`: the camera they were looked for with; `piece` (M,): which of them; `offset` (M,) px: how far each is
-    from where that camera expects it, and `slope` (M, 6): how that expectation moves with its pose.
+    from where that camera expects it, and `slope` (M, 6): how that expectation moves with its pose; `share`: of those
+    that were looked for.
     """
 
     expected: Camera
     piece: NDArray[np.intp]
     offset: Array
     slope: Array
+    share: float
 
     def __getitem__(self, chosen: NDArray[np.bool_]) -> LineObservations:
-        return LineObservations(self.expected, self.piece[chosen], self.offset[chosen], self.slope[chosen])
+        return LineObservations(self.expected, self.piece[chosen], self.offset[chosen], self.slope[chosen], self.share)
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """Pieces that were `seen`, and what was `observed` by them."""
+
+    seen: LineObservations
+    observed: PoseObservation
+
+
+@dataclass(frozen=True)
+class _ReadPieces:
+    """Pieces (M,), their lines and what a picture shows across them."""
+
+    pieces: NDArray[np.intp]
+    lines: LinePoints
+    profiles: LineProfiles
 
 
 class TrackedLines:
     """The lines that one camera is followed by; `reference`: the camera that changes are counted from.
 
-    `first`: the frame that the reference was found in. Markings that it hardly shows are not looked for: they would
-    be, in every frame, in every colour.
+    `first`: the frame that the reference was found in. Markings that it hardly shows are not looked for, and in which
+    channel each of the others stands out is looked up in it: later pictures are read in that one alone.
     """
 
     def __init__(self, pitch: Field, reference: Camera, first: Frame) -> None:
         self.reference = reference
         self._scale = reference.intrinsics.relative_size
-        self._no_network = np.zeros(first.shape[:2], np.float32)
-        lines = pitch.line_points()
-        chosen = self._shown(lines, first)
+        lines, channels = pitch.line_points(), Channels([first])
+        expected = VisibleLines.from_camera(lines, reference).thinned(APART_PX * self._scale).index
+        visible = VisibleLines.from_camera(lines[expected], reference)
+        self._contrasts = known_contrasts(visible, channels, AT_REFERENCE_PX * self._scale, self._scale)
+        chosen = self._shown(lines, expected, channels)
         self._pieces = lines[chosen]
-        self._some = np.arange(0, len(chosen), COARSELY)
+        self._all = np.arange(len(chosen))
+        self._few: NDArray[np.intp] | None = None
+        self._looks = 0
         self._patch = chosen // CLUSTER_POINTS
         self._usual = 0.0
         self._beside = LearnedOffsets(len(chosen), BESIDE_PX * self._scale, NOISE_PX)
 
-    def _shown(self, lines: LinePoints, first: Frame) -> NDArray[np.intp]:
+    def _shown(self, lines: LinePoints, expected: NDArray[np.intp], channels: Channels) -> NDArray[np.intp]:
         """Which of the line points: some of each marking that the first frame shows."""
-        expected = VisibleLines.from_camera(lines, self.reference).thinned(APART_PX * self._scale).index
-        found = self._measured(lines[expected], self.reference, Channels([first]), AT_REFERENCE_PX).index
+        reach_px = AT_REFERENCE_PX * self._scale
+        profiles = LineProfiles.read_known(lines[expected], self.reference, channels, self._contrasts, reach_px)
+        found = profiles.measure(self.reference, lines[expected], reach_px).index
         marking = lines.marking[expected]
         known, looked_for = (
             np.bincount(marking[found], minlength=len(lines)),
@@ -91,48 +126,90 @@ class TrackedLines:
         )
         return expected[(known >= SHOWN * looked_for)[marking]]
 
-    def sighted(self, frame: Frame, expected: Camera, searches_px: Sequence[float]) -> LineObservations | None:
-        """The pieces that a frame shows near where a camera expects them; None where they are too few.
+    def sighted(self, picture: PixelReader, expected: Camera) -> Sighting | None:
+        """What a picture shows near where a camera expects its lines; None where too few are found.
 
-        `searches_px`: how near, in pixels of a 4K frame, round by round from where the last one saw the camera. What
-        is measured far from where it was expected is a little off, so the last round is a narrow one.
+        Of a camera that has been seen for a while a few telling pieces are looked at, all of them from time to time:
+        those that were hidden come back.
         """
-        channels = Channels([frame])
-        for search in searches_px[:-1]:
-            seen = self._within(search, channels, expected, self._some)
-            if seen is None:
-                return None
-            expected = moved(self.reference, self.observed(seen).change)
-        return self._within(searches_px[-1], channels, expected, np.arange(len(self._pieces)))
+        return self._near(picture, expected, self._next_pieces())
 
-    def _within(
-        self, search_px: float, channels: Channels, expected: Camera, pieces: NDArray[np.intp]
-    ) -> LineObservations | None:
-        found = self._measured(self._pieces[pieces], expected, channels, search_px)
+    def searched(self, picture: PixelReader, expected: Camera) -> Sighting | None:
+        """The same farther off, step by step: for a camera of which is hardly known where it is."""
+        pieces = self._next_pieces()
+        for search in LOST_SEARCH_PX:
+            sighting = self._within(search, self._read(picture, expected, pieces[::COARSELY], search), expected)
+            if sighting is None:
+                return None
+            expected = moved(self.reference, sighting.observed.change)
+        return self._near(picture, expected, pieces)
+
+    def _next_pieces(self) -> NDArray[np.intp]:
+        """Which pieces are looked at in the next picture: all, or a few that were chosen once all had been learned."""
+        self._looks += 1
+        if self._looks <= LEARNING or self._looks % ALL_EVERY == 0:
+            self._few = None
+            return self._all
+        if self._few is None:
+            self._few = self._telling()
+        return self._few
+
+    def _near(self, picture: PixelReader, expected: Camera, pieces: NDArray[np.intp]) -> Sighting | None:
+        """Pieces that are looked for once, and once more from where the camera is found if they are not nearby.
+
+        What is measured far from where it was expected is a little off.
+        """
+        read = self._read(picture, expected, pieces, SEARCH_PX)
+        sighting = self._within(SEARCH_PX, read, expected)
+        if sighting is None:
+            return None
+        if np.median(np.abs(sighting.seen.offset)) < NEARBY_PX * self._scale:
+            return sighting
+        found = moved(self.reference, sighting.observed.change)
+        if not read.profiles.cover(found, read.lines, NEAR_PX * self._scale):
+            read = self._read(picture, found, pieces, NEAR_PX)
+        return self._within(NEAR_PX, read, found)
+
+    def _read(self, picture: PixelReader, expected: Camera, pieces: NDArray[np.intp], reach_px: float) -> _ReadPieces:
+        lines = self._pieces[pieces]
+        profiles = LineProfiles.read_known(lines, expected, picture, self._contrasts, reach_px * self._scale)
+        return _ReadPieces(pieces, lines, profiles)
+
+    def _within(self, search_px: float, read: _ReadPieces, expected: Camera) -> Sighting | None:
+        if not read.profiles.any:
+            return None
+        found = read.profiles.measure(expected, read.lines, search_px * self._scale)
         points = found.points.position
         offset = np.sum((found.pixel - expected.project(points)) * found.normal, axis=1)
         slope = np.einsum("mij,mi->mj", pixel_slopes(expected, points), found.normal)
         good = np.isfinite(offset) & np.isfinite(slope).all(axis=1)
-        if good.sum() < max(FEWEST_PIECES, FEWEST_SHARE * self._usual * len(pieces) / len(self._pieces)):
+        share = good.sum() / len(read.pieces)
+        if good.sum() < FEWEST_PIECES or share < FEWEST_SHARE * self._usual:
             return None
-        return LineObservations(expected, pieces[found.index[good]], offset[good], slope[good])
+        seen = LineObservations(expected, read.pieces[found.index[good]], offset[good], slope[good], share)
+        return Sighting(seen, self.observed(seen))
 
-    def _measured(self, lines: LinePoints, expected: Camera, channels: Channels, search_px: float) -> Measurements:
-        return measure_lines(lines, expected, channels, self._no_network, search_px * self._scale)
+    def _telling(self) -> NDArray[np.intp]:
+        """The few pieces that are looked at: of those that are seen at least half as often as others."""
+        often = np.flatnonzero(self._beside.are_seen_as_often(OFTEN))
+        seen = VisibleLines.from_camera(self._pieces[often], self.reference)
+        slopes = np.einsum("mij,mi->mj", pixel_slopes(self.reference, seen.points.position), seen.normal) / NOISE_PX
+        usable = np.flatnonzero(np.isfinite(slopes).all(axis=1))
+        pieces = often[seen.index[usable]]
+        return pieces[most_telling(slopes[usable], self._patch[pieces], PRIOR, FEW)]
 
     def observed(self, seen: LineObservations) -> PoseObservation:
         """What they say of the pose: robust least squares, with what pieces of one patch err together."""
         seen = self._known(seen)
         sigma = self._sigma(seen)
         rows, values = seen.slope / sigma[:, None], (seen.offset - self._beside.mean[seen.piece]) / sigma
-        prior = np.diag(np.repeat([PRIOR_RAD, PRIOR_M], 3) ** -2.0)
         change = np.zeros(POSE_NUMBERS)
         for weigh in (*STEPS * [huber_weights], *STEPS * [tukey_weights]):
             weight = weigh(values - rows @ change)
             information = (rows * weight[:, None]).T @ rows
-            change = np.asarray(np.linalg.solve(information + prior, rows.T @ (weight * values)), float)
+            change = np.asarray(np.linalg.solve(information + PRIOR, rows.T @ (weight * values)), float)
         spread = self._spread(seen, rows * (weight * (values - rows @ change))[:, None])
-        together = float(np.trace(np.linalg.solve(information + prior, spread))) / POSE_NUMBERS
+        together = float(np.trace(np.linalg.solve(information + PRIOR, spread))) / POSE_NUMBERS
         known = information / max(1.0, together)
         of_picture = np.diag(np.repeat([PICTURE_PX / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
         return PoseObservation(
@@ -154,7 +231,7 @@ class TrackedLines:
         left = seen.offset - seen.slope @ change_between(seen.expected, now)
         counted = tukey_weights((left - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
         which = seen.piece[counted]
-        self._usual += (len(seen.piece) - self._usual) * (NOVELTY if self._usual else 1.0)
+        self._usual += (seen.share - self._usual) * (NOVELTY if self._usual else 1.0)
         self._beside.learn(which, left[counted])
 
     def forget(self, seconds: float) -> None:

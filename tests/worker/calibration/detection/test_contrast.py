@@ -7,10 +7,12 @@ import pytest
 
 from fields.shapes import COLOURS
 from tests.worker.calibration.synthetic import CROWNED, pair, pair_markings
-from worker.calibration.detection.contrast import BLUE, GREEN, RED, Channels, possible_signs
+from worker.calibration.detection.contrast import BLUE, GREEN, LUMA, RED, Channels, possible_signs
 from worker.calibration.detection.evidence import evidence_of
 from worker.calibration.detection.frame_fusion import Sway
-from worker.calibration.detection.line_measurement import measure_lines
+from worker.calibration.detection.line_matching import known_contrasts
+from worker.calibration.detection.line_measurement import LineProfiles, measure_lines
+from worker.calibration.geometry.visibility import VisibleLines
 
 pytestmark = pytest.mark.slow
 
@@ -88,6 +90,36 @@ def test_white_says_nothing_and_every_other_colour_something():
     for colour in (*COLOURS, "#102040"):
         free = all(possible_signs(colour, channel) == (1, -1) for channel in (BLUE, GREEN, RED))
         assert free == (colour == "white")
+
+
+def contrasts_of_most(colour, ground):
+    one, _ = scene()
+    seen = VisibleLines.from_camera(lines(colour), one)
+    contrasts = known_contrasts(seen, painted(ground, (colour, 0)), 3.0, 1.0)[np.unique(seen.points.marking)]
+    each, counts = np.unique(contrasts, axis=0, return_counts=True)
+    return tuple(each[np.argmax(counts)])
+
+
+@pytest.mark.parametrize(("colour", "sign"), [("white", 1), ("black", -1), ("yellow", 1)])
+def test_video_is_read_in_luma_where_lines_stand_out_in_it(colour, sign):
+    assert contrasts_of_most(colour, WOOD) == (LUMA, sign)
+
+
+def test_video_is_read_in_the_channel_in_which_lines_stand_out_where_luma_does_not_show_them():
+    as_bright_as_blue = (40, 70, 148)
+    assert contrasts_of_most("blue", as_bright_as_blue)[0] != LUMA
+
+
+def test_lines_of_known_contrasts_are_measured_as_they_are_where_these_are_looked_for():
+    one, share = scene()
+    points, channels = lines("white"), painted(TURF, ("white", 0))
+    contrasts = known_contrasts(VisibleLines.from_camera(points, one), channels, 3.0, 1.0)
+    known = LineProfiles.read_known(points, one, channels, contrasts, 3.0).measure(one, points, 3.0)
+    found = measure_lines(points, one, channels, np.zeros_like(share), 3.0)
+    both, of_known, of_found = np.intersect1d(known.index, found.index, return_indices=True)
+    assert len(both) > 0.95 * len(found)
+    apart = np.linalg.norm(known.pixel[of_known] - found.pixel[of_found], axis=1)
+    assert np.median(apart) < 0.03
 
 
 def test_of_several_frames_each_channel_is_the_median():

@@ -98,7 +98,7 @@ def test_where_a_line_is_measured_does_not_depend_on_where_it_is_expected():
     cameras, channels, responses = scene()
     lines, here = CROWNED.line_points(), cameras[0]
     beside = moved(here, SMALL_TURN)
-    profiles = LineProfiles(lines, here, channels[0], responses[0], 12.0)
+    profiles = LineProfiles.read(lines, here, channels[0], responses[0], 12.0)
     one, other = (profiles.measure(camera, lines, 5.0) for camera in (here, beside))
     _, at_one, at_other = np.intersect1d(one.index, other.index, return_indices=True)
     assert len(at_one) > 300

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import CROWNED, moved, pair, pair_frames
+from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.frame_fusion import Sway
 from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.camera import inside
@@ -57,7 +58,7 @@ def followed(
     for number in range(1, COUNT):
         replaced = frames or {}
         picture = replaced[number] if number in replaced else frame(number)
-        now = follower.see({} if picture is None else {"left": picture})
+        now = follower.see({} if picture is None else {"left": Channels([picture])})
         assert now.number == number
         told += follower.settled()
     return told + follower.rest()
@@ -91,7 +92,7 @@ def test_a_shaking_camera_is_followed_to_a_fraction_of_a_pixel_and_every_frame_i
 
 def test_what_is_said_at_once_is_what_settles_without_looking_ahead():
     follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND)
-    at_once = [follower.see({"left": frame(number)}) for number in range(1, 4)]
+    at_once = [follower.see({"left": Channels([frame(number)])}) for number in range(1, 4)]
     for now, settled in zip(at_once, followed_as_it_is(1, 0)[1:4], strict=True):
         np.testing.assert_array_equal(now.cameras[0].camera.pose.rotation, settled.cameras[0].camera.pose.rotation)
 
@@ -112,7 +113,7 @@ def test_where_it_will_be_is_told_with_a_sigma_that_covers_it():
     follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND)
     off_deg, sigma, still_deg = [], [], []
     for number in range(1, 30):
-        now = follower.see({"left": frame(number)})
+        now = follower.see({"left": Channels([frame(number)])})
         (later,) = follower.predicted(ahead / FRAMES_PER_SECOND).cameras
         off_deg.append(rotation_angles_deg(later.camera.pose.rotation, true(number + ahead).pose.rotation))
         still_deg.append(rotation_angles_deg(now.cameras[0].camera.pose.rotation, true(number + ahead).pose.rotation))
@@ -129,6 +130,11 @@ def test_without_frames_it_coasts_with_a_sigma_that_grows_and_is_found_again():
     assert growing == sorted(growing)
     assert growing[-1] > 20 * sigma_deg(moments[11])
     assert residual_px(moments[:12] + moments[24:]) < 0.1
+
+
+def test_where_a_frame_is_missing_in_which_lines_were_due_they_are_measured_in_the_next_one():
+    moments = followed({2: None, 3: frame(3)}, every=2)
+    assert how(moments)[:8] == ["measured", "coasted", "coasted", "measured", *2 * ["coasted", "measured"]]
 
 
 def test_who_looks_ahead_bridges_a_short_gap():
@@ -164,7 +170,7 @@ def test_a_pose_does_not_jump_when_lines_are_hidden_that_a_wrong_lens_puts_besid
     for hidden in frames[8:]:
         hidden[:, :400] = (60, 130, 70)
     follower = CameraTracker(CROWNED, [wrong], {"left": frames[0]}, FRAMES_PER_SECOND, look_ahead=0)
-    told = [follower.see({"left": each}).cameras[0] for each in frames[1:]]
+    told = [follower.see({"left": Channels([each])}).cameras[0] for each in frames[1:]]
     assert {one.how for one in told} == {"measured"}
     before, after = (np.mean([one.camera.pose.rotation for one in part], axis=0) for part in (told[2:7], told[8:]))
     assert np.degrees(np.linalg.norm(after - before)) < 0.01
