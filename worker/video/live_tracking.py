@@ -6,6 +6,7 @@ whose pictures change their size, is opened again.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -31,6 +32,8 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S, LOST_PAUSE_S = 1.0, 30.0, 1.0
 # A camera that was not looked at for longer is looked for anew. On a busy machine that takes seconds itself, and the
 # picture after the one that it was found in comes as much later.
 LONGEST_GAP_S = 30.0
+# Nobody goes on as it went for longer: where pictures were not even decoded the filter goes in steps of no more.
+LONGEST_STEP_S = 0.1
 # Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
 LOST_AFTER_S = 3.0
 # A prompt picture that says it is from the future or older than this comes from a camera whose clock is wrong.
@@ -341,10 +344,11 @@ class _Track:
 
     def at(self, arrived: _ArrivedPicture, ahead_s: float) -> TrackedPose:
         """The pose by a picture. Pictures that were left out, and one that shows nothing new, pass unseen."""
-        pictures = arrived.number - self.number
+        gap_s = arrived.stream_s - self.stream_s
+        steps = max(arrived.number - self.number, math.ceil(gap_s / LONGEST_STEP_S))
         # Streams whose times stand still come evenly.
-        passed_s = (arrived.stream_s - self.stream_s) / pictures or self.interval_s
-        for _ in range(pictures - 1):
+        passed_s = gap_s / steps or self.interval_s
+        for _ in range(steps - 1):
             self.tracker.see({}, passed_s)
         is_seen = arrived.shows_new and self.tracker.looks
         self.tracker.see({self.stored.id: arrived.picture} if is_seen else {}, passed_s)

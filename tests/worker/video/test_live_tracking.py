@@ -83,6 +83,16 @@ def test_a_camera_that_took_long_to_be_found_is_tracked_on_from_there(clip, monk
     assert turned_deg(pose.tracked.camera, swung(pose.number)) < 0.02
 
 
+def test_a_camera_is_measured_in_a_picture_before_which_none_was_decoded_for_a_second(clip, monkeypatch):
+    shots = clips.Clip.shots
+    monkeypatch.setattr(clips.Clip, "shots", lambda *at: (s for n, s in enumerate(shots(*at)) if n in (0, COUNT - 1)))
+    with Tracking(clip) as tracking:
+        while (pose := tracking.poses.get(timeout=60)).number < 1:
+            pass
+    assert pose.tracked.how == "measured"
+    assert turned_deg(pose.tracked.camera, swung(COUNT - 1)) < 0.02
+
+
 def swung(number):
     return derivatives.moved(TRUE, np.array([*turn(number, 0.0), 0, 0, 0]))
 
