@@ -19,8 +19,8 @@ from collections import Counter
 import numpy as np
 
 from tests.benchmarks import live_faults
-from tests.benchmarks.live_running import LiveRun, running
-from tests.benchmarks.shaking import FRAMES_PER_SECOND, SIZES, clips
+from tests.benchmarks.live_running import Film, LiveRun, running
+from tests.benchmarks.shaking import SIZES, clips
 from tests.rtsp import has_server
 
 MEMORY_EVERY_S = 5.0
@@ -33,28 +33,29 @@ def main() -> int:
     parser.add_argument("--size", choices=[size for size in SIZES if size != "real"], default="1080p")
     parser.add_argument("--seconds", type=float, default=60.0, help="how long nothing happens, of quiet")
     parser.add_argument("--minutes", type=float, default=60.0, help="for how long, of soak")
+    parser.add_argument("--rate", type=float, choices=[5.0, 12.5, 25.0], default=25.0, help="pictures a second")
     parser.add_argument("--follow-every", type=int, default=2, help="lines are measured in every so many-th picture")
     parser.add_argument("--cameras", type=int, choices=[1, 2], default=2, help="how many, of quiet")
     options = parser.parse_args()
     if not has_server():
         print("install GStreamer's RTSP server, as CONTRIBUTING.md says", file=sys.stderr)
         return 2
-    every = options.follow_every
-    print(f"{options.size} at {FRAMES_PER_SECOND:g} Hz, lines in every {every}.", flush=True)
+    film, every = Film(options.size, options.rate), options.follow_every
+    print(f"{film.size} at {film.rate:g} Hz, lines in every {every}.", flush=True)
     if options.only in (None, "quiet"):
-        quiet(options.size, options.seconds, every, options.cameras)
+        quiet(film, options.seconds, every, options.cameras)
     if options.only in (None, "faults"):
-        live_faults.run_faults(options.size, every)
+        live_faults.run_faults(film, every)
     if options.only == "soak":
-        live_faults.run_soak(options.size, every, options.minutes)
+        live_faults.run_soak(film, every, options.minutes)
     return 0
 
 
-def quiet(size: str, seconds: float, every: int, cameras: int) -> None:
+def quiet(film: Film, seconds: float, every: int, cameras: int) -> None:
     """Run it while nothing happens."""
-    _, made = clips(size)
+    _, made = clips(film.size)
     memory_mb = []
-    with running(made[:cameras], {}, size, "--follow-every", str(every)) as run:
+    with running(made[:cameras], {}, film, "--follow-every", str(every)) as run:
         ends_at = time.monotonic() + seconds
         while time.monotonic() < ends_at:
             time.sleep(min(MEMORY_EVERY_S, max(0.0, ends_at - time.monotonic())))

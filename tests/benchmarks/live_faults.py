@@ -19,7 +19,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from tests.benchmarks.live_running import FOLDER, LiveRun, running
+from tests.benchmarks.live_running import Film, LiveRun, running
 from tests.benchmarks.shaking import SIZES, Clip, clips
 from tests.demo.render import FIELD, HERE, cameras
 from worker.calibration.geometry.camera import Camera, Pose
@@ -51,10 +51,10 @@ class Scene:
     end_ns: int
 
 
-def changed_clips(size: str) -> dict[str, tuple[Path, Clip]]:
+def changed_clips(film: Film) -> dict[str, tuple[Path, Clip]]:
     """What the first camera films once it was zoomed, nudged or knocked, by these words."""
     taken_by = cameras()[0]
-    taken_by = taken_by.with_lens(taken_by.intrinsics.scaled(SIZES[size][0]))
+    taken_by = taken_by.with_lens(taken_by.intrinsics.scaled(SIZES[film.size][0]))
     still = np.asarray(cv2.imread(str(HERE / f"{taken_by.id}.jpg")), np.uint8)
     picture = np.asarray(cv2.resize(still, taken_by.intrinsics.size, interpolation=cv2.INTER_AREA), np.uint8)
     made = {
@@ -63,7 +63,7 @@ def changed_clips(size: str) -> dict[str, tuple[Path, Clip]]:
         "knocked": panned(taken_by, KNOCKED_DEG),
     }
     return {
-        word: (FOLDER / f"{word}-{size}", Clip(FIELD, taken_by, picture, np.random.default_rng(number), camera))
+        word: (film.file(word), Clip(FIELD, taken_by, picture, np.random.default_rng(number), camera))
         for number, (word, camera) in enumerate(made.items())
     }
 
@@ -100,21 +100,21 @@ def faults(first: Path, changed: dict[str, Path]) -> list[Fault]:
     ]
 
 
-def run_faults(size: str, every: int) -> None:
+def run_faults(film: Film, every: int) -> None:
     """Have everything happen once and print what was sent and said."""
-    with filmed(size, every) as (run, listed):
+    with filmed(film, every) as (run, listed):
         scenes = list(played(run, listed))
     print("\nWhat happens to the first camera; the other one films on.\n")
     print("\n".join(table(run, scenes)))
 
 
-def run_soak(size: str, every: int, minutes: float) -> None:
+def run_soak(film: Film, every: int, minutes: float) -> None:
     """Have faults happen at intervals for so long, and print what was sent of each phase and the memory."""
     quiet_s = max(QUIET_S, min(LONGEST_QUIET_S, 60 * minutes * QUIET_SHARE))
     phases: list[Phase] = []
     memory_mb: list[float] = []
     over = threading.Event()
-    with filmed(size, every) as (run, listed):
+    with filmed(film, every) as (run, listed):
         threading.Thread(target=note_memory, args=(run, memory_mb, over), daemon=True).start()
         first, other = run.names
         ends_at = time.monotonic() + 60 * minutes
@@ -195,14 +195,14 @@ def soak_table(run: LiveRun, phases: Sequence[Phase]) -> list[str]:
 
 
 @contextmanager
-def filmed(size: str, every: int) -> Iterator[tuple[LiveRun, list[Fault]]]:
+def filmed(film: Film, every: int) -> Iterator[tuple[LiveRun, list[Fault]]]:
     """Both cameras while they are tracked, and what may happen to the first one."""
-    _, made = clips(size)
-    changed = changed_clips(size)
+    _, made = clips(film.size)
+    changed = changed_clips(film)
     paths = {word: path for word, (path, _) in changed.items()}
-    with running(made, dict(changed.values()), size, "--follow-every", str(every)) as run:
+    with running(made, dict(changed.values()), film, "--follow-every", str(every)) as run:
         wait_until(lambda: all(run.judged(name) for name in run.names), START_S)
-        yield run, faults(FOLDER / f"{made[0].still.id}-{size}", paths)
+        yield run, faults(film.file(made[0].still.id), paths)
 
 
 def played(run: LiveRun, listed: Sequence[Fault]) -> Iterator[Scene]:

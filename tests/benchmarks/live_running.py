@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.cli.tracked_poses import camera_document
 from tests.benchmarks.shaking import FRAMES_PER_SECOND, SIZES, SWING_HZ, Clip, stored_camera
@@ -26,13 +27,43 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
 
 FOLDER = Path("build/live")
-# After which the motion of the cameras is as it was.
+# After so many pictures of a clip the motion of its camera is as it was.
 PERIOD = round(FRAMES_PER_SECOND / SWING_HZ)
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 # A pose belongs to a picture that was taken no farther from its time than this.
 SAME_MS = 15.0
 
 Truth = Callable[[int], Camera]
+
+
+@dataclass(frozen=True)
+class Film:
+    """How cameras film: pictures of a `size`, so many a second, of which the clips have whole multiples."""
+
+    size: str
+    rate: float
+
+    @property
+    def every(self) -> int:
+        """One of so many pictures of a clip is filmed."""
+        return round(FRAMES_PER_SECOND / self.rate)
+
+    @property
+    def bits(self) -> int:
+        """Of a second: as many for each picture, whatever the rate."""
+        return round(SIZES[self.size][2] / self.every)
+
+    def file(self, name: str) -> Path:
+        """Where what a camera films is kept, by a name of it."""
+        return FOLDER / f"{name}-{self.size}-{self.rate:g}"
+
+    def pictures(self, clip: Clip) -> Iterator[NDArray[np.uint8]]:
+        """What a camera films of a clip, again and again."""
+        return (clip.frame(number) for number in range(0, PERIOD, self.every))
+
+    def truth(self, clip: Clip) -> Truth:
+        """Where a camera is at each picture that it films of a clip."""
+        return lambda picture: clip.camera(self.every * picture)
 
 
 @dataclass(frozen=True)
@@ -74,7 +105,7 @@ class JudgedPose:
 class LiveRun:
     """`esc live` and the cameras it tracks, while they run; what was sent, taken and said stays afterwards.
 
-    `truths`: by the file of a clip where its camera was at each picture, which come again after `PERIOD`.
+    `truths`: by the file of what is filmed where its camera was at each picture of that.
     """
 
     names: list[str]
@@ -139,21 +170,21 @@ class LiveRun:
 
 
 @contextmanager
-def running(clips: Sequence[Clip], others: Mapping[Path, Clip], size: str, *options: str) -> Iterator[LiveRun]:
+def running(clips: Sequence[Clip], others: Mapping[Path, Clip], film: Film, *options: str) -> Iterator[LiveRun]:
     """Run `esc live` on cameras that film these clips; the `others`, which they may film later, are encoded too."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    paths = [FOLDER / f"{clip.still.id}-{size}" for clip in clips]
+    paths = [film.file(clip.still.id) for clip in clips]
     truths: dict[Path, Truth] = {}
     for path, clip in [*zip(paths, clips, strict=True), *others.items()]:
         if not path.exists():
-            encode(map(clip.frame, range(PERIOD)), round(FRAMES_PER_SECOND), SIZES[size][2], path)
-        truths[path] = clip.camera
+            encode(film.pictures(clip), round(film.rate), film.bits, path)
+        truths[path] = film.truth(clip)
     venue = json.loads((HERE / "venue.json").read_text())
     stored = [stored_camera(clip.still, number, "exact") for number, clip in enumerate(clips)]
     venue["cameras"] = [camera_document(camera).model_dump(mode="json", exclude_unset=True) for camera in stored]
     (FOLDER / "venue.json").write_text(json.dumps(venue))
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    with filming(paths, FRAMES_PER_SECOND) as cameras:
+    with filming(paths, film.rate) as cameras:
         names = [camera.id for camera in stored]
         streams = [f"{name}={address}" for name, address in zip(names, cameras.addresses, strict=True)]
         command = [
