@@ -32,7 +32,10 @@ def has_server() -> bool:
 
 
 def encode(pictures: Iterable[NDArray[np.uint8]], rate: int, bits: int, path: Path) -> None:
-    """Write a clip as the cameras take it, of pictures (H, W, 3): without pictures that are shown out of order."""
+    """Write a clip as the cameras take it, of pictures (H, W, 3): without pictures that are shown out of order.
+
+    No second has more than so many `bits`, as cameras keep it, which a short clip at a mean rate would not.
+    """
     encoded, stream = io.BytesIO(), None
     with av.open(encoded, "w", format="h264") as out:
         for picture in pictures:
@@ -41,7 +44,7 @@ def encode(pictures: Iterable[NDArray[np.uint8]], rate: int, bits: int, path: Pa
                     "preset": "veryfast",
                     "tune": "zerolatency",
                     "g": str(rate),
-                    "x264-params": "sliced-threads=0",
+                    "x264-params": f"sliced-threads=0:vbv-maxrate={bits // 1000}:vbv-bufsize={bits // 1000}",
                 }
                 stream = out.add_stream("libx264", rate=rate, options=options)
                 stream.height, stream.width = picture.shape[:2]
