@@ -13,6 +13,7 @@ from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.exclusions import of_use
 from worker.calibration.detection.frame_fusion import median, sways
 from worker.calibration.detection.segmentation import Region, whole_frame
+from worker.calibration.gate.quality import CameraResult, Gate
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options, Progress, ProgressReporter, Segment, StageTimings
@@ -23,6 +24,9 @@ from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
 OF_ONE_KIND = 0.03
 """By which part the focal lengths of cameras of one kind differ, one standard deviation."""
+FITS_BETTER = 0.9
+"""Of the residual that the gate allows, through a lens that was found with the pose: it bends to meet a field whose
+measures are wrong by decimetres, and what is left over is smaller for that."""
 SEGMENTED, SEARCHED = 0.2, 0.85
 """Share of the whole at which the frames are segmented, and the cameras found; to calibrate them is the rest."""
 
@@ -179,8 +183,22 @@ def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration
     if found.refusal is not None or calibrated is None:
         return FoundCamera(sought.id, found.candidates, found.refusal, found.remarks)
     (result,) = (one for one in calibrated.cameras if one.camera.id == sought.id)
-    if result.refusal is not None:
-        refusal = NotFound("not-confirmed", result.refusal.words)
-        return FoundCamera(sought.id, found.candidates, refusal, found.remarks)
+    words = why_not_confirmed(result, is_lens_found=sought.is_lens_sought)
+    if words is not None:
+        return FoundCamera(sought.id, found.candidates, NotFound("not-confirmed", words), found.remarks)
     best, *others = found.candidates
     return FoundCamera(sought.id, [replace(best, camera=result.camera), *others], None, found.remarks)
+
+
+def why_not_confirmed(result: CameraResult, *, is_lens_found: bool) -> str | None:
+    """What the calibration that began with a camera has against it, in words; None if nothing."""
+    if result.refusal is not None:
+        return result.refusal.words
+    most_px = FITS_BETTER * Gate().most_residual_px(result.camera)
+    if is_lens_found and result.residual_px is not None and result.residual_px > most_px:
+        return (
+            f"lines are {result.residual_px:.2f} px from where pose and lens put them, at most {most_px:.2f} allowed "
+            "through a lens that was found with the pose; are the measures of the field quite right? Say what the "
+            "lens is, if it is known"
+        )
+    return None

@@ -1,13 +1,16 @@
 """Several cameras found at once, and what a calibration that begins with them says."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
+from tests.worker.calibration.gate.test_quality import good
 from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames
 from tests.worker.calibration.test_calibrate import white_on_green
-from worker.calibration.find_cameras import find_cameras
+from worker.calibration.find_cameras import find_cameras, why_not_confirmed
+from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Stopped
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
@@ -55,6 +58,14 @@ def test_a_camera_is_found_beside_one_that_is_known():
     (camera,) = found.cameras
     assert camera.accepted
     assert np.linalg.norm(camera.candidates[0].camera.pose.position - right.pose.position) < 0.03
+
+
+def test_lines_have_to_fit_better_through_a_lens_that_was_found_with_the_pose():
+    most_px = Gate().most_residual_px(good().camera)
+    fits_hardly = replace(good(), residual_px=0.95 * most_px)
+    assert why_not_confirmed(fits_hardly, is_lens_found=False) is None
+    assert "are the measures of the field quite right?" in why_not_confirmed(fits_hardly, is_lens_found=True)
+    assert why_not_confirmed(good(), is_lens_found=True) is None
 
 
 def test_who_is_asked_to_stop_stops():

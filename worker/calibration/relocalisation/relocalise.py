@@ -58,9 +58,10 @@ is found, wrong ones to 0.006 and worse."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
-FARTHEST_CENTRE = 3.03 * FREE_CENTRE
-"""One lens of a hundred has its principal point farther from where it was proposed, part of the frame's width. A lens
-that is found bends to meet a field whose measures are wrong, and its principal point says so first."""
+FARTHEST_CENTRE = 6 * FREE_CENTRE
+"""No lens has its principal point farther from where it was proposed, part of the frame's width; those of real frames
+are found up to half as far off. A lens bends to meet a field whose measures are wrong by metres, and its principal
+point says so first."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 

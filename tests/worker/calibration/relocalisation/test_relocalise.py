@@ -82,7 +82,7 @@ def test_three_lines_do_not_tell_a_lens_and_are_refused_with_the_pixels_that_it_
 
 
 def test_a_lens_that_bends_to_meet_a_field_of_other_measures_is_refused():
-    narrower = replace(PITCH, width=64.0)
+    narrower = replace(PITCH, width=63.0)
     answer = search(PITCH, SIDELINE, paint_frame(narrower, SIDELINE), lens_is_known=False)
     assert answer.refusal.reason == "implausible"
     assert "measures of the field" in answer.refusal.words
