@@ -58,10 +58,6 @@ is found, wrong ones to 0.006 and worse."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
-FARTHEST_CENTRE = 6 * FREE_CENTRE
-"""No lens has its principal point farther from where it was proposed, part of the frame's width; those of real frames
-are found up to half as far off. A lens bends to meet a field whose measures are wrong by metres, and its principal
-point says so first."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
@@ -236,14 +232,6 @@ def _why_not_taken(
             f"the lines in view do not tell lens and pose apart: the markings may lie {best.shift_px:.1f} pixels from "
             f"where the best pose puts them (at most {least_sure_px:.1f} allowed); say what the lens or its field of "
             "view is, or let the camera see more of the field",
-        )
-    off_centre = float(np.linalg.norm(best.camera.intrinsics.matrix[:2, 2] - sought.lenses[0].lens.matrix[:2, 2]))
-    if off_centre > FARTHEST_CENTRE * width:
-        return NotFound(
-            "implausible",
-            f"the lens that fits the lines best has its principal point {off_centre:.0f} pixels from where it was "
-            f"expected (at most {FARTHEST_CENTRE * width:.0f} allowed): the measures of the field are most likely not "
-            "quite these, or the frame is part of a larger picture; put them right, or say what the lens is",
         )
     if not films_a_field(best.camera.pose):
         return NotFound("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
