@@ -20,7 +20,7 @@ from worker.calibration.diagnostics.registration import Response
 from worker.calibration.geometry.camera import Camera, Pose, inside
 from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_of_all
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import SIGMA_NAMES
+from worker.calibration.geometry.lens import SIGMA_NAMES, Lens
 from worker.calibration.geometry.parameters import LensParameter
 from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.geometry.rotation import rotation_vectors
@@ -58,6 +58,8 @@ is found, wrong ones to 0.006 and worse."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
+BORDER_POINTS = 20
+"""On each side of the frame, where a lens is asked whether it sees all of that."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
 
@@ -233,6 +235,12 @@ def _why_not_taken(
             f"where the best pose puts them (at most {least_sure_px:.1f} allowed); say what the lens or its field of "
             "view is, or let the camera see more of the field",
         )
+    if not sees_all_of_its_frame(best.camera.intrinsics):
+        return NotFound(
+            "implausible",
+            "the lens that fits the lines best bends the picture back before its corners, so that it is wrong towards "
+            "them; say what the lens or its field of view is, or let the camera see more of the field",
+        )
     if not films_a_field(best.camera.pose):
         return NotFound("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
     for other in others:
@@ -243,6 +251,11 @@ def _why_not_taken(
                 "are seen where they put them; say where the camera stands, or let it see more of the field",
             )
     return None
+
+
+def sees_all_of_its_frame(lens: Lens) -> bool:
+    """Whether each pixel of the frame has a ray: whether the model grows as far as to the corners."""
+    return bool(np.isfinite(lens.undistort(lens.border(BORDER_POINTS))).all())
 
 
 def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:

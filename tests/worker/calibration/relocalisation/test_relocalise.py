@@ -14,7 +14,13 @@ from worker.calibration.detection.segmentation import Region
 from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.geometry.camera import inside
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.relocalise import Candidate, explains_nearly_as_well, relocalise, twin
+from worker.calibration.relocalisation.relocalise import (
+    Candidate,
+    explains_nearly_as_well,
+    relocalise,
+    sees_all_of_its_frame,
+    twin,
+)
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens, unknown_lenses
 
 pytestmark = pytest.mark.slow
@@ -78,6 +84,13 @@ def test_three_lines_do_not_tell_a_lens_and_are_refused_with_the_pixels_that_it_
     assert answer.candidates[0].shift_px > 1.2
     assert answer.refusal.reason == "few-lines"
     assert "do not tell lens and pose apart" in answer.refusal.words
+
+
+def test_a_lens_that_bends_the_picture_back_before_its_corners_does_not_see_all_of_its_frame():
+    # Netball: the lens that fitted all lines but those at the right edge, where it put them back into the picture.
+    folded = camera("one", (0.2, -12.9, 9.6), (0.0, 0.0), focal=697.0, distortion=(-0.289, 0.009, 0.0, 0.0))
+    assert not sees_all_of_its_frame(folded.intrinsics)
+    assert sees_all_of_its_frame(SIDELINE.intrinsics)
 
 
 def test_a_yard_line_too_far_is_left_for_the_true_one():
