@@ -235,7 +235,7 @@ def _why_not_taken(
             f"where the best pose puts them (at most {least_sure_px:.1f} allowed); say what the lens or its field of "
             "view is, or let the camera see more of the field",
         )
-    if not sees_all_of_its_frame(best.camera.intrinsics):
+    if sought.is_lens_sought and not sees_all_of_its_frame(best.camera.intrinsics):
         return NotFound(
             "implausible",
             "the lens that fits the lines best bends the picture back before its corners, so that it is wrong towards "
