@@ -8,6 +8,7 @@ import pytest
 
 from tests.rtsp import encode, filming, has_server
 from tests.worker.calibration.synthetic import PITCH, camera
+from tests.worker.video.numbered_pictures import COUNT, SIZE, number_shown, picture_of
 from worker.calibration.stitching.photometry import NEUTRAL
 from worker.calibration.stitching.views import ViewChoice
 from worker.video import camera_clocks
@@ -16,28 +17,16 @@ from worker.video.encoding import Encoding
 from worker.video.errors import VideoError
 from worker.video.stitch import Plan, StaticGeometry, StitchScene, stitch
 
-RATE, HEIGHT, BITS, STRIPE = 25, 64, 8, 16
-PERIOD_S = (1 << BITS) / RATE
+RATE = 25
+PERIOD_S = COUNT / RATE
 # How long is filmed: the first reports come within some three seconds.
 UNTIL_S = 9.0
 CAMERAS = [
-    camera(name, (x, -48.0, 10.0), (aim, 0.0), 75.0, size=(BITS * STRIPE, HEIGHT))
+    camera(name, (x, -48.0, 10.0), (aim, 0.0), 75.0, size=SIZE)
     for name, x, aim in (("left", -1.0, -18.0), ("right", 1.0, 18.0))
 ]
 SCENE = StitchScene(PITCH, CAMERAS, ViewChoice(width=320), {one.id: NEUTRAL for one in CAMERAS})
 QUICK = Encoding(preset="ultrafast")
-
-
-def picture_of(number):
-    """It shows its number in stripes, the lowest bit first."""
-    stripes = np.array([255 * (number >> bit & 1) for bit in range(BITS)], np.uint8)
-    return np.broadcast_to(np.repeat(stripes, STRIPE)[None, :, None], (HEIGHT, BITS * STRIPE, 3)).copy()
-
-
-def number_shown(picture):
-    luma, _, _ = picture.planes
-    stripes = np.median(luma, axis=0).reshape(BITS, STRIPE).mean(axis=1)
-    return int(sum(1 << bit for bit in np.flatnonzero(stripes > 126)))
 
 
 class Watched:
@@ -61,7 +50,7 @@ class Watched:
 def clip(tmp_path, missing):
     if not has_server():
         missing("gstreamer")
-    encode(map(picture_of, range(1 << BITS)), RATE, 500_000, tmp_path / "clip")
+    encode(map(picture_of, range(COUNT)), RATE, 500_000, tmp_path / "clip")
     return tmp_path / "clip"
 
 

@@ -6,24 +6,13 @@ import numpy as np
 import pytest
 
 from tests.rtsp import encode, filming, has_server
+from tests.worker.video.numbered_pictures import number_shown, picture_of
 from worker.video.clips import Clip
 from worker.video.stream_clock import Lateness
 
-RATE, HEIGHT, BITS, STRIPE = 25, 64, 8, 16
+RATE = 25
 # The first report comes within some three seconds.
 COUNT = 150
-
-
-def picture_of(number):
-    """It shows its number in stripes, the lowest bit first."""
-    stripes = np.array([255 * (number >> bit & 1) for bit in range(BITS)], np.uint8)
-    return np.broadcast_to(np.repeat(stripes, STRIPE)[None, :, None], (HEIGHT, BITS * STRIPE, 3)).copy()
-
-
-def number_shown(picture):
-    luma, _, _ = picture.planes
-    stripes = np.median(luma, axis=0).reshape(BITS, STRIPE).mean(axis=1)
-    return int(sum(1 << bit for bit in np.flatnonzero(stripes > 126)))
 
 
 def test_a_stream_tells_when_its_pictures_were_taken_once_its_camera_has_reported(tmp_path, missing):
