@@ -97,7 +97,7 @@ class TrackedStreams:
         return time.monotonic() - self._last_s.get(camera, -SILENT_S) < SILENT_S
 
     def lost(self, for_s: float) -> list[str]:
-        """Those whose pictures come, and have not shown their lines where they are expected for so long."""
+        """Ids of cameras whose pictures come without their lines where expected, for longer than `for_s` seconds."""
         return [name for name, camera in self.cameras.items() if camera.unseen_s > for_s]
 
     def frames(self) -> dict[str, bytes] | None:

@@ -37,7 +37,7 @@ class LiveCameras(Protocol):
     """The cameras that are tracked."""
 
     def lost(self, for_s: float) -> Sequence[str]:
-        """Those whose pictures come, and have not shown their lines where they are expected for so long."""
+        """Ids of cameras whose pictures come without their lines where expected, for longer than `for_s` seconds."""
 
     def frames(self) -> Mapping[str, bytes] | None:
         """Files of the newest pictures, by camera; none where not all cameras of the venue are tracked.
@@ -50,13 +50,13 @@ class RecoveryLog(Protocol):
     """Is told how calibrations go, of which each names the cameras that were `lost`."""
 
     def asked(self, lost: Sequence[str], job: Job) -> None:
-        """A job was submitted."""
+        """Take a job that was submitted."""
 
     def ended(self, lost: Sequence[str], job: Job) -> None:
-        """It has ended."""
+        """Take the end of that job."""
 
     def failed(self, lost: Sequence[str], error: Exception) -> None:
-        """The service did not take it, or cannot be reached."""
+        """Take why there is no job: the service refused it, or cannot be reached."""
 
 
 @dataclass(frozen=True)

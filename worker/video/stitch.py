@@ -386,7 +386,7 @@ def _offsets(
 def _motions(
     clips: Mapping[str, Clip], places: CoarseView, offsets: Mapping[str, float], from_s: float, told: Report
 ) -> dict[str, MotionSignal]:
-    """What moves in files, which are opened once more for that."""
+    """Motion signals of clips that are files, by camera; each file is opened a second time for that."""
     motions = {}
     for number, (camera, clip) in enumerate(clips.items()):
         told(f"sync {camera}", number / len(clips))
@@ -397,7 +397,7 @@ def _motions(
 
 
 def _live_motions(clips: Mapping[str, Clip], places: CoarseView) -> dict[str, MotionSignal]:
-    """What moves in live streams, which are read on from there."""
+    """Motion signals of clips that are live streams, by camera; the streams go on from where this read to."""
 
     def look(clip: Clip) -> MotionSignal:
         return places.motion(clip.camera, _until(time.monotonic() - clip.since + LOOKED_AT_S, clip.shots()))

@@ -161,7 +161,7 @@ class LineProfiles:
     def read_known(
         cls, lines: LinePoints, camera: Camera, picture: PixelReader, contrasts: NDArray[np.intp], reach_px: float
     ) -> Self:
-        """The same where the `contrasts` (K, 2) of all markings are known (see `known_contrasts`); no network."""
+        """Read profiles without the network, by known `contrasts` (K, 2) of all markings (see `known_contrasts`)."""
         seen = VisibleLines.from_camera(lines, camera)
         matches = match_known(seen, picture, contrasts, reach_px, camera.intrinsics.relative_size)
         return cls(seen, camera, matches, None, reach_px)

@@ -35,5 +35,5 @@ def blurred_point(offset_px: Array, sigma_px: float) -> Array:
 
 
 def without_nan(values: Array, instead: float = 0.0) -> Array:
-    """The same with another number where there is none: outside the picture."""
+    """Values (...) with NaN, which stands for places outside the picture, replaced by `instead`."""
     return np.where(np.isnan(values), instead, values)

@@ -48,7 +48,10 @@ def read_planes(
 
 
 def read_bytes(image: NDArray[np.uint8], column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The same of a plane of bytes as it is, to whole grey levels; beyond its border what is at the border."""
+    """Sample an image (H, W) of bytes at finite columns and rows (P, N), to whole grey levels.
+
+    Beyond the border of the image it is the value at the border.
+    """
     if column.size == 0:
         return np.empty(column.shape, dtype=np.float32)
     read = cv2.remap(image, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -20,7 +20,7 @@ LEAST_OF_UNSEEN = 0.15
 
 @dataclass(frozen=True)
 class Unseen:
-    """What no camera sees: its `share` of the view, 0 to 1, and the ninths that hold most of it, the emptiest first."""
+    """Part of a view that no camera sees: its `share`, 0 to 1, and the ninths that hold most of it, emptiest first."""
 
     share: float
     places: Sequence[str]

@@ -29,12 +29,12 @@ class LearnedOffsets:
 
     @property
     def mean(self) -> Array:
-        """Of each piece (N,), px."""
+        """Expected offset of each piece (N,), px."""
         return self._sum / (self._unknown + self._information)
 
     @property
     def variance(self) -> Array:
-        """Of each piece (N,), px²."""
+        """Variance of the expected offset of each piece (N,), px²."""
         return 1 / (self._unknown + self._information)
 
     @property

@@ -127,7 +127,7 @@ class TrackedLines:
         return expected[(known >= SHOWN * looked_for)[marking]]
 
     def sighted(self, picture: PixelReader, expected: Camera) -> Sighting | None:
-        """What a picture shows near where a camera expects its lines; None where too few are found.
+        """Measure lines near where the camera `expected` puts them; None where too few are found.
 
         Of a camera that has been seen for a while a few telling pieces are looked at, all of them from time to time:
         those that were hidden come back.
@@ -135,7 +135,7 @@ class TrackedLines:
         return self._near(picture, expected, self._next_pieces())
 
     def searched(self, picture: PixelReader, expected: Camera) -> Sighting | None:
-        """The same farther off, step by step: for a camera of which is hardly known where it is."""
+        """Measure lines in ever narrower searches, for a camera whose pose is hardly known; None as `sighted`."""
         pieces = self._next_pieces()
         for search in LOST_SEARCH_PX:
             sighting = self._within(search, self._read(picture, expected, pieces[::COARSELY], search), expected)
