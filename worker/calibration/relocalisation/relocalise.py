@@ -229,11 +229,18 @@ def _why_not_taken(
     width = best.camera.intrinsics.size[0]
     least_sure_px = width * (LEAST_SURE_OF_LENS if sought.is_lens_sought else LEAST_SURE)
     if best.shift_px is not None and best.shift_px > least_sure_px:
+        off = (
+            f"the markings may lie {best.shift_px:.1f} pixels from where the best pose puts them (at most "
+            f"{least_sure_px:.1f} allowed)"
+        )
+        if not sought.is_lens_sought:
+            return NotFound(
+                "few-lines", f"the lines in view leave the pose open: {off}; let the camera see more of the field"
+            )
         return NotFound(
             "few-lines",
-            f"the lines in view do not tell lens and pose apart: the markings may lie {best.shift_px:.1f} pixels from "
-            f"where the best pose puts them (at most {least_sure_px:.1f} allowed); say what the lens or its field of "
-            "view is, or let the camera see more of the field",
+            f"the lines in view do not tell lens and pose apart: {off}; say what the lens or its field of view is, or "
+            "let the camera see more of the field",
         )
     if sought.is_lens_sought and not sees_all_of_its_frame(best.camera.intrinsics):
         return NotFound(
