@@ -37,7 +37,7 @@ PARTS: dict[str, list[tuple[Any, str]]] = {
     "reading pixels": [(Picture, "read")],
     "matching profiles": [(LineProfiles, "read_known")],
     "centres of lines": [(LineProfiles, "measure")],
-    "pose by least squares": [(TrackedLines, "observed")],
+    "pose by least squares": [(TrackedLines, "explained")],
     "learning": [(TrackedLines, "learn")],
     "filter": [(State, "after"), (State, "drawn_back"), (State, "surprise"), (State, "with_observed")],
 }

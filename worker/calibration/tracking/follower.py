@@ -35,7 +35,7 @@ class TrackedPose:
     """A camera when one frame was taken.
 
     `how`: whether its lines were `measured`, or it went on as it went because they were not looked for or not seen
-    (`coasted`), or because they contradicted all that was known (`refused`). `motion_covariance` (6, 6) of turn (rad)
+    (`coasted`), or because they contradicted all that was known, or each other (`refused`). `motion_covariance` (6, 6) of turn (rad)
     and shift (m): how sure the motion since the reference is; `covariance`: with how sure the reference is.
     """
 
@@ -142,10 +142,11 @@ class _Track:
         sighting = self.lines.sighted(Channels([first]), reference)
         if sighting is None:
             raise _not_seen(reference)
-        self.lines.learn(sighting.seen, reference)
-        self._last = State.at_reference(self.lines.observed(sighting.seen).information)
+        self.lines.learn(sighting, reference)
+        self._last = State.at_reference(self.lines.explained(sighting.seen).observed.information)
         self._steps = [FilterStep(0.0, self._last)]
         self._how: list[How] = ["measured"]
+        self._is_refused = False
 
     def see(self, picture: PixelReader | None, seconds: float) -> None:
         """Take the next picture, so long after the one before; None: it is not looked at, or not there."""
@@ -179,10 +180,12 @@ class _Track:
         sighting = self._sighted(picture, expected)
         if sighting is None:
             return "coasted", expected
-        if expected.surprise(sighting.observed) > GATE:
+        if expected.surprise(sighting.observed) > GATE or not self.lines.fits(sighting, self._is_refused):
+            self._is_refused = True
             return "refused", expected
+        self._is_refused = False
         known = expected.with_observed(sighting.observed)
-        self.lines.learn(sighting.seen, moved(self.lines.reference, known.change))
+        self.lines.learn(sighting, moved(self.lines.reference, known.change))
         return "measured", known
 
     def _sighted(self, picture: PixelReader, expected: State) -> Sighting | None:

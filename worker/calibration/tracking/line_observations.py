@@ -42,7 +42,12 @@ FEWEST_PIECES, FEWEST_SHARE = 20, 0.3
 SHOWN, AT_REFERENCE_PX = 0.5, 3.0
 """Of a marking so much has to be found near the reference, in pixels of a 4K frame, for it to be followed."""
 NOVELTY = 0.05
-"""By so much of the difference a frame changes how many are usual."""
+"""By so much of the difference a frame changes how many are usual, and how far they lie from where a pose has them."""
+MOST_MISFIT, MOST_MISFIT_ANEW, LEAST_MISFIT = 3.0, 2.0, 0.3
+"""Lines contradict each other where the median residual is so many times the usual one, of a camera that was refused
+in the look before so many times, and the usual one counts as no less than so many expected errors. Five times it is
+after a zoom by 0.5 %; twice in noise of 25 grey levels, in JPEGs of quality 8 and out of focus by two pixels, all of a
+sudden; players and shadows do not reach a median."""
 BESIDE_PX = 1.0
 """How far a piece of line may lie beside its place for good, one standard deviation, in pixels of a 4K frame."""
 NOISE_PX = 0.1
@@ -76,10 +81,14 @@ class LineObservations:
 
 @dataclass(frozen=True)
 class Sighting:
-    """Pieces that were `seen`, and what was `observed` by them."""
+    """Pieces that were `seen`, and what was `observed` by them.
+
+    `misfit`: the median distance from where the observed pose has them, in expected errors: what no pose explains.
+    """
 
     seen: LineObservations
     observed: PoseObservation
+    misfit: float
 
 
 @dataclass(frozen=True)
@@ -111,7 +120,7 @@ class TrackedLines:
         self._few: NDArray[np.intp] | None = None
         self._looks = 0
         self._patch = chosen // CLUSTER_POINTS
-        self._usual = 0.0
+        self._usual = self._usual_misfit = 0.0
         self._beside = LearnedOffsets(len(chosen), BESIDE_PX * self._scale, NOISE_PX)
 
     def _shown(self, lines: LinePoints, expected: NDArray[np.intp], channels: Channels) -> NDArray[np.intp]:
@@ -143,6 +152,15 @@ class TrackedLines:
                 return None
             expected = moved(self.reference, sighting.observed.change)
         return self._near(picture, expected, pieces)
+
+    def fits(self, sighting: Sighting, anew: bool) -> bool:
+        """Whether the pieces lie about as near as usual to where the observed pose has them.
+
+        With another lens than the reference's, or another marking taken for one, each pose leaves some of them off.
+        `anew`: whether the camera was refused in the look before; then it has to be nearer.
+        """
+        most = MOST_MISFIT_ANEW if anew else MOST_MISFIT
+        return sighting.misfit <= most * max(LEAST_MISFIT, self._usual_misfit)
 
     def _next_pieces(self) -> NDArray[np.intp]:
         """Which pieces are looked at in the next picture: all, or a few that were chosen once all had been learned."""
@@ -187,7 +205,7 @@ class TrackedLines:
         if good.sum() < FEWEST_PIECES or share < FEWEST_SHARE * self._usual:
             return None
         seen = LineObservations(expected, read.pieces[found.index[good]], offset[good], slope[good], share)
-        return Sighting(seen, self.observed(seen))
+        return self.explained(seen)
 
     def _telling(self) -> NDArray[np.intp]:
         """The few pieces that are looked at: of those that are seen at least half as often as others."""
@@ -198,9 +216,9 @@ class TrackedLines:
         pieces = often[seen.index[usable]]
         return pieces[most_telling(slopes[usable], self._patch[pieces], PRIOR, FEW)]
 
-    def observed(self, seen: LineObservations) -> PoseObservation:
+    def explained(self, every: LineObservations) -> Sighting:
         """What they say of the pose: robust least squares, with what pieces of one patch err together."""
-        seen = self._known(seen)
+        seen = self._known(every)
         sigma = self._sigma(seen)
         rows, values = seen.slope / sigma[:, None], (seen.offset - self._beside.mean[seen.piece]) / sigma
         change = np.zeros(POSE_NUMBERS)
@@ -208,14 +226,16 @@ class TrackedLines:
             weight = weigh(values - rows @ change)
             information = (rows * weight[:, None]).T @ rows
             change = np.asarray(np.linalg.solve(information + PRIOR, rows.T @ (weight * values)), float)
-        spread = self._spread(seen, rows * (weight * (values - rows @ change))[:, None])
+        left = values - rows @ change
+        spread = self._spread(seen, rows * (weight * left)[:, None])
         together = float(np.trace(np.linalg.solve(information + PRIOR, spread))) / POSE_NUMBERS
         known = information / max(1.0, together)
         of_picture = np.diag(np.repeat([PICTURE_PX / seen.expected.intrinsics.focal_length_px, 0.0], 3) ** 2)
-        return PoseObservation(
+        observed = PoseObservation(
             change_between(self.reference, moved(seen.expected, change)),
             np.asarray(np.linalg.solve(np.eye(POSE_NUMBERS) + known @ of_picture, known), float),
         )
+        return Sighting(every, observed, float(np.median(np.abs(left))))
 
     def _known(self, seen: LineObservations) -> LineObservations:
         """The pieces that have been seen before, or all where those are too few.
@@ -226,12 +246,15 @@ class TrackedLines:
         known = self._beside.are_known[seen.piece]
         return seen[known] if known.sum() >= FEWEST_PIECES else seen
 
-    def learn(self, seen: LineObservations, now: Camera) -> None:
+    def learn(self, sighting: Sighting, now: Camera) -> None:
         """Keep how far beside their places the pieces lie when the camera is where it is `now` known to be."""
+        seen = sighting.seen
         left = seen.offset - seen.slope @ change_between(seen.expected, now)
         counted = tukey_weights((left - self._beside.mean[seen.piece]) / self._sigma(seen)) > 0
         which = seen.piece[counted]
-        self._usual += (seen.share - self._usual) * (NOVELTY if self._usual else 1.0)
+        novelty = NOVELTY if self._usual else 1.0
+        self._usual += (seen.share - self._usual) * novelty
+        self._usual_misfit += (sighting.misfit - self._usual_misfit) * novelty
         self._beside.learn(which, left[counted])
 
     def forget(self, seconds: float) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 
@@ -159,6 +160,29 @@ def test_a_frame_that_cannot_be_is_refused():
     elsewhere = np.roll(frame(15), (1, 2), axis=(0, 1))
     moments = followed({15: elsewhere})
     assert how(moments)[14:17] == ["measured", "refused", "measured"]
+    assert residual_px(moments) < 0.15
+
+
+def magnified(picture: np.ndarray, by: float) -> np.ndarray:
+    """What the camera shows with so much longer a focal length."""
+    about = LEFT.intrinsics.matrix[:2, 2]
+    matrix = np.column_stack([by * np.eye(2), (1 - by) * about])
+    return cv2.warpAffine(picture, matrix, LEFT.intrinsics.size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
+
+
+@pytest.mark.parametrize("by", [1.02, 1.01])
+def test_a_lens_that_is_zoomed_is_refused_however_long_it_is_looked_at(by):
+    """A pose that nobody knows any more must not be drawn to where a part of the lines fits it."""
+    moments = followed({number: magnified(frame(number), by) for number in range(12, COUNT)})
+    assert "measured" not in how(moments)[12:]
+
+
+def test_a_picture_that_is_noisier_or_less_sharp_than_usual_is_measured():
+    rng = np.random.default_rng(3)
+    noisy = {n: np.clip(frame(n) + rng.normal(0, 15, PICTURE.shape), 0, 255).astype(np.uint8) for n in range(12, 20)}
+    soft = {number: cv2.GaussianBlur(frame(number), (0, 0), 1.0) for number in range(24, 32)}
+    moments = followed(noisy | soft)
+    assert set(how(moments)) == {"measured"}
     assert residual_px(moments) < 0.15
 
 
