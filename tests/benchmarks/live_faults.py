@@ -195,12 +195,12 @@ def soak_table(run: LiveRun, phases: Sequence[Phase]) -> list[str]:
 
 
 @contextmanager
-def filmed(film: Film, every: int) -> Iterator[tuple[LiveRun, list[Fault]]]:
-    """Both cameras while they are tracked, and what may happen to the first one."""
+def filmed(film: Film, every: int, *options: str, url: str | None = None) -> Iterator[tuple[LiveRun, list[Fault]]]:
+    """Both cameras while they are tracked, with these options and by a service at `url`, and what may happen."""
     _, made = clips(film.size)
     changed = changed_clips(film)
     paths = {word: path for word, (path, _) in changed.items()}
-    with running(made, dict(changed.values()), film, "--follow-every", str(every)) as run:
+    with running(made, dict(changed.values()), film, "--follow-every", str(every), *options, url=url) as run:
         wait_until(lambda: all(run.judged(name) for name in run.names), START_S)
         yield run, faults(film.file(made[0].still.id), paths)
 

@@ -16,6 +16,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import httpx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +27,7 @@ from tests.rtsp import Cameras, Taken, encode, filming
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
 
-FOLDER = Path("build/live")
+FOLDER, VENUE = Path("build/live"), "demo"
 # After so many pictures of a clip the motion of its camera is as it was.
 PERIOD = round(FRAMES_PER_SECOND / SWING_HZ)
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
@@ -170,8 +171,13 @@ class LiveRun:
 
 
 @contextmanager
-def running(clips: Sequence[Clip], others: Mapping[Path, Clip], film: Film, *options: str) -> Iterator[LiveRun]:
-    """Run `esc live` on cameras that film these clips; the `others`, which they may film later, are encoded too."""
+def running(
+    clips: Sequence[Clip], others: Mapping[Path, Clip], film: Film, *options: str, url: str | None = None
+) -> Iterator[LiveRun]:
+    """Run `esc live` on cameras that film these clips; the `others`, which they may film later, are encoded too.
+
+    Their venue is of the service at `url`, as `VENUE`, or a file.
+    """
     FOLDER.mkdir(parents=True, exist_ok=True)
     paths = [film.file(clip.still.id) for clip in clips]
     truths: dict[Path, Truth] = {}
@@ -182,8 +188,14 @@ def running(clips: Sequence[Clip], others: Mapping[Path, Clip], film: Film, *opt
     venue = json.loads((HERE / "venue.json").read_text())
     stored = [stored_camera(clip.still, number, "exact") for number, clip in enumerate(clips)]
     venue["cameras"] = [camera_document(camera).model_dump(mode="json", exclude_unset=True) for camera in stored]
-    (FOLDER / "venue.json").write_text(json.dumps(venue))
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    if url is None:
+        named = str(FOLDER / "venue.json")
+        Path(named).write_text(json.dumps(venue))
+    else:
+        named = VENUE
+        httpx.put(f"{url}/venues/{VENUE}", json=venue).raise_for_status()
+        environment["ESC_URL"] = url
     with filming(paths, film.rate) as cameras:
         names = [camera.id for camera in stored]
         streams = [f"{name}={address}" for name, address in zip(names, cameras.addresses, strict=True)]
@@ -192,7 +204,7 @@ def running(clips: Sequence[Clip], others: Mapping[Path, Clip], film: Film, *opt
             "-m",
             "service.cli",
             "live",
-            str(FOLDER / "venue.json"),
+            named,
             *streams,
             "--json",
             *options,

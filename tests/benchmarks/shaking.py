@@ -13,7 +13,8 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import cycle
 from pathlib import Path
 
 import av
@@ -228,18 +229,23 @@ def moves(profiles: Array) -> Array:
     )
 
 
-def clips(size: str, seed: int = 19) -> tuple[Field, list[Clip]]:
-    """Those of the cameras of the demo, or of the real pair, whose lenses and lines are as lenses and lines are."""
+def clips(size: str, seed: int = 19, count: int = 2) -> tuple[Field, list[Clip]]:
+    """Those of the cameras of the demo, or of the real pair, whose lenses and lines are as lenses and lines are.
+
+    More than two stand where the demo's two do, each on a mast of its own.
+    """
     rng = np.random.default_rng(seed)
     if size == "real":
         pair = RealPair.load()
         return pair.pitch, [Clip(pair.pitch, one, picture(pair.files()[one.id]).copy(), rng) for one in pair.cameras]
     made = []
-    for camera in cameras():
+    for number, camera in zip(range(count), cycle(cameras()), strict=False):
         lens = camera.intrinsics.scaled(SIZES[size][0])
         still = np.asarray(cv2.imread(str(HERE / f"{camera.id}.jpg")), np.uint8)
         small = np.asarray(cv2.resize(still, lens.size, interpolation=cv2.INTER_AREA), np.uint8)
-        made.append(Clip(FIELD, camera.with_lens(lens), small, rng))
+        taken_by = camera.with_lens(lens)
+        named = taken_by if number < 2 else replace(taken_by, id=f"{camera.id}-{number // 2 + 1}")
+        made.append(Clip(FIELD, taken_by, small, rng, named))
     return FIELD, made
 
 
