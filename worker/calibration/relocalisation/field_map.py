@@ -23,6 +23,8 @@ SHORTEST_LINE = 0.03
 """Of the longer side of the field: shorter straight pieces (ticks, dashes) name no line that an image line could be."""
 SAME_LINE_M = 0.3
 """Two places of a field turned by half a turn are the same marking when they are no farther apart."""
+ALIKE_M = 0.05
+"""Circles whose radii differ by less are of one size."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class FieldMap:
 
     `nearest` (rows, columns, 2): from the nearest paint to each cell of the ground, m; the cell of row 0, column 0 has
     its centre at `origin` (2,) m and cells are `cell_m` wide. `lines_along_x`: y (m) of the straight lines that run
-    along x; `lines_along_y`: x (m) of those along y.
+    along x; `lines_along_y`: x (m) of those along y; `repeats` (R, 2) m: from each circle to others of its size.
     """
 
     points: NDArray[np.float32]
@@ -41,6 +43,7 @@ class FieldMap:
     cell_m: float
     lines_along_x: Array
     lines_along_y: Array
+    repeats: Array
     half_size: Array
 
     @classmethod
@@ -62,6 +65,7 @@ class FieldMap:
             cell,
             _straight(lines, 0, shortest),
             _straight(lines, 1, shortest),
+            _repeats([marking.centre for marking in lines if marking.closed]),
             half,
         )
 
@@ -110,3 +114,19 @@ def _straight(lines: list[Marking], axis: int, shortest: float) -> Array:
             if abs(end[1 - axis] - start[1 - axis]) < 1e-6 and abs(end[axis] - start[axis]) >= shortest:
                 found.add(round(float(start[1 - axis]), 3))
     return np.array(sorted(found))
+
+
+def _repeats(closed: list[Array]) -> Array:
+    """From the middle of each circle among closed polylines (n, 2) to those of others of its size, (R, 2)."""
+    middles = [line[:-1].mean(axis=0) for line in closed]
+    radii = [np.linalg.norm(line - middle, axis=1) for line, middle in zip(closed, middles, strict=True)]
+    circles = [
+        (middle, radius.mean()) for middle, radius in zip(middles, radii, strict=True) if np.ptp(radius) < ALIKE_M
+    ]
+    moves = [
+        there - here
+        for here, one in circles
+        for there, other in circles
+        if here is not there and abs(one - other) < ALIKE_M
+    ]
+    return np.unique(np.round(moves, 3), axis=0) if moves else np.zeros((0, 2))

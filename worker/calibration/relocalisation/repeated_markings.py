@@ -1,7 +1,7 @@
 """Cameras slid along a field whose markings repeat: the same lines, each taken for another one.
 
-Yard lines that lie evenly explain a view from every place that is so many yards farther on, and a search that climbs
-does not leave the one it ends at. What tells those places apart are the lines at their ends, which few pixels show.
+Yard lines that lie evenly explain a view from every place that is so many yards farther on, a circle of a rink from
+four, and a search that climbs does not leave the one it ends at. What tells those places apart few pixels show.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ LARGEST_SHARE = 0.75
 
 
 def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
-    """Each camera moved along x and along y by every distance between two parallel markings, both ways."""
+    """Each camera moved by every distance between two parallel lines, or between two circles of one size."""
     slides = np.concatenate(
         [
             _slides(field.lines_along_y, np.array([1.0, 0.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[0])),
             _slides(field.lines_along_x, np.array([0.0, 1.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[1])),
+            np.pad(field.repeats, ((0, 0), (0, 1))),
         ]
     )
     of_each = len(slides)

@@ -35,8 +35,9 @@ class TrackedPose:
     """A camera when one frame was taken.
 
     `how`: whether its lines were `measured`, or it went on as it went because they were not looked for or not seen
-    (`coasted`), or because they contradicted all that was known, or each other (`refused`). `motion_covariance` (6, 6) of turn (rad)
-    and shift (m): how sure the motion since the reference is; `covariance`: with how sure the reference is.
+    (`coasted`), or because they contradicted all that was known, or each other (`refused`). `motion_covariance` (6, 6)
+    of turn (rad) and shift (m): how sure the motion since the reference is; `covariance`: with how sure the reference
+    is.
     """
 
     camera: Camera

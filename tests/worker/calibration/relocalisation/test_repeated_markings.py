@@ -35,3 +35,10 @@ def test_slid_cameras_look_where_they_looked_and_stand_elsewhere_on_the_field(sp
     assert (np.count_nonzero(moves, axis=1) == 1).all()
     assert np.all(moves[:, 2] == 0)
     assert np.all(moved.rotations == SIDELINE.pose.matrix)
+
+
+def test_a_camera_of_a_rink_is_slid_from_each_circle_to_each_other_one():
+    moves = np.round(slid("ice-hockey").positions - SIDELINE.pose.position, 6).tolist()
+    for along, across in ((0, 14), (20, 7), (-20, 7), (40, 0), (-40, 14)):
+        assert [along, across, 0] in moves
+        assert [-along, -across, 0] in moves
