@@ -34,8 +34,9 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
-ATTEMPTS, BEGUN_ANEW = 2, frozenset({"lines", "no-lines"})
-"""Where no pose explains the lines the search, which draws at random, is begun anew: so often in all."""
+FAINT, BEGUN_ANEW = 2.5, frozenset({"lines", "no-lines", "few-lines"})
+"""Where the search ends for such a reason it is begun anew, with the network's probabilities so many times as large:
+then faint paint is paint as well, and so is more that is none."""
 REFINED, MUCH_WORSE = 4, 0.12
 """So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
 PROPOSED_APART, DIFFERENT = 0.04, 0.01
@@ -123,17 +124,17 @@ def relocalise(
     Where its focal length is not known, k1, k2 and principal point are found with it and the pose. `pulse` is called
     every second or so, and may raise to end the search. Proposals of less than `least_agreement` are not refined.
     """
-    small = np.rint(response * 255).astype(np.uint8)
-    sight = _Sight(field, Observations([channels], [response]), Paint.of(small))
+    sight = _Sight.of(field, channels, response)
     candidates = list[Candidate]()
-    for attempt in range(ATTEMPTS):
+    for attempt, looked in enumerate((sight, sight.fainter())):
         pulse()
         proposals = [
-            one for one in propose(markings, small, sought, seed + attempt) if one.agreement >= least_agreement
+            one for one in propose(markings, looked.small, sought, seed + attempt) if one.agreement >= least_agreement
         ]
         for camera in _distinct(field, markings, sought, proposals):
             pulse()
-            candidates.append(sight.with_lens_and_pose(camera) if sought.is_lens_sought else sight.with_pose(camera))
+            caught = camera if looked is sight else looked.candidate(camera, sought).camera
+            candidates.append(sight.candidate(caught, sought))
         candidates.sort(key=lambda one: -one.agreement)
         found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, sought, candidates))
         if found.refusal is None or found.refusal.reason not in BEGUN_ANEW:
@@ -143,11 +144,27 @@ def relocalise(
 
 @dataclass(frozen=True)
 class _Sight:
-    """What is seen of one camera: its lines as a finish measures them, and all paint."""
+    """What is seen of one camera: its lines as a finish measures them, and all paint, in `small` (0..255) as well."""
 
     field: Field
     observations: Observations
+    small: NDArray[np.uint8]
     paint: Paint
+
+    @classmethod
+    def of(cls, field: Field, channels: Channels, response: Response) -> _Sight:
+        """What a frame shows, by the response (H, W) of the network."""
+        small = np.rint(response * 255).astype(np.uint8)
+        return cls(field, Observations([channels], [response]), small, Paint.of(small))
+
+    def fainter(self) -> _Sight:
+        """The same with what is faint."""
+        (channels,), (response,) = self.observations.channels, self.observations.responses
+        return _Sight.of(self.field, channels, np.minimum(np.float32(FAINT) * response, np.float32(1.0)))
+
+    def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
+        """A proposed camera on the measured lines, with what is sought of it."""
+        return self.with_lens_and_pose(camera) if sought.is_lens_sought else self.with_pose(camera)
 
     def with_pose(self, camera: Camera) -> Candidate:
         """A proposed camera on the measured lines."""
