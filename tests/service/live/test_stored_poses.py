@@ -126,13 +126,13 @@ def test_lines_of_json_count_the_moments():
 
 
 def test_samples_come_at_their_rate(udp):
+    begun = time.monotonic()
     with listening() as opened, Sending([FreeD(udp, "127.0.0.1", port_of(opened), "x y z pan tilt roll")]):
-        opened.recv(64)
-        begun = time.monotonic()
-        for _ in range(2 * 100):
+        # A hundred and one moments of two cameras at 200 a second, the first at once. A busy machine may be late, and
+        # what it had to send in between may wait here; none is sent early.
+        for _ in range(2 * 101):
             opened.recv(64)
-        # A hundred moments of two cameras at 200 a second; a busy machine may be late, and never early.
-        assert time.monotonic() - begun >= 0.49
+        assert time.monotonic() - begun >= 0.5
 
 
 def test_a_pose_that_changes_a_little_is_moved_to_within_a_second():
