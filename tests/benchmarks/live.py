@@ -48,13 +48,14 @@ def main() -> int:
         print("install GStreamer's RTSP server, as CONTRIBUTING.md says", file=sys.stderr)
         return 2
     film, every = Film(options.size, options.rate), options.follow_every
+    if options.only == "rates":
+        rates(options.size, options.seconds)
+        return 0
     print(f"{film.size} at {film.rate:g} Hz, lines in every {every}.", flush=True)
     if options.only in (None, "quiet"):
         quiet(film, options.seconds, every, options.cameras)
     if options.only in (None, "faults"):
         live_faults.run_faults(film, every)
-    if options.only == "rates":
-        rates(options.size, options.seconds)
     if options.only == "recover":
         live_recovery.run_recoveries(film, every)
     if options.only == "soak":
