@@ -75,7 +75,7 @@ class Follower:
         """Run a job; an accepted one is where tracking begins anew."""
         done = calibrate(FIELD, [self.stored], {self.stored.id: [frame]}, segment, Options(seed=1))
         (result,) = done.cameras
-        self.jobs["accepted" if result.accepted else result.refusal.kind if result.refusal else "refused"] += 1
+        self.jobs["accepted" if result.accepted else result.refusal.reason if result.refusal else "refused"] += 1
         if result.accepted:
             self.stored, self.tracker = result.camera, None
 
