@@ -34,9 +34,9 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
-FAINT, BEGUN_ANEW = 2.5, frozenset({"lines", "no-lines", "few-lines"})
-"""Where the search ends for such a reason it is begun anew, with the network's probabilities so many times as large:
-then faint paint is paint as well, and so is more that is none."""
+ATTEMPTS, FAINT, BEGUN_ANEW = 2, 2.5, frozenset({"lines", "no-lines", "few-lines"})
+"""Where the search ends for such a reason it is begun anew, so often in all, with the network's probabilities so many
+times as large: then faint paint is paint as well, and so is more that is none."""
 REFINED, MUCH_WORSE = 4, 0.12
 """So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
 PROPOSED_APART, DIFFERENT = 0.04, 0.01
@@ -126,8 +126,9 @@ def relocalise(
     """
     sight = _Sight.of(field, channels, response)
     candidates = list[Candidate]()
-    for attempt, looked in enumerate((sight, sight.fainter())):
+    for attempt in range(ATTEMPTS):
         pulse()
+        looked = sight if attempt == 0 else sight.fainter()
         proposals = [
             one for one in propose(markings, looked.small, sought, seed + attempt) if one.agreement >= least_agreement
         ]

@@ -38,9 +38,9 @@ def found(pitch_name, truth_name, lens_is_known, place=None):
     return pitch, truth, search(pitch, truth, paint_frame(pitch, truth), lens_is_known, place or Place())
 
 
-def search(pitch, truth, frame, lens_is_known=True, place=Place()):  # noqa: B008  (frozen)
+def search(pitch, truth, frame, lens_is_known=True, place=Place(), sureness=1.0):  # noqa: B008  (frozen)
     lenses = [SoughtLens.known(truth.intrinsics)] if lens_is_known else unknown_lenses(truth.intrinsics.size)
-    response = white_on_green(frame, [Region(0, 0, *truth.intrinsics.size)]).astype(np.float32) / 255
+    response = white_on_green(frame, [Region(0, 0, *truth.intrinsics.size)]).astype(np.float32) / 255 * sureness
     sought = SoughtCamera(truth.id, lenses, place)
     return relocalise(pitch, FieldMap.of(pitch), sought, Channels([frame]), response, 1)
 
@@ -58,6 +58,13 @@ def off_px(pitch, truth, best):
 )
 def test_a_camera_of_a_known_lens_is_found(sport, truth):
     pitch, camera, answer = found(sport, truth, lens_is_known=True)
+    assert answer.refusal is None, answer.refusal
+    assert off_px(pitch, camera, answer.candidates[0].camera) < 0.5
+
+
+def test_paint_that_the_network_is_hardly_sure_of_is_searched_too():
+    pitch, camera = PITCH, SIDELINE
+    answer = search(pitch, camera, paint_frame(pitch, camera), sureness=np.float32(0.4))
     assert answer.refusal is None, answer.refusal
     assert off_px(pitch, camera, answer.candidates[0].camera) < 0.5
 
