@@ -11,11 +11,12 @@ import time
 from collections.abc import Iterable
 
 from worker.video.errors import VideoError
+from worker.video.stream_clock import EARLIEST_S, clock_in_words
 
 # Cameras report every five seconds or so (RFC 3550, 6.2), FFmpeg takes the second report at the latest.
 REPORTED_WITHIN_S = 12.0
-# A picture that says it is from the future or older than this comes from a camera whose clock is wrong.
-EARLIEST_S, LATEST_S = -0.1, 10.0
+# A picture that says it is older than this comes from a camera whose clock is wrong: the first ones may have waited.
+LATEST_S = 10.0
 
 
 class CameraClocks:
@@ -37,10 +38,9 @@ class CameraClocks:
             if taken_ns is not None and camera in self._silent:
                 late_s = (time.time_ns() - taken_ns) / 1e9
                 if not EARLIEST_S <= late_s <= LATEST_S:
-                    side = "behind" if late_s > 0 else "ahead of"
                     self._fault = (
-                        f"camera {camera}: its clock is {abs(late_s):.1f} s {side} this machine's. Let both keep time "
-                        f"by NTP, or take pictures as they arrive: --offset {camera}=0"
+                        f"camera {camera}: {clock_in_words(late_s)}. Let both keep time by NTP, or take pictures as "
+                        f"they arrive: --offset {camera}=0"
                     )
                 self._silent.discard(camera)
             if self._silent and time.monotonic() > self._until:

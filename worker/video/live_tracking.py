@@ -24,7 +24,7 @@ from worker.calibration.tracking.follower import CameraTracker, TrackedPose
 from worker.video.clips import Clip, camera_for_clip
 from worker.video.errors import VideoError
 from worker.video.stillness import Stillness
-from worker.video.stream_clock import Lateness
+from worker.video.stream_clock import EARLIEST_S, Lateness, clock_in_words
 from worker.video.yuv_planes import Picture
 
 # Between two attempts to open a stream, and to find the lines of a camera in a picture.
@@ -36,8 +36,8 @@ LONGEST_GAP_S = 30.0
 LONGEST_STEP_S = 0.1
 # Pictures without the lines where they were expected, one after the other, after which the camera is looked for anew.
 LOST_AFTER_S = 3.0
-# A prompt picture that says it is from the future or older than this comes from a camera whose clock is wrong.
-EARLIEST_S, LATEST_S = -0.1, 2.0
+# A prompt picture that says it is older than this comes from a camera whose clock is wrong.
+LATEST_S = 2.0
 # A picture that is older is not where the camera looks now.
 NEWEST_S = 2.0
 # A pose that is known no better than this is found by lines that do not fit: zoom or focus are others than stored.
@@ -281,9 +281,8 @@ class StreamTracker:
         set_by_s = 0.0 if self._clock_offset_s is None else offset_s - self._clock_offset_s
         self._clock_offset_s = offset_s
         if was_right and not self._is_clock_right:
-            side = "behind" if delay_s > 0 else "ahead of"
             self.remark(
-                f"camera {self.stored.id}: its clock is {abs(delay_s):.1f} s {side} this machine's"
+                f"camera {self.stored.id}: {clock_in_words(delay_s)}"
                 f"{', or its pictures are so long on their way' if delay_s > 0 else ''}, so they count from when they "
                 "arrive. Let both keep time by NTP"
             )

@@ -20,6 +20,14 @@ if TYPE_CHECKING:
 # By so much the clocks of camera and machine may differ, as a part of time.
 CLOCKS_DIFFER = 1e-3
 WALL_CLOCK_US = struct.Struct("=q")
+EARLIEST_S = -0.1
+"""Seconds after it was taken that a picture comes: less than so many, and its camera's clock is ahead."""
+
+
+def clock_in_words(late_s: float) -> str:
+    """What is wrong with a camera's clock by which a picture comes so many seconds after it was taken."""
+    side = "behind" if late_s > 0 else "ahead of"
+    return f"its clock is {abs(late_s):.1f} s {side} this machine's"
 
 
 class Lateness:
