@@ -34,7 +34,7 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
-ATTEMPTS, FAINT, BEGUN_ANEW = 2, 2.5, frozenset({"lines", "no-lines", "few-lines"})
+ATTEMPTS, FAINT, BEGUN_ANEW = 2, 1.6, frozenset({"lines", "no-lines", "few-lines"})
 """Where the search ends for such a reason it is begun anew, so often in all, with the network's probabilities so many
 times as large: then faint paint is paint as well, and so is more that is none."""
 REFINED, MUCH_WORSE = 4, 0.12
