@@ -33,7 +33,7 @@ class FieldMap:
 
     `nearest` (rows, columns, 2): from the nearest paint to each cell of the ground, m; the cell of row 0, column 0 has
     its centre at `origin` (2,) m and cells are `cell_m` wide. `lines_along_x`: y (m) of the straight lines that run
-    along x; `lines_along_y`: x (m) of those along y; `repeats` (R, 2) m: from each circle to others of its size.
+    along x; `lines_along_y`: x (m) of those along y; `between_circles` (R, 2) m: from each to others of its size.
     """
 
     points: NDArray[np.float32]
@@ -43,7 +43,7 @@ class FieldMap:
     cell_m: float
     lines_along_x: Array
     lines_along_y: Array
-    repeats: Array
+    between_circles: Array
     half_size: Array
 
     @classmethod
@@ -65,7 +65,7 @@ class FieldMap:
             cell,
             _straight(lines, 0, shortest),
             _straight(lines, 1, shortest),
-            _repeats([marking.centre for marking in lines if marking.closed]),
+            _between_circles([marking.centre for marking in lines if marking.closed]),
             half,
         )
 
@@ -116,7 +116,7 @@ def _straight(lines: list[Marking], axis: int, shortest: float) -> Array:
     return np.array(sorted(found))
 
 
-def _repeats(closed: list[Array]) -> Array:
+def _between_circles(closed: list[Array]) -> Array:
     """From the middle of each circle among closed polylines (n, 2) to those of others of its size, (R, 2)."""
     middles = [line[:-1].mean(axis=0) for line in closed]
     radii = [np.linalg.norm(line - middle, axis=1) for line, middle in zip(closed, middles, strict=True)]

@@ -24,7 +24,7 @@ def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
         [
             _slides(field.lines_along_y, np.array([1.0, 0.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[0])),
             _slides(field.lines_along_x, np.array([0.0, 1.0, 0.0]), 2 * LARGEST_SHARE * float(field.half_size[1])),
-            np.pad(field.repeats, ((0, 0), (0, 1))),
+            np.pad(field.between_circles, ((0, 0), (0, 1))),
         ]
     )
     of_each = len(slides)
