@@ -34,9 +34,11 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
-ATTEMPTS, FAINT, BEGUN_ANEW = 2, 1.6, frozenset({"lines", "no-lines", "few-lines"})
-"""Where the search ends for such a reason it is begun anew, so often in all, with the network's probabilities so many
-times as large: then faint paint is paint as well, and so is more that is none."""
+BEGUN_ANEW = frozenset({"lines", "no-lines", "few-lines"})
+"""Where the search ends for such a reason, it is begun anew with other draws and ..."""
+KNOWN_LENS, SOUGHT_LENS = (1.0, 1.0, 1.6), (1.0, 1.6)
+"""... the network's probabilities times so much: then faint paint is paint as well, and so is more that is none. To
+search for a lens too is dear."""
 REFINED, MUCH_WORSE = 4, 0.12
 """So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
 PROPOSED_APART, DIFFERENT = 0.04, 0.01
@@ -126,9 +128,9 @@ def relocalise(
     """
     sight = _Sight.of(field, channels, response)
     candidates = list[Candidate]()
-    for attempt in range(ATTEMPTS):
+    for attempt, times in enumerate(SOUGHT_LENS if sought.is_lens_sought else KNOWN_LENS):
         pulse()
-        looked = sight if attempt == 0 else sight.fainter()
+        looked = sight if times == 1.0 else sight.strengthened(times)
         proposals = [
             one for one in propose(markings, looked.small, sought, seed + attempt) if one.agreement >= least_agreement
         ]
@@ -158,10 +160,10 @@ class _Sight:
         small = np.rint(response * 255).astype(np.uint8)
         return cls(field, Observations([channels], [response]), small, Paint.of(small))
 
-    def fainter(self) -> _Sight:
-        """The same with what is faint."""
+    def strengthened(self, times: float) -> _Sight:
+        """The same with the network so many times as sure."""
         (channels,), (response,) = self.observations.channels, self.observations.responses
-        return _Sight.of(self.field, channels, np.minimum(np.float32(FAINT) * response, np.float32(1.0)))
+        return _Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
         """A proposed camera on the measured lines, with what is sought of it."""
