@@ -35,10 +35,12 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
 BEGUN_ANEW = frozenset({"lines", "no-lines", "few-lines"})
-"""Where the search ends for such a reason, it is begun anew with other draws and ..."""
-KNOWN_LENS, SOUGHT_LENS = (1.0, 1.0, 1.6), (1.0, 1.6)
-"""... the network's probabilities times so much: then faint paint is paint as well, and so is more that is none. To
-search for a lens too is dear."""
+"""Where the search ends for such a reason, it is begun anew with other draws, and ..."""
+FAINT = 1.6
+"""... if lines were found that no pose explains, then first as they are, else with the network's probabilities times so
+much: then faint paint is paint as well, and so is more that is none."""
+ATTEMPTS_KNOWN_LENS, ATTEMPTS_SOUGHT_LENS = 3, 2
+"""How often it is begun at most: to search for a lens too is dear."""
 REFINED, MUCH_WORSE = 4, 0.12
 """So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
 PROPOSED_APART, DIFFERENT = 0.04, 0.01
@@ -128,9 +130,9 @@ def relocalise(
     """
     sight = _Sight.of(field, channels, response)
     candidates = list[Candidate]()
-    for attempt, times in enumerate(SOUGHT_LENS if sought.is_lens_sought else KNOWN_LENS):
+    looked = sight
+    for attempt in range(ATTEMPTS_SOUGHT_LENS if sought.is_lens_sought else ATTEMPTS_KNOWN_LENS):
         pulse()
-        looked = sight if times == 1.0 else sight.strengthened(times)
         proposals = [
             one for one in propose(markings, looked.small, sought, seed + attempt) if one.agreement >= least_agreement
         ]
@@ -142,6 +144,8 @@ def relocalise(
         found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, sought, candidates))
         if found.refusal is None or found.refusal.reason not in BEGUN_ANEW:
             break
+        if attempt > 0 or found.refusal.reason != "lines":
+            looked = sight.strengthened(FAINT)
     return found
 
 
