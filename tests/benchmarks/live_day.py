@@ -12,8 +12,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from math import cos, pi, sin
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -55,12 +57,19 @@ class Follower:
 
     def see(self, frame: Frame, seconds: float, hour: float, true: Camera) -> None:
         """Take the next picture; the camera is looked for where it is stored if it is not tracked."""
-        learned_offsets.FORGOTTEN_IN_S, kept = (3600.0 if self.forgets else np.inf), learned_offsets.FORGOTTEN_IN_S
+        with nullcontext() if self.forgets else patch.object(learned_offsets, "FORGOTTEN_IN_S", np.inf):
+            tracked = self._tracked(frame, seconds)
+        if tracked is not None:
+            off_deg = rotation_angles_deg(tracked.camera.pose.rotation, true.pose.rotation)
+            self.found.append((hour, tracked, off_deg))
+
+    def _tracked(self, frame: Frame, seconds: float) -> TrackedPose | None:
+        """Return the pose in a picture so long after the one before, None where the camera is not found."""
         if self.tracker is None:
             try:
                 self.tracker = CameraTracker(FIELD, [self.stored], {self.stored.id: frame}, RATE)
             except CalibrationError:
-                return
+                return None
         else:
             for _ in range(round(seconds / COAST_S)):
                 self.tracker.see({}, COAST_S)
@@ -68,8 +77,7 @@ class Follower:
             self.tracker.see({self.stored.id: Channels([frame])}, 1 / RATE)
         (tracked,) = self.tracker.now.cameras
         self.tracker.settled()
-        learned_offsets.FORGOTTEN_IN_S = kept
-        self.found.append((hour, tracked, rotation_angles_deg(tracked.camera.pose.rotation, true.pose.rotation)))
+        return tracked
 
     def calibrated(self, frame: Frame, segment: Segmenter) -> None:
         """Run a job; an accepted one is where tracking begins anew."""

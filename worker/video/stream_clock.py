@@ -25,7 +25,7 @@ EARLIEST_S = -0.1
 
 
 def clock_in_words(late_s: float) -> str:
-    """What is wrong with a camera's clock by which a picture comes so many seconds after it was taken."""
+    """Say how far a camera's clock is off, by which a picture comes `late_s` seconds after it was taken."""
     side = "behind" if late_s > 0 else "ahead of"
     return f"its clock is {abs(late_s):.1f} s {side} this machine's"
 

@@ -151,7 +151,7 @@ def relocalise(
 
 @dataclass(frozen=True)
 class _Sight:
-    """What is seen of one camera: its lines as a finish measures them, and all paint, in `small` (0..255) as well."""
+    """Lines and paint of one frame: `observations` for a finish, `small` (H, W) the response in 0..255, its `paint`."""
 
     field: Field
     observations: Observations
@@ -160,12 +160,12 @@ class _Sight:
 
     @classmethod
     def of(cls, field: Field, channels: Channels, response: Response) -> _Sight:
-        """What a frame shows, by the response (H, W) of the network."""
+        """Return the sight of a frame by the response (H, W) of the network, 0..1."""
         small = np.rint(response * 255).astype(np.uint8)
         return cls(field, Observations([channels], [response]), small, Paint.of(small))
 
     def strengthened(self, times: float) -> _Sight:
-        """The same with the network so many times as sure."""
+        """Return the sight of this frame as if the network were so many `times` as sure."""
         (channels,), (response,) = self.observations.channels, self.observations.responses
         return _Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
