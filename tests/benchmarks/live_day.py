@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import cos, pi, sin
 from unittest.mock import patch
 
@@ -23,8 +23,8 @@ import numpy as np
 from models import MODEL_PATH
 from tests.benchmarks.fields.engine import THREADS
 from tests.benchmarks.live_faults import panned, zoomed
-from tests.benchmarks.shaking import SIZES, Clip, stored_camera
-from tests.demo.render import FIELD, HERE, cameras
+from tests.benchmarks.shaking import Clip, resized, stored_camera
+from tests.demo.render import FIELD, cameras
 from worker.calibration.calibrate import calibrate
 from worker.calibration.detection.contrast import Channels
 from worker.calibration.detection.segmentation import Segmenter
@@ -112,10 +112,7 @@ def row(follower: Follower, begin_h: float) -> str:
 def main() -> None:
     """Film the day, track it, print the table."""
     cv2.setNumThreads(THREADS)
-    camera = cameras()[0]
-    taken_by = replace(camera, intrinsics=camera.intrinsics.scaled(SIZES[SIZE][0]))
-    still = np.asarray(cv2.imread(str(HERE / f"{camera.id}.jpg")), np.uint8)
-    picture = np.asarray(cv2.resize(still, taken_by.intrinsics.size, interpolation=cv2.INTER_AREA), np.uint8)
+    taken_by, picture = resized(cameras()[0], SIZE)
     stored = stored_camera(taken_by, 0, "exact")
     ways = [
         Follower("as it is", stored, has_jobs=True, forgets=True),

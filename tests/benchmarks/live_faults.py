@@ -20,8 +20,8 @@ import cv2
 import numpy as np
 
 from tests.benchmarks.live_running import Film, LiveRun, running
-from tests.benchmarks.shaking import SIZES, Clip, clips
-from tests.demo.render import FIELD, HERE, cameras
+from tests.benchmarks.shaking import Clip, clips, resized
+from tests.demo.render import FIELD, cameras
 from worker.calibration.geometry.camera import Camera, Pose
 
 # Until both cameras are measured and have reported their clocks; between two faults; until one is measured again.
@@ -53,10 +53,7 @@ class Scene:
 
 def changed_clips(film: Film) -> dict[str, tuple[Path, Clip]]:
     """What the first camera films once it was zoomed, nudged or knocked, by these words."""
-    taken_by = cameras()[0]
-    taken_by = taken_by.with_lens(taken_by.intrinsics.scaled(SIZES[film.size][0]))
-    still = np.asarray(cv2.imread(str(HERE / f"{taken_by.id}.jpg")), np.uint8)
-    picture = np.asarray(cv2.resize(still, taken_by.intrinsics.size, interpolation=cv2.INTER_AREA), np.uint8)
+    taken_by, picture = resized(cameras()[0], film.size)
     made = {
         "zoomed": zoomed(taken_by, ZOOM),
         "nudged": panned(taken_by, NUDGED_DEG),

@@ -240,13 +240,18 @@ def clips(size: str, seed: int = 19, count: int = 2) -> tuple[Field, list[Clip]]
         return pair.pitch, [Clip(pair.pitch, one, picture(pair.files()[one.id]).copy(), rng) for one in pair.cameras]
     made = []
     for number, camera in zip(range(count), cycle(cameras()), strict=False):
-        lens = camera.intrinsics.scaled(SIZES[size][0])
-        still = np.asarray(cv2.imread(str(HERE / f"{camera.id}.jpg")), np.uint8)
-        small = np.asarray(cv2.resize(still, lens.size, interpolation=cv2.INTER_AREA), np.uint8)
-        taken_by = camera.with_lens(lens)
+        taken_by, small = resized(camera, size)
         named = taken_by if number < 2 else replace(taken_by, id=f"{camera.id}-{number // 2 + 1}")
         made.append(Clip(FIELD, taken_by, small, rng, named))
     return FIELD, made
+
+
+def resized(camera: Camera, size: str) -> tuple[Camera, Frame]:
+    """A camera of the demo at one of `SIZES`, and its picture."""
+    taken_by = camera.with_lens(camera.intrinsics.scaled(SIZES[size][0]))
+    still = np.asarray(cv2.imread(str(HERE / f"{camera.id}.jpg")), np.uint8)
+    small = cv2.resize(still, taken_by.intrinsics.size, interpolation=cv2.INTER_AREA)
+    return taken_by, np.asarray(small, np.uint8)
 
 
 @dataclass(frozen=True)
