@@ -7,8 +7,9 @@ Sections: `rendered` (every template, knocked by 5 to 45 degrees and 0 to 2 m), 
 they are, knocked likewise, and turned by each of `--turns` degrees about any axis), `exchanged` (the frames of 2, 3 and
 4 cameras of a venue, each sent for the next one). The frame is always one that sees enough of the field: a camera that
 is knocked until it sees nothing of it cannot be found. What is knocked is the stored pose, which sees some of the field
-as well. Every run is written to a file and not run again, so that long ones can be continued; after a change of the
-engine or of the renderer the file has to be removed.
+as well. Some pictures are too dark, blurred or faint for any job: beside the share of all draws stands that of those
+whose frame a job accepts which begins with the true pose. Every run is written to a file and not run again, so that
+long ones can be continued; after a change of the engine or of the renderer the file has to be removed.
 """
 
 from __future__ import annotations
@@ -152,7 +153,11 @@ def _row(
 ) -> dict:
     answer = engine(pitch, [stored], {stored.id: [frame]}, seed)
     turn = stored.pose.matrix @ truth.pose.matrix.T
-    row = {**answer.row, "deg": float(np.degrees(np.linalg.norm(rotation_vectors(turn))))}
+    row = {
+        **answer.row,
+        "deg": float(np.degrees(np.linalg.norm(rotation_vectors(turn)))),
+        "fit": engine(pitch, [truth], {truth.id: [frame]}, seed).accepted,
+    }
     if answer.said is None:
         return row | {"reason": "failed", "found": False, "near": False}
     (result,) = answer.said.cameras
@@ -212,14 +217,19 @@ def _within(rows: Sequence[dict], low: float, high: float) -> list[dict]:
 def _table(groups: dict[str, list[dict]], everything: Sequence[dict]) -> Iterator[str]:
     yield "Found: accepted or proposed. Wrong: found, and not near."
     yield ""
-    yield "| cameras | draws | found and near | of these accepted at once | wrong | core-s | longest |"
-    yield "|---" * 7 + "|"
+    yield (
+        "| cameras | draws | found and near | accepted at once | found and near of those a job accepts | wrong "
+        "| core-s | longest |"
+    )
+    yield "|---" * 8 + "|"
     for name, rows in {**groups, "knocked, all": list(everything)}.items():
         if rows:
             cores = [row["core_seconds"] for row in rows]
+            fit = [row for row in rows if row["fit"]]
             yield (
                 f"| {name} | {len(rows)} | {share([row['found'] and row['near'] for row in rows])} "
                 f"| {share([row['accepted'] and row['near'] for row in rows])} "
+                f"| {share([row['found'] and row['near'] for row in fit])} of {len(fit)} "
                 f"| {sum(row['found'] and not row['near'] for row in rows)} "
                 f"| {np.median(cores):.1f} | {max(cores):.1f} |"
             )
@@ -228,6 +238,7 @@ def _table(groups: dict[str, list[dict]], everything: Sequence[dict]) -> Iterato
         for row in rows:
             if not (row["found"] and row["near"]):
                 end = "WRONG" if row["found"] else f"refused: {row['reason']} {row.get('cause') or ''}"
+                end += "" if row["fit"] else " (no job accepts it)"
                 key = row["key"]
                 yield f"{name}, {key.get('knocked') or key['turned']} {key.get('n', '')}, {row['deg']:.0f}°: {end}"
     yield ""
