@@ -23,6 +23,7 @@ import numpy as np
 
 from fields.template import NAMES
 from models import MODEL_PATH
+from service.schemas.find import SoughtCameraIn
 from tests.benchmarks.fields import real
 from tests.benchmarks.fields.cases import Case, cases
 from tests.benchmarks.fields.engine import THREADS, Engine
@@ -35,8 +36,8 @@ from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import mean_shift_px
-from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens, lenses_of_view, unknown_lenses
-from worker.jobs.find import FIELD_OF_VIEW_UNCERTAIN
+from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
+from worker.jobs.find import sought_camera
 
 KNOWING = ("lens", "view", "nothing")
 VIEW_OFF = 0.3
@@ -147,7 +148,7 @@ def _found_in_case(case: Case, knowing: str, engine: Engine) -> dict:
 
 def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, engine: Engine) -> dict:
     """What is found of a camera, what it costs, and whether its frame is `fit` for any job."""
-    sought = SoughtCamera(truth.id, _lenses(truth, knowing, np.random.default_rng([seed, 5])))
+    sought = _sought(truth, knowing, np.random.default_rng([seed, 5]))
     cpu = time.process_time()
     found = find_cameras(pitch, [sought], [], {truth.id: [frame]}, engine.segment, seed)
     core_s = time.process_time() - cpu
@@ -165,6 +166,7 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, e
                 "found": one.evidence.agreement,
                 "unexpected": one.overlap.unexpected,
                 "iou": one.overlap.iou,
+                "shift_px": one.shift_px,
                 "off_px": off_px(one.camera),
             }
             for one in camera.candidates
@@ -175,14 +177,15 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, e
     }
 
 
-def _lenses(truth: Camera, knowing: str, rng: np.random.Generator) -> list[SoughtLens]:
-    size = truth.intrinsics.size
+def _sought(truth: Camera, knowing: str, rng: np.random.Generator) -> SoughtCamera:
+    """A camera of which so much is known, as a job has it."""
     if knowing == "lens":
-        return [SoughtLens.known(truth.intrinsics)]
+        return SoughtCamera(truth.id, [SoughtLens.known(truth.intrinsics)])
+    size, view_deg = truth.intrinsics.size, None
     if knowing == "view":
         focal = truth.intrinsics.focal_length_px * (1 + VIEW_OFF * rng.uniform(-1, 1))
-        return lenses_of_view(size, float(2 * np.degrees(np.arctan(size[0] / 2 / focal))), FIELD_OF_VIEW_UNCERTAIN)
-    return unknown_lenses(size)
+        view_deg = float(2 * np.degrees(np.arctan(size[0] / 2 / focal)))
+    return sought_camera(SoughtCameraIn(id=truth.id, field_of_view_deg=view_deg), size)
 
 
 if __name__ == "__main__":

@@ -151,7 +151,7 @@ def _with_lenses_of_others(
             if other.size == one.size and alone[other.id].refusal is None
         ]
         if lenses:
-            yield replace(one, lenses=lenses)
+            yield replace(one, lenses=lenses, other_lenses=())
 
 
 def _on_their_sides(

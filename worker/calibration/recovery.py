@@ -39,7 +39,7 @@ of them: what shows through fog, or beside what blocks the view, lies for a thir
 has not moved, and a search every quarter of an hour of a foggy night is dear."""
 ON_ITS_MOUNT_M = 2.5
 """How far from its stored place a camera is searched for first."""
-LEAST_PROPOSED = 0.3
+LEAST_PROPOSED = 0.34
 """Poses that agree less with the lines before they are refined are not refined, unless a search was asked for. Those of
 real frames that were found agree by 0.44 and more, those of upside-down frames and other sports by 0.17 to 0.36."""
 LONGEST_S = 20.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import cast
 
 import cv2
@@ -19,6 +20,8 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
 from worker.calibration.relocalisation.relocalise import Candidate
 from worker.calibration.relocalisation.sought import (
+    BENDS,
+    OTHER_BENDS,
     Place,
     SoughtCamera,
     SoughtLens,
@@ -69,7 +72,7 @@ def solve(
     cv2.setNumThreads(means.threads)
     frames = {camera.id: _decoded(camera, files[camera.id]) for camera in site.cameras if camera.id in files}
     pitch = pitch_of(site.field)
-    sought = [_sought(camera, frames[camera.id][0]) for camera in site.cameras if camera.pose is None]
+    sought = [sought_camera(one, _size(frames[one.id][0])) for one in site.cameras if one.pose is None]
     known = [_known(camera) for camera in site.cameras if camera.pose is not None]
     with engine_failures():
         found = find_cameras(
@@ -95,26 +98,24 @@ def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:
     return [decode_frame(camera.id, size, file) for file in files]
 
 
-def _sought(camera: SoughtCameraIn, frame: Picture) -> SoughtCamera:
-    """What is known of a camera, for the engine."""
+def _size(frame: Picture) -> tuple[int, int]:
     height, width = frame.shape[:2]
-    size = (width, height)
+    return width, height
+
+
+def sought_camera(camera: SoughtCameraIn, size: tuple[int, int]) -> SoughtCamera:
+    """What is known of a camera with frames of a size (width, height), for the engine."""
     position = None if camera.position is None else np.array(camera.position)
-    return SoughtCamera(
-        camera.id,
-        _lenses(camera, size),
-        Place(camera.side, position, camera.position_radius_m),
-        ignored_areas_of(camera.ignore, size),
-    )
-
-
-def _lenses(camera: SoughtCameraIn, size: tuple[int, int]) -> list[SoughtLens]:
+    place = Place(camera.side, position, camera.position_radius_m)
+    ignored = ignored_areas_of(camera.ignore, size)
     if camera.intrinsics is not None:
         lens = lens_of(camera.intrinsics, list(size))
-        return [SoughtLens.around(lens, lens.sigma.get("fx", 0.0) / lens.focal_length_px)]
+        known = SoughtLens.around(lens, lens.sigma.get("fx", 0.0) / lens.focal_length_px)
+        return SoughtCamera(camera.id, [known], place, ignored)
     if camera.field_of_view_deg is not None:
-        return lenses_of_view(size, camera.field_of_view_deg, FIELD_OF_VIEW_UNCERTAIN)
-    return unknown_lenses(size)
+        of_view = partial(lenses_of_view, size, camera.field_of_view_deg, FIELD_OF_VIEW_UNCERTAIN)
+        return SoughtCamera(camera.id, of_view(BENDS), place, ignored, of_view(OTHER_BENDS))
+    return SoughtCamera(camera.id, unknown_lenses(size, BENDS), place, ignored, unknown_lenses(size, OTHER_BENDS))
 
 
 def _known(camera: SoughtCameraIn) -> Camera:

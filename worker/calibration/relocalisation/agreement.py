@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import Hypotheses
-from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.line_view import WIDTH_PX, LineView
 
 AT_ONCE = 1024
 NEAREST_M = 0.3
+HALF_WIDTH_PX = WIDTH_PX / 2
 LONGEST_STEP_PX = 25.0
 """Two points of a marking that are farther apart in the view count as so far, view pixels."""
 UNSEEN_PX = 40.0
@@ -56,6 +58,11 @@ def _expected_and_found(
     ahead = depth > NEAREST_M
     depth = np.where(ahead, depth, 1)
     x, y = focal * moved[:, 0] / depth, focal * moved[:, 1] / depth
+    if cameras.bends.any():
+        bent = cameras.bends.astype(np.float32)[:, None] * (x * x + y * y) / HALF_WIDTH_PX**2
+        # Where a lens would bend the picture back nothing is seen.
+        ahead &= 3 * bent > -1
+        x, y = x * (1 + bent), y * (1 + bent)
     height, width = view.distance.shape
     column = np.clip(np.rint(x - view.corner[0]), -1, width).astype(np.int32)
     row = np.clip(np.rint(y - view.corner[1]), -1, height).astype(np.int32)
@@ -73,7 +80,7 @@ def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
     rotations = cameras.rotations.astype(np.float32)
     positions = cameras.positions.astype(np.float32)
     focal = cameras.focal_px.astype(np.float32)[:, None]
-    x, y = view.places[None, :, 0] / focal, view.places[None, :, 1] / focal
+    x, y = (straightened(view.places, cameras.bends) / focal[..., None]).transpose(2, 0, 1)
     rays = np.stack([x, y, np.ones_like(x)], axis=-1) @ rotations
     down = rays[..., 2] < -1e-3
     depth = np.where(down, -positions[:, None, 2] / np.where(down, rays[..., 2], -1), 0)
@@ -87,3 +94,13 @@ def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
     scale = focal / np.maximum(depth, 0.1)
     off = np.hypot(scale * (turned[..., 0] - x * turned[..., 2]), scale * (turned[..., 1] - y * turned[..., 2]))
     return np.asarray(np.where(on_map, np.exp(-((off / tolerance) ** 2)), 0).mean(axis=1))
+
+
+def straightened(places: NDArray[np.float32], bends: Array) -> NDArray[np.float32]:
+    """Places (M, 2) of the view without each of the bends (P,): (P, M, 2), by two steps of a fixed point."""
+    if not bends.any():
+        return places[None]
+    each = bends.astype(np.float32)[:, None]
+    seen = (places * places).sum(axis=1)[None] / np.float32(HALF_WIDTH_PX**2)
+    once = seen / (1 + each * seen) ** 2
+    return np.asarray(places[None] / (1 + each * once)[..., None])

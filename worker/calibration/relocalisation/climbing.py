@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.rotation import rotation_matrices
 from worker.calibration.relocalisation.agreement import LOWEST_M, agreement
+from worker.calibration.relocalisation.alignment import aligned
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.hypotheses import Hypotheses
+from worker.calibration.relocalisation.hypotheses import FARTHEST_BENT, Hypotheses, LensSteps
 from worker.calibration.relocalisation.line_view import LineView
 
 OFFSPRING = 12
@@ -20,7 +21,6 @@ TURN_RAD = np.array([0.05, 0.05, 0.02])
 STEP = 0.06
 """Of the distance to the ground that a camera looks at."""
 FARTHEST_M = 120.0
-FOCAL_STEP = 0.08
 COOLING = 0.9
 AIMING = 0.3
 """Half of the offspring go on looking at the same ground, and turn by this part besides."""
@@ -48,7 +48,7 @@ def climb(
     field: FieldMap,
     view: LineView,
     start: Hypotheses,
-    frees_focal: bool,
+    steps: LensSteps,
     rng: np.random.Generator,
     levels: Sequence[ClimbingRound] = LEVELS,
 ) -> tuple[Hypotheses, Array]:
@@ -58,7 +58,7 @@ def climb(
         scores = agreement(field, view, cameras, level.tolerance_px)
         for generation in range(level.generations):
             scale = level.scale * COOLING**generation
-            offspring = _mutated(cameras, scale, frees_focal, rng)
+            offspring = _mutated(cameras, scale, steps, rng)
             of_offspring = agreement(field, view, offspring, level.tolerance_px).reshape(len(cameras), OFFSPRING)
             best = of_offspring.argmax(axis=1)
             rows = np.arange(len(cameras))
@@ -66,21 +66,22 @@ def climb(
             chosen = np.where(better, len(cameras) + rows * OFFSPRING + best, rows)
             cameras = Hypotheses.joined([cameras, offspring])[chosen]
             scores = np.maximum(scores, of_offspring[rows, best])
+        cameras, scores = aligned(field, view, cameras, scores, level.tolerance_px, steps)
         kept = _apart(cameras, scores, level)
         cameras, scores = cameras[kept], scores[kept]
     return cameras, scores
 
 
-def _mutated(cameras: Hypotheses, scale: float, frees_focal: bool, rng: np.random.Generator) -> Hypotheses:
-    """`OFFSPRING` of each camera: a turn, a step and a change of focal length, drawn independently."""
+def _mutated(cameras: Hypotheses, scale: float, steps: LensSteps, rng: np.random.Generator) -> Hypotheses:
+    """`OFFSPRING` of each camera: a turn, a step, and changes of focal length and bend, drawn independently."""
     count, half = len(cameras), OFFSPRING // 2
     forward = cameras.rotations[:, 2]
     reach = np.minimum(np.maximum(cameras.positions[:, 2], 1) / np.maximum(-forward[:, 2], 0.05), FARTHEST_M)
     turns = rng.normal(size=(count, OFFSPRING, 3)) * TURN_RAD * scale
     places = cameras.positions[:, None] + rng.normal(size=(count, OFFSPRING, 3)) * (STEP * scale * reach)[:, None, None]
     focal = np.repeat(cameras.focal_px[:, None], OFFSPRING, axis=1)
-    if frees_focal:
-        focal = focal * np.exp(FOCAL_STEP * scale * rng.normal(size=focal.shape))
+    if steps.focal > 0:
+        focal = focal * np.exp(steps.focal * scale * rng.normal(size=focal.shape))
         # A longer lens from farther back shows nearly the same.
         back = (focal / cameras.focal_px[:, None] - 1) * reach[:, None]
         places[:, :half] -= back[:, :half, None] * forward[:, None]
@@ -88,11 +89,16 @@ def _mutated(cameras: Hypotheses, scale: float, frees_focal: bool, rng: np.rando
     rotations = np.repeat(cameras.rotations[:, None], OFFSPRING, axis=1)
     aim = (cameras.positions + reach[:, None] * forward)[:, None] - places[:, :half]
     aim /= np.linalg.norm(aim, axis=-1, keepdims=True)
+    bends = np.repeat(cameras.bends[:, None], OFFSPRING, axis=1)
+    if steps.bend > 0:
+        # Every other one keeps the bend: what was right before need not be found again.
+        bends[:, ::2] += steps.bend * scale * rng.normal(size=bends[:, ::2].shape)
+        bends = np.clip(bends, -FARTHEST_BENT, FARTHEST_BENT)
     towards = np.einsum("nij,nkj->nki", cameras.rotations, np.cross(forward[:, None], aim))
     turns[:, :half] *= AIMING
     rotations[:, :half] = rotation_matrices(-towards) @ rotations[:, :half]
     rotations = rotation_matrices(turns) @ rotations
-    return Hypotheses(rotations.reshape(-1, 3, 3), places.reshape(-1, 3), focal.reshape(-1))
+    return Hypotheses(rotations.reshape(-1, 3, 3), places.reshape(-1, 3), focal.reshape(-1), bends.reshape(-1))
 
 
 def _apart(cameras: Hypotheses, scores: Array, level: ClimbingRound) -> NDArray[np.intp]:

@@ -33,7 +33,7 @@ def draw(field: FieldMap, focal_px: Array, count: int, rng: np.random.Generator)
     to_y = rng.uniform(-AIMED_AT * half_y, AIMED_AT * half_y, count) - y
     roll = np.radians(USUAL_ROLL_DEG) * rng.normal(size=count)
     rotations = rotations_of(np.arctan2(to_y, to_x), np.arctan2(z, np.hypot(to_x, to_y)), roll)
-    return Hypotheses(rotations, np.stack([x, y, z], axis=1), rng.choice(focal_px, count))
+    return Hypotheses.unbent(rotations, np.stack([x, y, z], axis=1), rng.choice(focal_px, count))
 
 
 def draw_at(
@@ -48,7 +48,7 @@ def draw_at(
     to_y = rng.uniform(-AIMED_AT * half_y, AIMED_AT * half_y, count) - positions[:, 1]
     roll = np.radians(KNOCKED_ROLL_DEG) * rng.normal(size=count)
     tilt = np.arctan2(positions[:, 2], np.hypot(to_x, to_y))
-    return Hypotheses(rotations_of(np.arctan2(to_y, to_x), tilt, roll), positions, rng.choice(focal_px, count))
+    return Hypotheses.unbent(rotations_of(np.arctan2(to_y, to_x), tilt, roll), positions, rng.choice(focal_px, count))
 
 
 def _log_uniform(low: float, high: float, count: int, rng: np.random.Generator) -> Array:

@@ -1,4 +1,4 @@
-"""A population of camera hypotheses: rotations, positions and focal lengths, as arrays of one length."""
+"""A population of camera hypotheses: rotations, positions, focal lengths and bends, as arrays of one length."""
 
 from __future__ import annotations
 
@@ -9,23 +9,35 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
 
+FARTHEST_BENT = 0.06
+"""No lens bends more or less than the one that undistorted the view by more than this."""
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 """Of the field about its centre."""
 
 
 @dataclass(frozen=True)
 class Hypotheses:
-    """P cameras: `rotations` (P, 3, 3) world to camera, `positions` (P, 3) m, `focal_px` (P,) in view pixels."""
+    """P cameras: `rotations` (P, 3, 3) world to camera, `positions` (P, 3) m, `focal_px` (P,) in view pixels.
+
+    `bends` (P,): what each lens bends more than the one that undistorted the view: the part by which it puts a point
+    farther from the centre at half the width of the frame, and elsewhere by the square of the distance.
+    """
 
     rotations: Array
     positions: Array
     focal_px: Array
+    bends: Array
+
+    @classmethod
+    def unbent(cls, rotations: Array, positions: Array, focal_px: Array) -> Hypotheses:
+        """Cameras whose lenses bend as the one that undistorted the view."""
+        return cls(rotations, positions, focal_px, np.zeros(len(positions)))
 
     def __len__(self) -> int:
         return len(self.positions)
 
     def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Hypotheses:
-        return Hypotheses(self.rotations[chosen], self.positions[chosen], self.focal_px[chosen])
+        return Hypotheses(self.rotations[chosen], self.positions[chosen], self.focal_px[chosen], self.bends[chosen])
 
     @classmethod
     def joined(cls, several: list[Hypotheses]) -> Hypotheses:
@@ -34,7 +46,19 @@ class Hypotheses:
             np.concatenate([one.rotations for one in several] or [np.zeros((0, 3, 3))]),
             np.concatenate([one.positions for one in several] or [np.zeros((0, 3))]),
             np.concatenate([one.focal_px for one in several] or [np.zeros(0)]),
+            np.concatenate([one.bends for one in several] or [np.zeros(0)]),
         )
+
+
+@dataclass(frozen=True)
+class LensSteps:
+    """How far the lenses of hypotheses may be off: the logarithm of the focal length, and the bend; 0 where known."""
+
+    focal: float
+    bend: float
+
+
+LENS_KNOWN, FOCAL_SOUGHT, LENS_SOUGHT = LensSteps(0.0, 0.0), LensSteps(0.08, 0.0), LensSteps(0.08, 0.02)
 
 
 def rotations_of(pan: Array, tilt: Array, roll: Array) -> Array:

@@ -40,7 +40,8 @@ def positions(field: FieldMap, view: LineView, direction: Direction, most: int) 
         rotation = rotations_of(*(direction.pan_tilt_roll + [turn * np.pi / 2, 0, 0]))
         places = _positions(field, view, rotation, direction.focal_px)[:most]
         count = len(places)
-        found.append(Hypotheses(np.repeat(rotation[None], count, axis=0), places, np.full(count, direction.focal_px)))
+        rotations = np.repeat(rotation[None], count, axis=0)
+        found.append(Hypotheses.unbent(rotations, places, np.full(count, direction.focal_px)))
     return Hypotheses.joined(found)
 
 

@@ -32,8 +32,8 @@ class LineView:
 
     `focal_px`: of the lens that undistorted it, in view pixels; another focal length f sees the same picture along rays
     (x / f, y / f, 1). `places` (M, 2) on the middles of paint; `painted_px`: their length in all; `distance` (H, W) to
-    the nearest of them, and `covered` (H, W) what the frame covers, from `corner` (2,) on; `starts`, `ends` (S, 2) of
-    straight segments.
+    the nearest of them, which is at `nearest` (H, W, 2), column and row, and `covered` (H, W) what the frame covers,
+    from `corner` (2,) on; `starts`, `ends` (S, 2) of straight segments.
     """
 
     focal_px: float
@@ -41,6 +41,7 @@ class LineView:
     places: NDArray[np.float32]
     painted_px: float
     distance: NDArray[np.float32]
+    nearest: NDArray[np.float32]
     covered: NDArray[np.bool_]
     corner: Array
     starts: Array
@@ -64,6 +65,7 @@ class LineView:
         free[cells[:, 1], cells[:, 0]] = 0
         covered = np.zeros(shape, np.uint8)
         cv2.fillPoly(covered, [np.rint(border - low).astype(np.int32)], 1)
+        distance, label = cv2.distanceTransformWithLabels(free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
         chosen = np.random.default_rng(1).permutation(len(cells))[:PLACES]
         starts, ends = _segments(small, lens, focal, 2 * scale)
         return cls(
@@ -71,7 +73,8 @@ class LineView:
             1 / scale,
             (cells[chosen] + low).astype(np.float32),
             float(len(cells)),
-            np.minimum(cv2.distanceTransform(free, cv2.DIST_L2, 5), FARTHEST_PX).astype(np.float32),
+            np.minimum(distance, FARTHEST_PX).astype(np.float32),
+            _places_of(np.asarray(label, np.int32), free),
             covered.astype(bool),
             low,
             starts,
@@ -82,6 +85,16 @@ class LineView:
     def lengths(self) -> Array:
         """The lengths (S,) of the segments, view pixels."""
         return np.asarray(np.linalg.norm(self.ends - self.starts, axis=1))
+
+    def to_paint(self, places: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """From places (..., 2) to the nearest paint, view pixels; and which of them lie in the frame."""
+        height, width = self.covered.shape
+        at = places - self.corner
+        column, row = (
+            np.clip(np.rint(at[..., axis]), 0, most - 1).astype(int) for axis, most in ((0, width), (1, height))
+        )
+        inside = (np.abs(at - np.stack([column, row], axis=-1)) <= 0.5).all(axis=-1)
+        return self.nearest[row, column] - at, inside & self.covered[row, column]
 
     def normals(self, focal_px: float) -> Array:
         """Unit normals (S, 3), in the camera's frame, of the planes through the camera and each segment."""
@@ -94,6 +107,14 @@ def _undistorted(pixels: Array, lens: Lens, focal: float) -> Array:
     """Pixels (n, 2) of a frame in view pixels; those without a ray are left out."""
     plane = lens.undistort(pixels) * focal
     return np.asarray(plane[np.isfinite(plane).all(axis=-1)])
+
+
+def _places_of(label: NDArray[np.int32], free: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Column and row (H, W, 2) of the painted cell, where `free` is 0, whose label each cell has."""
+    row, column = np.nonzero(free == 0)
+    of_label = np.zeros((int(label.max()) + 1, 2), np.float32)
+    of_label[label[row, column]] = np.stack([column, row], axis=1)
+    return of_label[label]
 
 
 def middles_of_paint(small: NDArray[np.uint8]) -> Array:

@@ -14,7 +14,7 @@ from worker.calibration.relocalisation.agreement import agreement
 from worker.calibration.relocalisation.climbing import LEVELS, climb
 from worker.calibration.relocalisation.drawing import draw, draw_at
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.hypotheses import HALF_TURN, Hypotheses
+from worker.calibration.relocalisation.hypotheses import FOCAL_SOUGHT, HALF_TURN, LENS_KNOWN, LENS_SOUGHT, Hypotheses
 from worker.calibration.relocalisation.line_assignment import positions
 from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.repeated_markings import slid_along_field
@@ -62,21 +62,26 @@ def _through(
     if view.painted_px == 0:
         return []
     focal, known = focal_lengths(view, lens), lens.is_known
+    steps = LENS_KNOWN if known else FOCAL_SOUGHT if lens.is_bend_known else LENS_SOUGHT
     directions = _with_neighbours(vote(view, focal, DIRECTIONS_KNOWN if known else DIRECTIONS_UNKNOWN, rng), rng)
     most = POSITIONS_KNOWN if known else POSITIONS_UNKNOWN
     by_lines = _at(place, field, Hypotheses.joined([positions(field, view, one, most) for one in directions]))
     start = _best(field, view, by_lines, FIRST_TOLERANCE_PX, CLIMBING_KNOWN if known else CLIMBING_UNKNOWN)
-    found, scores = climb(field, view, start, not known, rng)
+    found, scores = climb(field, view, start, steps, rng)
     if scores.max(initial=0.0) < CLEARLY_FOUND:
         drawn = _drawn(field, focal, place, rng)
         by_draws = _best(field, view, drawn, DRAWN_TOLERANCE_PX, CLIMBING_DRAWN)
-        found, scores = climb(field, view, Hypotheses.joined([by_draws, found]), not known, rng)
+        found, scores = climb(field, view, Hypotheses.joined([by_draws, found]), steps, rng)
     slid = _best(field, view, _at(place, field, slid_along_field(field, found)), LEVELS[-2].tolerance_px, CLIMBING_SLID)
-    found, scores = climb(field, view, Hypotheses.joined([found, slid]), not known, rng, LEVELS[-2:])
+    found, scores = climb(field, view, Hypotheses.joined([found, slid]), steps, rng, LEVELS[-2:])
     return [
-        Proposal(_zoomed(lens.lens, focal / view.focal_px), Pose(rotation_vectors(rotation), position), float(score))
-        for rotation, position, focal, score in zip(
-            found.rotations, found.positions, found.focal_px, scores, strict=True
+        Proposal(
+            _zoomed(_bent_more(lens.lens, bend), focal / view.focal_px),
+            Pose(rotation_vectors(rotation), position),
+            float(score),
+        )
+        for rotation, position, focal, bend, score in zip(
+            found.rotations, found.positions, found.focal_px, found.bends, scores, strict=True
         )
     ]
 
@@ -104,13 +109,23 @@ def _at(place: Place, field: FieldMap, cameras: Hypotheses) -> Hypotheses:
     here = place.allows(cameras.positions)
     if not field.is_symmetric:
         return cameras[here]
-    turned = Hypotheses(cameras.rotations @ HALF_TURN, cameras.positions @ HALF_TURN, cameras.focal_px)
+    turned = Hypotheses(cameras.rotations @ HALF_TURN, cameras.positions @ HALF_TURN, cameras.focal_px, cameras.bends)
     return Hypotheses.joined([cameras[here], turned[place.allows(turned.positions) & ~here]])
 
 
 def _best(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: float, most: int) -> Hypotheses:
     scores: Array = agreement(field, view, cameras, tolerance_px)
     return cameras[np.argsort(-scores)[:most]]
+
+
+def _bent_more(lens: Lens, bend: float) -> Lens:
+    """The lens with another one before it that bends by a part at half the width of the frame, as to fourth powers."""
+    if bend == 0.0:
+        return lens
+    distortion = lens.distortion.copy()
+    more = bend * (2 * lens.focal_length_px / lens.size[0]) ** 2
+    distortion[:2] += [more, 3 * distortion[0] * more]
+    return replace(lens, distortion=distortion)
 
 
 def _zoomed(lens: Lens, by: float) -> Lens:

@@ -34,11 +34,14 @@ from worker.calibration.relocalisation.sought import SoughtCamera
 
 SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 """How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
-BEGUN_ANEW = frozenset({"lines", "no-lines", "few-lines"})
-"""Where the search ends for such a reason, it is begun anew with other draws, and ..."""
+TOO_LITTLE_PAINT = frozenset({"no-lines", "few-lines"})
+BEGUN_ANEW = TOO_LITTLE_PAINT | {"lines"}
+BEGUN_ANEW_WITH_OTHER_LENSES = BEGUN_ANEW | {"implausible", "not-unique"}
+"""Where the search ends for such a reason, it is begun anew with other draws, through other lenses if there are any,
+and ..."""
 FAINT = 1.6
-"""... if lines were found that no pose explains, then first as they are, else with the network's probabilities times so
-much: then faint paint is paint as well, and so is more that is none."""
+"""... if there was too little paint, or that has been done once, with the network's probabilities times so much: then
+faint paint is paint as well, and so is more that is none."""
 ATTEMPTS_KNOWN_LENS, ATTEMPTS_SOUGHT_LENS = 3, 2
 """How often it is begun at most: to search for a lens too is dear."""
 REFINED, MUCH_WORSE = 4, 0.12
@@ -50,11 +53,13 @@ LEAST_FOUND = 0.7
 """Of the expected lines, beyond chance. Right poses on real frames find 0.86 and more, wrong ones up to 0.9."""
 RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, MORE_EXPLAINED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.05, 0.15
 OWN_PAINT, MUCH_MORE_EXPLAINED, MORE_SEEN, ALIKE_EXPLAINED = 0.02, 0.2, 0.04, 0.01
+LESS_EXACT = 1.4
 """A different pose may be the true one that agrees little less both ways, and which misses no more than so many times
 as much of its lines and a few more, or explains more of the paint, or alone explains so much of it and overlaps with
 the lines by this part of what the best does. It is not where it explains nothing that the best does not explain, and
 the best explains more: a little if it misses as much, much if it misses less; or where the best explains as much and
-misses so much less: yard lines farther on, one of them where there is none."""
+misses so much less: yard lines farther on, one of them where there is none. Nor is it where it explains no more, and
+its lines lie so many times as far from it."""
 LEAST_SURE, LEAST_SURE_OF_LENS = 0.0025, 0.00125
 """How far the markings in view may be from where the best pose puts them, of the width of the frame (rms, one standard
 deviation), through a lens that is known and one that is found. Pose and lens that slide together, one to make up for
@@ -130,21 +135,26 @@ def relocalise(
     """
     sight = _Sight.of(field, channels, response)
     candidates = list[Candidate]()
-    looked = sight
+    looked, through = sight, sought
     for attempt in range(ATTEMPTS_SOUGHT_LENS if sought.is_lens_sought else ATTEMPTS_KNOWN_LENS):
         pulse()
         proposals = [
-            one for one in propose(markings, looked.small, sought, seed + attempt) if one.agreement >= least_agreement
+            one for one in propose(markings, looked.small, through, seed + attempt) if one.agreement >= least_agreement
         ]
         for camera in _distinct(field, markings, sought, proposals):
+            if any(not _differ(field, markings, one.camera, camera, DIFFERENT) for one in candidates):
+                continue
             pulse()
             caught = camera if looked is sight else looked.candidate(camera, sought).camera
             candidates.append(sight.candidate(caught, sought))
         candidates.sort(key=lambda one: -one.agreement)
         found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, sought, candidates))
-        if found.refusal is None or found.refusal.reason not in BEGUN_ANEW:
+        reasons = BEGUN_ANEW_WITH_OTHER_LENSES if sought.other_lenses else BEGUN_ANEW
+        if found.refusal is None or found.refusal.reason not in reasons:
             break
-        if attempt > 0 or found.refusal.reason != "lines":
+        if sought.other_lenses:
+            through = replace(sought, lenses=sought.other_lenses)
+        if found.refusal.reason in TOO_LITTLE_PAINT or attempt > 0:
             looked = sight.strengthened(FAINT)
     return found
 
@@ -297,12 +307,21 @@ def explains_nearly_as_well(other: Candidate, best: Candidate) -> bool:
     has_paint_of_its_own = share(other.explains & ~best.explains) > OWN_PAINT
     if not has_paint_of_its_own and _is_outdone(other, best):
         return False
+    if other.explained <= best.explained and _is_less_exact(other, best):
+        return False
     return (
         its < MORE_MISSED * missed + FEW_MISSED
         or other.explained > best.explained + MORE_EXPLAINED
         # What misses clearly more, and explains nothing that the best does not explain, is a worse reading of the same.
         or (has_paint_of_its_own and other.overlap.iou > RIVAL_OVERLAP * best.overlap.iou)
     )
+
+
+def _is_less_exact(other: Candidate, best: Candidate) -> bool:
+    """Whether lines lie clearly farther from the other one of two that both were measured."""
+    if other.residual_px is None or best.residual_px is None:
+        return False
+    return other.residual_px > LESS_EXACT * best.residual_px
 
 
 def _is_outdone(other: Candidate, best: Candidate) -> bool:

@@ -32,6 +32,7 @@ def slid_along_field(field: FieldMap, cameras: Hypotheses) -> Hypotheses:
         np.repeat(cameras.rotations, of_each, axis=0),
         (cameras.positions[:, None] + slides).reshape(-1, 3),
         np.repeat(cameras.focal_px, of_each),
+        np.repeat(cameras.bends, of_each),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,9 +17,10 @@ Side = Literal["near", "far", "left", "right"]
 """Of the field: near is y < 0, far y > 0, left x < 0, right x > 0."""
 SHORTEST_FOCAL, LONGEST_FOCAL = 0.4, 4.5
 """Of lenses that nothing is known of, in widths of the frame: views of 103° to 13°."""
-BENDS = (0.0, -0.07)
+BENDS, OTHER_BENDS = (0.0, -0.07), (-0.035, -0.14)
 """Of such lenses: the radial term k1 at half the width of the frame, which tells lenses of one bend apart from those of
-another whatever their focal length."""
+another whatever their focal length; the others are looked through where these find nothing. An action camera has -0.2,
+and from there a pose is caught that was proposed with -0.14."""
 WELL_KNOWN = 0.02
 """Focal lengths that are known to this part need no search."""
 SIGMAS = 2.0
@@ -28,11 +29,15 @@ SIGMAS = 2.0
 
 @dataclass(frozen=True)
 class SoughtLens:
-    """A lens through which a frame may have been taken, with a focal length between `shortest_px` and `longest_px`."""
+    """A lens through which a frame may have been taken, with a focal length between `shortest_px` and `longest_px`.
+
+    `is_bend_known`: whether it bends the picture as `lens` does, or only about so.
+    """
 
     lens: Lens
     shortest_px: float
     longest_px: float
+    is_bend_known: bool = True
 
     @classmethod
     def known(cls, lens: Lens) -> SoughtLens:
@@ -81,12 +86,16 @@ ANYWHERE = Place()
 
 @dataclass(frozen=True)
 class SoughtCamera:
-    """A camera without a pose: `lenses` through which it may look, where it may stand, what of its frame is ignored."""
+    """A camera without a pose: `lenses` through which it may look, where it may stand, what of its frame is ignored.
+
+    `other_lenses`: to be tried in their place if nothing is found through them.
+    """
 
     id: str
     lenses: Sequence[SoughtLens]
     place: Place = ANYWHERE
     ignored: Ignored | None = None
+    other_lenses: Sequence[SoughtLens] = ()
 
     @property
     def size(self) -> tuple[int, int]:
@@ -99,21 +108,25 @@ class SoughtCamera:
         return not all(one.is_known for one in self.lenses)
 
 
-def unknown_lenses(size: tuple[int, int]) -> list[SoughtLens]:
-    """Lenses of each usual bend and focal length for a frame (width, height) about whose lens nothing is known."""
+def unknown_lenses(size: tuple[int, int], bends: Sequence[float] = BENDS) -> list[SoughtLens]:
+    """Lenses of each bend and every usual focal length for a frame (width, height) of whose lens nothing is known."""
     width = size[0]
-    lenses = [_bent(size, float(width), bend) for bend in BENDS]
-    return [SoughtLens(lens, SHORTEST_FOCAL * width, LONGEST_FOCAL * width) for lens in lenses]
+    lenses = [_bent(size, float(width), bend) for bend in bends]
+    return [SoughtLens(lens, SHORTEST_FOCAL * width, LONGEST_FOCAL * width, is_bend_known=False) for lens in lenses]
 
 
-def lenses_of_view(size: tuple[int, int], field_of_view_deg: float, uncertain: float) -> list[SoughtLens]:
-    """Lenses of each usual bend for a horizontal field of view that is known to a part of the focal length."""
+def lenses_of_view(
+    size: tuple[int, int], field_of_view_deg: float, uncertain: float, bends: Sequence[float] = BENDS
+) -> list[SoughtLens]:
+    """Lenses of each bend for a horizontal field of view that is known to a part of the focal length."""
     focal = size[0] / 2 / float(np.tan(np.radians(field_of_view_deg) / 2))
-    return [SoughtLens.around(_bent(size, focal, bend), uncertain) for bend in BENDS]
+    return [replace(SoughtLens.around(_bent(size, focal, bend), uncertain), is_bend_known=False) for bend in bends]
 
 
 def _bent(size: tuple[int, int], focal: float, bend: float) -> Intrinsics:
     width, height = size
     matrix = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
-    # k1 counts in the square of the distance from the centre, in focal lengths.
-    return Intrinsics(matrix, np.array([bend * (2 * focal / width) ** 2, 0.0, 0.0, 0.0]), size)
+    # k1 counts in the square of the distance from the centre, in focal lengths. With such a k2, as real lenses have it,
+    # no corner is bent back.
+    k1 = bend * (2 * focal / width) ** 2
+    return Intrinsics(matrix, np.array([k1, k1 * k1, 0.0, 0.0]), size)

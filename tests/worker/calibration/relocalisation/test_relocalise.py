@@ -1,5 +1,6 @@
 """A camera found from nothing but its frame and the field."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,7 +22,7 @@ from worker.calibration.relocalisation.relocalise import (
     sees_all_of_its_frame,
     twin,
 )
-from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens, unknown_lenses
+from worker.calibration.relocalisation.sought import OTHER_BENDS, Place, SoughtCamera, SoughtLens, unknown_lenses
 
 pytestmark = pytest.mark.slow
 
@@ -78,6 +79,32 @@ def test_lens_and_pose_are_found_together():
     assert abs(off) < max(4 * best.intrinsics.sigma["fx"], 6.0)
 
 
+def test_a_lens_that_bends_much_more_than_usual_ones_is_found_with_the_pose():
+    barrel = camera("one", (-6.0, -52.0, 16.0), (-10.0, 0.0), distortion=(-0.25, 0.06, 0.0, 0.0))
+    size = barrel.intrinsics.size
+    response = white_on_green(paint_frame(PITCH, barrel), [Region(0, 0, *size)]).astype(np.float32) / 255
+    sought = SoughtCamera("one", unknown_lenses(size), other_lenses=unknown_lenses(size, OTHER_BENDS))
+    channels = Channels([paint_frame(PITCH, barrel)])
+    answer = relocalise(PITCH, FieldMap.of(PITCH), sought, channels, response, 1)
+    assert answer.refusal is None, answer.refusal
+    assert off_px(PITCH, barrel, answer.candidates[0].camera) < 1.0
+
+
+def test_other_lenses_are_looked_through_where_the_first_find_nothing():
+    # A lens of half the focal length explains no line of the frame.
+    _, truth, _ = found("football", "SIDELINE", lens_is_known=True)
+    frame = paint_frame(PITCH, truth)
+    response = white_on_green(frame, [Region(0, 0, *truth.intrinsics.size)]).astype(np.float32) / 255
+    wide = replace(truth.intrinsics, matrix=np.diag([0.3, 0.3, 1.0]) @ truth.intrinsics.matrix)
+    alone = SoughtCamera("one", [SoughtLens.known(wide)])
+    with_other = replace(alone, other_lenses=[SoughtLens.known(truth.intrinsics)])
+    answers = [
+        relocalise(PITCH, FieldMap.of(PITCH), one, Channels([frame]), response, 1) for one in (alone, with_other)
+    ]
+    assert answers[0].refusal is not None
+    assert answers[1].refusal is None
+
+
 def test_a_camera_stands_where_it_may():
     _, _, answer = found("football", "SIDELINE", lens_is_known=True, place=Place("far"))
     assert answer.candidates[0].camera.pose.position[1] > 0
@@ -120,12 +147,14 @@ def test_two_parallel_lines_are_no_field():
     assert answer.refusal.words
 
 
-def candidate(found_of_100, explained_of_100, iou):
+def candidate(found_of_100, explained_of_100, iou, residual_px=0.4):
     """What is seen of 100 pieces of expected line, and which of 100 places on paint lie on one."""
     seen = Evidence(np.arange(100), np.zeros(100, int), np.ones(100), np.arange(100) < found_of_100, np.zeros(100))
     explains = np.isin(np.arange(100), explained_of_100)
     agreement = 2 / (1 / seen.agreement + 1 / explains.mean())
-    return Candidate(SIDELINE, agreement, explains, seen, Overlap(iou, found_of_100 / 100, 0.0), 0.4, None, None)
+    return Candidate(
+        SIDELINE, agreement, explains, seen, Overlap(iou, found_of_100 / 100, 0.0), residual_px, None, None
+    )
 
 
 def test_a_pose_that_misses_more_and_explains_nothing_of_its_own_is_no_rival():
@@ -154,3 +183,12 @@ def test_a_pose_is_no_rival_of_one_that_explains_the_same_and_sees_more_of_its_l
     assert not explains_nearly_as_well(shifted, best)
     alike = candidate(93, range(98), iou=0.84)
     assert explains_nearly_as_well(alike, best)
+
+
+def test_a_pose_that_explains_no_more_and_whose_lines_lie_clearly_farther_off_is_no_rival():
+    # American football through a lens that is sought: it bends to meet the yard lines farther on, and does not quite.
+    best = candidate(99, range(96), iou=0.88, residual_px=0.17)
+    assert explains_nearly_as_well(candidate(99, range(5, 97), iou=0.89, residual_px=0.2), best)
+    assert not explains_nearly_as_well(candidate(99, range(5, 97), iou=0.89, residual_px=0.55), best)
+    # One of which too little was measured may be the true one.
+    assert explains_nearly_as_well(candidate(99, range(5, 97), iou=0.89, residual_px=None), best)

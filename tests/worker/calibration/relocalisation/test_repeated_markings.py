@@ -14,7 +14,7 @@ SIDELINE = camera("one", (5.0, -40.0, 15.0), (5.0, 0.0))
 
 
 def slid(sport):
-    start = Hypotheses(
+    start = Hypotheses.unbent(
         SIDELINE.pose.matrix[None], np.array([SIDELINE.pose.position]), np.array([SIDELINE.intrinsics.focal_length_px])
     )
     return slid_along_field(FieldMap.of(field(sport)), start)

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.synthetic import camera
-from worker.calibration.relocalisation.sought import Place, SoughtLens, lenses_of_view, unknown_lenses
+from worker.calibration.relocalisation.relocalise import sees_all_of_its_frame
+from worker.calibration.relocalisation.sought import (
+    BENDS,
+    OTHER_BENDS,
+    Place,
+    SoughtLens,
+    lenses_of_view,
+    unknown_lenses,
+)
 
 LENS = camera("one", (0.0, -48.0, 10.0), (0.0, 0.0)).intrinsics
 CORNERS = np.array([[-5.0, -40.0, 8.0], [5.0, -40.0, 8.0], [5.0, 40.0, 8.0]])
@@ -32,6 +40,21 @@ def test_lenses_that_nothing_is_known_of_are_wide_and_long_and_of_two_bends():
     straight, barrel = unknown_lenses((960, 540))
     assert straight.shortest_px < 400 < 4000 < straight.longest_px
     assert straight.lens.distortion[0] == 0 > barrel.lens.distortion[0]
+    assert not straight.is_bend_known
+
+
+@pytest.mark.parametrize("bend", [*BENDS, *OTHER_BENDS])
+def test_lenses_of_every_bend_that_is_tried_see_all_of_their_frame(bend):
+    for size in ((960, 540), (1280, 1280)):
+        (unknown,) = unknown_lenses(size, [bend])
+        (of_view,) = lenses_of_view(size, 100.0, 0.15, [bend])
+        assert sees_all_of_its_frame(unknown.lens)
+        assert sees_all_of_its_frame(of_view.lens)
+
+
+def test_a_given_lens_bends_as_it_is_given():
+    assert SoughtLens.known(LENS).is_bend_known
+    assert SoughtLens.around(LENS, 0.1).is_bend_known
 
 
 @pytest.mark.parametrize(

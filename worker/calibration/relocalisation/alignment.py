@@ -1,0 +1,81 @@
+"""Hypotheses moved onto the paint that is seen: Gauss-Newton steps of an iterated closest point, for all at once.
+
+Each point of a marking is drawn to the nearest paint, across its own line alone: along it nothing is measured. What the
+lines leave open stays as it was, by how far a hypothesis may be off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.geometry.camera import Array
+from worker.calibration.geometry.rotation import rotation_matrices
+from worker.calibration.relocalisation.agreement import HALF_WIDTH_PX, NEAREST_M, agreement
+from worker.calibration.relocalisation.field_map import FieldMap
+from worker.calibration.relocalisation.hypotheses import FARTHEST_BENT, Hypotheses, LensSteps
+from worker.calibration.relocalisation.line_view import LineView
+
+STEPS = 3
+TURN_RAD, SHIFT = 0.05, 0.06
+"""How far off a hypothesis may be (one standard deviation): turned, and moved by a part of how far it is from what it
+sees."""
+NOISE_PX = 2.0
+"""Of the place of one point across its line, view pixels; points close by are off together."""
+
+
+def aligned(
+    field: FieldMap, view: LineView, cameras: Hypotheses, scores: Array, tolerance_px: float, lens: LensSteps
+) -> tuple[Hypotheses, Array]:
+    """Return each hypothesis (P,) moved onto the paint as long as its agreement grows, and the agreements."""
+    for _ in range(STEPS):
+        moved = _stepped(field, view, cameras, tolerance_px, lens)
+        of_moved = agreement(field, view, moved, tolerance_px)
+        better = of_moved > scores
+        if not better.any():
+            break
+        rows = np.arange(len(cameras))
+        cameras = Hypotheses.joined([cameras, moved])[np.where(better, len(cameras) + rows, rows)]
+        scores = np.maximum(scores, of_moved)
+    return cameras, scores
+
+
+def _stepped(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance_px: float, lens: LensSteps) -> Hypotheses:
+    """Each hypothesis after one step: of rotation (3), place in its own axes (3), log focal length and bend."""
+    focal = cameras.focal_px[:, None]
+    ahead_of = np.einsum("pij,pnj->pni", cameras.rotations, field.points[None] - cameras.positions[:, None])
+    ahead = ahead_of[..., 2] > NEAREST_M
+    depth = np.where(ahead, ahead_of[..., 2], 1.0)
+    seen = focal[..., None] * ahead_of[..., :2] / depth[..., None]
+    outwards = (seen * seen).sum(axis=-1) / HALF_WIDTH_PX**2
+    bent = seen * (1 + cameras.bends[:, None] * outwards)[..., None]
+
+    to_paint, in_view = view.to_paint(bent)
+    along = np.diff(bent, axis=1, append=bent[:, -1:])
+    length = np.linalg.norm(along, axis=-1)
+    counted = ahead & in_view & field.joined & (length > 1e-9)
+    across = np.stack([-along[..., 1], along[..., 0]], axis=-1) / np.where(counted, length, 1.0)[..., None]
+    off = (to_paint * across).sum(axis=-1)
+    weights = np.where(counted, np.exp(-((to_paint**2).sum(axis=-1) / tolerance_px**2)), 0.0) / NOISE_PX**2
+
+    push = np.concatenate([focal[..., None] * across, -(seen * across).sum(axis=-1, keepdims=True)], axis=-1)
+    push /= depth[..., None]
+    radial = (seen * across).sum(axis=-1)
+    # What is known of a lens has no slope, and so stays exactly as it is.
+    of_lens = np.stack([radial * (lens.focal > 0), radial * outwards * (lens.bend > 0)], axis=-1)
+    slopes = np.concatenate([np.cross(ahead_of, push), push, of_lens], axis=-1)
+    reach = np.median(depth, axis=1)
+    spread = np.empty((len(cameras), 8))
+    spread[:, :3], spread[:, 3:6] = TURN_RAD, SHIFT * reach[:, None]
+    spread[:, 6:] = lens.focal or 1.0, lens.bend or 1.0
+    weighted = slopes * weights[..., None]
+    information = np.swapaxes(slopes, 1, 2) @ weighted + np.eye(8) / spread[:, None] ** 2
+    step = np.linalg.solve(information, np.einsum("pnk,pn->pk", weighted, off)[..., None])[..., 0]
+    return _moved(cameras, step)
+
+
+def _moved(cameras: Hypotheses, step: Array) -> Hypotheses:
+    turned = rotation_matrices(step[:, :3]) @ cameras.rotations
+    positions = cameras.positions - np.einsum("pji,pj->pi", turned, step[:, 3:6])
+    bends: NDArray[np.float64] = np.clip(cameras.bends + step[:, 7], -FARTHEST_BENT, FARTHEST_BENT)
+    return Hypotheses(turned, positions, cameras.focal_px * np.exp(step[:, 6]), bends)
