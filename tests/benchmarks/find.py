@@ -6,8 +6,9 @@
 Sections: `rendered` (every template on grounds and in colours of all kinds, from wide to medium lenses), `real` (frames
 with known cameras, where they are). What is known of each camera: its `lens`, its field of `view` to 30 %, or
 `nothing`. Some pictures are too dark, blurred or faint for any job: beside the share of all views stands that of those
-whose frame an ordinary job accepts which begins with the true pose and lens. Every run is written to a file and not run
-again, so that long ones can be continued; after a change of the engine or of the renderer the file has to be removed.
+whose frame an ordinary job accepts which begins with the true pose and lens. The last lines of the table are of views
+that show a circle, an arc, or straight lines of three directions. Every run is written to a file and not run again, so
+that long ones can be continued; after a change of the engine or of the renderer the file has to be removed.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
 from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER as RUNS
 from worker.calibration.find_cameras import find_cameras
-from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.camera import Camera, Frame, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import mean_shift_px
@@ -44,6 +45,8 @@ VIEW_OFF = 0.3
 """A given field of view makes the focal length at most this part longer or shorter than it is."""
 UNSEEN_PX = 1e4
 """How far off a marking counts that a camera does not see which is found."""
+BENT_DEG, ALIKE_DEG, FEWEST_POINTS = 30.0, 5.0, 6
+"""A marking in view is an arc if it turns by so much at least; straight ones have one direction within so much."""
 NEAR = 0.0026
 """Found: the markings in view lie, on mean, within this part of the frame's width of where they are (5 px of 1920)."""
 
@@ -113,7 +116,11 @@ def _table(found: Mapping[tuple[str, str], Sequence[dict]], knowing: Sequence[st
         (f"all, {known}", known): [r for key, rows in found.items() if key[1] == known for r in rows]
         for known in knowing
     }
-    for (name, known), rows in [*found.items(), *total.items()]:
+    many = {
+        (f"of these with many directions, {known}", known): [row for row in rows if row["many_directions"]]
+        for (_, known), rows in total.items()
+    }
+    for (name, known), rows in [*found.items(), *total.items(), *many.items()]:
         if not rows:
             continue
         cores = [row["core_s"] for row in rows]
@@ -172,9 +179,26 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, e
             for one in camera.candidates
         ],
         "core_s": core_s,
+        "many_directions": shows_many_directions(pitch, truth),
         "fit": engine(pitch, [truth], {truth.id: [frame]}, seed).accepted,
         "stages": found.timings.core_seconds,
     }
+
+
+def shows_many_directions(pitch: Field, camera: Camera) -> bool:
+    """Whether a camera sees an arc or a circle, or straight lines of three directions: enough to tell pose and lens."""
+    lines = pitch.line_points()
+    in_view = lines[inside(camera.project(lines.position), camera.intrinsics.size)]
+    along_deg = np.degrees(np.arctan2(in_view.tangent[:, 1], in_view.tangent[:, 0])) % 180
+    directions = set[int]()
+    for marking in np.unique(in_view.marking):
+        of_one = np.sort(along_deg[in_view.marking == marking])
+        # What the largest gap between two of its directions leaves of half a turn, the last and the first included.
+        turned = 180 - np.diff(of_one, append=of_one[0] + 180).max()
+        if turned > BENT_DEG and len(of_one) >= FEWEST_POINTS:
+            return True
+        directions.add(round(float(np.median(of_one)) / ALIKE_DEG) % round(180 / ALIKE_DEG))
+    return len(directions) > 2
 
 
 def _sought(truth: Camera, knowing: str, rng: np.random.Generator) -> SoughtCamera:
