@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from worker.calibration.detection.view_condition import OF_THE_GROUND, ViewCondition, look_at
@@ -32,11 +33,17 @@ LOST = frozenset({"lines", "few-lines", "moved"})
 """Reasons for a refusal that a knocked camera may have."""
 UNFIT = frozenset({"residual", "zoomed", "undetermined"})
 """Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
-LEAST_PAINT, LEAST_UNEXPLAINED, UNEXPLAINED_BY_WEATHER = 200, 0.4, 0.85
+LEAST_PAINT, LEAST_UNEXPLAINED, UNEXPLAINED_BY_WEATHER = 200, 0.25, 0.85
 """Lines are clearly seen elsewhere when so many of the places on the middles of paint are there, and this share of them
-lies on no line by any pose that was found. Where the frame looks fogged or blocked at that pose it has to be nearly all
-of them: what shows through fog, or beside what blocks the view, lies for a third or more on the lines of a camera that
-has not moved, and a search every quarter of an hour of a foggy night is dear."""
+lies on no line by any pose that was found: one that was caught by wrong lines explains up to 0.7 of the paint. Where
+the frame looks fogged or blocked at that pose it has to be nearly all of them: what shows through fog, or beside what
+blocks the view, lies for a third or more on the lines of a camera that has not moved, and a search every quarter of an
+hour of a foggy night is dear."""
+LOOKED_AT_EVERY = 4
+OF_THE_LIGHT = frozenset({"dark", "blinded"})
+DARKEST, BRIGHTEST, LEAST_LIT = 25, 245, 0.3
+"""A field that is too dark or too bright where the stored pose has it may lie elsewhere, and lit, if this share of the
+frame has a brightness between these, of 255."""
 ON_ITS_MOUNT_M = 2.5
 """How far from its stored place a camera is searched for first."""
 LEAST_PROPOSED = 0.34
@@ -81,9 +88,9 @@ def recover_knocked(
     problem, solution, judged, path = solved
     if problem.options.search == "wide" or problem.options.recover == "never":
         return solved
-    of_the_ground = [n for n, view in enumerate(problem.observed.views) if view.cause in OF_THE_GROUND]
-    problem = observer.look_in_full(problem, of_the_ground, progress)
-    sought = [n for n in range(len(problem.cameras)) if _is_sought(problem, n, judged.cameras[n])]
+    beside = [n for n in range(len(problem.cameras)) if _may_be_of_what_lies_beside(problem, n, observer)]
+    problem = observer.look_in_full(problem, beside, progress)
+    sought = [n for n, one in enumerate(judged.cameras) if _is_sought(problem, n, one, is_view_doubted=n in beside)]
     if not sought:
         return solved
     solved = problem, solution, judged, path
@@ -102,11 +109,21 @@ def recover_knocked(
     return solved
 
 
-def _is_sought(problem: Problem, number: int, result: CameraResult) -> bool:
+def _may_be_of_what_lies_beside(problem: Problem, number: int, observer: FrameObserver) -> bool:
+    """Whether what the view is refused for may be true of nothing but what the stored pose takes for the field."""
+    cause = problem.observed.views[number].cause
+    if cause in OF_THE_LIGHT:
+        frame = observer.frames[problem.cameras[number].id][0]
+        brightness = cv2.cvtColor(frame[::LOOKED_AT_EVERY, ::LOOKED_AT_EVERY], cv2.COLOR_BGR2GRAY)
+        return bool(((brightness >= DARKEST) & (brightness <= BRIGHTEST)).mean() >= LEAST_LIT)
+    return cause in OF_THE_GROUND
+
+
+def _is_sought(problem: Problem, number: int, result: CameraResult, *, is_view_doubted: bool) -> bool:
     """Whether a camera is to be searched for: whatever its result, or where that is one of a knocked camera."""
     if problem.options.search == "anywhere":
         return result.view.cause != "other-camera"
-    if result.view.cause in OF_THE_GROUND:
+    if is_view_doubted:
         # Said of where the stored pose has the ground: lines that the network saw beside it contradict it.
         return _has_lines_elsewhere(problem, result, problem.observed.observations.responses[number])
     if result.refusal is None or result.refusal.reason not in LOST:
@@ -168,7 +185,7 @@ def _has_lines_elsewhere(problem: Problem, result: CameraResult, response: Respo
         return False
     if result.refusal is not None and result.refusal.reason == "moved":
         return True
-    least = UNEXPLAINED_BY_WEATHER if result.view.cause in OF_THE_GROUND else LEAST_UNEXPLAINED
+    least = LEAST_UNEXPLAINED if result.view.usable else UNEXPLAINED_BY_WEATHER
     return paint.explained_by(problem.pitch, result.camera) <= 1 - least
 
 

@@ -201,3 +201,30 @@ def test_what_was_not_surely_found_is_not_taken():
     left, _ = pair()
     unsure = replace(found_as(left), refusal=NotFound("not-unique", "two poses explain the lines"))
     assert recovery._on_its_side(FieldMap.of(CROWNED), left, unsure, ANYWHERE) is None
+
+
+def before_a_bright_sky(frame):
+    """The frame with all that is high in the picture blown out, as by a low sun."""
+    bright = frame.copy()
+    bright[: frame.shape[0] * 38 // 100] = 255
+    return bright
+
+
+def test_a_camera_that_was_knocked_until_its_field_lies_where_the_sky_is_blinded_is_found():
+    left = pair()[0]
+    upwards = np.array([np.radians(16.0), 0.0, 0.0])
+    stored = left.with_pose(Pose(rotation_vectors(rotation_matrices(upwards) @ left.pose.matrix), left.pose.position))
+    pictures = {"left": (before_a_bright_sky(frames()["left"][0]),)}
+    (alone,) = run([stored], pictures, seed=3, recover="never").cameras
+    (found,) = run([stored], pictures, seed=3).cameras
+    assert alone.view.cause == "blinded"
+    assert found.refusal.reason == "knocked", found.rejected_because
+    assert rotation_angles_deg(found.camera.pose.rotation, left.pose.rotation) < 0.1
+
+
+def test_a_frame_that_is_blown_out_as_a_whole_is_not_searched():
+    network = CountingNetwork()
+    blown = {"left": (np.full_like(frames()["left"][0], 255),)}
+    (found,) = run(outdated()[:1], blown, network=network, seed=3).cameras
+    assert found.view.cause == "blinded"
+    assert network.whole == 0
