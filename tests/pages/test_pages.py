@@ -141,6 +141,19 @@ def test_frames_are_looked_at_before_they_travel(stub, frames, visit):
     assert job["venue_revision"] is None
 
 
+def test_frames_that_were_chosen_before_the_script_came_are_taken(stub, frames, visit):
+    page = visit(stub.url, "/")
+    held = []
+    page.route("**/frameform.js", lambda route: held.append(route))
+    page.goto(f"{stub.url}/ui/venues/{stub.venue('early', 'accept')}/calibrate", wait_until="commit")
+    for camera in ("left", "right"):
+        page.locator(f"[data-camera={camera}] input[type=file]").set_input_files(frames[camera])
+    held[0].continue_()
+    for camera in ("left", "right"):
+        expect(page.get_by_role("img", name=f"{camera}.png")).to_be_visible()
+    expect(page.get_by_role("button", name="Calibrate")).to_be_enabled()
+
+
 def test_a_frame_that_was_chosen_can_be_taken_away_again(stub, frames, visit):
     page = visit(stub.url, f"/ui/venues/{stub.venue('sent', 'accept')}/calibrate")
     page.locator("[data-camera=left] input[type=file]").set_input_files(frames["left"])

@@ -16,10 +16,7 @@ class Drop {
     this.size = [Number(box.dataset.width), Number(box.dataset.height)];
     this.files = [];
     this.input = box.querySelector("input[type=file]");
-    this.input.addEventListener("change", () => {
-      this.add([...this.input.files]);
-      this.input.value = "";
-    });
+    this.input.addEventListener("change", () => this.take());
     box.addEventListener("dragover", (event) => { event.preventDefault(); box.classList.add("over"); });
     box.addEventListener("dragleave", () => box.classList.remove("over"));
     box.addEventListener("drop", (event) => {
@@ -28,6 +25,13 @@ class Drop {
       box.classList.remove("over");
       this.add([...event.dataTransfer.files]);
     });
+  }
+
+  /** Whatever the input has by now: on a slow line, files are chosen before this script has come. */
+  take() {
+    if (this.input.files.length === 0) return;
+    this.add([...this.input.files]);
+    this.input.value = "";
   }
 
   async add(files) {
@@ -70,6 +74,7 @@ class Drop {
 }
 
 const drops = [...form.querySelectorAll(".drop")].map((box) => new Drop(box));
+for (const drop of drops) drop.take();
 
 /** What still has to be chosen. */
 function tell() {

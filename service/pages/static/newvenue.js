@@ -95,10 +95,15 @@ async function find() {
   }
 }
 
-input.addEventListener("change", () => {
+/** Whatever the input has by now: on a slow line, files are chosen before this script has come. */
+function take() {
+  if (input.files.length === 0) return;
   add([...input.files]);
   input.value = "";
-});
+}
+
+input.addEventListener("change", take);
+take();
 document.addEventListener("dragover", (event) => event.preventDefault());
 document.addEventListener("drop", (event) => {
   event.preventDefault();
