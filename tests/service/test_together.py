@@ -18,8 +18,9 @@ from service.schemas.venue import VenueIn
 from service.store.database import connect, migrate
 from service.store.ids import new_id
 from service.store.jobs import attempts
+from service.store.jobs import submission as submissions
 from service.store.jobs.queries import JobPage
-from service.store.jobs.submission import QueueFull, Submission
+from service.store.jobs.submission import KeyReused, QueueFull, Submission
 from service.store.statistics import counters
 from service.store.workers import WorkerRepository
 from tests.e2e.running import venue
@@ -111,6 +112,26 @@ def test_the_queue_takes_no_more_than_its_limit_however_many_come_at_once(stock,
     with ThreadPoolExecutor(crowd) as pool:
         assert sum(pool.map(submit, range(crowd))) == LIMIT
     assert [job.status for job in stock.jobs.page(JobPage(100))] == ["queued"] * LIMIT
+
+
+@on_servers
+def test_other_content_under_a_key_whose_job_comes_meanwhile_is_told_that_and_not_that_the_venue_is_busy(
+    stock, queue, monkeypatch
+):
+    stock.venues.put(stored("v"), lambda _: None)
+    first, other = (submission("v", content).model_copy(update={"idempotency_key": "k"}) for content in ("c", "d"))
+    look_up = submissions._of_key
+
+    def looked_up_just_before(*arguments):
+        monkeypatch.setattr(submissions, "_of_key", look_up)
+        before = look_up(*arguments)
+        stock.submissions.submit(first, LIMIT, queue.enqueue)
+        return before
+
+    monkeypatch.setattr(submissions, "_of_key", looked_up_just_before)
+    with pytest.raises(KeyReused) as refused:
+        stock.submissions.announce(other, LIMIT, timedelta(minutes=1))
+    assert refused.value.job_id == first.job_id
 
 
 @in_both_homes

@@ -265,11 +265,14 @@ def _duplicate(
         return str(known.id)
     if kind != "calibration":
         return None
-    query = sa.select(j.id, j.content_hash).where(j.venue == venue_id, tables.ACTIVE)
+    query = sa.select(j.id, j.content_hash, j.idempotency_key).where(j.venue == venue_id, tables.ACTIVE)
     active = connection.execute(query).one_or_none()
     if active is None:
         return None
     if active.content_hash != content_hash:
+        # Without the lock, the job of this key may have come since the key was looked up.
+        if idempotency_key is not None and active.idempotency_key == idempotency_key:
+            raise KeyReused(active.id)
         raise VenueBusy(active.id)
     return str(active.id)
 
