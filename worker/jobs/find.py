@@ -104,7 +104,7 @@ def _size(frame: Picture) -> tuple[int, int]:
 
 
 def sought_camera(camera: SoughtCameraIn, size: tuple[int, int]) -> SoughtCamera:
-    """What is known of a camera with frames of a size (width, height), for the engine."""
+    """Make the engine's camera out of what a site says of one whose frames have a `size` (width, height)."""
     position = None if camera.position is None else np.array(camera.position)
     place = Place(camera.side, position, camera.position_radius_m)
     ignored = ignored_areas_of(camera.ignore, size)

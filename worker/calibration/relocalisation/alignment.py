@@ -21,7 +21,7 @@ TURN_RAD, SHIFT = 0.05, 0.06
 """How far off a hypothesis may be (one standard deviation): turned, and moved by a part of how far it is from what it
 sees."""
 NOISE_PX = 2.0
-"""Of the place of one point across its line, view pixels; points close by are off together."""
+"""Standard deviation of where one point of paint is measured across its line, view pixels: neighbours share errors."""
 
 
 def aligned(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Array
 from worker.calibration.geometry.field import Field, Marking
+from worker.calibration.relocalisation.line_view import labelled_places
 
 POINTS = 420
 """About so many points on the markings are projected by each pose of a population."""
@@ -99,11 +100,8 @@ def _from_nearest(paint: Array, low: Array, high: Array, cell: float) -> NDArray
     column, row = np.rint((paint - low) / cell).astype(int).T
     free[row, column] = 0
     _, label = cv2.distanceTransformWithLabels(free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    painted_rows, painted_columns = np.nonzero(free == 0)
-    nearest = np.zeros((int(label.max()) + 1, 2), np.float32)
-    nearest[label[painted_rows, painted_columns]] = np.stack([painted_columns, painted_rows], axis=1)
     here = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1)
-    return ((here - nearest[label]) * cell).astype(np.float32)
+    return ((here - labelled_places(np.asarray(label), free)) * cell).astype(np.float32)
 
 
 def _straight(lines: list[Marking], axis: int, shortest: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -74,7 +75,7 @@ class LineView:
             (cells[chosen] + low).astype(np.float32),
             float(len(cells)),
             np.minimum(distance, FARTHEST_PX).astype(np.float32),
-            _places_of(np.asarray(label, np.int32), free),
+            labelled_places(np.asarray(label), free),
             covered.astype(bool),
             low,
             starts,
@@ -109,7 +110,7 @@ def _undistorted(pixels: Array, lens: Lens, focal: float) -> Array:
     return np.asarray(plane[np.isfinite(plane).all(axis=-1)])
 
 
-def _places_of(label: NDArray[np.int32], free: NDArray[np.uint8]) -> NDArray[np.float32]:
+def labelled_places(label: NDArray[Any], free: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Column and row (H, W, 2) of the painted cell, where `free` is 0, whose label each cell has."""
     row, column = np.nonzero(free == 0)
     of_label = np.zeros((int(label.max()) + 1, 2), np.float32)
