@@ -12,6 +12,7 @@ A line on standard input has something happen to camera N:
     restart N S       it is away for S seconds
     freeze N          it sends the last whole picture again and again
     step N S          its clock, which its RTCP reports tell, jumps by S seconds more; its pictures come as before
+    hush N            it sends no RTCP reports
     clip N FILE       it films another clip
     mend N            it takes pictures again, of the clip that it films
 """
@@ -57,7 +58,7 @@ class Camera(GstRtspServer.RTSPMediaFactory):
         super().__init__()
         self._number, self._film, self._rate = number, film, rate
         self._next = self._ahead_s = 0
-        self._is_pulled = self._is_frozen = False
+        self._is_pulled = self._is_frozen = self._is_hushed = False
         self.set_launch(PIPELINE)
         self.set_shared(True)
         self._server = GstRtspServer.RTSPServer(address="127.0.0.1", service="0")
@@ -98,6 +99,8 @@ class Camera(GstRtspServer.RTSPMediaFactory):
         pad.add_probe(Gst.PadProbeType.BUFFER, self._change_report)
 
     def _change_report(self, pad: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
+        if self._is_hushed:
+            return Gst.PadProbeReturn.DROP
         if not self._ahead_s:
             return Gst.PadProbeReturn.OK
         report = info.get_buffer()
@@ -130,6 +133,10 @@ class Camera(GstRtspServer.RTSPMediaFactory):
     def step(self, seconds: str) -> None:
         """Let the clock jump."""
         self._ahead_s += int(seconds)
+
+    def hush(self) -> None:
+        """Send no RTCP reports."""
+        self._is_hushed = True
 
     def cut(self) -> None:
         """Drop whoever looks."""
