@@ -210,6 +210,10 @@ def print_found_summary(result: FindResult) -> None:
         print_note(_found_text(camera))
         for remark in camera.remarks:
             print_note(f"  {remark}")
+    if result.ridge is not None:
+        print_note(
+            f"The field is not flat: the lines tell a ridge {result.ridge[0][2]:.2f} m high, which the venue gets"
+        )
 
 
 def _found_text(camera: FoundCameraResult) -> str:

@@ -80,13 +80,16 @@ class SoughtSite(NamedField):
     def completed(self, result: FindResult, chosen: Mapping[str, CandidateResult]) -> VenueIn:
         """The venue of the cameras that were known and of those that were found, in the order of the site.
 
+        With the ridge that was found, if one was.
+
         `chosen`: the candidate that each found camera is taken to be; a sought camera without one is left out. Raises
         `ValidationError` where that leaves no camera, or a candidate is none that a venue can have.
         """
         sizes = {camera.id: camera.image_size for camera in result.cameras}
         placed = [_placed(one, chosen.get(one.id), sizes.get(one.id)) for one in self.cameras]
         cameras = [one for one in placed if one is not None]
-        return VenueIn(id=self.id, name=self.name, field=self.field, cameras=cameras)
+        field = self.field if result.ridge is None else self.field.changed({"ridge": result.ridge})
+        return VenueIn(id=self.id, name=self.name, field=field, cameras=cameras)
 
 
 def _sought(camera: Camera, options: FindOptions) -> SoughtCameraIn:

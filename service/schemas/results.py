@@ -499,6 +499,11 @@ class FindResult(Schema):
     accepted: bool
     rejected_because: str | None
     cameras: list[FoundCameraResult]
+    ridge: list[Row] | None = Field(
+        None,
+        description="Of a field that was taken for flat, the ridge that the lines tell; the venue gets it with the "
+        "poses. null: they tell none, or the field has one.",
+    )
     stitch_error_px: float | None
     warnings: list[str] = Field([], description="Pictures that are missing.")
     timings_s: dict[str, float]

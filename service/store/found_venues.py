@@ -120,7 +120,9 @@ def _wanted(before: Venue | None, found: FoundSite, choice: Mapping[str, int | N
         else one
         for one in before.cameras
     ]
-    return before.model_copy(update={"cameras": standing})
+    # A ridge belongs to the poses of all cameras.
+    is_each_taken = len(cameras) == len(before.cameras)
+    return before.model_copy(update={"cameras": standing, "field": placed.field if is_each_taken else before.field})
 
 
 def _is_untouched(now_stored: Venue, began_with: Venue, cameras: Sequence[str]) -> bool:

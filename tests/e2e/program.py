@@ -164,6 +164,7 @@ def found_cameras(sought: list[str], behaviour: str, task: dict) -> dict:
             }
             for number, camera in enumerate(sought)
         ],
+        "ridge": [[-18.5, 0.0, 0.25], [18.5, 0.0, 0.25]] if behaviour == "crowned" else None,
         "stitch_error_px": 0.4,
         "timings_s": {"evolution": 0.1},
         "provenance": {"software": "0", "model_sha256": "0", "seed": task["options"]["seed"], "options": {}},

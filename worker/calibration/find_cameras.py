@@ -17,9 +17,11 @@ from worker.calibration.gate.quality import CameraResult, Gate
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options, Progress, ProgressReporter, Segment, StageTimings
+from worker.calibration.relocalisation.candidate import Candidate, Sight
+from worker.calibration.relocalisation.crown import find_crown
 from worker.calibration.relocalisation.field_halves import choose_sides
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.relocalise import Candidate, NotFound, Relocalisation, relocalise, twin
+from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, relocalise, twin
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
 OF_ONE_KIND = 0.03
@@ -53,8 +55,12 @@ class FoundCamera:
 
 @dataclass(frozen=True)
 class FoundCameras:
-    """The cameras that were sought; `stitch_error_px`: between those that were accepted, None where none overlap."""
+    """The cameras that were sought, on their `pitch`: as it was given, or with the ridge that was found for a flat one.
 
+    `stitch_error_px`: between those that were accepted, None where none overlap.
+    """
+
+    pitch: Field
     cameras: Sequence[FoundCamera]
     stitch_error_px: float | None
     timings: StageTimings
@@ -97,6 +103,9 @@ def find_cameras(
             again = relocalise(pitch, markings, helped, *seen[helped.id], seed)
             alone[helped.id] = again if again.refusal is None else alone[helped.id]
     placed = _on_their_sides(alone, sought, known) if markings.is_symmetric else alone
+    if pitch.ridge is None and not known:
+        with progress.timed("refinement"):
+            pitch, placed = _on_its_crown(pitch, placed, {one.id: one for one in sought}, seen)
 
     # Calibrate those that were found, as every later job will.
     found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
@@ -112,6 +121,7 @@ def find_cameras(
                 pitch, [*found, *beside], frames, remembered, Options(seed=seed, recover="never"), stop=stop
             )
     return FoundCameras(
+        pitch,
         [_judged(camera, placed[camera.id], calibrated) for camera in sought],
         None if calibrated is None else calibrated.stitch_error_px,
         progress.timings,
@@ -176,6 +186,31 @@ def _on_their_sides(
         both = [first, replace(first, camera=twin(side.camera)), *others]
         placed[camera] = replace(found, candidates=both, refusal=NotFound("not-unique", side.remark or ""))
     return placed
+
+
+def _on_its_crown(
+    flat: Field,
+    placed: dict[str, Relocalisation],
+    sought: Mapping[str, SoughtCamera],
+    seen: Mapping[str, tuple[Channels, NDArray[np.float32]]],
+) -> tuple[Field, dict[str, Relocalisation]]:
+    """The field with the ridge that the lines of the cameras tell that were found on it flat, and these on that."""
+    found = [camera for camera, one in placed.items() if one.refusal is None]
+    if not found:
+        return flat, placed
+    crowned = find_crown(
+        flat,
+        [placed[one].candidates[0] for one in found],
+        [Sight.of(flat, *seen[one]) for one in found],
+        [sought[one].is_lens_sought for one in found],
+    )
+    if crowned is None:
+        return flat, placed
+    first = dict(zip(found, crowned.candidates, strict=True))
+    return crowned.field, {
+        camera: replace(one, candidates=[first[camera], *one.candidates[1:]]) if camera in first else one
+        for camera, one in placed.items()
+    }
 
 
 def _judged(sought: SoughtCamera, found: Relocalisation, calibrated: Calibration | None) -> FoundCamera:

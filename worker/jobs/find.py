@@ -18,7 +18,7 @@ from service.store.jobs.files import candidate_picture_name
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.calibration.relocalisation.relocalise import Candidate
+from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.sought import (
     BENDS,
     OTHER_BENDS,
@@ -56,6 +56,7 @@ from worker.jobs.to_schemas import (
 )
 
 log = logging.getLogger(__name__)
+MILLIMETRE = 3
 FIELD_OF_VIEW_UNCERTAIN = 0.15
 """One standard deviation of the focal length that a given field of view leaves, as a part of it."""
 
@@ -81,9 +82,9 @@ def solve(
     pictures = {
         name: picture
         for camera in found.cameras
-        for name, picture in _pictures(pitch, camera, frames[camera.id][0]).items()
+        for name, picture in _pictures(pitch, found.pitch, camera, frames[camera.id][0]).items()
     }
-    return Solution(_result(found, sought, provenance_of(means, segmenter, seed, {"seed": seed})), pictures)
+    return Solution(_result(found, pitch, sought, provenance_of(means, segmenter, seed, {"seed": seed})), pictures)
 
 
 def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:
@@ -126,29 +127,35 @@ def _known(camera: SoughtCameraIn) -> Camera:
     return camera_of(PosedCamera(id=camera.id, image_size=camera.image_size or [], intrinsics=intrinsics, pose=pose))
 
 
-def _pictures(pitch: Field, camera: FoundCamera, frame: Picture) -> dict[str, bytes]:
-    """A picture of each candidate, the best first."""
+def _pictures(given: Field, found: Field, camera: FoundCamera, frame: Picture) -> dict[str, bytes]:
+    """A picture of each candidate, the best first: on the field as it was found if it is taken, or else as given."""
     pictures = {}
     for number, one in enumerate(camera.candidates, start=1):
         name = candidate_picture_name(camera.id, number)
         try:
+            pitch = found if camera.accepted and number == 1 else given
             pictures[name] = encode_jpeg(candidate_picture(pitch, one.camera, frame, f"candidate {number}"))
         except Exception:  # what is no camera of this frame may look anywhere; a picture is not worth losing the others
             log.warning("cannot draw %s", name, exc_info=True)
     return pictures
 
 
-def _result(found: FoundCameras, sought: Sequence[SoughtCamera], provenance: Provenance) -> FindResult:
+def _result(found: FoundCameras, given: Field, sought: Sequence[SoughtCamera], provenance: Provenance) -> FindResult:
     refusals = [f"camera {one.id}: {one.refusal.words}" for one in found.cameras if one.refusal is not None]
     return FindResult(
         accepted=not refusals,
         rejected_because="; ".join(refusals) or None,
         cameras=[_camera(one, its.size) for one, its in zip(found.cameras, sought, strict=True)],
+        ridge=_ridge_of(found.pitch) if given.ridge is None else None,
         stitch_error_px=finite_or_none(found.stitch_error_px),
         timings_s=round_to_ms(found.timings.seconds),
         cpu_s=round_to_ms(found.timings.core_seconds),
         provenance=provenance,
     )
+
+
+def _ridge_of(pitch: Field) -> list[list[float]] | None:
+    return None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
 
 
 def _camera(found: FoundCamera, size: tuple[int, int]) -> FoundCameraResult:

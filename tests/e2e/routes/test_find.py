@@ -106,6 +106,22 @@ def test_of_a_stored_venue_those_with_frames_are_found_and_the_others_stay(servi
     assert back["cameras"] == before["cameras"]
 
 
+def test_a_new_venue_gets_the_ridge_that_was_found_with_its_cameras(service, name):
+    job = found(service, name, place=site(name, "crowned"))
+    assert adopt(service, name, job).json()["field"]["ridge"] == job["result"]["ridge"]
+
+
+def test_a_stored_venue_gets_the_ridge_with_the_poses_of_all_of_its_cameras_and_with_fewer_not(service, name):
+    service.venue(name, "crowned")
+    job = found(service, name)
+    assert adopt(service, name, job, right=None).json()["field"]["ridge"] is None
+    assert refused(adopt(service, name, job)) == (409, "venue-moved-on")
+    service.http.post(f"/venues/{name}/restore", json={"revision": 1}).raise_for_status()
+    assert adopt(service, name, job).json()["field"]["ridge"] == job["result"]["ridge"]
+    back = service.http.post(f"/venues/{name}/restore", json={"revision": 1}).json()
+    assert back["field"]["ridge"] is None
+
+
 def test_options_name_the_cameras_that_are_found_of_those_with_frames(service, name):
     service.venue(name)
     job = found(service, name, cameras=["right"])

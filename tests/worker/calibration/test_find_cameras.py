@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.worker.calibration.gate.test_quality import good
-from tests.worker.calibration.synthetic import CROWNED, pair, pair_frames
+from tests.worker.calibration.synthetic import CROWNED, PITCH, paint_frame, pair, pair_frames
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.find_cameras import find_cameras, why_not_confirmed
 from worker.calibration.gate.quality import Gate
@@ -58,6 +58,24 @@ def test_a_camera_is_found_beside_one_that_is_known():
     (camera,) = found.cameras
     assert camera.accepted
     assert np.linalg.norm(camera.candidates[0].camera.pose.position - right.pose.position) < 0.03
+
+
+def test_the_crown_of_a_field_that_is_given_flat_is_found_with_the_cameras():
+    found = find_cameras(CROWNED.flat(), [sought(one) for one in pair()], [], frames(), white_on_green, 1)
+    assert found.pitch.ridge_height == pytest.approx(CROWNED.ridge_height, abs=0.02)
+    for truth, camera in zip(pair(), found.cameras, strict=True):
+        assert camera.accepted, camera.refusal
+        assert np.linalg.norm(camera.candidates[0].camera.pose.position - truth.pose.position) < 0.03
+
+
+def test_a_flat_field_stays_flat_and_a_field_with_a_known_camera_as_it_is_given():
+    left, right = pair()
+    on_the_flat = paint_frame(PITCH, left)
+    flat = find_cameras(PITCH, [sought(left)], [], {left.id: [on_the_flat]}, white_on_green, 1)
+    assert flat.cameras[0].accepted
+    assert flat.pitch is PITCH
+    beside = find_cameras(CROWNED.flat(), [sought(right)], [left], frames(), white_on_green, 1)
+    assert beside.pitch.ridge is None
 
 
 def test_lines_have_to_fit_better_through_a_lens_that_was_found_with_the_pose():

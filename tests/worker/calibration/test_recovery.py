@@ -15,9 +15,10 @@ from worker.calibration.gate.quality import Refusal
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.geometry.rotation import rotation_angles_deg, rotation_matrices, rotation_vectors
 from worker.calibration.records import Options, Stopped
-from worker.calibration.relocalisation import relocalise as relocalisation
+from worker.calibration.relocalisation import candidate
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.relocalise import Candidate, NotFound, Relocalisation, twin
+from worker.calibration.relocalisation.candidate import Candidate
+from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, twin
 from worker.calibration.relocalisation.sought import ANYWHERE
 from worker.calibration.solve import Problem
 
@@ -148,7 +149,7 @@ def test_what_hardly_agrees_with_the_lines_of_an_upside_down_frame_is_not_refine
         return searched[-1]
 
     monkeypatch.setattr(recovery, "relocalise", watched)
-    monkeypatch.setattr(relocalisation, "refine", lambda *given, **_: refined.append(given))
+    monkeypatch.setattr(candidate, "refine", lambda *given, **_: refined.append(given))
     upside_down = {"left": (np.ascontiguousarray(frames()["left"][0][::-1]),)}
     (found,) = run([outdated()[0]], upside_down, seed=3).cameras
     assert not found.accepted

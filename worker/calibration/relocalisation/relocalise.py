@@ -11,29 +11,21 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from worker.calibration.detection.contrast import Channels
-from worker.calibration.detection.evidence import Evidence
-from worker.calibration.diagnostics.overlap import Overlap, overlap_of
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.geometry.camera import Camera, Pose, inside
-from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_of_all
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.lens import SIGMA_NAMES, Lens
-from worker.calibration.geometry.parameters import LensParameter
+from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.geometry.rotation import rotation_vectors
-from worker.calibration.refinement.refine import Observations, refine
-from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
+from worker.calibration.relocalisation.candidate import Candidate, Sight
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import HALF_TURN
-from worker.calibration.relocalisation.paint import Paint, share
+from worker.calibration.relocalisation.paint import share
 from worker.calibration.relocalisation.propose import Proposal, propose
 from worker.calibration.relocalisation.sought import SoughtCamera
 
-SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
-"""How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
 TOO_LITTLE_PAINT = frozenset({"no-lines", "few-lines"})
 BEGUN_ANEW = TOO_LITTLE_PAINT | {"lines"}
 BEGUN_ANEW_WITH_OTHER_LENSES = BEGUN_ANEW | {"implausible", "not-unique"}
@@ -65,38 +57,10 @@ LEAST_SURE, LEAST_SURE_OF_LENS = 0.0025, 0.00125
 deviation), through a lens that is known and one that is found. Pose and lens that slide together, one to make up for
 the other, keep every limit of a pose alone. Right ones on rendered views are sure to 0.0012 and better where the lens
 is found, wrong ones to 0.006 and worse."""
-FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
-"""How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
-k2 at half the width of the frame."""
 BORDER_POINTS = 20
 """On each side of the frame, where a lens is asked whether it sees all of that."""
 
 Reason = Literal["no-lines", "lines", "few-lines", "implausible", "not-unique", "not-confirmed"]
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A camera that may have taken the frame, refined.
-
-    `agreement` 0..1: the harmonic mean of how much of the lines that it expects is seen beyond chance, as `evidence`
-    has it, and of how much of the paint in the frame is `explained`; `explains` (n,): which places on paint lie on such
-    a line; `residual_px`: rms of its lines, None where too few were measured, as `sigma` of the pose and `shift_px`,
-    how far off the markings in view may be for all that the lines leave open of pose and lens (rms, one sigma).
-    """
-
-    camera: Camera
-    agreement: float
-    explains: NDArray[np.bool_]
-    evidence: Evidence
-    overlap: Overlap
-    residual_px: float | None
-    sigma: Sigma | None
-    shift_px: float | None
-
-    @property
-    def explained(self) -> float:
-        """The share of the paint in the frame, 0..1, that lies on a line of the field."""
-        return share(self.explains)
 
 
 @dataclass(frozen=True)
@@ -133,7 +97,7 @@ def relocalise(
     Where its focal length is not known, k1, k2 and principal point are found with it and the pose. `pulse` is called
     every second or so, and may raise to end the search. Proposals of less than `least_agreement` are not refined.
     """
-    sight = _Sight.of(field, channels, response)
+    sight = Sight.of(field, channels, response)
     candidates = list[Candidate]()
     looked, through = sight, sought
     for attempt in range(ATTEMPTS_SOUGHT_LENS if sought.is_lens_sought else ATTEMPTS_KNOWN_LENS):
@@ -159,58 +123,6 @@ def relocalise(
     return found
 
 
-@dataclass(frozen=True)
-class _Sight:
-    """Lines and paint of one frame: `observations` for a finish, `small` (H, W) the response in 0..255, its `paint`."""
-
-    field: Field
-    observations: Observations
-    small: NDArray[np.uint8]
-    paint: Paint
-
-    @classmethod
-    def of(cls, field: Field, channels: Channels, response: Response) -> _Sight:
-        """Return the sight of a frame by the response (H, W) of the network, 0..1."""
-        small = np.rint(response * 255).astype(np.uint8)
-        return cls(field, Observations([channels], [response]), small, Paint.of(small))
-
-    def strengthened(self, times: float) -> _Sight:
-        """Return the sight of this frame as if the network were so many `times` as sure."""
-        (channels,), (response,) = self.observations.channels, self.observations.responses
-        return _Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
-
-    def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
-        """A proposed camera on the measured lines, with what is sought of it."""
-        return self.with_lens_and_pose(camera) if sought.is_lens_sought else self.with_pose(camera)
-
-    def with_pose(self, camera: Camera) -> Candidate:
-        """A proposed camera on the measured lines."""
-        return self._candidate(refine(self.field, [camera], self.observations, 0.0, searches_px=SEARCH_PX).each[0])
-
-    def with_lens_and_pose(self, camera: Camera) -> Candidate:
-        """A proposed camera on the measured lines, with focal length and k1, and then with principal point and k2."""
-        width, focal = camera.intrinsics.size[0], camera.intrinsics.focal_length_px
-        coarse = [
-            LensParameter(0, "focal_length_px", FREE_FOCAL * focal),
-            LensParameter(0, "k1", FREE_BEND * (2 * focal / width) ** 2),
-        ]
-        fine = [LensParameter(0, f"principal_point_{axis}_px", FREE_CENTRE * width) for axis in ("x", "y")]
-        fine += [LensParameter(0, "k2", FREE_BEND * (2 * focal / width) ** 4)]
-        caught = refine(self.field, [camera], self.observations, 0.0, coarse, SEARCH_PX).each[0].camera
-        found = refine(self.field, [caught], self.observations, 0.0, [*coarse, *fine]).each[0]
-        return self._candidate(replace(found, camera=_with_sigmas(found)))
-
-    def _candidate(self, found: RefinedPose) -> Candidate:
-        explains = self.paint.on_markings(self.field, found.camera)
-        explained = share(explains)
-        seen = max(found.evidence.agreement, 0.0)
-        both = 2 * seen * explained / max(seen + explained, 1e-9)
-        sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
-        overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
-        shift_px = _shift_sigma_px(self.field, found)
-        return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, shift_px)
-
-
 def _distinct(field: Field, markings: FieldMap, sought: SoughtCamera, proposals: Sequence[Proposal]) -> list[Camera]:
     """The cameras to be refined: good beside the best, and different from each other."""
     chosen = list[Camera]()
@@ -221,27 +133,6 @@ def _distinct(field: Field, markings: FieldMap, sought: SoughtCamera, proposals:
         if all(_differ(field, markings, other, camera, PROPOSED_APART) for other in chosen):
             chosen.append(camera)
     return chosen
-
-
-def _with_sigmas(found: RefinedPose) -> Camera:
-    """The camera with what is known of its lens written beside it."""
-    if found.refined is None:
-        return found.camera
-    deviations = np.sqrt(np.diag(found.refined.covariance)[POSE_NUMBERS:]).tolist()
-    known = dict(zip(SIGMA_NAMES.values(), deviations, strict=True))
-    known["fy"] = float(np.hypot(known["fx"], known.pop("aspect") * found.camera.intrinsics.focal_length_px))
-    return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known))
-
-
-def _shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
-    """How far off the markings in view may be: rms of one standard deviation each; None where none were measured."""
-    lines = field.line_points().position
-    in_view = lines[inside(found.camera.project(lines), found.camera.intrinsics.size)]
-    if found.refined is None or len(in_view) == 0:
-        return None
-    slopes = pixel_slopes_of_all(found.camera, in_view)
-    variances = np.einsum("nij,jk,nik->n", slopes, found.refined.covariance, slopes)
-    return float(np.sqrt(np.nanmean(variances)))
 
 
 def _why_not_taken(

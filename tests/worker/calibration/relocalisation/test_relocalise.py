@@ -14,9 +14,9 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.segmentation import Region
 from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.geometry.camera import inside
+from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import (
-    Candidate,
     explains_nearly_as_well,
     relocalise,
     sees_all_of_its_frame,

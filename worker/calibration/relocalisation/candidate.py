@@ -1,0 +1,144 @@
+"""Cameras that may have taken a frame: proposed ones refined onto its measured lines, and what speaks for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worker.calibration.detection.contrast import Channels
+from worker.calibration.detection.evidence import Evidence
+from worker.calibration.diagnostics.overlap import Overlap, overlap_of
+from worker.calibration.diagnostics.registration import Response
+from worker.calibration.geometry.camera import Camera, inside
+from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_of_all
+from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.lens import SIGMA_NAMES
+from worker.calibration.geometry.parameters import LensParameter
+from worker.calibration.refinement.refine import Observations, refine
+from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
+from worker.calibration.relocalisation.paint import Paint, share
+from worker.calibration.relocalisation.sought import SoughtCamera
+
+SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
+"""How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
+FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
+"""How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
+k2 at half the width of the frame."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A camera that may have taken the frame, refined.
+
+    `agreement` 0..1: the harmonic mean of how much of the lines that it expects is seen beyond chance, as `evidence`
+    has it, and of how much of the paint in the frame is `explained`; `explains` (n,): which places on paint lie on such
+    a line; `residual_px`: rms of its lines, None where too few were measured, as `sigma` of the pose and `shift_px`,
+    how far off the markings in view may be for all that the lines leave open of pose and lens (rms, one sigma).
+    """
+
+    camera: Camera
+    agreement: float
+    explains: NDArray[np.bool_]
+    evidence: Evidence
+    overlap: Overlap
+    residual_px: float | None
+    sigma: Sigma | None
+    shift_px: float | None
+
+    @property
+    def explained(self) -> float:
+        """The share of the paint in the frame, 0..1, that lies on a line of the field."""
+        return share(self.explains)
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Lines and paint of one frame: `observations` for a finish, `small` (H, W) the response in 0..255, its `paint`."""
+
+    field: Field
+    observations: Observations
+    small: NDArray[np.uint8]
+    paint: Paint
+
+    @classmethod
+    def of(cls, field: Field, channels: Channels, response: Response) -> Sight:
+        """Return the sight of a frame by the response (H, W) of the network, 0..1."""
+        small = np.rint(response * 255).astype(np.uint8)
+        return cls(field, Observations([channels], [response]), small, Paint.of(small))
+
+    def strengthened(self, times: float) -> Sight:
+        """Return the sight of this frame as if the network were so many `times` as sure."""
+        (channels,), (response,) = self.observations.channels, self.observations.responses
+        return Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
+
+    def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
+        """A proposed camera on the measured lines, with what is sought of it."""
+        return self.with_lens_and_pose(camera) if sought.is_lens_sought else self.with_pose(camera)
+
+    def with_pose(self, camera: Camera) -> Candidate:
+        """A proposed camera on the measured lines."""
+        return self.assessed(refine(self.field, [camera], self.observations, 0.0, searches_px=SEARCH_PX).each[0])
+
+    def with_lens_and_pose(self, camera: Camera) -> Candidate:
+        """A proposed camera on the measured lines, with focal length and k1, and then with principal point and k2."""
+        coarse, fine = coarse_lens(0, camera), fine_lens(0, camera)
+        caught = refine(self.field, [camera], self.observations, 0.0, coarse, SEARCH_PX).each[0].camera
+        return self.assessed_with_lens(refine(self.field, [caught], self.observations, 0.0, [*coarse, *fine]).each[0])
+
+    def assessed_with_lens(self, found: RefinedPose) -> Candidate:
+        """A camera that was refined with its lens, which says what is known of it, beside lines and paint."""
+        return self.assessed(replace(found, camera=_with_sigmas(found)))
+
+    def assessed(self, found: RefinedPose) -> Candidate:
+        """A refined camera beside the lines and the paint of the frame."""
+        explains = self.paint.on_markings(self.field, found.camera)
+        explained = share(explains)
+        seen = max(found.evidence.agreement, 0.0)
+        both = 2 * seen * explained / max(seen + explained, 1e-9)
+        sigma = None if found.covariance is None else Sigma.from_covariance(found.covariance)
+        overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
+        shift_px = _shift_sigma_px(self.field, found)
+        return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, shift_px)
+
+
+def coarse_lens(number: int, camera: Camera) -> list[LensParameter]:
+    """Focal length and k1 of a proposed camera, `number` of several, to be found along with its pose."""
+    return [
+        LensParameter(number, "focal_length_px", FREE_FOCAL * camera.intrinsics.focal_length_px),
+        LensParameter(number, "k1", FREE_BEND * _half_width(camera) ** -2),
+    ]
+
+
+def fine_lens(number: int, camera: Camera) -> list[LensParameter]:
+    """Its principal point and k2, to be found once it is nearly in place."""
+    off_px = FREE_CENTRE * camera.intrinsics.size[0]
+    centre = [LensParameter(number, f"principal_point_{axis}_px", off_px) for axis in ("x", "y")]
+    return [*centre, LensParameter(number, "k2", FREE_BEND * _half_width(camera) ** -4)]
+
+
+def _half_width(camera: Camera) -> float:
+    """Half the width of the frame in focal lengths."""
+    return camera.intrinsics.size[0] / (2 * camera.intrinsics.focal_length_px)
+
+
+def _with_sigmas(found: RefinedPose) -> Camera:
+    """The camera with what is known of its lens written beside it."""
+    if found.refined is None:
+        return found.camera
+    deviations = np.sqrt(np.diag(found.refined.covariance)[POSE_NUMBERS:]).tolist()
+    known = dict(zip(SIGMA_NAMES.values(), deviations, strict=True))
+    known["fy"] = float(np.hypot(known["fx"], known.pop("aspect") * found.camera.intrinsics.focal_length_px))
+    return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known))
+
+
+def _shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
+    """How far off the markings in view may be: rms of one standard deviation each; None where none were measured."""
+    lines = field.line_points().position
+    in_view = lines[inside(found.camera.project(lines), found.camera.intrinsics.size)]
+    if found.refined is None or len(in_view) == 0:
+        return None
+    slopes = pixel_slopes_of_all(found.camera, in_view)
+    variances = np.einsum("nij,jk,nik->n", slopes, found.refined.covariance, slopes)
+    return float(np.sqrt(np.nanmean(variances)))
