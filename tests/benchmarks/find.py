@@ -178,6 +178,7 @@ def _found(pitch: Field, truth: Camera, frame: Frame, knowing: str, seed: int, e
             }
             for one in camera.candidates
         ],
+        "ridge_m": found.pitch.ridge_height,
         "core_s": core_s,
         "many_directions": shows_many_directions(pitch, truth),
         "fit": engine(pitch, [truth], {truth.id: [frame]}, seed).accepted,

@@ -97,10 +97,12 @@ def _explained(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
 
 
 def straightened(places: NDArray[np.float32], bends: Array) -> NDArray[np.float32]:
-    """Places (M, 2) of the view without each of the bends (P,): (P, M, 2), by two steps of a fixed point."""
+    """Places (M, 2) of the view without each of the bends (P,): (P, M, 2), by a Newton step from a first guess."""
     if not bends.any():
         return places[None]
-    each = bends.astype(np.float32)[:, None]
-    seen = (places * places).sum(axis=1)[None] / np.float32(HALF_WIDTH_PX**2)
-    once = seen / (1 + each * seen) ** 2
-    return np.asarray(places[None] / (1 + each * once)[..., None])
+    # A place that was `scale` times as far from the centre has scale (1 + bent scale²) = 1.
+    bent = bends.astype(np.float32)[:, None] * (places * places).sum(axis=1)[None] / np.float32(HALF_WIDTH_PX**2)
+    scale = 1 / (1 + bent)
+    square = scale * scale
+    scale = (1 + 2 * bent * square * scale) / (1 + 3 * bent * square)
+    return np.asarray(places[None] * scale[..., None])
