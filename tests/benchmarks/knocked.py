@@ -8,8 +8,10 @@ they are, knocked likewise, and turned by each of `--turns` degrees about any ax
 4 cameras of a venue, each sent for the next one). The frame is always one that sees enough of the field: a camera that
 is knocked until it sees nothing of it cannot be found. What is knocked is the stored pose, which sees some of the field
 as well. Some pictures are too dark, blurred or faint for any job: beside the share of all draws stands that of those
-whose frame a job accepts which begins with the true pose. Every run is written to a file and not run again, so that
-long ones can be continued; after a change of the engine or of the renderer the file has to be removed.
+whose frame a job accepts which begins with the true pose. Where its lines lead astray, that job ends as far from the
+true pose: how many of the wrong ones stand where it ends is said in brackets. Every run is written to a file and not
+run again, so that long ones can be continued; after a change of the engine or of the renderer the file has to be
+removed.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ from tests.benchmarks.fields.cases import Case, cases, started
 from tests.benchmarks.fields.engine import Engine
 from tests.benchmarks.fields.judging import near, share
 from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
-from tests.benchmarks.find import NEAR, UNSEEN_PX
+from tests.benchmarks.find import NEAR, UNSEEN_PX, ends_alike, wrong_in_words, wrong_ones
 from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER as RUNS
 from tests.benchmarks.scenes import scene
@@ -152,20 +154,22 @@ def _row(
     engine: Engine,
 ) -> dict:
     answer = engine(pitch, [stored], {stored.id: [frame]}, seed)
+    from_truth = engine(pitch, [truth], {truth.id: [frame]}, seed)
     turn = stored.pose.matrix @ truth.pose.matrix.T
     row = {
         **answer.row,
         "deg": float(np.degrees(np.linalg.norm(rotation_vectors(turn)))),
-        "fit": engine(pitch, [truth], {truth.id: [frame]}, seed).accepted,
+        "fit": from_truth.accepted,
     }
     if answer.said is None:
-        return row | {"reason": "failed", "found": False, "near": False}
+        return row | {"reason": "failed", "found": False, "near": False, "as_from_truth": False}
     (result,) = answer.said.cameras
     return row | {
         "reason": "" if result.refusal is None else result.refusal.reason,
         "cause": result.view.cause,
         "found": result.accepted or (result.refusal is not None and result.refusal.reason == "knocked"),
         "near": is_near(result.camera),
+        "as_from_truth": ends_alike(pitch, from_truth, result.camera),
     }
 
 
@@ -215,7 +219,7 @@ def _within(rows: Sequence[dict], low: float, high: float) -> list[dict]:
 
 
 def _table(groups: dict[str, list[dict]], everything: Sequence[dict]) -> Iterator[str]:
-    yield "Found: accepted or proposed. Wrong: found, and not near."
+    yield "Found: accepted or proposed. Wrong: found, and not near (of these, where a job ends that began right)."
     yield ""
     yield (
         "| cameras | draws | found and near | accepted at once | found and near of those a job accepts | wrong "
@@ -230,14 +234,14 @@ def _table(groups: dict[str, list[dict]], everything: Sequence[dict]) -> Iterato
                 f"| {name} | {len(rows)} | {share([row['found'] and row['near'] for row in rows])} "
                 f"| {share([row['accepted'] and row['near'] for row in rows])} "
                 f"| {share([row['found'] and row['near'] for row in fit])} of {len(fit)} "
-                f"| {sum(row['found'] and not row['near'] for row in rows)} "
+                f"| {wrong_ones([row for row in rows if row['found']])} "
                 f"| {np.median(cores):.1f} | {max(cores):.1f} |"
             )
     yield ""
     for name, rows in groups.items():
         for row in rows:
             if not (row["found"] and row["near"]):
-                end = "WRONG" if row["found"] else f"refused: {row['reason']} {row.get('cause') or ''}"
+                end = wrong_in_words(row) if row["found"] else f"refused: {row['reason']} {row.get('cause') or ''}"
                 end += "" if row["fit"] else " (no job accepts it)"
                 key = row["key"]
                 yield f"{name}, {key.get('knocked') or key['turned']} {key.get('n', '')}, {row['deg']:.0f}°: {end}"

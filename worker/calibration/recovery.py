@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from worker.calibration.detection.view_condition import OF_THE_GROUND, ViewCondition, look_at
+from worker.calibration.detection.view_condition import LEAST_LIGHT, OF_THE_GROUND, ViewCondition, look_at
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import stitch_error_px
 from worker.calibration.gate.quality import CameraResult, Movement, Refusal, in_one_sentence
@@ -29,8 +29,10 @@ from worker.calibration.relocalisation.relocalise import Relocalisation, mean_sh
 from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
 from worker.calibration.solve import PoseSolution, Problem
 
-LOST = frozenset({"lines", "few-lines", "moved"})
+LOST = frozenset({"lines", "few-lines", "moved", "undetermined"})
 """Reasons for a refusal that a knocked camera may have."""
+OUT_OF_PLACE = frozenset({"moved", "undetermined"})
+"""Those of them that are said of lines which are seen: only a camera that moved too far is searched for then."""
 UNFIT = frozenset({"residual", "zoomed", "undetermined"})
 """Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
 LEAST_PAINT, LEAST_UNEXPLAINED, UNEXPLAINED_BY_WEATHER = 200, 0.25, 0.85
@@ -41,9 +43,9 @@ blocks the view, lies for a third or more on the lines of a camera that has not 
 hour of a foggy night is dear."""
 LOOKED_AT_EVERY = 4
 OF_THE_LIGHT = frozenset({"dark", "blinded"})
-DARKEST, BRIGHTEST, LEAST_LIT = 25, 245, 0.3
+BRIGHTEST, LEAST_LIT = 245, 0.3
 """A field that is too dark or too bright where the stored pose has it may lie elsewhere, and lit, if this share of the
-frame has a brightness between these, of 255."""
+frame is no brighter, of 255, and not too dark either."""
 ON_ITS_MOUNT_M = 2.5
 """How far from its stored place a camera is searched for first."""
 LEAST_PROPOSED = 0.34
@@ -115,7 +117,7 @@ def _may_be_of_what_lies_beside(problem: Problem, number: int, observer: FrameOb
     if cause in OF_THE_LIGHT:
         frame = observer.frames[problem.cameras[number].id][0]
         brightness = cv2.cvtColor(frame[::LOOKED_AT_EVERY, ::LOOKED_AT_EVERY], cv2.COLOR_BGR2GRAY)
-        return bool(((brightness >= DARKEST) & (brightness <= BRIGHTEST)).mean() >= LEAST_LIT)
+        return bool(((brightness >= LEAST_LIGHT) & (brightness <= BRIGHTEST)).mean() >= LEAST_LIT)
     return cause in OF_THE_GROUND
 
 
@@ -129,7 +131,7 @@ def _is_sought(problem: Problem, number: int, result: CameraResult, *, is_view_d
     if result.refusal is None or result.refusal.reason not in LOST:
         return False
     # A mount that gave way over many nights stands where it was found last night.
-    return result.refusal.reason != "moved" or result.moved.beyond(problem.gate)
+    return result.refusal.reason not in OUT_OF_PLACE or result.moved.beyond(problem.gate)
 
 
 def _is_there(result: CameraResult) -> bool:
@@ -179,11 +181,11 @@ def _search(
 
 
 def _has_lines_elsewhere(problem: Problem, result: CameraResult, response: Response) -> bool:
-    """Whether lines are clearly seen that neither the stored nor the best pose explains; of one that moved, any."""
+    """Whether lines are clearly seen that no pose explains which was found; of a camera that moved too far, any."""
     paint = Paint.of(np.rint(response * 255).astype(np.uint8))
     if len(paint.middles) < LEAST_PAINT:
         return False
-    if result.refusal is not None and result.refusal.reason == "moved":
+    if result.refusal is not None and result.moved.beyond(problem.gate):
         return True
     least = LEAST_UNEXPLAINED if result.view.usable else UNEXPLAINED_BY_WEATHER
     return paint.explained_by(problem.pitch, result.camera) <= 1 - least

@@ -38,6 +38,9 @@ CAPTURE_RAD = 0.1
 """How far a line may be from where the stored pose expects it: 4 degrees of rotation and 0.3 m at 15 m."""
 LEAST_CAUGHT = 0.6
 """Share of the expected lines that has to be caught in the frame for lines alone to suffice."""
+MOST_CAUGHT, CLEARLY_MORE, MOST_AGAIN = 0.9, 0.02, 3
+"""Agreement with the lines below which a finish is begun again from where it ended, by how much it has to grow with
+that, and how often it may."""
 SEARCHED_POWER = 3
 """Power of the network's responses in the search: what it half believes (a shadow's edge, a board) hardly pulls."""
 
@@ -250,18 +253,36 @@ def refine_and_judge(
 def refine_poses(
     problem: Problem, begun: Sequence[Camera], observations: Observations, progress: ProgressReporter
 ) -> RefinedPoses:
-    """Refine the cameras jointly onto the lines of these `observations`, from where they were found (`begun`)."""
+    """Refine the cameras jointly onto the lines of these `observations`, from where they were found (`begun`).
+
+    Where one of them ends without some of its lines, again from there while more are found: lines beside which the
+    search for them has narrowed are found from where the others led.
+    """
     with progress.timed("refinement"):
         progress.at("refinement", 0.0)
-        return refine(
-            problem.pitch,
-            begun,
-            observations,
-            problem.options.stitch_weight,
-            free_parameters(problem),
-            stored=problem.cameras,
-            memories=problem.memories,
-        )
+        free = free_parameters(problem)
+        refined = _refined_from(problem, begun, observations, free)
+        # What is solved for beside the poses would be as open once more as it was at first.
+        rounds = 0 if free else MOST_AGAIN
+        for _ in range(rounds):
+            if _weakest_agreement(refined) >= MOST_CAUGHT:
+                break
+            again = _refined_from(problem, refined.cameras, observations, free)
+            if _weakest_agreement(again) < _weakest_agreement(refined) + CLEARLY_MORE:
+                break
+            refined = again
+        return refined
+
+
+def _refined_from(
+    problem: Problem, begun: Sequence[Camera], observations: Observations, free: Sequence[Parameter]
+) -> RefinedPoses:
+    weight, memories = problem.options.stitch_weight, problem.memories
+    return refine(problem.pitch, begun, observations, weight, free, stored=problem.cameras, memories=memories)
+
+
+def _weakest_agreement(refined: RefinedPoses) -> float:
+    return min(one.evidence.agreement for one in refined.each)
 
 
 def refine_without(

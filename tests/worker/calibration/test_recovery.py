@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -221,6 +222,20 @@ def test_a_camera_that_was_knocked_until_its_field_lies_where_the_sky_is_blinded
     assert alone.view.cause == "blinded"
     assert found.refusal.reason == "knocked", found.rejected_because
     assert rotation_angles_deg(found.camera.pose.rotation, left.pose.rotation) < 0.1
+
+
+@pytest.mark.parametrize(("lit_rows", "is_doubted"), [(40, False), (80, True)])
+def test_of_a_camera_in_the_dark_it_is_asked_whether_a_third_of_its_frame_is_light_enough_for_lines(
+    lit_rows, is_doubted
+):
+    frame = np.full((200, 320, 3), 8, np.uint8)
+    frame[-lit_rows:] = 17
+    problem = SimpleNamespace(
+        cameras=[camera("left", (0.0, -40.0, 8.0), (0.0, 0.0))],
+        observed=SimpleNamespace(views=[SimpleNamespace(cause="dark")]),
+    )
+    observer = SimpleNamespace(frames={"left": (frame,)})
+    assert recovery._may_be_of_what_lies_beside(problem, 0, observer) == is_doubted
 
 
 def test_a_frame_that_is_blown_out_as_a_whole_is_not_searched():

@@ -43,6 +43,9 @@ PROPOSED_APART, DIFFERENT = 0.04, 0.01
 of the frame, on mean."""
 LEAST_FOUND = 0.7
 """Of the expected lines, beyond chance. Right poses on real frames find 0.86 and more, wrong ones up to 0.9."""
+LEAST_FOUND_IN_PLACE, EXPLAINED_IN_PLACE = 0.6, 0.85
+"""The same, as a job asks for it, of a camera that is sought where it stood, through its own lens, and where so much of
+the paint is explained: there are few other poses from which it could be."""
 RIVAL_OVERLAP, MORE_MISSED, FEW_MISSED, MORE_EXPLAINED, LESS_AGREEMENT = 0.8, 2.5, 0.05, 0.05, 0.15
 OWN_PAINT, MUCH_MORE_EXPLAINED, MORE_SEEN, ALIKE_EXPLAINED = 0.02, 0.2, 0.04, 0.01
 LESS_EXACT = 1.4
@@ -143,7 +146,7 @@ def _why_not_taken(
         return NotFound("no-lines", "no lines of a field are seen in the frame; is the view free and lit?")
     best, *others = candidates
     seen = best.evidence
-    if seen.agreement < LEAST_FOUND:
+    if seen.agreement < LEAST_FOUND and not _is_likely_in_place(sought, best):
         return NotFound(
             "lines",
             f"no pose explains the lines: at the best one {seen.share:.0%} of the markings in view are seen "
@@ -183,6 +186,13 @@ def _why_not_taken(
                 "are seen where they put them; say where the camera stands, or let it see more of the field",
             )
     return None
+
+
+def _is_likely_in_place(sought: SoughtCamera, best: Candidate) -> bool:
+    """Whether a camera that is turned on its mount is found by fewer of its lines than one that may stand anywhere."""
+    if sought.place.position is None or sought.is_lens_sought:
+        return False
+    return best.evidence.agreement >= LEAST_FOUND_IN_PLACE and best.explained >= EXPLAINED_IN_PLACE
 
 
 def sees_all_of_its_frame(lens: Lens) -> bool:

@@ -14,6 +14,7 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.segmentation import Region
 from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.geometry.camera import inside
+from worker.calibration.relocalisation import relocalise as relocalisation
 from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import (
@@ -155,6 +156,18 @@ def candidate(found_of_100, explained_of_100, iou, residual_px=0.4):
     return Candidate(
         SIDELINE, agreement, explains, seen, Overlap(iou, found_of_100 / 100, 0.0), residual_px, None, None
     )
+
+
+def test_a_camera_that_is_sought_where_it_stood_may_miss_more_of_its_lines():
+    (lens, place) = [SoughtLens.known(SIDELINE.intrinsics)], Place(position=SIDELINE.pose.position)
+    misses_a_third, explains_little = candidate(66, range(90), iou=0.6), candidate(66, range(60), iou=0.6)
+    in_place, anywhere = SoughtCamera("one", lens, place), SoughtCamera("one", lens)
+    refusals = [
+        relocalisation._why_not_taken(PITCH, FieldMap.of(PITCH), sought, [best]).reason
+        for sought, best in ((in_place, misses_a_third), (in_place, explains_little), (anywhere, misses_a_third))
+    ]
+    # Of the candidate too few points are measured, which comes after how many lines are seen.
+    assert refusals == ["few-lines", "lines", "lines"]
 
 
 def test_a_pose_that_misses_more_and_explains_nothing_of_its_own_is_no_rival():
