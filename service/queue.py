@@ -21,7 +21,7 @@ from dbos import WorkflowStatusString as QueueStatus
 from dbos._core import execute_dequeued_workflow
 
 from service.schemas.names import JobKind
-from service.store.database import LIMITS, postgresql
+from service.store.database import LIMITS, postgresql, sqlite_file
 
 APPLICATION = "esc"
 QUEUE = "calibration"
@@ -54,7 +54,7 @@ def remove(url: str) -> None:
 
 def _engine(url: str, limits: str = LIMITS) -> sa.Engine:
     """The queue's own engine: its SQL expects the driver to begin transactions, ours does not."""
-    if not url.startswith("sqlite"):
+    if sqlite_file(url) is None:
         return postgresql(url, limits)
     engine = sa.create_engine(url)
 
@@ -135,7 +135,7 @@ class WorkerQueue:
 
     def __init__(self, url: str, worker: str, jobs_at_once: int, run: Callable[[str], None]) -> None:
         self._worker = worker
-        self._poll_s = POLL_FILE_S if url.startswith("sqlite") else POLL_S
+        self._poll_s = POLL_FILE_S if sqlite_file(url) else POLL_S
         self._at_once = {QUEUE: jobs_at_once, LIGHT_QUEUE: 1}
         config: DBOSConfig = {
             "name": APPLICATION,

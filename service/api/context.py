@@ -23,6 +23,7 @@ from service.schemas.actor import Actor
 from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN
 from service.schemas.problems import Problem
 from service.settings import Settings
+from service.store.database import sqlite_file
 from service.store.jobs.task import Origin
 from service.store.statistics.snapshot import read_statistics
 
@@ -37,7 +38,7 @@ class Context(ApplicationState):
         super().__init__(settings)
         silence_s = settings.takeover_after_s
         self.reads = SharedReads(self.jobs.get)
-        interval_s = FILE_INTERVAL_S if settings.home_database_url.startswith("sqlite") else INTERVAL_S
+        interval_s = FILE_INTERVAL_S if sqlite_file(settings.home_database_url) else INTERVAL_S
         self.job_watch = ChangeWatch(self.jobs.states, interval_s)
         self.venue_watch = ChangeWatch(self.events.newest, interval_s)
         self.live_watch = ChangeWatch(self.live.newest, LIVE_INTERVAL_S)

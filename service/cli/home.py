@@ -110,9 +110,9 @@ def _new_database(url: str) -> Iterator[sa.Engine]:
 
     from service import queue
     from service.store.copying import require_empty
-    from service.store.database import connect, reading
+    from service.store.database import connect, reading, sqlite_file
 
-    file = Path(sa.make_url(url).database or "") if url.startswith("sqlite") else None
+    file = sqlite_file(url)
     was_there = file is not None and file.exists()
     engine = connect(url)
     try:

@@ -119,8 +119,11 @@ def _print_key(key: str) -> None:
 @contextmanager
 def _known_keys(data: Path | None) -> Iterator[KeyRepository]:
     """The keys of a service that has been there: to ask for them makes none."""
+    from service.store.database import sqlite_file
+
     url = load_settings(data=data).home_database_url
-    if url.startswith("sqlite") and not Path(url.partition("sqlite:///")[2]).exists():
+    file = sqlite_file(url)
+    if file is not None and not file.exists():
         fail(f"There is no service here: {url} does not exist. {OTHER_FOLDER_HINT}", FAILED)
     with _keys(data) as keys:
         yield keys

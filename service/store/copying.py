@@ -15,7 +15,16 @@ import sqlalchemy as sa
 
 from service.schemas.names import OPEN_STATUSES
 from service.store import tables
-from service.store.database import SNAPSHOT, advisory_lock, connect, newest_schema, schema_of, upgrade, writing
+from service.store.database import (
+    SNAPSHOT,
+    advisory_lock,
+    connect,
+    newest_schema,
+    schema_of,
+    sqlite_file,
+    upgrade,
+    writing,
+)
 from service.store.jobs.attempts import Enqueue
 
 ROWS_AT_ONCE = 500
@@ -34,7 +43,7 @@ def exclusive_snapshot(url: str) -> Iterator[sa.Connection]:
 
     Raises `CannotCopy` if somebody uses it, or it has another schema than this program.
     """
-    engine = _exclusive(url) if url.startswith("sqlite") else connect(url)
+    engine = _exclusive(url) if sqlite_file(url) else connect(url)
     try:
         known_tables = _tables_in(engine) if engine.dialect.name == "postgresql" else []
         with engine.connect().execution_options(**SNAPSHOT[engine.dialect.name]) as connection, connection.begin():

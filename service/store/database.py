@@ -57,19 +57,24 @@ class UnsupportedDatabase(Exception):  # noqa: N818
     """This program, or this machine, cannot run the service on this database; the message says what to do."""
 
 
+def sqlite_file(url: str) -> Path | None:
+    """The file of an SQLite database; None where the address is one of PostgreSQL."""
+    parsed = sa.make_url(url)
+    return Path(parsed.database or "") if parsed.get_backend_name() == "sqlite" else None
+
+
 def connect(url: str) -> sa.Engine:
     """An engine on SQLite in WAL mode or on PostgreSQL."""
-    parsed = sa.make_url(url)
-    if parsed.get_backend_name() != "sqlite":
+    file = sqlite_file(url)
+    if file is None:
         return postgresql(url)
     if sys.version_info >= (3, 12) and sqlite3.sqlite_version_info < (3, 42):
         raise UnsupportedDatabase(
             f"Python {sys.version_info.major}.{sys.version_info.minor} here has SQLite {sqlite3.sqlite_version}; "
             "the job queue needs 3.42 with it. Use Python 3.11, a Python with a newer SQLite, or PostgreSQL."
         )
-    if parsed.database:
-        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
-    engine = sa.create_engine(parsed, pool_timeout=POOL_TIMEOUT_S)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    engine = sa.create_engine(url, pool_timeout=POOL_TIMEOUT_S)
     engine.dialect.statement_compiler = _Hinting
     sa.event.listen(engine, "connect", _set_up_sqlite)
     sa.event.listen(engine, "begin", _begin_sqlite)
