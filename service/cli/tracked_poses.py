@@ -16,7 +16,7 @@ from service.schemas.problems import Problem
 if TYPE_CHECKING:
     from service.schemas.venue import Camera, Venue
     from worker.calibration.geometry import camera as engine
-    from worker.calibration.tracking.follower import Moment, TrackedPose
+    from worker.calibration.tracking.follower import TrackedMoment, TrackedPose
     from worker.video.tracking import MotionSummary, TrackedGeometryFactory
 
 
@@ -36,7 +36,7 @@ def tracking(venue: Venue, every: int, stem: Path | None, freed_axes: str) -> It
             stem, [NumberedCamera(camera, numbers[camera.id]) for camera in venue.cameras], freed_axes
         ) as poses:
 
-            def keep(moment: Moment, rate: Fraction) -> None:
+            def keep(moment: TrackedMoment, rate: Fraction) -> None:
                 poses.add([_tracked_camera(one, numbers) for one in moment.cameras], rate)
 
             follow = TrackedGeometryFactory(every, keep)

@@ -33,7 +33,7 @@ UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
-class Moment:
+class SampleTime:
     """When a sample that is sent was taken: `unix_ns` by the clock of the machine, the `number` of the sample from 0.
 
     `rate`: samples a second; `status`: of the tracking.
@@ -76,7 +76,7 @@ def write_frame(shot: NumberedCamera, frame: Frame) -> bytes:
     return (json.dumps(_with_sample_id(_sample(shot) | moment), separators=(",", ":")) + "\n").encode()
 
 
-def write_moment(shot: NumberedCamera, moment: Moment) -> bytes:
+def write_moment(shot: NumberedCamera, moment: SampleTime) -> bytes:
     """One sample of a stream, compact JSON. Its timestamp is UTC in seconds since 1970 by the sender's clock."""
     seconds, nanoseconds = divmod(moment.unix_ns, 1_000_000_000)
     timing = {

@@ -56,7 +56,7 @@ class Sample:
     """A camera at a moment. `tracked`: how that is known, unless it is the stored pose."""
 
     shot: NumberedCamera
-    moment: opentrackio.Moment
+    moment: opentrackio.SampleTime
     tracked: Tracked | None = None
 
 
@@ -176,10 +176,10 @@ class PoseSender:
         status: str,
         tracked: Tracked | None = None,
     ) -> None:
-        """Send a sample of each of these cameras; the other arguments as of `Moment` and `Sample`."""
+        """Send a sample of each of these cameras; the other arguments as of `SampleTime` and `Sample`."""
         with self._lock:
             samples = [
-                Sample(shot, opentrackio.Moment(unix_ns, self._numbers[shot.id], rate, status), tracked)
+                Sample(shot, opentrackio.SampleTime(unix_ns, self._numbers[shot.id], rate, status), tracked)
                 for shot in shots
             ]
             self._numbers.update(shot.id for shot in shots)

@@ -27,15 +27,15 @@ DECIDES = "database"
 
 
 @dataclass(frozen=True)
-class Part:
+class ComponentState:
     """A part of the service: whether it is there, and what there is to say about it."""
 
     ok: bool
     says: str = "ok"
 
 
-HANGS = Part(False, f"gave no answer within {LIMIT_S:g} s")
-Parts = dict[str, Part]
+HANGS = ComponentState(False, f"gave no answer within {LIMIT_S:g} s")
+ComponentStates = dict[str, ComponentState]
 
 
 class Readiness:
@@ -52,19 +52,19 @@ class Readiness:
         self._disk = disk
         self._silence_s = silence_s
         # By the parts that each tells of.
-        self._checks: Mapping[tuple[str, ...], Callable[[], Parts]] = {
+        self._checks: Mapping[tuple[str, ...], Callable[[], ComponentStates]] = {
             (DECIDES,): lambda: {DECIDES: _answers(self._jobs.check, "cannot be read")},
             ("blobs",): lambda: {"blobs": _answers(self._blobs.check, "cannot be reached")},
             ("disk",): lambda: {"disk": self._room()},
             ("worker", "model"): self._worker,
         }
         self._threads = ThreadPoolExecutor(len(self._checks), thread_name_prefix="readiness")
-        self._running: dict[tuple[str, ...], asyncio.Future[Parts]] = {}
+        self._running: dict[tuple[str, ...], asyncio.Future[ComponentStates]] = {}
         self._one_at_a_time = asyncio.Lock()
-        self._seen: Parts = {}
+        self._seen: ComponentStates = {}
         self._seen_at = float("-inf")
 
-    async def look(self) -> Parts:
+    async def look(self) -> ComponentStates:
         """Every part by its name, not older than a second."""
         # Those who come meanwhile wait here: one look is enough for all.
         async with self._one_at_a_time:
@@ -78,12 +78,12 @@ class Readiness:
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._engine.dispose()
 
-    async def _look(self) -> Parts:
+    async def _look(self) -> ComponentStates:
         for names, check in self._checks.items():
             if names not in self._running:
                 self._running[names] = asyncio.get_running_loop().run_in_executor(self._threads, check)
         await asyncio.wait(self._running.values(), timeout=LIMIT_S)
-        parts: Parts = {}
+        parts: ComponentStates = {}
         for names, answer in list(self._running.items()):
             if answer.done():
                 parts |= answer.result()
@@ -92,41 +92,41 @@ class Readiness:
                 parts |= dict.fromkeys(names, HANGS)
         return parts
 
-    def _room(self) -> Part:
+    def _room(self) -> ComponentState:
         try:
             free = self._disk.free_bytes()
         except OSError as error:
-            return Part(False, f"cannot be read: {type(error).__name__}")
+            return ComponentState(False, f"cannot be read: {type(error).__name__}")
         least = self._disk.min_free_bytes
         if free is None or free >= least:
-            return Part(True)
-        return Part(False, f"{free / 1e6:.0f} MB free, {least / 1e6:.0f} needed: uploads are refused")
+            return ComponentState(True)
+        return ComponentState(False, f"{free / 1e6:.0f} MB free, {least / 1e6:.0f} needed: uploads are refused")
 
-    def _worker(self) -> Parts:
+    def _worker(self) -> ComponentStates:
         try:
             alive = self._workers.alive(self._silence_s)
         except Exception:  # the database is already named above
             alive = []
         if not alive:
             return {
-                "worker": Part(False, "none gave a sign of life"),
-                "model": Part(False, "unknown: only workers have it"),
+                "worker": ComponentState(False, "none gave a sign of life"),
+                "model": ComponentState(False, "unknown: only workers have it"),
             }
-        return {"worker": Part(True), "model": _model(alive)}
+        return {"worker": ComponentState(True), "model": _model(alive)}
 
 
-def _answers(check: Callable[[], None], otherwise: str) -> Part:
+def _answers(check: Callable[[], None], otherwise: str) -> ComponentState:
     try:
         check()
     except Exception as error:  # whatever a driver or a store says
-        return Part(False, f"{otherwise}: {type(error).__name__}")
-    return Part(True)
+        return ComponentState(False, f"{otherwise}: {type(error).__name__}")
+    return ComponentState(True)
 
 
-def _model(alive: list[WorkerHeartbeat]) -> Part:
+def _model(alive: list[WorkerHeartbeat]) -> ComponentState:
     """The network: one hash, or for the minutes of an upgrade several."""
     missing = [worker.name for worker in alive if worker.model_sha256 is None]
     if missing:
-        return Part(False, f"missing at {', '.join(missing)}")
+        return ComponentState(False, f"missing at {', '.join(missing)}")
     hashes = sorted({worker.model_sha256 for worker in alive if worker.model_sha256})
-    return Part(True, f"{'ok' if len(hashes) == 1 else 'several'}: {', '.join(hashes)}")
+    return ComponentState(True, f"{'ok' if len(hashes) == 1 else 'several'}: {', '.join(hashes)}")

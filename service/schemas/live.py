@@ -34,7 +34,7 @@ def _as_written(moment: Any) -> Any:
 
 
 # Not a number of seconds as well, which Pydantic would take for a moment.
-Moment = Annotated[AwareDatetime, BeforeValidator(_as_written)]
+Timestamp = Annotated[AwareDatetime, BeforeValidator(_as_written)]
 Count = Annotated[Integer, Field(ge=0, le=10**9)]
 Milliseconds = Annotated[Number, Field(ge=0, le=1e9)]
 StreamAddress = Annotated[Name, StringConstraints(min_length=1, max_length=1024), AfterValidator(hide_secrets)]
@@ -73,7 +73,7 @@ class _LiveCamera(Schema):
     moved_m: Annotated[Number, Field(ge=0, le=4000)] | None = Field(
         None, description="How far it is from its stored pose."
     )
-    taken_at: Moment | None = Field(None, description="When the picture of this pose was taken, by `clock`.")
+    taken_at: Timestamp | None = Field(None, description="When the picture of this pose was taken, by `clock`.")
     clock: Annotated[LiveClock, OPEN_WORD] | None = Field(
         None, description="`rtcp`: by the camera's own clock; `arrival`: when the picture arrived; null: no picture."
     )
@@ -137,7 +137,7 @@ class LiveReport(Schema):
 
     model_config = ConfigDict(json_schema_extra={"examples": [PROCESS_EXAMPLE | {"cameras": [CAMERA_EXAMPLE]}]})
 
-    started_at: Moment
+    started_at: Timestamp
     host: Annotated[Name, StringConstraints(min_length=1, max_length=255)] = Field(description="Where it runs.")
     pid: Annotated[Integer, Field(ge=0, le=2**31 - 1)] | None = None
     destinations: Annotated[list[Name], Field(max_length=100)] = Field(

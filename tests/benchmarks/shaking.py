@@ -30,7 +30,7 @@ from worker.calibration.geometry.derivatives import change_between, moved
 from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.moving_panorama import MovingPanorama
 from worker.calibration.stitching.views import View, ViewChoice, chosen_view
-from worker.calibration.tracking.follower import CameraTracker, Moment
+from worker.calibration.tracking.follower import CameraTracker, TrackedMoment
 from worker.video.yuv_planes import Picture, picture_of
 
 SWING_DEG, SWING_HZ = 0.3, 0.5
@@ -160,7 +160,7 @@ class Told:
     """What a follower said of all frames, and what it took: core milliseconds a frame and camera."""
 
     run: Run
-    moments: list[Moment]
+    moments: list[TrackedMoment]
     follower: CameraTracker
     milliseconds: float
 

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.stitching.panorama import BACKDROP, Panorama, Part
+from worker.calibration.stitching.panorama import BACKDROP, Contribution, Panorama
 from worker.calibration.stitching.photometry import NEUTRAL, Light
 from worker.video.yuv_planes import BLACK, FROM_PLANES, NO_COLOUR, TO_PLANES, Picture, Plane
 
@@ -114,7 +114,7 @@ class _View:
     falloff: float
 
     @classmethod
-    def of(cls, part: Part) -> _View:
+    def of(cls, part: Contribution) -> _View:
         light: Light = part.light
         tones = light.tones
         grey = np.clip((np.arange(256) - BLACK) * 255 / 219, 0, 255)
@@ -173,7 +173,7 @@ def _strip(panorama: Panorama, rows: slice) -> _Strip:
     return _Strip(rows, bool((already == 0).any()), stretches)
 
 
-def _stretches(number: int, part: Part, rows: slice, share: NDArray[np.float32]) -> list[_Stretch]:
+def _stretches(number: int, part: Contribution, rows: slice, share: NDArray[np.float32]) -> list[_Stretch]:
     """The columns of a strip where a camera counts, blocks that are alike put together."""
     source = part.source[rows]
     kinds = []
@@ -202,7 +202,7 @@ def _level(source: NDArray[np.float32], counts: NDArray[np.bool_]) -> int:
     return int(np.clip(np.floor(0.5 * np.log2(max(area, 1.0))), 0, LARGEST_LEVEL))
 
 
-def _maps(part: Part, rows: slice, stretch: _Stretch) -> _Maps:
+def _maps(part: Contribution, rows: slice, stretch: _Stretch) -> _Maps:
     source = part.source[rows, stretch.columns]
     chroma = (_between(source, stretch.share) - np.array([0, CHROMA_ROW], np.float32)) / np.float32(2)
     return _Maps(_map(source, stretch.level), _map(chroma, stretch.level))
@@ -233,7 +233,7 @@ def _shares(share: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np
 
 
 def _rise(
-    part: Part, source: NDArray[np.float32], between: NDArray[np.float32]
+    part: Contribution, source: NDArray[np.float32], between: NDArray[np.float32]
 ) -> tuple[tuple[Plane, Plane, Plane] | None, float]:
     if part.light.falloff == 0:
         return None, 0.0

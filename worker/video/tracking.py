@@ -16,13 +16,13 @@ from worker.calibration.stitching.moving_panorama import VIEW_BORDER, MovingPano
 from worker.calibration.stitching.panorama import Panorama
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import View
-from worker.calibration.tracking.follower import CameraTracker, How, Moment
+from worker.calibration.tracking.follower import CameraTracker, How, TrackedMoment
 from worker.video.errors import VideoError
 from worker.video.yuv_planes import Picture
 
 # Poses are told when so many seconds more have been seen.
 LOOK_AHEAD_S = 1.0
-Keep = Callable[[Moment, Fraction], None]
+Keep = Callable[[TrackedMoment, Fraction], None]
 
 
 @dataclass
@@ -60,7 +60,7 @@ class TrackedGeometryFactory:
         if self._moving is not None:
             self._moving.finish()
 
-    def _told(self, moment: Moment, references: Sequence[Camera], rate: Fraction) -> None:
+    def _told(self, moment: TrackedMoment, references: Sequence[Camera], rate: Fraction) -> None:
         for reference, now in zip(references, moment.cameras, strict=True):
             motion = self.motions.setdefault(reference.id, MotionSummary())
             motion.how[now.how] += 1
@@ -80,7 +80,7 @@ class _TrackedGeometry:
     lights: Mapping[str, Light]
     rate: Fraction
     every: int
-    told: Callable[[Moment, Sequence[Camera], Fraction], None]
+    told: Callable[[TrackedMoment, Sequence[Camera], Fraction], None]
     _follower: CameraTracker | None = field(default=None, init=False)
     _panoramas: dict[frozenset[str], MovingPanorama] = field(default_factory=dict, init=False)
 
@@ -118,6 +118,6 @@ class _TrackedGeometry:
             self._panoramas[shown] = MovingPanorama(self.pitch, self.view, still, self.lights)
         return self._panoramas[shown].at([now[camera] for camera in ids])
 
-    def _tell(self, follower: CameraTracker, moments: Sequence[Moment]) -> None:
+    def _tell(self, follower: CameraTracker, moments: Sequence[TrackedMoment]) -> None:
         for moment in moments:
             self.told(moment, follower.references, self.rate)

@@ -33,7 +33,7 @@ CLIMBING_SLID = 6
 
 
 @dataclass(frozen=True)
-class Proposal:
+class ProposedCamera:
     """A lens at a pose, and how well the lines agree with it both ways, 0..1."""
 
     lens: Lens
@@ -41,7 +41,7 @@ class Proposal:
     agreement: float
 
 
-def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, seed: int) -> list[Proposal]:
+def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, seed: int) -> list[ProposedCamera]:
     """Return cameras that may have seen `response` (height, width), 0..255, the best first.
 
     On a field that looks the same turned by half a turn, one of each two cameras, at a place where it may stand.
@@ -57,7 +57,7 @@ def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, 
 
 def _through(
     field: FieldMap, view: LineView, lens: SoughtLens, place: Place, rng: np.random.Generator
-) -> list[Proposal]:
+) -> list[ProposedCamera]:
     """The proposals for one lens: by lines first, by random draws only where lines do not suffice."""
     if view.painted_px == 0:
         return []
@@ -75,7 +75,7 @@ def _through(
     slid = _best(field, view, _at(place, field, slid_along_field(field, found)), LEVELS[-2].tolerance_px, CLIMBING_SLID)
     found, scores = climb(field, view, Hypotheses.joined([found, slid]), steps, rng, LEVELS[-2:])
     return [
-        Proposal(
+        ProposedCamera(
             _zoomed(_bent_more(lens.lens, bend), focal / view.focal_px),
             Pose(rotation_vectors(rotation), position),
             float(score),

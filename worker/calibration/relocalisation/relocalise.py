@@ -23,7 +23,7 @@ from worker.calibration.relocalisation.candidate import Candidate, Sight
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import HALF_TURN
 from worker.calibration.relocalisation.paint import share
-from worker.calibration.relocalisation.propose import Proposal, propose
+from worker.calibration.relocalisation.propose import ProposedCamera, propose
 from worker.calibration.relocalisation.sought import SoughtCamera
 
 TOO_LITTLE_PAINT = frozenset({"no-lines", "few-lines"})
@@ -126,7 +126,9 @@ def relocalise(
     return found
 
 
-def _distinct(field: Field, markings: FieldMap, sought: SoughtCamera, proposals: Sequence[Proposal]) -> list[Camera]:
+def _distinct(
+    field: Field, markings: FieldMap, sought: SoughtCamera, proposals: Sequence[ProposedCamera]
+) -> list[Camera]:
     """The cameras to be refined: good beside the best, and different from each other."""
     chosen = list[Camera]()
     for one in proposals:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from worker.calibration.geometry.camera import Camera, inside
 from worker.calibration.geometry.field import Field
-from worker.calibration.stitching.panorama import Panorama, Part, every_nth_pixel, every_pixel, panorama
+from worker.calibration.stitching.panorama import Contribution, Panorama, every_nth_pixel, every_pixel, panorama
 from worker.calibration.stitching.photometry import Light
 from worker.calibration.stitching.views import View
 
@@ -61,7 +61,7 @@ class MovingPanorama:
         return Panorama(self._still.size, parts)
 
 
-def _within_frames(parts: Sequence[Part], seen: NDArray[np.bool_], margin: float) -> list[Part]:
+def _within_frames(parts: Sequence[Contribution], seen: NDArray[np.bool_], margin: float) -> list[Contribution]:
     """The parts without what lies outside of their frames, or nearer to the border than `margin` (of the width).
 
     Weights sum to 1 again where it was `seen` (H, W) before, wherever a camera is left that sees it.
@@ -75,7 +75,7 @@ def _within_frames(parts: Sequence[Part], seen: NDArray[np.bool_], margin: float
     return [replace(part, weight=weight * share) for part, weight in zip(parts, weights, strict=True)]
 
 
-def _used(part: Part, step: int) -> NDArray[np.bool_]:
+def _used(part: Contribution, step: int) -> NDArray[np.bool_]:
     """Which of `every_nth_pixel` (h, w) have to do with pixels where a camera counts."""
     reach = cv2.dilate((part.weight > 0).astype(np.uint8), np.ones((2 * step + 1, 2 * step + 1), np.uint8))
     height, width = part.weight.shape

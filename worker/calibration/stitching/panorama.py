@@ -31,7 +31,7 @@ LEAST_WEIGHT = 1 / 512
 
 
 @dataclass(frozen=True)
-class Part:
+class Contribution:
     """What one camera gives to a view of (H, W) pixels.
 
     `weight` (H, W): how much it counts, 0 to 1; `source` (H, W, 2): the pixel x, y of its frame (centres at integers),
@@ -62,7 +62,7 @@ class Panorama:
     """A stitched view of `size` (width, height): its parts, whose weights sum to 1 where any camera sees."""
 
     size: tuple[int, int]
-    parts: Sequence[Part]
+    parts: Sequence[Contribution]
 
     @property
     def seen(self) -> NDArray[np.bool_]:
@@ -107,7 +107,7 @@ def panorama(
     valid = np.stack([inside(at, camera.intrinsics.size) for camera, at in zip(cameras, sources, strict=True)])
     weights = seam_weights(np.where(valid, np.maximum(qualities, 1e-9), np.float32(0)))
     parts = [
-        Part(
+        Contribution(
             camera.id,
             camera.intrinsics.size,
             # Finite wherever somebody looks at it, and not so far off that arithmetic overflows.

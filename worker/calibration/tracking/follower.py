@@ -57,7 +57,7 @@ class TrackedPose:
 
 
 @dataclass(frozen=True)
-class Moment:
+class TrackedMoment:
     """All cameras when the frames of this number, from 0, were taken."""
 
     number: int
@@ -99,7 +99,7 @@ class CameraTracker:
         """Whether lines are measured in the frames that are next: where frames were missing, in the first that come."""
         return self._since_look >= self._every
 
-    def see(self, pictures: Mapping[str, PixelReader], seconds: float | None = None) -> Moment:
+    def see(self, pictures: Mapping[str, PixelReader], seconds: float | None = None) -> TrackedMoment:
         """Take the next pictures; a camera that has none coasts, and so do all where nobody `looks`.
 
         `seconds`: since the pictures before, where they do not come evenly.
@@ -112,26 +112,26 @@ class CameraTracker:
         return self.now
 
     @property
-    def now(self) -> Moment:
+    def now(self) -> TrackedMoment:
         """The moment of the last frames, by all frames up to it."""
-        return Moment(self._taken - 1, [track.newest() for track in self._tracks])
+        return TrackedMoment(self._taken - 1, [track.newest() for track in self._tracks])
 
-    def predicted(self, seconds: float) -> Moment:
+    def predicted(self, seconds: float) -> TrackedMoment:
         """The moment so long after the last frames, should the cameras go on as they go."""
-        return Moment(self._taken - 1, [track.predicted(seconds) for track in self._tracks])
+        return TrackedMoment(self._taken - 1, [track.predicted(seconds) for track in self._tracks])
 
-    def settled(self) -> list[Moment]:
+    def settled(self) -> list[TrackedMoment]:
         """The moments that enough frames have been seen after, each of them once."""
         return self._settle(self._taken - self._look_ahead)
 
-    def rest(self) -> list[Moment]:
+    def rest(self) -> list[TrackedMoment]:
         """The last moments, after the last frames."""
         return self._settle(self._taken)
 
-    def _settle(self, until: int) -> list[Moment]:
+    def _settle(self, until: int) -> list[TrackedMoment]:
         numbers = range(self._settled, until)
         self._settled = max(self._settled, until)
-        return [Moment(number, [track.oldest() for track in self._tracks]) for number in numbers]
+        return [TrackedMoment(number, [track.oldest() for track in self._tracks]) for number in numbers]
 
 
 class _Track:

@@ -18,7 +18,7 @@ from service import child_process
 from service.schemas.programs.files import split_files
 from service.schemas.programs.stitching import StitchRequest
 from worker.calibration.rendering.layers import seam_layer
-from worker.calibration.stitching.panorama import Panorama, Part, panorama
+from worker.calibration.stitching.panorama import Contribution, Panorama, panorama
 from worker.calibration.stitching.views import chosen_view
 from worker.jobs.from_schemas import (
     Picture,
@@ -76,7 +76,7 @@ def picture(asked: StitchRequest, made: Panorama, files: Mapping[str, bytes]) ->
     return drawn
 
 
-def _read(part: Part, file: bytes) -> tuple[Part, Picture]:
+def _read(part: Contribution, file: bytes) -> tuple[Contribution, Picture]:
     """A camera's frame, and what it gives to the view as it was read: of half the size where that is enough."""
     width, height = part.frame_size
     if width % 2 or height % 2 or scaled_size(part)[0] > width // 2:

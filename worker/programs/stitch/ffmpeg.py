@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.ground_view import box
-from worker.calibration.stitching.panorama import BACKDROP, Panorama, Part
+from worker.calibration.stitching.panorama import BACKDROP, Contribution, Panorama
 from worker.calibration.stitching.photometry import MIDDLE, Light
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
@@ -74,7 +74,7 @@ class _Camera:
         return min(1.0, corner), max(1.0, corner)
 
 
-def _of_camera(part: Part, mask: NDArray[np.float32]) -> _Camera:
+def _of_camera(part: Contribution, mask: NDArray[np.float32]) -> _Camera:
     counts = part.weight > 0
     rows, columns = box(counts) if counts.any() else (slice(0, 2), slice(0, 2))
     camera = _Camera(part.camera, scaled_size(part), part.light, (columns.start, rows.start), {})

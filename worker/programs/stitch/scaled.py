@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from worker.calibration.geometry.ground_view import level_of_detail
-from worker.calibration.stitching.panorama import Part
+from worker.calibration.stitching.panorama import Contribution
 
 
-def scaled_size(part: Part) -> tuple[int, int]:
+def scaled_size(part: Contribution) -> tuple[int, int]:
     """Width and height, even: halved as often as most of the view's pixels of this camera call for."""
     counts = part.weight > 0
     level = int(np.median(level_of_detail(part.source)[counts])) if counts.any() else 0
@@ -17,7 +17,7 @@ def scaled_size(part: Part) -> tuple[int, int]:
     return width, height
 
 
-def in_scaled(part: Part, size: tuple[int, int]) -> NDArray[np.float32]:
+def in_scaled(part: Contribution, size: tuple[int, int]) -> NDArray[np.float32]:
     """Where each pixel of the view lies in the scaled frame (H, W, 2), pixel centres at integers."""
     scale = np.array(size, np.float32) / np.array(part.frame_size, np.float32)
     return np.asarray((part.source + 0.5) * scale - 0.5, np.float32)

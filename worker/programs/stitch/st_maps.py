@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from worker.calibration.rendering.st_maps import NOWHERE
-from worker.calibration.stitching.panorama import Panorama, Part
+from worker.calibration.stitching.panorama import Contribution, Panorama
 from worker.programs.exr import exr
 
 Origin = Literal["top-left", "bottom-left"]
@@ -18,7 +18,7 @@ def files(made: Panorama, origin: Origin) -> dict[str, bytes]:
     return {f"{part.camera}.exr": exr("RGBA", _pixels(part, origin)) for part in made.parts}
 
 
-def _pixels(part: Part, origin: Origin) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+def _pixels(part: Contribution, origin: Origin) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
     """Red, green, an empty blue, and alpha, (H, W, 4)."""
     height, width = part.weight.shape
     pixels = np.zeros((height, width, 4), np.float32)

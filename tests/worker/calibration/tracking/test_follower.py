@@ -15,7 +15,7 @@ from worker.calibration.geometry import derivatives
 from worker.calibration.geometry.camera import inside
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import CalibrationError
-from worker.calibration.tracking.follower import CameraTracker, Moment
+from worker.calibration.tracking.follower import CameraTracker, TrackedMoment
 
 pytestmark = pytest.mark.slow
 
@@ -45,17 +45,17 @@ def true(number: int):
 
 
 @cache
-def followed_as_it_is(every: int, look_ahead: int) -> list[Moment]:
+def followed_as_it_is(every: int, look_ahead: int) -> list[TrackedMoment]:
     """The clip with none of its frames replaced."""
     return followed(every=every, look_ahead=look_ahead)
 
 
 def followed(
     frames: Mapping[int, np.ndarray | None] | None = None, every: int = 1, look_ahead: int = 0
-) -> list[Moment]:
+) -> list[TrackedMoment]:
     """The clip, with some of its frames replaced; None is none."""
     follower = CameraTracker(CROWNED, [STORED], {"left": frame(0)}, FRAMES_PER_SECOND, every, look_ahead)
-    told: list[Moment] = []
+    told: list[TrackedMoment] = []
     for number in range(1, COUNT):
         replaced = frames or {}
         picture = replaced[number] if number in replaced else frame(number)
@@ -65,7 +65,7 @@ def followed(
     return told + follower.rest()
 
 
-def residual_px(moments: list[Moment]) -> float:
+def residual_px(moments: list[TrackedMoment]) -> float:
     """How far lines are from where the cameras that are told expect them, about the mean of each, rms."""
     points = CROWNED.line_points(2.0).position
     points = points[inside(LEFT.project(points), LEFT.intrinsics.size, 20)]
@@ -73,11 +73,11 @@ def residual_px(moments: list[Moment]) -> float:
     return float(np.sqrt(np.mean(np.sum((off - off.mean(axis=0)) ** 2, axis=-1))))
 
 
-def how(moments: list[Moment]) -> list[str]:
+def how(moments: list[TrackedMoment]) -> list[str]:
     return [moment.cameras[0].how for moment in moments]
 
 
-def sigma_deg(moment: Moment) -> float:
+def sigma_deg(moment: TrackedMoment) -> float:
     return moment.cameras[0].motion_sigma.rotation_deg
 
 
