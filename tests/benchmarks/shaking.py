@@ -29,7 +29,7 @@ from worker.calibration.geometry.camera import Array, Camera, Frame, inside
 from worker.calibration.geometry.derivatives import change_between, moved
 from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.moving_panorama import MovingPanorama
-from worker.calibration.stitching.views import View, ViewChoice, chosen_view
+from worker.calibration.stitching.views import StitchedView, ViewChoice, chosen_view
 from worker.calibration.tracking.follower import CameraTracker, TrackedMoment
 from worker.video.yuv_planes import Picture, picture_of
 
@@ -174,7 +174,7 @@ class FarLine:
     Cameras that are followed are told; None: as if they stood still.
     """
 
-    def __init__(self, pitch: Field, view: View, panorama: MovingPanorama, references: list[Camera]) -> None:
+    def __init__(self, pitch: Field, view: StitchedView, panorama: MovingPanorama, references: list[Camera]) -> None:
         self._view, self._panorama, self._references = view, panorama, references
         points = pitch.lift(np.stack([np.linspace(-48, 48, 97), np.full(97, pitch.width / 2)], axis=1))
         self._weights = [part.weight for part in panorama.at(references).parts]

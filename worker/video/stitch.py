@@ -24,7 +24,7 @@ from worker.calibration.stitching.coverage import Unseen, unseen_part
 from worker.calibration.stitching.panorama import Panorama, panorama
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
-from worker.calibration.stitching.views import View, ViewChoice, chosen_view
+from worker.calibration.stitching.views import StitchedView, ViewChoice, chosen_view
 from worker.video.camera_clocks import CameraClocks
 from worker.video.clips import Clip, ClipPicture, camera_for_clip
 from worker.video.encoding import Encoding, Sound, Writer
@@ -82,7 +82,7 @@ class StaticGeometry:
     border: ClassVar[float] = 0.0
 
     pitch: Field
-    view: View
+    view: StitchedView
     cameras: Sequence[Camera]
     lights: Mapping[str, Light]
     rate: Fraction
@@ -107,7 +107,13 @@ class GeometryFactory(Protocol):
         ...
 
     def __call__(
-        self, pitch: Field, view: View, cameras: Sequence[Camera], lights: Mapping[str, Light], rate: Fraction, /
+        self,
+        pitch: Field,
+        view: StitchedView,
+        cameras: Sequence[Camera],
+        lights: Mapping[str, Light],
+        rate: Fraction,
+        /,
     ) -> Geometry:
         """The geometry of these cameras."""
         ...

@@ -15,7 +15,7 @@ from worker.calibration.records import CalibrationError
 from worker.calibration.stitching.moving_panorama import VIEW_BORDER, MovingPanorama
 from worker.calibration.stitching.panorama import Panorama
 from worker.calibration.stitching.photometry import Light
-from worker.calibration.stitching.views import View
+from worker.calibration.stitching.views import StitchedView
 from worker.calibration.tracking.follower import CameraTracker, How, TrackedMoment
 from worker.video.errors import VideoError
 from worker.video.yuv_planes import Picture
@@ -49,7 +49,7 @@ class TrackedGeometryFactory:
         self._moving: _TrackedGeometry | None = None
 
     def __call__(
-        self, pitch: Field, view: View, cameras: Sequence[Camera], lights: Mapping[str, Light], rate: Fraction
+        self, pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light], rate: Fraction
     ) -> _TrackedGeometry:
         """The geometry of these cameras."""
         self._moving = _TrackedGeometry(pitch, view, cameras, lights, rate, self._every, self._told)
@@ -75,7 +75,7 @@ class _TrackedGeometry:
     """A geometry (`worker.video.stitch.Geometry`) that follows its cameras from the first pictures on."""
 
     pitch: Field
-    view: View
+    view: StitchedView
     cameras: Sequence[Camera]
     lights: Mapping[str, Light]
     rate: Fraction

@@ -25,7 +25,7 @@ HELD_FOR_S = 2.0
 # Of all frames that are held together; with more, each is fetched anew.
 HELD_BYTES = 64_000_000
 # Venue and camera, and all else that a frame depends on.
-View = tuple[object, ...]
+CacheKey = tuple[object, ...]
 Seen = bytes | Problem
 
 
@@ -35,9 +35,9 @@ class CameraViews:
     def __init__(self, snapshots: Snapshots) -> None:
         self._snapshots = snapshots
         self._turns = asyncio.Semaphore(AT_ONCE)
-        self._fetching: WeakValueDictionary[View, asyncio.Lock] = WeakValueDictionary()
+        self._fetching: WeakValueDictionary[CacheKey, asyncio.Lock] = WeakValueDictionary()
         # A frame, or why there is none: a camera that is away is not asked again for each who looks.
-        self._held: dict[View, Seen] = {}
+        self._held: dict[CacheKey, Seen] = {}
 
     async def frame(self, venue_id: str, camera: Camera, credentials: Mapping[str, str]) -> bytes:
         """A frame, not older than `HELD_FOR_S`. Who waits for a turn holds no thread."""
@@ -59,7 +59,7 @@ class CameraViews:
         except Problem as problem:
             return problem
 
-    def _hold(self, view: View, seen: Seen) -> None:
+    def _hold(self, view: CacheKey, seen: Seen) -> None:
         held = sum(len(one) for one in (*self._held.values(), seen) if isinstance(one, bytes))
         if held <= HELD_BYTES:
             self._held[view] = seen

@@ -14,7 +14,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.panorama import Panorama, panorama
 from worker.calibration.stitching.photometric_alignment import evened_out
 from worker.calibration.stitching.photometry import Light
-from worker.calibration.stitching.views import View, ViewFromAbove
+from worker.calibration.stitching.views import StitchedView, ViewFromAbove
 
 # Least length of the pitch in the bird's-eye view, in pixels: courts are small.
 BIRDSEYE_LENGTH = 800
@@ -31,7 +31,7 @@ class Stitched:
 
 def stitched(
     pitch: Field,
-    view: View,
+    view: StitchedView,
     cameras: Sequence[Camera],
     frames: Mapping[str, Frame],
     evened: Mapping[str, Light] = NOT_KNOWN,
@@ -66,7 +66,11 @@ def birdseye(
 
 
 def _made(
-    pitch: Field, view: View, cameras: Sequence[Camera], frames: Mapping[str, Frame], evened: Mapping[str, Light]
+    pitch: Field,
+    view: StitchedView,
+    cameras: Sequence[Camera],
+    frames: Mapping[str, Frame],
+    evened: Mapping[str, Light],
 ) -> Panorama:
     """With seams in the middle between cameras, where wrong poses show, and not where they would be seen least."""
     lights = evened or evened_out(pitch, cameras, frames)

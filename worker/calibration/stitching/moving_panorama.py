@@ -17,7 +17,7 @@ from worker.calibration.geometry.camera import Camera, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.stitching.panorama import Contribution, Panorama, every_nth_pixel, every_pixel, panorama
 from worker.calibration.stitching.photometry import Light
-from worker.calibration.stitching.views import View
+from worker.calibration.stitching.views import StitchedView
 
 MOTION_COLUMNS = 320
 """The motion is computed at about so many places across the view; the tests hold it below 0.05 px for a degree."""
@@ -33,7 +33,7 @@ class MovingPanorama:
     """The view and its parts where `cameras` are the references of a clip; `at` is the panorama of other moments."""
 
     def __init__(
-        self, pitch: Field, view: View, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
+        self, pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
     ) -> None:
         still = panorama(pitch, view, cameras, lights)
         self._still = Panorama(still.size, _within_frames(still.parts, still.seen, STILL_BORDER))

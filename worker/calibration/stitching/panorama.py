@@ -18,7 +18,7 @@ from worker.calibration.geometry.camera import Array, Camera, Frame, inside
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground_view import box, quality, sampled
 from worker.calibration.stitching.photometry import NEUTRAL, Light
-from worker.calibration.stitching.views import View
+from worker.calibration.stitching.views import StitchedView
 
 # What no camera sees: dark grey rather than black, so that it reads as "outside" and not as "broken".
 BACKDROP = 38
@@ -91,7 +91,7 @@ class Panorama:
 
 
 def panorama(
-    pitch: Field, view: View, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
+    pitch: Field, view: StitchedView, cameras: Sequence[Camera], lights: Mapping[str, Light] | None = None
 ) -> Panorama:
     """How the cameras' frames become one view. `lights` by camera; a camera that has none is taken as it is."""
     lights = lights or {}

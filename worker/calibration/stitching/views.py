@@ -52,7 +52,7 @@ class ViewChoice:
     horizon: float | None = None
 
 
-class View(Protocol):
+class StitchedView(Protocol):
     """A virtual camera. Pixel centres are at integers."""
 
     @property
@@ -69,7 +69,7 @@ class View(Protocol):
         ...
 
 
-def chosen_view(pitch: Field, cameras: Sequence[Camera], choice: ViewChoice, border: float = 0.0) -> View:
+def chosen_view(pitch: Field, cameras: Sequence[Camera], choice: ViewChoice, border: float = 0.0) -> StitchedView:
     """The virtual camera that shows what is wanted of what the cameras see.
 
     `border`: what lies nearer than this to the border of a frame, in parts of its width, is taken as not seen.

@@ -22,7 +22,7 @@ from worker.calibration.geometry.rotation import rotation_matrices, rotation_vec
 from worker.calibration.rendering.stitched_pictures import birdseye, stitched
 from worker.calibration.stitching.panorama import BACKDROP, panorama, seam_weights
 from worker.calibration.stitching.photometric_alignment import LARGEST_GAIN, evened_out
-from worker.calibration.stitching.views import View, ViewChoice, chosen_view
+from worker.calibration.stitching.views import StitchedView, ViewChoice, chosen_view
 
 pytestmark = pytest.mark.slow
 
@@ -52,7 +52,7 @@ def turned(one: Camera, yaw_deg: float) -> Camera:
     return one.with_pose(Pose(rotation_vectors(one.pose.matrix @ about_vertical), one.pose.position))
 
 
-def halfway(view: View, y: float) -> Array:
+def halfway(view: StitchedView, y: float) -> Array:
     """Where the preview shows a point of the halfway line."""
     return view.project(CROWNED.lift(np.array([0.0, y])))
 
