@@ -52,6 +52,11 @@ class FoundCamera:
         """Whether a calibration can begin with the best candidate."""
         return self.refusal is None
 
+    @property
+    def was_calibrated(self) -> bool:
+        """Whether a calibration has begun with the best candidate, on the field as it was found."""
+        return self.refusal is None or self.refusal.reason == "not-confirmed"
+
 
 @dataclass(frozen=True)
 class FoundCameras:

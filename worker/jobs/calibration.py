@@ -28,6 +28,7 @@ from worker.jobs.inputs import Anchor, Options, Venue, View
 from worker.jobs.masks import masks
 from worker.jobs.nights import lens_change_to_schema, read_memories, refined_to_schema
 from worker.jobs.to_schemas import (
+    MILLIMETRE,
     Solution,
     camera_to_schema,
     displacement_to_schema,
@@ -59,7 +60,6 @@ class NightHistory:
 
 
 NO_HISTORY = NightHistory()
-MILLIMETRE = 3
 
 
 def solve(

@@ -17,9 +17,8 @@ from worker.jobs import frames_job
 from worker.jobs.answers import Progress, Provenance
 from worker.jobs.frames_job import EngineInputs, JobPictures
 from worker.jobs.from_schemas import encode_jpeg
-from worker.jobs.to_schemas import Solution, camera_to_schema, finite_or_none, round_to_ms
+from worker.jobs.to_schemas import MILLIMETRE, Solution, camera_to_schema, finite_or_none, ridge_to_schema, round_to_ms
 
-MILLIMETRE = 3
 log = logging.getLogger(__name__)
 
 
@@ -75,9 +74,8 @@ def _result(given: FieldOfPlay, found: FieldFit, spent: StageTimings, provenance
 def _field_to_schema(given: FieldOfPlay, found: FieldFit) -> FieldOfPlay:
     """The fitted pitch in millimetres, which are finer than any of its sigmas."""
     pitch = found.pitch
-    ridge = None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
     size = {"length_m": round(pitch.length, MILLIMETRE), "width_m": round(pitch.width, MILLIMETRE)}
-    return given.changed({**size, "ridge": ridge})
+    return given.changed({**size, "ridge": ridge_to_schema(pitch)})
 
 
 def _measure_to_schema(measure: Measure) -> MeasureResult:

@@ -51,12 +51,12 @@ from worker.jobs.to_schemas import (
     pose_to_schema,
     progress_to_schema,
     provenance_of,
+    ridge_to_schema,
     round_to_ms,
     sigma_to_schema,
 )
 
 log = logging.getLogger(__name__)
-MILLIMETRE = 3
 FIELD_OF_VIEW_UNCERTAIN = 0.15
 """One standard deviation of the focal length that a given field of view leaves, as a part of it."""
 
@@ -128,12 +128,12 @@ def _known(camera: SoughtCameraIn) -> Camera:
 
 
 def _pictures(given: Field, found: Field, camera: FoundCamera, frame: Picture) -> dict[str, bytes]:
-    """A picture of each candidate, the best first: on the field as it was found if it is taken, or else as given."""
+    """A picture of each candidate, the best first, on the field that it was refined on."""
     pictures = {}
     for number, one in enumerate(camera.candidates, start=1):
         name = candidate_picture_name(camera.id, number)
         try:
-            pitch = found if camera.accepted and number == 1 else given
+            pitch = found if camera.was_calibrated and number == 1 else given
             pictures[name] = encode_jpeg(candidate_picture(pitch, one.camera, frame, f"candidate {number}"))
         except Exception:  # what is no camera of this frame may look anywhere; a picture is not worth losing the others
             log.warning("cannot draw %s", name, exc_info=True)
@@ -146,16 +146,12 @@ def _result(found: FoundCameras, given: Field, sought: Sequence[SoughtCamera], p
         accepted=not refusals,
         rejected_because="; ".join(refusals) or None,
         cameras=[_camera(one, its.size) for one, its in zip(found.cameras, sought, strict=True)],
-        ridge=_ridge_of(found.pitch) if given.ridge is None else None,
+        ridge=ridge_to_schema(found.pitch) if given.ridge is None else None,
         stitch_error_px=finite_or_none(found.stitch_error_px),
         timings_s=round_to_ms(found.timings.seconds),
         cpu_s=round_to_ms(found.timings.core_seconds),
         provenance=provenance,
     )
-
-
-def _ridge_of(pitch: Field) -> list[list[float]] | None:
-    return None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
 
 
 def _camera(found: FoundCamera, size: tuple[int, int]) -> FoundCameraResult:

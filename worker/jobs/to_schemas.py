@@ -48,6 +48,8 @@ if TYPE_CHECKING:
 PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider", "openvino": "OpenVINOExecutionProvider"}
 # The engine's report ends with the refinement; what is left is drawing.
 PREVIEW_FRACTION = 0.96
+# Decimal places of a metre.
+MILLIMETRE = 3
 R = TypeVar("R", covariant=True)
 
 
@@ -98,6 +100,11 @@ def pose_to_schema(pose: Pose) -> answers.Pose:
     return answers.Pose(
         rotation=pose.rotation.tolist(), position=pose.position.tolist(), translation=pose.translation.tolist()
     )
+
+
+def ridge_to_schema(pitch: Field) -> list[list[float]] | None:
+    """The two ends of a pitch's ridge for the wire, in millimetres; None of a flat one."""
+    return None if pitch.ridge is None else pitch.ridge.round(MILLIMETRE).tolist()
 
 
 def finite_or_none(value: Any) -> float | None:
