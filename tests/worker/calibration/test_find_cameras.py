@@ -9,10 +9,11 @@ import pytest
 from tests.worker.calibration.gate.test_quality import good
 from tests.worker.calibration.synthetic import CROWNED, PITCH, paint_frame, pair, pair_frames
 from tests.worker.calibration.test_calibrate import white_on_green
-from worker.calibration.find_cameras import find_cameras, why_not_confirmed
+from worker.calibration.find_cameras import FoundCamera, find_cameras, why_not_confirmed
 from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.records import Stopped
+from worker.calibration.relocalisation.relocalise import NotFound
 from worker.calibration.relocalisation.sought import Place, SoughtCamera, SoughtLens
 
 pytestmark = pytest.mark.slow
@@ -84,6 +85,14 @@ def test_lines_have_to_fit_better_through_a_lens_that_was_found_with_the_pose():
     assert why_not_confirmed(fits_hardly, is_lens_found=False) is None
     assert "are the measures of the field quite right?" in why_not_confirmed(fits_hardly, is_lens_found=True)
     assert why_not_confirmed(good(), is_lens_found=True) is None
+
+
+@pytest.mark.parametrize(
+    ("reason", "was_calibrated"), [(None, True), ("not-confirmed", True), ("not-unique", False), ("no-lines", False)]
+)
+def test_a_calibration_begins_with_what_was_found_and_may_not_confirm_it(reason, was_calibrated):
+    refusal = None if reason is None else NotFound(reason, "")
+    assert FoundCamera("left", [], refusal, []).was_calibrated is was_calibrated
 
 
 def test_who_is_asked_to_stop_stops():
