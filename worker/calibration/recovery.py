@@ -9,7 +9,7 @@ person, or accepted where the venue says so.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -92,7 +92,7 @@ def recover_knocked(
         return solved
     beside = [n for n in range(len(problem.cameras)) if _may_be_of_what_lies_beside(problem, n, observer)]
     problem = observer.look_in_full(problem, beside, progress)
-    sought = [n for n, one in enumerate(judged.cameras) if _is_sought(problem, n, one, is_view_doubted=n in beside)]
+    sought = _sought(problem, judged.cameras, beside)
     if not sought:
         return solved
     solved = problem, solution, judged, path
@@ -121,13 +121,21 @@ def _may_be_of_what_lies_beside(problem: Problem, number: int, observer: FrameOb
     return cause in OF_THE_GROUND
 
 
-def _is_sought(problem: Problem, number: int, result: CameraResult, *, is_view_doubted: bool) -> bool:
-    """Whether a camera is to be searched for: whatever its result, or where that is one of a knocked camera."""
+def _sought(problem: Problem, results: Sequence[CameraResult], beside: Sequence[int]) -> list[int]:
+    """Numbers of the cameras to be searched for: all that were asked for, or those that may have been knocked.
+
+    `beside`: those whose view is refused for what may be true of nothing but the place where they are stored.
+    """
     if problem.options.search == "anywhere":
-        return result.view.cause != "other-camera"
-    if is_view_doubted:
-        # Said of where the stored pose has the ground: lines that the network saw beside it contradict it.
-        return _has_lines_elsewhere(problem, result, problem.observed.observations.responses[number])
+        return [n for n, one in enumerate(results) if one.view.cause != "other-camera"]
+    responses = problem.observed.observations.responses
+    # Lines that the network saw elsewhere contradict what is said of a view.
+    contradicted = {n for n in beside if _has_lines_elsewhere(problem, results[n], responses[n])}
+    return [n for n, one in enumerate(results) if n in contradicted or _is_lost(problem, one)]
+
+
+def _is_lost(problem: Problem, result: CameraResult) -> bool:
+    """Whether a result is one of a camera that may have been knocked."""
     if result.refusal is None or result.refusal.reason not in LOST:
         return False
     # A mount that gave way over many nights stands where it was found last night.
