@@ -43,6 +43,7 @@ from worker.calibration.refinement.diagnosis import find_suspicions
 from worker.calibration.solve import (
     PoseSolution,
     Problem,
+    is_doubtful,
     loss_of,
     refine_without,
     ridges_of,
@@ -165,7 +166,8 @@ def _judged_together(
 def _recover(solved: Solved, observer: FrameObserver, progress: ProgressReporter) -> Solved:
     """Return the solution with those cameras in it that were knocked and found again; most nights there are none."""
     problem, _, judged, _ = solved
-    if judged.accepted and problem.options.search != "anywhere":
+    is_clear = judged.accepted and not any(map(is_doubtful, judged.cameras))
+    if is_clear and problem.options.search != "anywhere":
         return solved
     # Only such nights pay for loading it.
     from worker.calibration.recovery import recover_knocked

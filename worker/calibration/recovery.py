@@ -23,11 +23,12 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.observe import FrameObserver
 from worker.calibration.records import EngineResult, Path, ProgressReporter
+from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.relocalise import Relocalisation, mean_shift_px, relocalise, twin
 from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
-from worker.calibration.solve import PoseSolution, Problem
+from worker.calibration.solve import PoseSolution, Problem, is_doubtful
 
 LOST = frozenset({"lines", "few-lines", "moved", "undetermined"})
 """Reasons for a refusal that a knocked camera may have."""
@@ -136,7 +137,9 @@ def _sought(problem: Problem, results: Sequence[CameraResult], beside: Sequence[
 
 def _is_lost(problem: Problem, result: CameraResult) -> bool:
     """Whether a result is one of a camera that may have been knocked."""
-    if result.refusal is None or result.refusal.reason not in LOST:
+    if result.refusal is None:
+        return is_doubtful(result)
+    if result.refusal.reason not in LOST:
         return False
     # A mount that gave way over many nights stands where it was found last night.
     return result.refusal.reason not in OUT_OF_PLACE or result.moved.beyond(problem.gate)
@@ -179,7 +182,7 @@ def _search(
         camera = _on_its_side(markings, stored, found, place)
         if camera is not None and not _is_anothers(problem, number, camera):
             camera = stored.with_pose(camera.pose)
-            if result.accepted and _is_same(problem, markings, result.camera, camera):
+            if result.accepted and not _is_better(problem, markings, result, found.candidates[0], camera):
                 return None
             view = look_at(observer.frames[stored.id][0], problem.pitch, camera)
             return FoundAgain(camera, response, view) if view.usable else None
@@ -284,6 +287,13 @@ def _proposal(result: CameraResult) -> str:
         f"{_turned_and_moved(result.moved)}, and found again: {result.evidence.share:.0%} of the lines are seen where "
         "the new pose puts them; look at its picture, then accept the job by hand, or turn the camera back"
     )
+
+
+def _is_better(problem: Problem, markings: FieldMap, result: CameraResult, found: Candidate, camera: Camera) -> bool:
+    """Whether a camera was found at another pose than it was accepted at, and with more of its lines there."""
+    if found.evidence.agreement <= result.evidence.agreement:
+        return False
+    return not _is_same(problem, markings, result.camera, camera)
 
 
 def _is_same(problem: Problem, markings: FieldMap, one: Camera, other: Camera) -> bool:

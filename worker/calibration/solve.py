@@ -41,6 +41,8 @@ LEAST_CAUGHT = 0.6
 MOST_CAUGHT, CLEARLY_MORE, MOST_AGAIN = 0.9, 0.02, 3
 """Agreement with the lines below which a finish is begun again from where it ended, by how much it has to grow with
 that, and how often it may."""
+DOUBTFUL = 0.75
+"""Agreement below which a camera that is accepted may have been knocked, and caught by wrong lines."""
 SEARCHED_POWER = 3
 """Power of the network's responses in the search: what it half believes (a shadow's edge, a board) hardly pulls."""
 
@@ -304,6 +306,11 @@ def refine_without(
         together=together,
         deviations=refined.deviations + of_others,
     )
+
+
+def is_doubtful(result: CameraResult) -> bool:
+    """Whether so few of its lines are found that an accepted camera may stand elsewhere."""
+    return result.evidence.agreement < DOUBTFUL
 
 
 def free_parameters(problem: Problem) -> list[Parameter]:

@@ -7,13 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, moved, pair
+from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_frame, pair
 from tests.worker.calibration.test_calibrate import SHIFT, TURN, frames, outdated, white_on_green
 from tests.worker.calibration.test_near_path import WIND
+from tests.worker.calibration.test_sports import field
 from worker.calibration import recovery
 from worker.calibration.calibrate import calibrate
 from worker.calibration.gate.quality import Refusal
-from worker.calibration.geometry.camera import Pose
+from worker.calibration.geometry.camera import Camera, Pose
+from worker.calibration.geometry.lens import Intrinsics
 from worker.calibration.geometry.rotation import rotation_angles_deg, rotation_matrices, rotation_vectors
 from worker.calibration.records import Options, Stopped
 from worker.calibration.relocalisation import candidate
@@ -236,6 +238,33 @@ def test_of_a_camera_in_the_dark_it_is_asked_whether_a_third_of_its_frame_is_lig
     )
     observer = SimpleNamespace(frames={"left": (frame,)})
     assert recovery._may_be_of_what_lies_beside(problem, 0, observer) == is_doubted
+
+
+def test_a_camera_that_was_accepted_a_line_aside_is_searched_for_and_put_right():
+    """Of a tennis court, whose sidelines are taken for one another: accepted with 61 % of its lines."""
+    size = (640, 640)
+    lens = Intrinsics(np.array([[554.5, 0.0, 319.6], [0.0, 554.5, 320.1], [0.0, 0.0, 1.0]]), np.zeros(4), size)
+    truth = Camera("one", lens, Pose(np.array([1.527, -1.986, 0.808]), np.array([-14.70, 1.07, 8.70])))
+    stored = truth.with_pose(Pose(np.array([1.592, -1.911, 0.741]), np.array([-15.39, 1.88, 9.56])))
+    court = field("tennis")
+    pictures = {"one": (paint_frame(court, truth),)}
+    (aside,) = calibrate(court, [stored], pictures, white_on_green, Options(seed=7, recover="never")).cameras
+    assert aside.accepted
+    assert aside.evidence.agreement < 0.75
+    assert np.linalg.norm(aside.camera.pose.position - truth.pose.position) > 1.0
+    (found,) = calibrate(court, [stored], pictures, white_on_green, Options(seed=7)).cameras
+    assert found.accepted
+    assert np.linalg.norm(found.camera.pose.position - truth.pose.position) < 0.03
+
+
+def test_a_camera_that_was_accepted_stays_where_a_search_finds_no_more_of_its_lines():
+    left, right = (found_as(one).candidates[0] for one in (pair()[0], turned(pair()[0], 9.0)))
+    problem, markings = Problem(CROWNED, pair(), None, Options(), [None, None]), FieldMap.of(CROWNED)
+    for seen, more, is_better in ((0.7, 0.9, True), (0.7, 0.6, False)):
+        result = SimpleNamespace(camera=left.camera, evidence=SimpleNamespace(agreement=seen))
+        elsewhere = replace(right, evidence=SimpleNamespace(agreement=more))
+        assert recovery._is_better(problem, markings, result, elsewhere, right.camera) == is_better
+        assert not recovery._is_better(problem, markings, result, elsewhere, left.camera)
 
 
 def test_a_frame_that_is_blown_out_as_a_whole_is_not_searched():
