@@ -14,10 +14,15 @@ from worker.calibration.geometry.camera import Camera
 from worker.calibration.records import ProgressReporter
 from worker.calibration.refinement.refine import refine
 from worker.calibration.refinement.uncertainty import RefinedPoses
-from worker.calibration.solve import Problem, follows_zoom, free_parameters, is_confirmed, judge_each, shows_most_lines
-
-FARTHEST_PX = 12.0
-"""How far the visible lines may have moved on average, in pixels of a 4K frame: within what the refinement catches."""
+from worker.calibration.solve import (
+    Problem,
+    follows_zoom,
+    free_parameters,
+    has_hardly_moved,
+    is_confirmed,
+    judge_each,
+    shows_most_lines,
+)
 
 
 @dataclass(frozen=True)
@@ -70,5 +75,4 @@ def refine_by_lines(problem: Problem, progress: ProgressReporter) -> NearSolutio
 
 def _is_near(problem: Problem, result: CameraResult) -> bool:
     """True if a camera passes the gate by itself, has hardly moved, and has no zoom that is to be followed."""
-    farthest_px = FARTHEST_PX * result.camera.intrinsics.relative_size
-    return result.accepted and not follows_zoom(problem, result) and result.moved.pixels <= farthest_px
+    return result.accepted and not follows_zoom(problem, result) and has_hardly_moved(result)

@@ -41,8 +41,11 @@ LEAST_CAUGHT = 0.6
 MOST_CAUGHT, CLEARLY_MORE, MOST_AGAIN = 0.9, 0.02, 3
 """Agreement with the lines below which a finish is begun again from where it ended, by how much it has to grow with
 that, and how often it may."""
+HARDLY_MOVED_PX = 12.0
+"""How far the visible lines may have moved on average, in pixels of a 4K frame, of a camera that stands almost where it
+is stored: within what the refinement catches."""
 DOUBTFUL = 0.75
-"""Agreement below which a camera that is accepted may have been knocked, and caught by wrong lines."""
+"""Agreement below which an accepted camera that moved may have been knocked, and caught by wrong lines."""
 SEARCHED_POWER = 3
 """Power of the network's responses in the search: what it half believes (a shadow's edge, a board) hardly pulls."""
 
@@ -309,8 +312,16 @@ def refine_without(
 
 
 def is_doubtful(result: CameraResult) -> bool:
-    """Whether so few of its lines are found that an accepted camera may stand elsewhere."""
-    return result.evidence.agreement < DOUBTFUL
+    """Whether so few of its lines are found that a camera which is accepted may stand elsewhere.
+
+    One that stands almost where it is stored was not knocked: its lines are faint every night.
+    """
+    return result.evidence.agreement < DOUBTFUL and not has_hardly_moved(result)
+
+
+def has_hardly_moved(result: CameraResult) -> bool:
+    """Whether a camera stands almost where it is stored."""
+    return result.moved.pixels <= HARDLY_MOVED_PX * result.camera.intrinsics.relative_size
 
 
 def free_parameters(problem: Problem) -> list[Parameter]:
