@@ -17,7 +17,8 @@ from worker.calibration.gate.quality import CameraResult, Gate
 from worker.calibration.geometry.camera import Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.records import Calibration, Options, Progress, ProgressReporter, Segment, StageTimings
-from worker.calibration.relocalisation.candidate import Candidate, Sight
+from worker.calibration.refinement.refine import Observations
+from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.crown import find_crown
 from worker.calibration.relocalisation.field_halves import choose_sides
 from worker.calibration.relocalisation.field_map import FieldMap
@@ -203,12 +204,9 @@ def _on_its_crown(
     found = [camera for camera, one in placed.items() if one.refusal is None]
     if not found:
         return flat, placed
-    crowned = find_crown(
-        flat,
-        [placed[one].candidates[0] for one in found],
-        [Sight.of(flat, *seen[one]) for one in found],
-        [sought[one].is_lens_sought for one in found],
-    )
+    observations = Observations([seen[one][0] for one in found], [seen[one][1] for one in found])
+    candidates = [placed[one].candidates[0] for one in found]
+    crowned = find_crown(flat, [sought[one] for one in found], candidates, observations)
     if crowned is None:
         return flat, placed
     first = dict(zip(found, crowned.candidates, strict=True))

@@ -33,7 +33,8 @@ from worker.calibration.solve import PoseSolution, Problem, is_doubtful
 LOST = frozenset({"lines", "few-lines", "moved", "undetermined"})
 """Reasons for a refusal that a knocked camera may have."""
 OUT_OF_PLACE = frozenset({"moved", "undetermined"})
-"""Those of them that are said of lines which are seen: only a camera that moved too far is searched for then."""
+"""The reasons in `LOST` that are given although the lines are seen where the pose has them: a camera that is refused
+for one of these is searched for only if it moved farther than the gate allows."""
 UNFIT = frozenset({"residual", "zoomed", "undetermined"})
 """Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
 LEAST_PAINT, LEAST_UNEXPLAINED, UNEXPLAINED_BY_WEATHER = 200, 0.25, 0.85

@@ -268,8 +268,9 @@ def refine_poses(
         free = free_parameters(problem)
         refined = _refined_from(problem, begun, observations, free)
         # What is solved for beside the poses would be as open once more as it was at first.
-        rounds = 0 if free else MOST_AGAIN
-        for _ in range(rounds):
+        if free:
+            return refined
+        for _ in range(MOST_AGAIN):
             if _weakest_agreement(refined) >= MOST_CAUGHT:
                 break
             again = _refined_from(problem, refined.cameras, observations, free)

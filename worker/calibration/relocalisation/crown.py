@@ -7,7 +7,8 @@ together how high the ridge is, if there is one.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import free_ridge
 from worker.calibration.refinement.refine import Observations, refine
 from worker.calibration.relocalisation.candidate import Candidate, Sight, coarse_lens, fine_lens
+from worker.calibration.relocalisation.sought import SoughtCamera
 
 LOWEST_M, SIGMAS = 0.05, 5.0
 """A ridge is taken that is so high, and so many of its standard deviations, ..."""
@@ -32,31 +34,28 @@ class CrownedField:
 
 
 def find_crown(
-    flat: Field, candidates: Sequence[Candidate], sights: Sequence[Sight], are_lenses_sought: Sequence[bool]
+    flat: Field, sought: Sequence[SoughtCamera], candidates: Sequence[Candidate], observations: Observations
 ) -> CrownedField | None:
     """Return the field with the ridge that the lines of all cameras tell, and these on it; None: it may be flat.
 
-    `candidates`: those that were found on the `flat` field, each with its own sight of it, and whether its lens was
-    found with it; one that was given stays.
+    `candidates`: what was found on the `flat` field of each camera that was `sought`; `observations`: what they see. A
+    lens that was given stays.
     """
     cameras = [one.camera for one in candidates]
     lenses = [
         parameter
-        for number, (camera, is_lens_sought) in enumerate(zip(cameras, are_lenses_sought, strict=True))
-        if is_lens_sought
+        for number, (camera, one) in enumerate(zip(cameras, sought, strict=True))
+        if one.is_lens_sought
         for parameter in (*coarse_lens(number, camera), *fine_lens(number, camera))
     ]
-    observations = Observations(
-        [one.observations.channels[0] for one in sights], [one.observations.responses[0] for one in sights]
-    )
     found = refine(flat, cameras, observations, 0.0, [*lenses, *free_ridge(flat)])
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
     if not max(LOWEST_M, SIGMAS * sigma_m) < height_m < Gate().highest_ridge_m:
         return None
-    crowned = [replace(one, field=found.pitch) for one in sights]
+    sights = map(partial(Sight.of, found.pitch), observations.channels, observations.responses)
     refined = [
-        sight.assessed_with_lens(one) if is_lens_sought else sight.assessed(one)
-        for sight, one, is_lens_sought in zip(crowned, found.each, are_lenses_sought, strict=True)
+        sight.assessed_with_lens(pose) if one.is_lens_sought else sight.assessed(pose)
+        for sight, pose, one in zip(sights, found.each, sought, strict=True)
     ]
     if not _rms(refined) < LESS_LEFT * _rms(candidates):
         return None
