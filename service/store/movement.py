@@ -1,6 +1,6 @@
 """How far a camera moved: degrees, metres, and pixels of the pitch in its picture.
 
-For history, alarms and what is said of a pose that was put, which the service writes itself: `quality.Movement` of the
+For history, alarms and what is said of a pose that was put, which the service writes itself: `quality.Moved` of the
 engine, on fewer points and a flat pitch. Lenses are OpenCV's own, which takes its time to load: import this where a
 movement is wanted.
 """

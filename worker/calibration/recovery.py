@@ -18,7 +18,7 @@ import numpy as np
 from worker.calibration.detection.view_condition import LEAST_LIGHT, OF_THE_GROUND, ViewCondition, look_at
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import stitch_error_px
-from worker.calibration.gate.quality import CameraResult, Movement, Refusal, in_one_sentence
+from worker.calibration.gate.quality import CameraResult, Moved, Refusal, in_one_sentence
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.observe import FrameObserver
@@ -224,7 +224,7 @@ def _is_anothers(problem: Problem, number: int, found: Camera) -> bool:
     return any(
         n != number
         and other.intrinsics.size == found.intrinsics.size
-        and not Movement.between(problem.pitch, other, found).beyond(problem.gate)
+        and not Moved.between(problem.pitch, other, found).beyond(problem.gate)
         and _away_m(other, found) < _away_m(problem.cameras[number], found) + OWN_PLACE_M
         for n, other in enumerate(problem.cameras)
     )
@@ -235,7 +235,7 @@ def _begun_there(problem: Problem, found: Mapping[int, FoundAgain]) -> Problem:
     cameras, memories, views = list(problem.cameras), list(problem.memories), list(problem.observed.views)
     responses = list(problem.observed.observations.responses)
     for n, one in found.items():
-        if Movement.between(problem.pitch, problem.cameras[n], one.camera).beyond(problem.gate):
+        if Moved.between(problem.pitch, problem.cameras[n], one.camera).beyond(problem.gate):
             memories[n] = None
         cameras[n], views[n], responses[n] = one.camera, one.view, one.response
     observations = replace(problem.observed.observations, responses=responses)
@@ -268,7 +268,7 @@ def _joined(before: Solved, again: Solved, found: Mapping[int, FoundAgain]) -> S
 
 def _beside_stored(problem: Problem, number: int, result: CameraResult, before: CameraResult) -> CameraResult:
     """The result of a camera that was found, as seen from its stored pose; refused where a person is to be asked."""
-    moved = Movement.between(problem.pitch, problem.cameras[number], result.camera)
+    moved = Moved.between(problem.pitch, problem.cameras[number], result.camera)
     result = replace(result, moved=moved, evidence_before=before.evidence_before)
     if not moved.beyond(problem.gate):
         return result
@@ -279,7 +279,7 @@ def _beside_stored(problem: Problem, number: int, result: CameraResult, before: 
     return replace(result, knocked=True, refusal=refusal)
 
 
-def _turned_and_moved(moved: Movement) -> str:
+def _turned_and_moved(moved: Moved) -> str:
     return f"turned by {moved.rotation_deg:.1f} degrees and moved by {moved.position_m:.2f} m"
 
 

@@ -20,7 +20,7 @@ from worker.calibration.detection.view_condition import ViewCondition
 from worker.calibration.diagnostics.markings import report_markings
 from worker.calibration.diagnostics.overlap import overlap_of
 from worker.calibration.diagnostics.registration import Response
-from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult, Gate, Movement, alone_rejection
+from worker.calibration.gate.quality import MUCH_UNEXPECTED, CameraResult, Gate, Moved, alone_rejection
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.parameters import Parameter, free_focal_lengths, free_ridge
@@ -354,9 +354,9 @@ def judge_each(problem: Problem, refined: RefinedPoses, progress: ProgressReport
                 view=view,
                 overlap=overlap_of(refined.pitch, after.camera.resized(seen.shape[1]), seen),
                 evidence_before=cache(partial(_evidence_at_stored, lines, pitch, before, channels, response)),
-                moved=Movement.between(pitch, before, after.camera),
+                moved=Moved.between(pitch, before, after.camera),
                 markings=report_markings(refined.pitch, after, channels, response),
-                moved_in_all=None if memory is None else Movement.between(pitch, memory.origin, after.camera),
+                moved_in_all=None if memory is None else Moved.between(pitch, memory.origin, after.camera),
             )
             for before, memory, after, view, channels, response, seen in zip(
                 problem.cameras,

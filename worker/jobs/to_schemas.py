@@ -179,7 +179,7 @@ def camera_to_schema(
     )
 
 
-def _moved(found: quality.Movement) -> Moved:
+def _moved(found: quality.Moved) -> Moved:
     return Moved(rotation_deg=found.rotation_deg, position_m=found.position_m, pixels=finite_or_none(found.pixels))
 
 
@@ -204,7 +204,7 @@ def displacement_to_schema(
     moved = measure_displacement(pitch, begun, found)
     if moved is None:
         return None
-    turned_and_moved = quality.Movement.between(pitch, begun, found.camera)
+    turned_and_moved = quality.Moved.between(pitch, begun, found.camera)
     return Displacement(
         anchor=None if anchor is None else anchor.revision,
         at=moved.place[:2].round(2).tolist(),

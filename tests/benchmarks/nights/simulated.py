@@ -17,7 +17,7 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
 from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection
+from worker.calibration.gate.quality import CameraResult, Gate, Moved, alone_rejection
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field, LinePoints
 from worker.calibration.geometry.ground import Ground
@@ -163,8 +163,8 @@ class Installation:
                 view=USABLE,
                 overlap=Overlap(1.0, 1.0, 0.0),
                 evidence_before=partial(replace, was),
-                moved=Movement.between(self.pitch, stored, after.camera),
-                moved_in_all=memory and Movement.between(self.pitch, memory.origin, after.camera),
+                moved=Moved.between(self.pitch, stored, after.camera),
+                moved_in_all=memory and Moved.between(self.pitch, memory.origin, after.camera),
             )
             for stored, after, was, memory in zip(self.stored, finished.each, before, self.memories, strict=True)
         ]

@@ -6,7 +6,7 @@ import pytest
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Intrinsics, Pose, PosedCamera
 from service.store import movement
-from worker.calibration.gate.quality import Movement
+from worker.calibration.gate.quality import Moved
 from worker.jobs.from_schemas import camera_of, pitch_of
 
 FIELD = FieldOfPlay(length_m=105, width_m=68)
@@ -51,7 +51,7 @@ def test_points_of_the_pitch_are_where_the_engine_has_them(lens, skew):
 def test_a_movement_is_what_the_engine_calls_one(lens, turned, by):
     before, after = camera(lens), camera(lens, turned, by)
     told = movement.moved(FIELD, before, after)
-    expected = Movement.between(pitch_of(FIELD), camera_of(before), camera_of(after))
+    expected = Moved.between(pitch_of(FIELD), camera_of(before), camera_of(after))
     assert told.rotation_deg == pytest.approx(expected.rotation_deg, abs=1e-9)
     assert told.position_m == pytest.approx(expected.position_m)
     # Other points of the same lines.

@@ -23,7 +23,7 @@ from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import UsualView, ViewCondition, ViewFigures
 from worker.calibration.diagnostics.markings import MarkingReport
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Movement, Refusal
+from worker.calibration.gate.quality import CameraResult, Moved, Refusal
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.memory.camera_memory import CameraMemory, fingerprint
 from worker.calibration.memory.epoch import Epoch
@@ -94,7 +94,7 @@ def asked(monkeypatch):
                 view=ViewCondition(True, None, None, "The field can be seen.", FIGURES),
                 overlap=Overlap(0.9, 0.95, 0.05),
                 evidence_before=lambda: evidence,
-                moved=Movement(0.0, 0.05, float("nan")),
+                moved=Moved(0.0, 0.05, float("nan")),
                 refusal=Refusal(asked.get("reason", "view"), asked["against"][camera.id])
                 if camera.id in asked["against"]
                 else None,

@@ -10,7 +10,7 @@ from service.schemas.lens_limits import BOARD_FOCAL_PERCENT
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Movement
+from worker.calibration.gate.quality import CameraResult, Moved
 from worker.calibration.geometry.camera import Camera, Pose
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Intrinsics
@@ -40,7 +40,7 @@ def found():
         ViewCondition(True, None, None, "", FIGURES),
         Overlap(0.9, 0.95, 0.05),
         seen,
-        Movement(0.0, 0.0, 0.0),
+        Moved(0.0, 0.0, 0.0),
     )
 
 

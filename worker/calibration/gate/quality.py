@@ -82,7 +82,7 @@ class Refusal:
 
 
 @dataclass(frozen=True)
-class Movement:
+class Moved:
     """From the stored pose to the new one: degrees, metres, and the mean shift of the visible markings in pixels."""
 
     rotation_deg: float
@@ -90,7 +90,7 @@ class Movement:
     pixels: float
 
     @classmethod
-    def between(cls, pitch: Field, before: Camera, after: Camera) -> Movement:
+    def between(cls, pitch: Field, before: Camera, after: Camera) -> Moved:
         """How far a camera moved."""
         lines = pitch.line_points().position
         was = before.project(lines)
@@ -129,11 +129,11 @@ class CameraResult(RefinedPose):
     view: ViewCondition
     overlap: Overlap
     evidence_before: Callable[[], Evidence]
-    moved: Movement
+    moved: Moved
     refusal: Refusal | None = None
     lens_found: bool = False
     markings: Sequence[MarkingReport] = field(default=(), kw_only=True)
-    moved_in_all: Movement | None = field(default=None, kw_only=True)
+    moved_in_all: Moved | None = field(default=None, kw_only=True)
     knocked: bool = field(default=False, kw_only=True)
 
     @property

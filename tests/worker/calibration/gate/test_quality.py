@@ -9,7 +9,7 @@ from tests.worker.calibration.synthetic import PITCH, moved, pair
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.view_condition import ViewCondition, ViewFigures
 from worker.calibration.diagnostics.overlap import Overlap
-from worker.calibration.gate.quality import CameraResult, Gate, Movement, alone_rejection, in_one_sentence
+from worker.calibration.gate.quality import CameraResult, Gate, Moved, alone_rejection, in_one_sentence
 from worker.calibration.geometry.camera import Pose
 from worker.calibration.refinement.uncertainty import Deviation, Sigma
 
@@ -41,7 +41,7 @@ def good():
         view=IN_VIEW,
         overlap=Overlap(0.9, 0.95, 0.05),
         evidence_before=lambda: seen(0.3),
-        moved=Movement(0.5, 0.1, 12.0),
+        moved=Moved(0.5, 0.1, 12.0),
     )
 
 
@@ -66,8 +66,8 @@ def test_a_good_result_passes_the_gate():
             {"zoom": ZOOMED, "with_fitted_zoom": moved(LEFT, by=(0.5, 0.0, 0.0))},
             "a focal length 2.00% ± 0.20% longer than the venue says",
         ),
-        ({"moved": Movement(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
-        ({"moved": Movement(1.0, 3.0, 300.0)}, "3.00 m"),
+        ({"moved": Moved(20.0, 0.1, 300.0)}, "turned by 20.0 degrees (at most 8.0 allowed)"),
+        ({"moved": Moved(1.0, 3.0, 300.0)}, "3.00 m"),
         ({"evidence": seen(0.8), "evidence_before": lambda: seen(0.95)}, "stored pose fits the frame better"),
     ],
 )
@@ -89,11 +89,11 @@ def test_a_doubt_of_the_focal_length_that_moves_no_camera_rejects_none():
 
 
 def test_movement_is_told_in_degrees_metres_and_pixels():
-    turned = Movement.between(PITCH, LEFT, moved(LEFT, by=(0.3, 0, 0.4)))
+    turned = Moved.between(PITCH, LEFT, moved(LEFT, by=(0.3, 0, 0.4)))
     assert turned.rotation_deg == pytest.approx(0)
     assert turned.position_m == pytest.approx(0.5)
     assert turned.pixels > 1
-    assert Movement.between(PITCH, LEFT, LEFT) == Movement(0.0, 0.0, 0.0)
+    assert Moved.between(PITCH, LEFT, LEFT) == Moved(0.0, 0.0, 0.0)
 
 
 def test_a_pose_from_which_no_field_is_filmed_is_doubted_before_the_sport_is():
