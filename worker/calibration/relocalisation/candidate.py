@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,13 +17,17 @@ from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_o
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.geometry.parameters import LensParameter
-from worker.calibration.refinement.refine import Observations, refine
+from worker.calibration.refinement.refine import SEARCH_PX, Observations, refine
 from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
 from worker.calibration.relocalisation.paint import Paint, share
 from worker.calibration.relocalisation.sought import SoughtCamera
 
-SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
-"""How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame."""
+FAR_SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
+"""How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame, where close by too
+few are seen: most proposals are right to a pixel or two, and what is looked for farther off may be found in blotches of
+snow and worn grass."""
+WELL_SEEN = 0.9
+"""So much of the expected lines, beyond chance, is seen from a camera that needs no look farther off."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
@@ -74,25 +79,26 @@ class Sight:
         return Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
-        """A proposed camera on the measured lines, with what is sought of it."""
-        return self.with_lens_and_pose(camera) if sought.is_lens_sought else self.with_pose(camera)
+        """A proposed camera on the measured lines, with its lens if that is sought."""
+        coarse, fine = (coarse_lens(0, camera), fine_lens(0, camera)) if sought.is_lens_sought else ([], [])
+        close = self.assessed(self._refined(camera, [*coarse, *fine]), sought)
+        if close.evidence.agreement >= WELL_SEEN:
+            return close
+        # Principal point and k2 would be bent for the sake of lines that are not caught yet.
+        caught = self._refined(camera, coarse, FAR_SEARCH_PX).camera
+        far = self.assessed(self._refined(caught, [*coarse, *fine]), sought)
+        return max(close, far, key=lambda one: one.agreement)
 
-    def with_pose(self, camera: Camera) -> Candidate:
-        """A proposed camera on the measured lines."""
-        return self.assessed(refine(self.field, [camera], self.observations, 0.0, searches_px=SEARCH_PX).each[0])
+    def _refined(
+        self, camera: Camera, free: Sequence[LensParameter], searches_px: Sequence[float] = SEARCH_PX
+    ) -> RefinedPose:
+        """A camera on the lines within such searches, with the `free` numbers of its lens."""
+        return refine(self.field, [camera], self.observations, 0.0, free, searches_px).each[0]
 
-    def with_lens_and_pose(self, camera: Camera) -> Candidate:
-        """A proposed camera on the measured lines, with focal length and k1, and then with principal point and k2."""
-        coarse, fine = coarse_lens(0, camera), fine_lens(0, camera)
-        caught = refine(self.field, [camera], self.observations, 0.0, coarse, SEARCH_PX).each[0].camera
-        return self.assessed_with_lens(refine(self.field, [caught], self.observations, 0.0, [*coarse, *fine]).each[0])
-
-    def assessed_with_lens(self, found: RefinedPose) -> Candidate:
-        """A camera that was refined with its lens, which says what is known of it, beside lines and paint."""
-        return self.assessed(replace(found, camera=_with_sigmas(found)))
-
-    def assessed(self, found: RefinedPose) -> Candidate:
-        """A refined camera beside the lines and the paint of the frame."""
+    def assessed(self, found: RefinedPose, sought: SoughtCamera) -> Candidate:
+        """A refined camera beside lines and paint of the frame, with what is known of a lens that was sought."""
+        if sought.is_lens_sought:
+            found = replace(found, camera=_with_sigmas(found))
         explains = self.paint.on_markings(self.field, found.camera)
         explained = share(explains)
         seen = max(found.evidence.agreement, 0.0)

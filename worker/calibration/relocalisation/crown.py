@@ -53,10 +53,7 @@ def find_crown(
     if not max(LOWEST_M, SIGMAS * sigma_m) < height_m < Gate().highest_ridge_m:
         return None
     sights = map(partial(Sight.of, found.pitch), observations.channels, observations.responses)
-    refined = [
-        sight.assessed_with_lens(pose) if one.is_lens_sought else sight.assessed(pose)
-        for sight, pose, one in zip(sights, found.each, sought, strict=True)
-    ]
+    refined = [sight.assessed(pose, one) for sight, pose, one in zip(sights, found.each, sought, strict=True)]
     if not _rms(refined) < LESS_LEFT * _rms(candidates):
         return None
     return CrownedField(found.pitch, refined)
