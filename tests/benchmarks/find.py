@@ -4,20 +4,23 @@
     python -m tests.benchmarks.find --only real --folder FOLDER --knowing lens nothing
 
 Sections: `rendered` (every template on grounds and in colours of all kinds, from wide to medium lenses), `real` (frames
-with known cameras, where they are). What is known of each camera: its `lens`, its field of `view` to 30 %, or
-`nothing`. Some pictures are too dark, blurred or faint for any job: beside the share of all views stands that of those
-whose frame an ordinary job accepts which begins with the true pose and lens. Where its lines lead astray, that job ends
-as far from the true pose: how many of the wrong ones stand where it ends is said in brackets. The last lines of the
-table are of views that show a circle, an arc, or straight lines of three directions. Every run is written to a file and
-not run again, so that long ones can be continued; after a change of the engine or of the renderer the file has to be
-removed.
+with known cameras, where they are), `beside` (pairs of cameras anywhere around a field, the first one known, which see
+some of the same ground: on which side does the second one stand?). What is known of each camera: its `lens`, its field
+of `view` to 30 %, or `nothing`. Some pictures are too dark, blurred or faint for any job: beside the share of all views
+stands that of those whose frame an ordinary job accepts which begins with the true pose and lens. Where its lines lead
+astray, that job ends as far from the true pose: how many of the wrong ones stand where it ends is said in brackets. The
+last lines of the table are of views that show a circle, an arc, or straight lines of three directions. Every run is
+written to a file and not run again, so that long ones can be continued; after a change of the engine or of the renderer
+the file has to be removed.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -26,19 +29,24 @@ import numpy as np
 
 from fields.template import NAMES
 from models import MODEL_PATH
+from models.training.courts.floors import grass
+from models.training.pitches.conditions import Conditions
+from models.training.pitches.render import render_frame
 from service.schemas.find import SoughtCameraIn
 from tests.benchmarks.fields import real
 from tests.benchmarks.fields.cases import Case, cases
 from tests.benchmarks.fields.engine import THREADS, Answer, Engine
 from tests.benchmarks.fields.judging import share
-from tests.benchmarks.fields.rendered import LEAST_SHOWN, shot
+from tests.benchmarks.fields.rendered import GROUNDS, LEAST_SHOWN, random_camera, shot, usual_field
 from tests.benchmarks.rows import Rows
 from tests.benchmarks.scenes import FOLDER as RUNS
+from tests.benchmarks.scenes import seen_well
 from worker.calibration.find_cameras import find_cameras
 from worker.calibration.geometry.camera import Camera, Frame, inside
 from worker.calibration.geometry.field import Field
+from worker.calibration.geometry.ground_view import ground_grid
 from worker.calibration.relocalisation.field_map import FieldMap
-from worker.calibration.relocalisation.relocalise import mean_shift_px
+from worker.calibration.relocalisation.relocalise import mean_shift_px, twin
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 from worker.jobs.find import sought_camera
 
@@ -51,6 +59,8 @@ BENT_DEG, ALIKE_DEG, FEWEST_POINTS = 30.0, 5.0, 6
 """A marking in view is an arc if it turns by so much at least; straight ones have one direction within so much."""
 NEAR = 0.0026
 """Found: the markings in view lie, on mean, within this part of the frame's width of where they are (5 px of 1920)."""
+LEAST_SHARED, MOST_SHARED = 0.2, 0.8
+"""So much of the ground that one of a pair sees, which sees less of it, the other one sees too."""
 ALIKE = 0.001
 """Two jobs end alike that put the markings in view apart by no more than this part of the frame's width."""
 
@@ -58,13 +68,14 @@ ALIKE = 0.001
 def main() -> None:
     """Run what is asked for and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    sections = {"rendered": _rendered, "real": _real}
+    sections = {"rendered": _rendered, "real": _real, "beside": _beside}
     parser.add_argument("--only", nargs="+", choices=sections, default=list(sections), help="sections")
     parser.add_argument("--knowing", nargs="+", choices=KNOWING, default=list(KNOWING), help="what is known of cameras")
     parser.add_argument("--folder", type=Path, default=real.FOLDER, help="of real frames, with cases.json")
     parser.add_argument("--cases", nargs="+", help="real ones with one of these in their names")
     parser.add_argument("--fields", nargs="+", choices=NAMES, default=list(NAMES), help="templates to render")
     parser.add_argument("--views", type=int, default=20, help="rendered, of each template")
+    parser.add_argument("--pairs", type=int, default=8, help="rendered, of each template that is played on grass")
     parser.add_argument("--rows", type=Path, default=RUNS / "find.jsonl", help="the file of what has been run")
     options = parser.parse_args()
     cv2.setNumThreads(THREADS)
@@ -110,6 +121,33 @@ def _real(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
     yield from _table(found, options.knowing)
 
 
+def _beside(options: argparse.Namespace, engine: Engine) -> Iterator[str]:
+    yield "| field | pairs | accepted and near | accepted on the wrong side | accepted, wrong | told by the ground |"
+    yield "|---" * 6 + "|"
+    everything = list[dict]()
+    for name in (name for name in options.fields if grass in GROUNDS[name]):
+        rows = [
+            engine.rows.remembered(
+                {"beside": name, "n": number},
+                lambda name=name, number=number: _found_beside(name, number, engine),
+            )
+            for number in range(options.pairs)
+        ]
+        everything += rows
+        yield _beside_line(name, rows)
+    yield _beside_line("all", everything)
+
+
+def _beside_line(name: str, rows: Sequence[dict]) -> str:
+    accepted = [row for row in rows if row["accepted"]]
+    here = [row for row in accepted if row["near"] and row["on_its_side"]]
+    there = [row for row in accepted if row["near"] and not row["on_its_side"]]
+    return (
+        f"| {name} | {len(rows)} | {len(here)} | {len(there)} | {len(accepted) - len(here) - len(there)} "
+        f"| {sum('the ground between the lines' in row['remarks'] for row in accepted)} |"
+    )
+
+
 def _table(found: Mapping[tuple[str, str], Sequence[dict]], knowing: Sequence[str]) -> Iterator[str]:
     yield (
         "| field | known | views | accepted and near | of those a job accepts | accepted, wrong | near, not accepted "
@@ -151,6 +189,36 @@ def _found_in_shot(name: str, number: int, knowing: str, engine: Engine) -> dict
     taken = shot(name, number)
     row = _found(taken.pitch, taken.camera, taken.frame, knowing, number, engine)
     return {**row, "shown": taken.shown, "ground": taken.ground}
+
+
+def _found_beside(name: str, number: int, engine: Engine) -> dict:
+    """A camera that is sought, through its own lens, beside a known one that sees some of the same ground."""
+    rng = np.random.default_rng([zlib.crc32(name.encode()), number, 9])
+    pitch = usual_field(name)
+    known, truth = _overlapping(pitch, rng)
+    conditions = seen_well(Conditions.random(rng))
+    frames = {one.id: [render_frame(pitch, one, conditions, rng).frame] for one in (known, truth)}
+    found = find_cameras(pitch, [_sought(truth, "lens", rng)], [known], frames, engine.segment, number)
+    (camera,) = found.cameras
+    row = {"accepted": camera.accepted, "near": False, "on_its_side": False, "remarks": " ".join(camera.remarks)}
+    if not camera.candidates:
+        return row
+    best = camera.candidates[0].camera
+    off = mean_shift_px(pitch, FieldMap.of(pitch), truth, best, UNSEEN_PX)
+    is_nearer = np.linalg.norm(best.pose.position - truth.pose.position) < np.linalg.norm(
+        twin(best).pose.position - truth.pose.position
+    )
+    return row | {"near": bool(off <= NEAR * truth.intrinsics.size[0]), "on_its_side": bool(is_nearer)}
+
+
+def _overlapping(pitch: Field, rng: np.random.Generator) -> list[Camera]:
+    """Two cameras anywhere around a field; of what one of them sees of the ground, the other sees part."""
+    places = pitch.lift(ground_grid(50, 50, max(pitch.length, pitch.width) / 100))
+    while True:
+        cameras = [replace(random_camera(rng, pitch), id=name) for name in ("known", "sought")]
+        one, other = (inside(camera.project(places), camera.intrinsics.size) for camera in cameras)
+        if LEAST_SHARED < np.count_nonzero(one & other) / min(map(np.count_nonzero, (one, other))) < MOST_SHARED:
+            return cameras
 
 
 def _found_in_case(case: Case, knowing: str, engine: Engine) -> dict:

@@ -23,6 +23,8 @@ from worker.calibration.relocalisation.crown import find_crown
 from worker.calibration.relocalisation.field_halves import choose_sides
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import NotFound, Relocalisation, relocalise, twin
+from worker.calibration.relocalisation.rivals import tell_rivals_apart
+from worker.calibration.relocalisation.shared_ground import SharedGround
 from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
 
 OF_ONE_KIND = 0.03
@@ -97,7 +99,8 @@ def find_cameras(
             progress.at_fraction("segmentation", SEGMENTED * number / len(sought))
             responses[one.id] = [segment(frame, whole_frame(one.size)) for frame in frames[one.id]]
 
-    # Find each camera alone; who was found helps who was not. Then choose the halves of the field that they look at.
+    # Find each camera alone; who was found helps who was not. Then choose the halves of the field that they look at,
+    # and of several poses the one from which the ground looks as another camera sees it.
     with progress.timed("evolution"):
         seen = {one.id: _seen(one, frames[one.id], responses[one.id]) for one in sought}
         alone = dict[str, Relocalisation]()
@@ -108,10 +111,13 @@ def find_cameras(
             progress.at_fraction("evolution", SEARCHED)
             again = relocalise(pitch, markings, helped, *seen[helped.id], seed)
             alone[helped.id] = again if again.refusal is None else alone[helped.id]
-    placed = _on_their_sides(alone, sought, known) if markings.is_symmetric else alone
+        ground = SharedGround.of(pitch, {camera: its[0] for camera, its in frames.items()})
+        placed = _on_their_sides(alone, sought, known, ground) if markings.is_symmetric else alone
+        by_id = {one.id: one for one in sought}
+        placed = tell_rivals_apart(pitch, markings, placed, by_id, known, ground)
     if pitch.ridge is None and not known:
         with progress.timed("refinement"):
-            pitch, placed = _on_its_crown(pitch, placed, {one.id: one for one in sought}, seen)
+            pitch, placed = _on_its_crown(pitch, placed, by_id, seen)
 
     # Calibrate those that were found, as every later job will.
     found = [one.candidates[0].camera for one in placed.values() if one.refusal is None]
@@ -171,11 +177,14 @@ def _with_lenses_of_others(
 
 
 def _on_their_sides(
-    alone: Mapping[str, Relocalisation], sought: Sequence[SoughtCamera], known: Sequence[Camera]
+    alone: Mapping[str, Relocalisation],
+    sought: Sequence[SoughtCamera],
+    known: Sequence[Camera],
+    ground: SharedGround,
 ) -> dict[str, Relocalisation]:
     """The same with each camera on its side of a symmetric field; refused where that is not clear."""
     best = [one.candidates[0].camera for one in alone.values() if one.refusal is None]
-    sides = {one.camera.id: one for one in choose_sides(best, {one.id: one.place for one in sought}, known)}
+    sides = {one.camera.id: one for one in choose_sides(best, {one.id: one.place for one in sought}, known, ground)}
     placed = dict[str, Relocalisation]()
     for camera, found in alone.items():
         side = sides.get(camera)

@@ -25,6 +25,7 @@ CROWNED = Field(105.0, 68.0, ridge=np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.3
 BARREL = (-0.12, 0.02, 0.0, 0.0, 0.0)
 # Samples a side of a pixel, and pixels a side of a block.
 SAMPLES, BLOCK = 3, 4
+PATCH_M = 0.25
 # How steeply a ray has to go down to meet the ground.
 LEVEL = 1e-3
 
@@ -189,6 +190,26 @@ def paint_frame(pitch: Field, camera: Camera, exposure: float = 1.0) -> NDArray[
     """Lines on grass under a sky, BGR."""
     colours = sorted({marking.colour for marking in pitch.markings()})
     return _coloured(camera, {colour: paint_markings(pitch, camera, colour) for colour in colours}, exposure)
+
+
+def worn(pitch: Field, camera: Camera, frame: NDArray[np.uint8], seed: int = 0) -> NDArray[np.uint8]:
+    """The frame of a camera with grass that is worn here and there, at the same places for each camera of a `seed`."""
+    patches = cv2.GaussianBlur(np.random.default_rng(seed).normal(size=(500, 700)), (0, 0), 1.5)
+    return _shaded(pitch, camera, frame, (0.1 * patches / patches.std()).astype(np.float32))
+
+
+def mown(pitch: Field, camera: Camera, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The frame of a camera with grass in light and dark stripes across the pitch, 5 m wide."""
+    stripes = 0.1 * np.sign(np.sin(np.pi * (np.arange(700) - 350) * PATCH_M / 5))
+    return _shaded(pitch, camera, frame, np.broadcast_to(stripes, (500, 700)).astype(np.float32))
+
+
+def _shaded(pitch: Field, camera: Camera, frame: NDArray[np.uint8], shades: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """The frame with the ground so much lighter at each place of a map, `PATCH_M` apart around the middle."""
+    rows, columns = shades.shape
+    at = ground_behind(pitch, camera).astype(np.float32) / np.float32(PATCH_M)
+    there = cv2.remap(shades, at[..., 0] + columns // 2, at[..., 1] + rows // 2, cv2.INTER_LINEAR)
+    return np.clip(frame * (1 + np.nan_to_num(there)[..., None]), 0, 255).astype(np.uint8)
 
 
 def _coloured(camera: Camera, paint: dict[str, NDArray[np.float32]], exposure: float = 1.0) -> NDArray[np.uint8]:

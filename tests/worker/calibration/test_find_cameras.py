@@ -6,8 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.worker.calibration import synthetic
 from tests.worker.calibration.gate.test_quality import good
-from tests.worker.calibration.synthetic import CROWNED, PITCH, paint_frame, pair, pair_frames
+from tests.worker.calibration.synthetic import CROWNED, PITCH, paint_frame, pair, pair_frames, worn
 from tests.worker.calibration.test_calibrate import white_on_green
 from worker.calibration.find_cameras import FoundCamera, find_cameras, why_not_confirmed
 from worker.calibration.gate.quality import Gate
@@ -59,6 +60,18 @@ def test_a_camera_is_found_beside_one_that_is_known():
     (camera,) = found.cameras
     assert camera.accepted
     assert np.linalg.norm(camera.candidates[0].camera.pose.position - right.pose.position) < 0.03
+
+
+def test_a_camera_on_a_stand_opposite_is_found_there_by_the_ground_that_both_see():
+    left, _ = pair()
+    # Its twin stands 2 m from the other camera.
+    other = synthetic.camera("other", (0.5, 47.0, 10.5), (-15.0, 0.0))
+    seen = {one.id: [worn(PITCH, one, paint_frame(PITCH, one))] for one in (left, other)}
+    found = find_cameras(PITCH, [sought(left), sought(other)], [], seen, white_on_green, 1)
+    for truth, one in zip((left, other), found.cameras, strict=True):
+        assert one.accepted, one.refusal
+        assert np.linalg.norm(one.candidates[0].camera.pose.position - truth.pose.position) < 0.05
+    assert "looks as camera left sees it" in found.cameras[1].remarks[0]
 
 
 def test_the_crown_of_a_field_that_is_given_flat_is_found_with_the_cameras():

@@ -9,10 +9,13 @@ import numpy as np
 
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.relocalisation.relocalise import twin
+from worker.calibration.relocalisation.shared_ground import GroundComparison, SharedGround
 from worker.calibration.relocalisation.sought import Place
 
 ON_ONE_MOUNT = 0.25
 """A camera is taken for one on the mount of another when its twin is so much farther away: by one over this part."""
+SPEAKS_AGAINST = 0.1
+"""... unless from there the ground correlates by so much more with what another one sees: stands may be alike."""
 BEHIND_AN_END = 0.5
 """A camera is told by left and right, not by near and far, whose y is less than this part of its x."""
 
@@ -28,11 +31,14 @@ class ChosenSide:
     decided: bool
 
 
-def choose_sides(found: Sequence[Camera], places: Mapping[str, Place], known: Sequence[Camera]) -> list[ChosenSide]:
+def choose_sides(
+    found: Sequence[Camera], places: Mapping[str, Place], known: Sequence[Camera], ground: SharedGround
+) -> list[ChosenSide]:
     """Choose of each camera found on a symmetric field itself or its twin.
 
     Cameras with a place are where they may be; the first of all, if no other is `known`, is taken to stand on the near
-    side; each other one stands with those, if it is clearly nearer to one of them than its twin.
+    side; each other one where the ground looks as one of those sees it. Where that is not clear it stands with one of
+    those, if it is clearly nearer to it than its twin, and if the ground does not speak against that.
     """
     chosen: dict[str, ChosenSide] = {}
     standing = list(known)
@@ -50,9 +56,11 @@ def choose_sides(found: Sequence[Camera], places: Mapping[str, Place], known: Se
         chosen[first.id] = _on_the_near_side(first)
         standing.append(chosen[first.id].camera)
     while free:
-        camera = max(free, key=lambda one: _clearness(one, standing))
+        compared = {one.id: ground.compare([one, twin(one)], standing) for one in free}
+        camera = max(free, key=lambda one: (compared[one.id].right is not None, _clearness(one, standing)))
         free.remove(camera)
-        chosen[camera.id] = _beside_the_others(camera, standing)
+        on_shared_ground = _on_shared_ground(camera, compared[camera.id])
+        chosen[camera.id] = on_shared_ground or _beside_the_others(camera, standing, compared[camera.id])
         standing.append(chosen[camera.id].camera)
     return [chosen[camera.id] for camera in found]
 
@@ -76,12 +84,24 @@ def _on_the_near_side(camera: Camera) -> ChosenSide:
     )
 
 
-def _beside_the_others(camera: Camera, standing: Sequence[Camera]) -> ChosenSide:
-    """On the side on which it stands with another one, if that is clear."""
-    here, there = _distance(camera, standing), _distance(twin(camera), standing)
-    taken = camera if here <= there else twin(camera)
-    near, far = sorted((here, there))
-    if near <= ON_ONE_MOUNT * far:
+def _on_shared_ground(camera: Camera, compared: GroundComparison) -> ChosenSide | None:
+    """On the side from which the ground looks as another camera sees it, if that is clear."""
+    if compared.right is None:
+        return None
+    taken = (camera, twin(camera))[compared.right]
+    return ChosenSide(
+        taken, f"taken to stand on the {side_of(taken)} side: {compared.in_words(compared.right)}", decided=True
+    )
+
+
+def _beside_the_others(camera: Camera, standing: Sequence[Camera], compared: GroundComparison) -> ChosenSide:
+    """On the side on which it stands with another one, if that is clear, and the ground does not look otherwise."""
+    sides = (camera, twin(camera))
+    metres = [_distance(one, standing) for one in sides]
+    nearer = int(np.argmin(metres))
+    taken, near, far = sides[nearer], metres[nearer], metres[1 - nearer]
+    alike, otherwise = compared.correlations[nearer], compared.correlations[1 - nearer]
+    if near <= ON_ONE_MOUNT * far and alike > otherwise - SPEAKS_AGAINST:
         return ChosenSide(
             taken, f"taken to stand on the {side_of(taken)} side, {near:.1f} m from the nearest camera", decided=True
         )

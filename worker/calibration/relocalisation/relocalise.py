@@ -6,7 +6,7 @@ clearly different pose explains the frame nearly as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -115,7 +115,9 @@ def relocalise(
             caught = camera if looked is sight else looked.candidate(camera, sought).camera
             candidates.append(sight.candidate(caught, sought))
         candidates.sort(key=lambda one: -one.agreement)
-        found = Relocalisation(candidates[:REFINED], _why_not_taken(field, markings, sought, candidates))
+        found = Relocalisation(
+            _to_choose_from(field, markings, candidates), why_not_taken(field, markings, sought, candidates)
+        )
         reasons = BEGUN_ANEW_WITH_OTHER_LENSES if sought.other_lenses else BEGUN_ANEW
         if found.refusal is None or found.refusal.reason not in reasons:
             break
@@ -124,6 +126,12 @@ def relocalise(
         if found.refusal.reason in TOO_LITTLE_PAINT or attempt > 0:
             looked = sight.strengthened(FAINT)
     return found
+
+
+def _to_choose_from(field: Field, markings: FieldMap, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The best candidates, and each other one that may be the true one as well."""
+    best, others = candidates[:REFINED], candidates[REFINED:]
+    return [*best, *(rivals(field, markings, best[0], others) if others else ())]
 
 
 def _distinct(
@@ -140,7 +148,7 @@ def _distinct(
     return chosen
 
 
-def _why_not_taken(
+def why_not_taken(
     field: Field, markings: FieldMap, sought: SoughtCamera, candidates: Sequence[Candidate]
 ) -> NotFound | None:
     """Why the best candidate is not taken. Whether it is exact enough a calibration says that begins with it."""
@@ -180,14 +188,24 @@ def _why_not_taken(
         )
     if not films_a_field(best.camera.pose):
         return NotFound("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
-    for other in others:
-        if explains_nearly_as_well(other, best) and _differ(field, markings, best.camera, other.camera, DIFFERENT):
-            return NotFound(
-                "not-unique",
-                f"two poses explain the lines: {seen.share:.0%} and {other.evidence.share:.0%} of the markings in view "
-                "are seen where they put them; say where the camera stands, or let it see more of the field",
-            )
+    for other in rivals(field, markings, best, others):
+        return NotFound(
+            "not-unique",
+            f"two poses explain the lines: {seen.share:.0%} and {other.evidence.share:.0%} of the markings in view "
+            "are seen where they put them; say where the camera stands, or let it see more of the field",
+        )
     return None
+
+
+def rivals(field: Field, markings: FieldMap, best: Candidate, others: Iterable[Candidate]) -> Iterator[Candidate]:
+    """Those of other candidates that may be the true one too; clearly different from the best and from each other."""
+    different = [best]
+    for other in others:
+        if explains_nearly_as_well(other, best) and all(
+            _differ(field, markings, one.camera, other.camera, DIFFERENT) for one in different
+        ):
+            different.append(other)
+            yield other
 
 
 def _is_likely_in_place(sought: SoughtCamera, best: Candidate) -> bool:

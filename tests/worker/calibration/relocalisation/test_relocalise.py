@@ -163,7 +163,7 @@ def test_a_camera_that_is_sought_where_it_stood_may_miss_more_of_its_lines():
     misses_a_third, explains_little = candidate(66, range(90), iou=0.6), candidate(66, range(60), iou=0.6)
     in_place, anywhere = SoughtCamera("one", lens, place), SoughtCamera("one", lens)
     refusals = [
-        relocalisation._why_not_taken(PITCH, FieldMap.of(PITCH), sought, [best]).reason
+        relocalisation.why_not_taken(PITCH, FieldMap.of(PITCH), sought, [best]).reason
         for sought, best in ((in_place, misses_a_third), (in_place, explains_little), (anywhere, misses_a_third))
     ]
     # Of the candidate too few points are measured, which comes after how many lines are seen.
