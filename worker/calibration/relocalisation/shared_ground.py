@@ -7,7 +7,7 @@ shadows, lettering, players' feet. Cameras of one job have taken their frames at
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -69,15 +69,16 @@ class SharedGround:
     all of about the same moment.
     """
 
-    field: Field
+    pitch: Field
     places: Array
     from_paint: NDArray[np.float32]
     frames: Mapping[str, Frame]
+    _textures: dict[tuple[str, bytes], _Texture] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
-    def of(cls, field: Field, frames: Mapping[str, Frame]) -> SharedGround:
+    def of(cls, pitch: Field, frames: Mapping[str, Frame]) -> SharedGround:
         """Return the ground of a field and a little around it."""
-        lines = field.line_points().position[:, :2]
+        lines = pitch.line_points().position[:, :2]
         low, high = lines.min(axis=0) - BESIDE_M, lines.max(axis=0) + BESIDE_M
         step_m = float((high - low).max()) / CELLS_A_SIDE
         x, y = (np.arange(low[axis], high[axis], step_m) for axis in (0, 1))
@@ -87,7 +88,7 @@ class SharedGround:
         bare[row, column] = 0
         from_paint = cv2.distanceTransform(bare, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         near = from_paint < max(OFF_PAINT_M / step_m, OFF_PAINT_CELLS)
-        return cls(field, places, np.where(near, np.float32(0), from_paint).astype(np.float32), frames)
+        return cls(pitch, places, np.where(near, np.float32(0), from_paint).astype(np.float32), frames)
 
     def compare(self, poses: Sequence[Camera], others: Sequence[Camera]) -> GroundComparison:
         """Compare the ground as a camera sees it from several poses with how others see it, if those have frames."""
@@ -99,9 +100,17 @@ class SharedGround:
         return GroundComparison(alike.max(axis=1), [list(seen)[number] for number in alike.argmax(axis=1)])
 
     def _texture(self, camera: Camera) -> _Texture:
-        """What its frame shows of the ground between the lines if a camera has this pose."""
-        values, seen = ground_view(self.field, camera, self.frames[camera.id], self.places)
-        px = _least_px(camera.project(self.field.lift(self.places)))
+        """What its frame shows of the ground between the lines if a camera has this pose and lens; looked at once."""
+        pose, lens = camera.pose, camera.intrinsics
+        numbers = np.concatenate([pose.rotation, pose.position, lens.matrix.ravel(), lens.distortion])
+        key = camera.id, numbers.tobytes()
+        if key not in self._textures:
+            self._textures[key] = self._look_at(camera)
+        return self._textures[key]
+
+    def _look_at(self, camera: Camera) -> _Texture:
+        values, seen = ground_view(self.pitch, camera, self.frames[camera.id], self.places)
+        px = _least_px(camera.project(self.pitch.lift(self.places)))
         seen = seen & (px > LEAST_PX) & (self.from_paint * px > OFF_PAINT_PX)
         lightness = np.log(np.maximum(values.mean(axis=-1), DARKEST)).astype(np.float32)
         contrast = _mean(lightness, seen, FINE_CELLS) - _mean(lightness, seen, COARSE_CELLS)
