@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,17 +16,11 @@ from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_o
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
 from worker.calibration.geometry.parameters import LensParameter
-from worker.calibration.refinement.refine import SEARCH_PX, Observations, refine
+from worker.calibration.refinement.refine import Observations, refine
 from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
 from worker.calibration.relocalisation.paint import Paint, share
 from worker.calibration.relocalisation.sought import SoughtCamera
 
-FAR_SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
-"""How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame, where close by too
-few are seen: most proposals are right to a pixel or two, and what is looked for farther off may be found in blotches of
-snow and worn grass."""
-WELL_SEEN = 0.9
-"""So much of the expected lines, beyond chance, is seen from a camera that needs no look farther off."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
@@ -79,21 +72,12 @@ class Sight:
         return Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
-        """A proposed camera on the measured lines, with its lens if that is sought."""
-        coarse, fine = (coarse_lens(0, camera), fine_lens(0, camera)) if sought.is_lens_sought else ([], [])
-        close = self.assessed(self._refined(camera, [*coarse, *fine]), sought)
-        if close.evidence.agreement >= WELL_SEEN:
-            return close
-        # Principal point and k2 would be bent for the sake of lines that are not caught yet.
-        caught = self._refined(camera, coarse, FAR_SEARCH_PX).camera
-        far = self.assessed(self._refined(caught, [*coarse, *fine]), sought)
-        return max(close, far, key=lambda one: one.agreement)
+        """A proposed camera on the measured lines, with its lens if that is sought.
 
-    def _refined(
-        self, camera: Camera, free: Sequence[LensParameter], searches_px: Sequence[float] = SEARCH_PX
-    ) -> RefinedPose:
-        """A camera on the lines within such searches, with the `free` numbers of its lens."""
-        return refine(self.field, [camera], self.observations, 0.0, free, searches_px).each[0]
+        Proposals are right to a pixel or two: what lies farther off than an ordinary finish looks is no line of theirs.
+        """
+        lens = free_lens(0, camera) if sought.is_lens_sought else []
+        return self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
 
     def assessed(self, found: RefinedPose, sought: SoughtCamera) -> Candidate:
         """A refined camera beside lines and paint of the frame, with what is known of a lens that was sought."""
@@ -109,19 +93,16 @@ class Sight:
         return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, shift_px)
 
 
-def coarse_lens(number: int, camera: Camera) -> list[LensParameter]:
-    """Focal length and k1 of a proposed camera, `number` of several, to be found along with its pose."""
-    return [
-        LensParameter(number, "focal_length_px", FREE_FOCAL * camera.intrinsics.focal_length_px),
-        LensParameter(number, "k1", FREE_BEND * _half_width(camera) ** -2),
-    ]
-
-
-def fine_lens(number: int, camera: Camera) -> list[LensParameter]:
-    """Its principal point and k2, to be found once it is nearly in place."""
+def free_lens(number: int, camera: Camera) -> list[LensParameter]:
+    """The lens of a proposed camera, `number` of several, to be found along with its pose."""
+    focal_length_px, half_width = camera.intrinsics.focal_length_px, _half_width(camera)
     off_px = FREE_CENTRE * camera.intrinsics.size[0]
-    centre = [LensParameter(number, f"principal_point_{axis}_px", off_px) for axis in ("x", "y")]
-    return [*centre, LensParameter(number, "k2", FREE_BEND * _half_width(camera) ** -4)]
+    return [
+        LensParameter(number, "focal_length_px", FREE_FOCAL * focal_length_px),
+        LensParameter(number, "k1", FREE_BEND * half_width**-2),
+        *(LensParameter(number, f"principal_point_{axis}_px", off_px) for axis in ("x", "y")),
+        LensParameter(number, "k2", FREE_BEND * half_width**-4),
+    ]
 
 
 def _half_width(camera: Camera) -> float:

@@ -16,7 +16,7 @@ from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import free_ridge
 from worker.calibration.refinement.refine import Observations, refine
-from worker.calibration.relocalisation.candidate import Candidate, Sight, coarse_lens, fine_lens
+from worker.calibration.relocalisation.candidate import Candidate, Sight, free_lens
 from worker.calibration.relocalisation.sought import SoughtCamera
 
 LOWEST_M, SIGMAS = 0.05, 5.0
@@ -46,7 +46,7 @@ def find_crown(
         parameter
         for number, (camera, one) in enumerate(zip(cameras, sought, strict=True))
         if one.is_lens_sought
-        for parameter in (*coarse_lens(number, camera), *fine_lens(number, camera))
+        for parameter in free_lens(number, camera)
     ]
     found = refine(flat, cameras, observations, 0.0, [*lenses, *free_ridge(flat)])
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
