@@ -21,6 +21,13 @@ from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
 from worker.calibration.relocalisation.paint import Paint, share
 from worker.calibration.relocalisation.sought import SoughtCamera
 
+FAR_SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
+"""How far from a proposed line a painted one is looked for, round by round, in pixels of a 4K frame, where an ordinary
+finish sees some of the lines and not all. Most proposals are right to a pixel or two, and from there what lies farther
+off may be blotches of snow and worn grass; of others some lines are caught and one is taken for its neighbour."""
+HARDLY_SEEN, WELL_SEEN = 0.3, 0.9
+"""Of the expected lines, beyond chance: from a pose that sees less, none is near that sees more, as a rule; one that
+sees more is left as it is."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
@@ -72,12 +79,16 @@ class Sight:
         return Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
-        """A proposed camera on the measured lines, with its lens if that is sought.
-
-        Proposals are right to a pixel or two: what lies farther off than an ordinary finish looks is no line of theirs.
-        """
+        """A proposed camera on the measured lines, with its lens if that is sought."""
         lens = free_lens(0, camera) if sought.is_lens_sought else []
-        return self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
+        close = self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
+        if not HARDLY_SEEN < close.evidence.agreement < WELL_SEEN:
+            return close
+        # Principal point and k2 would be bent for the sake of lines that are not caught yet.
+        first = free_focal_length_and_k1(0, camera) if sought.is_lens_sought else []
+        caught = refine(self.field, [camera], self.observations, 0.0, first, FAR_SEARCH_PX).each[0].camera
+        far = self.assessed(refine(self.field, [caught], self.observations, 0.0, lens).each[0], sought)
+        return max(close, far, key=lambda one: one.agreement)
 
     def assessed(self, found: RefinedPose, sought: SoughtCamera) -> Candidate:
         """A refined camera beside lines and paint of the frame, with what is known of a lens that was sought."""
@@ -94,14 +105,18 @@ class Sight:
 
 
 def free_lens(number: int, camera: Camera) -> list[LensParameter]:
-    """The lens of a proposed camera, `number` of several, to be found along with its pose."""
-    focal_length_px, half_width = camera.intrinsics.focal_length_px, _half_width(camera)
+    """All numbers of the lens of a proposed camera, `number` of several, to be found along with its pose."""
     off_px = FREE_CENTRE * camera.intrinsics.size[0]
+    centre = [LensParameter(number, f"principal_point_{axis}_px", off_px) for axis in ("x", "y")]
+    k2 = LensParameter(number, "k2", FREE_BEND * _half_width(camera) ** -4)
+    return [*free_focal_length_and_k1(number, camera), *centre, k2]
+
+
+def free_focal_length_and_k1(number: int, camera: Camera) -> list[LensParameter]:
+    """Those of them that are to be found while the camera is not yet in place."""
     return [
-        LensParameter(number, "focal_length_px", FREE_FOCAL * focal_length_px),
-        LensParameter(number, "k1", FREE_BEND * half_width**-2),
-        *(LensParameter(number, f"principal_point_{axis}_px", off_px) for axis in ("x", "y")),
-        LensParameter(number, "k2", FREE_BEND * half_width**-4),
+        LensParameter(number, "focal_length_px", FREE_FOCAL * camera.intrinsics.focal_length_px),
+        LensParameter(number, "k1", FREE_BEND * _half_width(camera) ** -2),
     ]
 
 
