@@ -188,10 +188,11 @@ def why_not_taken(
         )
     if not films_a_field(best.camera.pose):
         return NotFound("implausible", "the best pose is none from which a field is filmed: upside down, or far away")
-    for other in rivals(field, markings, best, others):
+    rival = next(rivals(field, markings, best, others), None)
+    if rival is not None:
         return NotFound(
             "not-unique",
-            f"two poses explain the lines: {seen.share:.0%} and {other.evidence.share:.0%} of the markings in view "
+            f"two poses explain the lines: {seen.share:.0%} and {rival.evidence.share:.0%} of the markings in view "
             "are seen where they put them; say where the camera stands, or let it see more of the field",
         )
     return None
