@@ -28,6 +28,8 @@ off may be blotches of snow and worn grass; of others some lines are caught and 
 HARDLY_SEEN, WELL_SEEN = 0.3, 0.9
 """Of the expected lines, beyond chance: from a pose that sees less, none is near that sees more, as a rule; one that
 sees more is left as it is."""
+CLEARLY_MORE = 0.03
+"""By how much more a pose has to agree that may lie farther from its lines."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
 """How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
 k2 at half the width of the frame."""
@@ -79,16 +81,19 @@ class Sight:
         return Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
-        """A proposed camera on the measured lines, with its lens if that is sought."""
+        """A proposed camera on the measured lines close by, with its lens if that is sought."""
         lens = free_lens(0, camera) if sought.is_lens_sought else []
-        close = self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
+        return self.assessed(refine(self.field, [camera], self.observations, 0.0, lens).each[0], sought)
+
+    def on_lines_farther_off(self, camera: Camera, close: Candidate, sought: SoughtCamera) -> Candidate:
+        """A proposed camera on measured lines that lie farther off, if that is better than what it is `close` by."""
         if not HARDLY_SEEN < close.evidence.agreement < WELL_SEEN:
             return close
         # Principal point and k2 would be bent for the sake of lines that are not caught yet.
         first = free_focal_length_and_k1(0, camera) if sought.is_lens_sought else []
-        caught = refine(self.field, [camera], self.observations, 0.0, first, FAR_SEARCH_PX).each[0].camera
-        far = self.assessed(refine(self.field, [caught], self.observations, 0.0, lens).each[0], sought)
-        return max(close, far, key=lambda one: one.agreement)
+        caught = refine(self.field, [camera], self.observations, 0.0, first, FAR_SEARCH_PX).each[0]
+        far = self.candidate(caught.camera, sought) if sought.is_lens_sought else self.assessed(caught, sought)
+        return far if is_better(far, close) else close
 
     def assessed(self, found: RefinedPose, sought: SoughtCamera) -> Candidate:
         """A refined camera beside lines and paint of the frame, with what is known of a lens that was sought."""
@@ -102,6 +107,14 @@ class Sight:
         overlap = overlap_of(self.field, found.camera, self.observations.responses[0])
         shift_px = _shift_sigma_px(self.field, found)
         return Candidate(found.camera, both, explains, found.evidence, overlap, found.residual_px, sigma, shift_px)
+
+
+def is_better(one: Candidate, other: Candidate) -> bool:
+    """Whether one agrees clearly more with lines and paint than the other, or about as much with lines closer to it."""
+    more = one.agreement - other.agreement
+    if abs(more) > CLEARLY_MORE or one.residual_px is None or other.residual_px is None:
+        return more > 0
+    return one.residual_px < other.residual_px
 
 
 def free_lens(number: int, camera: Camera) -> list[LensParameter]:

@@ -38,6 +38,8 @@ ATTEMPTS_KNOWN_LENS, ATTEMPTS_SOUGHT_LENS = 3, 2
 """How often it is begun at most: to search for a lens too is dear."""
 REFINED, MUCH_WORSE = 4, 0.12
 """So many proposals are refined, of those whose agreement is lower than that of the best by no more than this."""
+LOOKED_FARTHER_KNOWN_LENS, LOOKED_FARTHER_SOUGHT_LENS = REFINED, 2
+"""For so many of those, the best ones, lines are looked for farther off as well: with a lens that is dear."""
 PROPOSED_APART, DIFFERENT = 0.04, 0.01
 """Proposals, and refined poses, are different that put the markings in view farther apart than this part of the width
 of the frame, on mean."""
@@ -108,12 +110,18 @@ def relocalise(
         proposals = [
             one for one in propose(markings, looked.small, through, seed + attempt) if one.agreement >= least_agreement
         ]
+        refined = list[tuple[Camera, Candidate]]()
         for camera in _distinct(field, markings, sought, proposals):
-            if any(not _differ(field, markings, one.camera, camera, DIFFERENT) for one in candidates):
+            tried = [*candidates, *(candidate for _, candidate in refined)]
+            if any(not _differ(field, markings, one.camera, camera, DIFFERENT) for one in tried):
                 continue
             pulse()
             caught = camera if looked is sight else looked.candidate(camera, sought).camera
-            candidates.append(sight.candidate(caught, sought))
+            refined.append((caught, sight.candidate(caught, sought)))
+        refined.sort(key=lambda one: -one[1].agreement)
+        farther = LOOKED_FARTHER_SOUGHT_LENS if sought.is_lens_sought else LOOKED_FARTHER_KNOWN_LENS
+        candidates += [sight.on_lines_farther_off(camera, close, sought) for camera, close in refined[:farther]]
+        candidates += [close for _, close in refined[farther:]]
         candidates.sort(key=lambda one: -one.agreement)
         found = Relocalisation(
             _to_choose_from(field, markings, candidates), why_not_taken(field, markings, sought, candidates)

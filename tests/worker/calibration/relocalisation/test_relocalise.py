@@ -15,7 +15,7 @@ from worker.calibration.detection.segmentation import Region
 from worker.calibration.diagnostics.overlap import Overlap
 from worker.calibration.geometry.camera import inside
 from worker.calibration.relocalisation import relocalise as relocalisation
-from worker.calibration.relocalisation.candidate import Candidate
+from worker.calibration.relocalisation.candidate import Candidate, is_better
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.relocalise import (
     explains_nearly_as_well,
@@ -156,6 +156,28 @@ def candidate(found_of_100, explained_of_100, iou, residual_px=0.4):
     return Candidate(
         SIDELINE, agreement, explains, seen, Overlap(iou, found_of_100 / 100, 0.0), residual_px, None, None
     )
+
+
+def test_of_two_poses_that_agree_alike_the_one_closer_to_its_lines_is_better_and_else_the_one_that_agrees_more():
+    # Handball on a floor with other lines: one of them was caught, 4 px off.
+    close, far = (
+        candidate(70, range(53), iou=0.4, residual_px=0.52),
+        candidate(73, range(53), iou=0.4, residual_px=0.63),
+    )
+    assert not is_better(far, close)
+    # Futsal: the touchline was taken for its neighbour, and what lies farther off is right.
+    close, far = (
+        candidate(88, range(30), iou=0.4, residual_px=0.47),
+        candidate(99, range(29), iou=0.4, residual_px=0.14),
+    )
+    assert is_better(far, close)
+    # Ice hockey: most of the lines were not caught.
+    close, far = (
+        candidate(50, range(61), iou=0.4, residual_px=0.57),
+        candidate(91, range(96), iou=0.8, residual_px=0.73),
+    )
+    assert is_better(far, close)
+    assert not is_better(candidate(40, range(50), iou=0.4, residual_px=None), close)
 
 
 def test_a_camera_that_is_sought_where_it_stood_may_miss_more_of_its_lines():
