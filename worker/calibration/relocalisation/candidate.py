@@ -26,8 +26,8 @@ FAR_SEARCH_PX = (60.0, 28.0, 14.0, 8.0, 5.0)
 finish sees some of the lines and not all. Most proposals are right to a pixel or two, and from there what lies farther
 off may be blotches of snow and worn grass; of others some lines are caught and one is taken for its neighbour."""
 HARDLY_SEEN, WELL_SEEN = 0.3, 0.9
-"""Of the expected lines, beyond chance: from a pose that sees less, none is near that sees more, as a rule; one that
-sees more is left as it is."""
+"""Shares of the expected lines, beyond chance. A pose that sees less than the first has none near that sees more, as a
+rule; a pose that sees more than the second is left as it is."""
 CLEARLY_MORE = 0.03
 """By how much more a pose has to agree that may lie farther from its lines."""
 FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
@@ -126,7 +126,7 @@ def free_lens(number: int, camera: Camera) -> list[LensParameter]:
 
 
 def free_focal_length_and_k1(number: int, camera: Camera) -> list[LensParameter]:
-    """Those of them that are to be found while the camera is not yet in place."""
+    """Focal length and k1 of a proposed camera, to be found along with a pose that is not yet in place."""
     return [
         LensParameter(number, "focal_length_px", FREE_FOCAL * camera.intrinsics.focal_length_px),
         LensParameter(number, "k1", FREE_BEND * _half_width(camera) ** -2),

@@ -207,7 +207,7 @@ def why_not_taken(
 
 
 def rivals(field: Field, markings: FieldMap, best: Candidate, others: Iterable[Candidate]) -> Iterator[Candidate]:
-    """Those of other candidates that may be the true one too; clearly different from the best and from each other."""
+    """Yield candidates that may be the true one as well as the best; all of them clearly differ from each other."""
     different = [best]
     for other in others:
         if explains_nearly_as_well(other, best) and all(

@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from worker.calibration.geometry.camera import Array, Camera, Frame
+from worker.calibration.geometry.camera import Array, Camera, Frame, inside
 from worker.calibration.geometry.field import Field
-from worker.calibration.geometry.ground_view import ground_view
+from worker.calibration.geometry.ground_view import sampled
 from worker.calibration.robust import USUAL
 
 CELLS_A_SIDE, BESIDE_M = 400, 3.0
@@ -23,9 +23,9 @@ CELLS_A_SIDE, BESIDE_M = 400, 3.0
 OFF_PAINT_M, OFF_PAINT_CELLS, OFF_PAINT_PX = 0.4, 2.5, 3.0
 """No place counts that is nearer to the middle of a line, which looks alike from each pose that explains the lines."""
 LEAST_PX = 0.5
-"""Nor one far away, where the next place is nearer than this in the frame."""
+"""No place counts whose neighbour is nearer than this in the frame, as far away."""
 FINE_CELLS, COARSE_CELLS = 1.0, 3.0
-"""What is finer is noise, and not in place from far away; what is coarser is light and the colour of the grass."""
+"""Detail finer than the first is noise, and misplaced from far away; coarser than the second it is light and colour."""
 DARKEST = 4.0
 """Values below are taken for it: their logarithms are noise."""
 OUTLYING = 3.0
@@ -55,7 +55,7 @@ class GroundComparison:
         return best if self.correlations[best] >= max(LEAST_ALIKE, next_best + CLEARLY_MORE_ALIKE) else None
 
     def in_words(self, right: int) -> str:
-        """What speaks for a pose."""
+        """The correlations that speak for the pose of number `right`, as a clause of a sentence."""
         return (
             f"from there the ground between the lines looks as camera {self.others[right]} sees it (correlation "
             f"{self.correlations[right]:.2f}, otherwise at most {np.delete(self.correlations, right).max():.2f})"
@@ -100,7 +100,7 @@ class SharedGround:
         return GroundComparison(alike.max(axis=1), [list(seen)[number] for number in alike.argmax(axis=1)])
 
     def _texture(self, camera: Camera) -> _Texture:
-        """What its frame shows of the ground between the lines if a camera has this pose and lens; looked at once."""
+        """The texture that a frame shows if its camera has this pose and lens; each such pair is computed once."""
         pose, lens = camera.pose, camera.intrinsics
         numbers = np.concatenate([pose.rotation, pose.position, lens.matrix.ravel(), lens.distortion])
         key = camera.id, numbers.tobytes()
@@ -109,9 +109,10 @@ class SharedGround:
         return self._textures[key]
 
     def _look_at(self, camera: Camera) -> _Texture:
-        values, seen = ground_view(self.pitch, camera, self.frames[camera.id], self.places)
-        px = _least_px(camera.project(self.pitch.lift(self.places)))
-        seen = seen & (px > LEAST_PX) & (self.from_paint * px > OFF_PAINT_PX)
+        pixels = camera.project(self.pitch.lift(self.places))
+        within = inside(pixels, camera.intrinsics.size)
+        values, px = sampled(self.frames[camera.id], pixels, within), _least_px(pixels)
+        seen = within & camera.sees(pixels) & (px > LEAST_PX) & (self.from_paint * px > OFF_PAINT_PX)
         lightness = np.log(np.maximum(values.mean(axis=-1), DARKEST)).astype(np.float32)
         contrast = _mean(lightness, seen, FINE_CELLS) - _mean(lightness, seen, COARSE_CELLS)
         return _Texture(_without_stripes(contrast, seen), seen)
@@ -153,7 +154,7 @@ def _mean(values: NDArray[np.float32], counted: NDArray[np.bool_], cells: float)
 
 
 def _without_stripes(values: NDArray[np.float32], counted: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """What is left beside the means of each row and column: mown stripes look alike from many poses."""
+    """The values less the means of rows and columns: stripes of mown grass look alike from many poses."""
     left = np.where(counted, values, np.float32(0))
     for axis in (0, 1):
         mean = left.sum(axis=axis, keepdims=True) / np.maximum(counted.sum(axis=axis, keepdims=True), 1)

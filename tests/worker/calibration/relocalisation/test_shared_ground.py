@@ -47,6 +47,7 @@ def test_mown_stripes_which_look_alike_from_many_poses_decide_nothing():
 def test_ground_on_which_nothing_is_to_be_seen_decides_nothing():
     compared = ground(LEFT, RIGHT, shaded=lambda pitch, camera, frame: frame).compare([LEFT, twin(LEFT)], [RIGHT])
     assert compared.right is None
+    assert np.abs(compared.correlations).max() < 0.2
 
 
 @pytest.mark.parametrize("others", [[], [APART], [RIGHT]], ids=["nobody", "elsewhere", "without a frame"])
