@@ -15,7 +15,13 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from worker.calibration.detection.view_condition import LEAST_LIGHT, OF_THE_GROUND, ViewCondition, look_at
+from worker.calibration.detection.view_condition import (
+    LEAST_LIGHT,
+    LEAST_LIGHT_OVER_NOISE,
+    OF_THE_GROUND,
+    ViewCondition,
+    look_at,
+)
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import stitch_error_px
 from worker.calibration.gate.quality import CameraResult, Moved, Refusal, in_one_sentence
@@ -30,11 +36,8 @@ from worker.calibration.relocalisation.relocalise import Relocalisation, mean_sh
 from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
 from worker.calibration.solve import PoseSolution, Problem, is_doubtful
 
-LOST = frozenset({"lines", "few-lines", "moved", "undetermined"})
-"""Reasons for a refusal that a knocked camera may have."""
-OUT_OF_PLACE = frozenset({"moved", "undetermined"})
-"""The reasons in `LOST` that are given although the lines are seen where the pose has them: a camera that is refused
-for one of these is searched for only if it moved farther than the gate allows."""
+LOST = frozenset({"lines", "few-lines", "undetermined"})
+"""Reasons for a refusal that a knocked camera may have, beside having moved too far."""
 UNFIT = frozenset({"residual", "zoomed", "undetermined"})
 """Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
 LEAST_PAINT, LEAST_UNEXPLAINED, UNEXPLAINED_BY_WEATHER = 200, 0.25, 0.85
@@ -47,7 +50,9 @@ LOOKED_AT_EVERY = 4
 OF_THE_LIGHT = frozenset({"dark", "blinded"})
 BRIGHTEST, LEAST_LIT = 245, 0.3
 """A field that is too dark or too bright where the stored pose has it may lie elsewhere, and lit, if this share of the
-frame is no brighter, of 255, and not too dark either."""
+frame is no brighter, of 255, and not too dark either;"""
+DARKEST = 5.0
+"""or in the dark, where lines are seen as well if it is brighter than this and than the noise."""
 ON_ITS_MOUNT_M = 2.5
 """How far from its stored place a camera is searched for first."""
 LEAST_PROPOSED = 0.34
@@ -115,7 +120,9 @@ def recover_knocked(
 
 def _may_be_of_what_lies_beside(problem: Problem, number: int, observer: FrameObserver) -> bool:
     """Whether what the view is refused for may be true of nothing but what the stored pose takes for the field."""
-    cause = problem.observed.views[number].cause
+    cause, figures = problem.observed.views[number].cause, problem.observed.views[number].figures
+    if cause == "dark" and figures.brightness > max(DARKEST, LEAST_LIGHT_OVER_NOISE * figures.noise):
+        return True
     if cause in OF_THE_LIGHT:
         frame = observer.frames[problem.cameras[number].id][0]
         brightness = cv2.cvtColor(frame[::LOOKED_AT_EVERY, ::LOOKED_AT_EVERY], cv2.COLOR_BGR2GRAY)
@@ -140,10 +147,10 @@ def _is_lost(problem: Problem, result: CameraResult) -> bool:
     """Whether a result is one of a camera that may have been knocked."""
     if result.refusal is None:
         return is_doubtful(result)
-    if result.refusal.reason not in LOST:
-        return False
-    # A mount that gave way over many nights stands where it was found last night.
-    return result.refusal.reason not in OUT_OF_PLACE or result.moved.beyond(problem.gate)
+    if result.refusal.reason == "moved":
+        # A mount that gave way over many nights stands where it was found last night.
+        return result.moved.beyond(problem.gate)
+    return result.refusal.reason in LOST
 
 
 def _is_there(result: CameraResult) -> bool:

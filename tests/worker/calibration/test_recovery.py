@@ -234,10 +234,54 @@ def test_of_a_camera_in_the_dark_it_is_asked_whether_a_third_of_its_frame_is_lig
     frame[-lit_rows:] = 17
     problem = SimpleNamespace(
         cameras=[camera("left", (0.0, -40.0, 8.0), (0.0, 0.0))],
-        observed=SimpleNamespace(views=[SimpleNamespace(cause="dark")]),
+        observed=SimpleNamespace(views=[noisy("dark", brightness=8.0, noise=6.0)]),
     )
     observer = SimpleNamespace(frames={"left": (frame,)})
     assert recovery._may_be_of_what_lies_beside(problem, 0, observer) == is_doubted
+
+
+def noisy(cause, brightness, noise):
+    return SimpleNamespace(cause=cause, figures=SimpleNamespace(brightness=brightness, noise=noise))
+
+
+@pytest.mark.parametrize(
+    ("brightness", "noise", "is_doubted"), [(8.0, 1.0, True), (8.0, 6.0, False), (2.0, 0.0, False)]
+)
+def test_what_lies_in_the_dark_is_looked_for_where_noise_does_not_hide_it(brightness, noise, is_doubted):
+    problem = SimpleNamespace(
+        cameras=[camera("left", (0.0, -40.0, 8.0), (0.0, 0.0))],
+        observed=SimpleNamespace(views=[noisy("dark", brightness, noise)]),
+    )
+    observer = SimpleNamespace(frames={"left": (np.full((200, 320, 3), int(brightness), np.uint8),)})
+    assert recovery._may_be_of_what_lies_beside(problem, 0, observer) == is_doubted
+
+
+@pytest.mark.parametrize(
+    ("reason", "is_far", "is_lost"),
+    [("lines", False, True), ("undetermined", False, True), ("moved", False, False), ("moved", True, True)],
+)
+def test_a_camera_is_lost_by_its_lines_or_by_having_moved_too_far_since_last_night(reason, is_far, is_lost):
+    """Caught by a few lines that are not its own it does not move far, and they leave its pose open."""
+    problem = SimpleNamespace(gate=None)
+    result = SimpleNamespace(
+        refusal=Refusal(reason, "words"), moved=SimpleNamespace(beyond=lambda _: is_far), view=SimpleNamespace()
+    )
+    assert recovery._is_lost(problem, result) == is_lost
+
+
+def test_a_camera_that_was_knocked_in_the_dusk_is_found_where_noise_does_not_hide_its_lines():
+    left, _ = pair()
+    stored = turned(left, TURNED_DEG)
+    dusk = (np.rint(frames()["left"][0] * 0.06).astype(np.uint8),)
+
+    def in_daylight(frame, regions):
+        return white_on_green(np.rint(np.minimum(frame / 0.06, 255)).astype(np.uint8), regions)
+
+    (alone,) = run([stored], {"left": dusk}, network=in_daylight, seed=3, recover="never").cameras
+    (found,) = run([stored], {"left": dusk}, network=in_daylight, seed=3).cameras
+    assert alone.view.cause == "dark"
+    assert found.refusal.reason == "knocked", found.rejected_because
+    assert rotation_angles_deg(found.camera.pose.rotation, left.pose.rotation) < 0.2
 
 
 def test_a_camera_that_was_accepted_a_line_aside_is_searched_for_and_put_right():
