@@ -192,6 +192,15 @@ def test_a_camera_that_is_sought_where_it_stood_may_miss_more_of_its_lines():
     assert refusals == ["few-lines", "lines", "lines"]
 
 
+def test_a_pose_whose_lines_the_network_does_not_see_is_not_taken():
+    # Lacrosse, faint lines on a floor of parquet: two lines of a pose that is wrong lay on its grain.
+    sought = SoughtCamera("one", [SoughtLens.known(SIDELINE.intrinsics)])
+    on_grain, right = candidate(93, range(64), iou=0.12), candidate(93, range(64), iou=0.27)
+    refusals = [relocalisation.why_not_taken(PITCH, FieldMap.of(PITCH), sought, [best]) for best in (on_grain, right)]
+    assert [one.reason for one in refusals] == ["lines", "few-lines"]
+    assert "12%" in refusals[0].words
+
+
 def test_a_pose_that_misses_more_and_explains_nothing_of_its_own_is_no_rival():
     # American football: the same field a few yard lines farther on, with its goal line where there is none.
     best, shifted = candidate(99, range(90), iou=0.91), candidate(90, range(88), iou=0.81)
