@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import copy
 import json
-import math
 import signal
 import threading
 import time
@@ -65,7 +64,7 @@ def main() -> None:
             training.load()
         elif options.start:
             start = options.start / training.checkpoint.name if options.start.is_dir() else options.start
-            training.load_weights(start, pool.batch(64).pictures)
+            training.load_weights(start, pool.batch(64).pictures, options.threshold)
         trainings.append(training)
     train(trainings, pool, options.batch, teacher)
     for training in trainings:
@@ -180,13 +179,13 @@ class Training:
         self.average.load_state_dict(state["average"])
         self.optimiser.load_state_dict(state["optimiser"])
 
-    def load_weights(self, path: Path, pictures: Tensor) -> None:
+    def load_weights(self, path: Path, pictures: Tensor, threshold: float) -> None:
         """Start a new schedule from the averaged weights of another run, or from a served model.
 
-        `pictures` (N, 3, S, S): what a served model's batch normalisation is set by.
+        `pictures` (N, 3, S, S): what a served model's batch normalisation is set by; `threshold`: of its export.
         """
         if path.suffix == ".onnx":
-            load_served(self.network, path, pictures.to(self.device))
+            load_served(self.network, path, pictures.to(self.device), threshold)
             self.average.load_state_dict(self.network.state_dict())
             return
         state = torch.load(path, map_location=self.device, weights_only=True)
@@ -248,8 +247,7 @@ def taught(batch: Batch, teacher: UNet) -> Batch:
 def _teacher(path: Path, threshold: float, pictures: Tensor) -> UNet:
     """A served model in the paper's shape, as it answered before its export made one half of `threshold`."""
     network = UNet(PAPER).to(pictures.device, memory_format=torch.channels_last)
-    load_served(network, path, pictures)
-    network.head.bias += math.log(threshold / (1 - threshold))
+    load_served(network, path, pictures, threshold)
     return network.eval()
 
 

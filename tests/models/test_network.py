@@ -124,6 +124,16 @@ def test_an_exported_model_is_read_back_with_its_weights(path, shape):
     assert np.corrcoef(again.ravel(), served.ravel())[0, 1] > 0.95
 
 
+def test_a_served_model_is_read_back_as_it_answered_before_its_export_moved_the_threshold():
+    pictures = torch.rand(2, 3, 64, 64)
+    as_served, before = UNet(SERVED), UNet(SERVED)
+    load_served(as_served, MODEL_PATH, pictures)
+    load_served(before, MODEL_PATH, pictures, threshold=0.37)
+    with torch.no_grad():
+        moved = before.eval()(pictures) - as_served.eval()(pictures)
+    torch.testing.assert_close(moved, torch.full_like(moved, float(np.log(0.37 / 0.63))), atol=1e-3, rtol=0.0)
+
+
 def test_a_training_goes_on_where_it_was_saved(tmp_path):
     batch = Batch(torch.rand(2, 3, 32, 32), torch.zeros(2, 1, 32, 32), torch.ones(2, 1, 32, 32))
     torch.manual_seed(0)

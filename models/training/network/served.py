@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,12 @@ TEACHER_PATH = Path(__file__).parents[1] / "teacher.onnx"
 
 
 @torch.no_grad()
-def load_served(network: UNet, path: Path, pictures: Tensor) -> None:
+def load_served(network: UNet, path: Path, pictures: Tensor, threshold: float = 0.5) -> None:
     """Give `network` the weights of an exported, quantised model; `pictures` (N, 3, H, W) set its batch normalisation.
 
     The export folded batch normalisation into the convolutions. Here each gets the mean and spread of what it is shown
-    back as its own, so that the network answers as the model does and can be trained as before.
+    back as its own, so that the network answers as it did before the export, which made one half of its `threshold`,
+    and can be trained as before.
     """
     graph = onnx.load(path).graph
     values = {item.name: numpy_helper.to_array(item) for item in graph.initializer}
@@ -50,6 +52,7 @@ def load_served(network: UNet, path: Path, pictures: Tensor) -> None:
     network(pictures)
     for hook in hooks:
         hook.remove()
+    network.head.bias += math.log(threshold / (1 - threshold))
 
 
 def _value(
