@@ -82,10 +82,10 @@ class TriedRidges:
         return np.array([ridge.cost for ridge in self.tried])
 
 
-def try_ridges(base: RefinedPoses, free: Sequence[Parameter], sight: Observations) -> TriedRidges:
+def try_ridges(base: RefinedPoses, free: Sequence[Parameter], observations: Observations) -> TriedRidges:
     """Ridges of all lengths on the lines that a finish left; `free`: what is found anew for each, with the poses."""
     lines = base.pitch.line_points()
-    measured = sight.reader().measure(lines, base.cameras, EVALUATION_SEARCH_PX)
+    measured = observations.reader().measure(lines, base.cameras, EVALUATION_SEARCH_PX)
     unknowns = Unknowns(len(base.cameras), free, Ground.under(lines))
     held, rows = _fitted(base.pitch, base.cameras, measured, unknowns)
     scale = robust_scale(rows.value)

@@ -81,14 +81,14 @@ class Observations:
 class LineReader:
     """Measures the lines of several cameras around any poses; reads a frame again only where it has to."""
 
-    def __init__(self, sight: Observations, read: Mapping[int, LineProfiles] = MappingProxyType({})) -> None:
-        self._sight = sight
+    def __init__(self, observations: Observations, read: Mapping[int, LineProfiles] = MappingProxyType({})) -> None:
+        self._observations = observations
         self._read = dict(read)
 
     def of(self, numbers: Sequence[int]) -> LineReader:
         """A reader for some of the cameras, with what has been read of them."""
         read = {at: self._read[n] for at, n in enumerate(numbers) if n in self._read}
-        return LineReader(self._sight.of(numbers), read)
+        return LineReader(self._observations.of(numbers), read)
 
     def measure(self, lines: LinePoints, cameras: Sequence[Camera], search_px: float) -> list[Measurements]:
         """The lines of each camera within `search_px` (of a 4K frame) of where its pose expects them."""
@@ -97,7 +97,7 @@ class LineReader:
             search = search_px * camera.intrinsics.relative_size
             profiles = self._read.get(number)
             if profiles is None or not profiles.cover(camera, lines, search):
-                channels, response = self._sight.channels[number], self._sight.responses[number]
+                channels, response = self._observations.channels[number], self._observations.responses[number]
                 profiles = LineProfiles.read(lines, camera, channels, response, search + SPARE_PX)
                 self._read[number] = profiles
             measured.append(profiles.measure(camera, lines, search))
@@ -107,7 +107,9 @@ class LineReader:
         """How much of the lines the frames show where the cameras put them."""
         return [
             evidence_of(lines, camera, channels, response, left_out(pitch, camera))
-            for camera, channels, response in zip(cameras, self._sight.channels, self._sight.responses, strict=True)
+            for camera, channels, response in zip(
+                cameras, self._observations.channels, self._observations.responses, strict=True
+            )
         ]
 
     def read_anew(self) -> None:
@@ -118,7 +120,7 @@ class LineReader:
 def refine(
     pitch: Field,
     cameras: Sequence[Camera],
-    sight: Observations,
+    observations: Observations,
     stitch_weight: float,
     free: Sequence[Parameter] = (),
     searches_px: Sequence[float] = SEARCH_PX,
@@ -130,15 +132,15 @@ def refine(
 
     `stored`: where the cameras stood when that was last known, if not where they begin. `free`: numbers of lenses and
     field to be found along with the poses; pitch and cameras come back with them. `memories`: of the earlier nights of
-    each camera. `reader`: of the `sight`, if it has been measured before. `stitch_weight` 0: each camera on a ground of
-    its own; any other has no effect, since what cameras know of each other is weighed by its errors alone.
+    each camera. `reader`: of the `observations`, if they have been measured before. `stitch_weight` 0: each camera on
+    a ground of its own; any other has no effect, since what cameras know of each other is weighed by its errors alone.
     """
     if stitch_weight == 0 and len(cameras) > 1 and not free:
-        return _each_alone(pitch, cameras, sight, stored or cameras, memories)
+        return _each_alone(pitch, cameras, observations, stored or cameras, memories)
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     begun = Estimate.at(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), begun.lines)
-    finish = _Finish(reader or sight.reader(), unknowns, _aside(remembered), cameras)
+    finish = _Finish(reader or observations.reader(), unknowns, _aside(remembered), cameras)
     caught = finish.catch(begun, searches_px)
     anew = _painted_anew(caught, remembered, finish)
     if len(anew) != len(finish.anew):
@@ -273,7 +275,7 @@ def doubted(here: Estimate, measured: Sequence[Measurements]) -> list[Measuremen
 def evaluate_poses(
     pitch: Field,
     cameras: Sequence[Camera],
-    sight: Observations,
+    observations: Observations,
     free: Sequence[Parameter] = (),
     stored: Sequence[Camera] | None = None,
     memories: Sequence[CameraMemory | None] | None = None,
@@ -282,7 +284,7 @@ def evaluate_poses(
     unknowns = Unknowns(len(cameras), free, Ground.under(pitch.line_points()))
     here = Estimate.at(pitch, cameras, unknowns)
     remembered = memories_of_field(memories or [None] * len(cameras), here.lines)
-    finish = _Finish(sight.reader(), unknowns, _aside(remembered), cameras)
+    finish = _Finish(observations.reader(), unknowns, _aside(remembered), cameras)
     finish = replace(finish, anew=_painted_anew(here, remembered, finish))
     return _assessed(here, stored or cameras, remembered, finish)
 
@@ -290,13 +292,13 @@ def evaluate_poses(
 def _each_alone(
     pitch: Field,
     cameras: Sequence[Camera],
-    sight: Observations,
+    observations: Observations,
     stored: Sequence[Camera],
     memories: Sequence[CameraMemory | None] | None,
 ) -> RefinedPoses:
     """Cameras that need not agree, each on a ground of its own."""
     ends = [
-        refine(pitch, [camera], sight.of([n]), 0.0, stored=[stored[n]], memories=memories and [memories[n]])
+        refine(pitch, [camera], observations.of([n]), 0.0, stored=[stored[n]], memories=memories and [memories[n]])
         for n, camera in enumerate(cameras)
     ]
     deviations = [deviation for end in ends for deviation in end.deviations if deviation.camera is not None]

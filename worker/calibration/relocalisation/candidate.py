@@ -61,8 +61,8 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Sight:
-    """Lines and paint of one frame: `observations` for a finish, `small` (H, W) the response in 0..255, its `paint`."""
+class FrameObservations:
+    """Lines and `paint` of one frame: `observations` for a refinement, `small` (H, W) the response in 0..255."""
 
     field: Field
     observations: Observations
@@ -70,15 +70,15 @@ class Sight:
     paint: Paint
 
     @classmethod
-    def of(cls, field: Field, channels: Channels, response: Response) -> Sight:
-        """Return the sight of a frame by the response (H, W) of the network, 0..1."""
+    def of(cls, field: Field, channels: Channels, response: Response) -> FrameObservations:
+        """Return what is observed in a frame by the response (H, W) of the network, 0..1."""
         small = np.rint(response * 255).astype(np.uint8)
         return cls(field, Observations([channels], [response]), small, Paint.of(small))
 
-    def strengthened(self, times: float) -> Sight:
-        """Return the sight of this frame as if the network were so many `times` as sure."""
+    def strengthened(self, times: float) -> FrameObservations:
+        """Return what would be observed in this frame if the network were so many `times` as sure."""
         (channels,), (response,) = self.observations.channels, self.observations.responses
-        return Sight.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
+        return FrameObservations.of(self.field, channels, np.minimum(np.float32(times) * response, np.float32(1.0)))
 
     def candidate(self, camera: Camera, sought: SoughtCamera) -> Candidate:
         """A proposed camera on the measured lines close by, with its lens if that is sought."""

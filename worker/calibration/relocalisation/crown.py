@@ -16,7 +16,7 @@ from worker.calibration.gate.quality import Gate
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.parameters import free_ridge
 from worker.calibration.refinement.refine import Observations, refine
-from worker.calibration.relocalisation.candidate import Candidate, Sight, free_lens
+from worker.calibration.relocalisation.candidate import Candidate, FrameObservations, free_lens
 from worker.calibration.relocalisation.sought import SoughtCamera
 
 LOWEST_M, SIGMAS = 0.05, 5.0
@@ -52,8 +52,8 @@ def find_crown(
     height_m, sigma_m = found.pitch.ridge_height, found.parameter_uncertainties[-1].sigma
     if not max(LOWEST_M, SIGMAS * sigma_m) < height_m < Gate().highest_ridge_m:
         return None
-    sights = map(partial(Sight.of, found.pitch), observations.channels, observations.responses)
-    refined = [sight.assessed(pose, one) for sight, pose, one in zip(sights, found.each, sought, strict=True)]
+    observed = map(partial(FrameObservations.of, found.pitch), observations.channels, observations.responses)
+    refined = [frame.assessed(pose, one) for frame, pose, one in zip(observed, found.each, sought, strict=True)]
     if not _rms(refined) < LESS_LEFT * _rms(candidates):
         return None
     return CrownedField(found.pitch, refined)

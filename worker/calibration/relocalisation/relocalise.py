@@ -19,7 +19,7 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import Lens
 from worker.calibration.geometry.plausible_pose import films_a_field
 from worker.calibration.geometry.rotation import rotation_vectors
-from worker.calibration.relocalisation.candidate import Candidate, Sight
+from worker.calibration.relocalisation.candidate import Candidate, FrameObservations
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import HALF_TURN
 from worker.calibration.relocalisation.paint import share
@@ -106,9 +106,9 @@ def relocalise(
     Where its focal length is not known, k1, k2 and principal point are found with it and the pose. `pulse` is called
     every second or so, and may raise to end the search. Proposals of less than `least_agreement` are not refined.
     """
-    sight = Sight.of(field, channels, response)
+    observed = FrameObservations.of(field, channels, response)
     candidates = list[Candidate]()
-    looked, through = sight, sought
+    looked, through = observed, sought
     for attempt in range(ATTEMPTS_SOUGHT_LENS if sought.is_lens_sought else ATTEMPTS_KNOWN_LENS):
         pulse()
         proposals = [
@@ -120,11 +120,11 @@ def relocalise(
             if any(not _differ(field, markings, one.camera, camera, DIFFERENT) for one in tried):
                 continue
             pulse()
-            caught = camera if looked is sight else looked.candidate(camera, sought).camera
-            refined.append((caught, sight.candidate(caught, sought)))
+            caught = camera if looked is observed else looked.candidate(camera, sought).camera
+            refined.append((caught, observed.candidate(caught, sought)))
         refined.sort(key=lambda one: -one[1].agreement)
         farther = LOOKED_FARTHER_SOUGHT_LENS if sought.is_lens_sought else LOOKED_FARTHER_KNOWN_LENS
-        candidates += [sight.on_lines_farther_off(camera, close, sought) for camera, close in refined[:farther]]
+        candidates += [observed.on_lines_farther_off(camera, close, sought) for camera, close in refined[:farther]]
         candidates += [close for _, close in refined[farther:]]
         candidates.sort(key=lambda one: -one.agreement)
         found = Relocalisation(
@@ -136,7 +136,7 @@ def relocalise(
         if sought.other_lenses:
             through = replace(sought, lenses=sought.other_lenses)
         if found.refusal.reason in TOO_LITTLE_PAINT or attempt > 0:
-            looked = sight.strengthened(FAINT)
+            looked = observed.strengthened(FAINT)
     return found
 
 

@@ -206,9 +206,9 @@ class _Track:
 def _references(pitch: Field, cameras: Sequence[Camera], first: Mapping[str, Frame]) -> list[tuple[Camera, Array]]:
     """The cameras where their first frames show them, and the covariances (6, 6) of their poses."""
     responses = [np.zeros(first[camera.id].shape[:2], np.float32) for camera in cameras]
-    sight = Observations([Channels([first[camera.id]]) for camera in cameras], responses)
+    observations = Observations([Channels([first[camera.id]]) for camera in cameras], responses)
     found = []
-    for one in refine(pitch, cameras, sight, 0.5, searches_px=FIRST_SEARCH_PX).each:
+    for one in refine(pitch, cameras, observations, 0.5, searches_px=FIRST_SEARCH_PX).each:
         if one.covariance is None or one.evidence.agreement < LEAST_AGREEMENT:
             raise _not_seen(one.camera)
         found.append((one.camera, one.covariance))
