@@ -36,8 +36,12 @@ from worker.calibration.relocalisation.relocalise import Relocalisation, mean_sh
 from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
 from worker.calibration.solve import PoseSolution, Problem, is_doubtful
 
-LOST = frozenset({"lines", "few-lines", "undetermined"})
-"""Reasons for a refusal that a knocked camera may have, beside having moved too far."""
+LOST = frozenset({"lines", "few-lines", "moved", "undetermined"})
+"""Reasons for a refusal that a knocked camera may have."""
+OUT_OF_PLACE = frozenset({"moved", "undetermined"})
+"""The reasons in `LOST` that are given although the lines are seen where the pose has them: a camera that is refused
+for one of these is searched for only if it moved farther than the gate allows. One whose field was repainted, and which
+is refused as undetermined for it, would be accepted where the search puts it."""
 UNFIT = frozenset({"residual", "zoomed", "undetermined"})
 """Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
 LEAST_PAINT, LEAST_UNEXPLAINED, UNEXPLAINED_BY_WEATHER = 200, 0.25, 0.85
@@ -147,10 +151,10 @@ def _is_lost(problem: Problem, result: CameraResult) -> bool:
     """Whether a result is one of a camera that may have been knocked."""
     if result.refusal is None:
         return is_doubtful(result)
-    if result.refusal.reason == "moved":
-        # A mount that gave way over many nights stands where it was found last night.
-        return result.moved.beyond(problem.gate)
-    return result.refusal.reason in LOST
+    if result.refusal.reason not in LOST:
+        return False
+    # A mount that gave way over many nights stands where it was found last night.
+    return result.refusal.reason not in OUT_OF_PLACE or result.moved.beyond(problem.gate)
 
 
 def _is_there(result: CameraResult) -> bool:
