@@ -54,9 +54,9 @@ LOOKED_AT_EVERY = 4
 OF_THE_LIGHT = frozenset({"dark", "blinded"})
 BRIGHTEST, LEAST_LIT = 245, 0.3
 """A field that is too dark or too bright where the stored pose has it may lie elsewhere, and lit, if this share of the
-frame is no brighter, of 255, and not too dark either;"""
-DARKEST = 5.0
-"""or in the dark, where lines are seen as well if it is brighter than this and than the noise."""
+frame is no brighter, of 255, and not too dark either."""
+LEAST_LIGHT_IN_THE_DARK = 5.0
+"""Of 255: a dark field that is brighter, and clearly brighter than its noise, would show lines that lie elsewhere."""
 ON_ITS_MOUNT_M = 2.5
 """How far from its stored place a camera is searched for first."""
 LEAST_PROPOSED = 0.34
@@ -124,14 +124,15 @@ def recover_knocked(
 
 def _may_be_of_what_lies_beside(problem: Problem, number: int, observer: FrameObserver) -> bool:
     """Whether what the view is refused for may be true of nothing but what the stored pose takes for the field."""
-    cause, figures = problem.observed.views[number].cause, problem.observed.views[number].figures
-    if cause == "dark" and figures.brightness > max(DARKEST, LEAST_LIGHT_OVER_NOISE * figures.noise):
+    view = problem.observed.views[number]
+    least_light = max(LEAST_LIGHT_IN_THE_DARK, LEAST_LIGHT_OVER_NOISE * view.figures.noise)
+    if view.cause == "dark" and view.figures.brightness > least_light:
         return True
-    if cause in OF_THE_LIGHT:
+    if view.cause in OF_THE_LIGHT:
         frame = observer.frames[problem.cameras[number].id][0]
         brightness = cv2.cvtColor(frame[::LOOKED_AT_EVERY, ::LOOKED_AT_EVERY], cv2.COLOR_BGR2GRAY)
         return bool(((brightness >= LEAST_LIGHT) & (brightness <= BRIGHTEST)).mean() >= LEAST_LIT)
-    return cause in OF_THE_GROUND
+    return view.cause in OF_THE_GROUND
 
 
 def _sought(problem: Problem, results: Sequence[CameraResult], beside: Sequence[int]) -> list[int]:

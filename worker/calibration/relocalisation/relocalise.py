@@ -109,7 +109,9 @@ def relocalise(
     observed = FrameObservations.of(field, channels, response)
     candidates = list[Candidate]()
     looked, through = observed, sought
-    for attempt in range(ATTEMPTS_SOUGHT_LENS if sought.is_lens_sought else ATTEMPTS_KNOWN_LENS):
+    attempts = ATTEMPTS_SOUGHT_LENS if sought.is_lens_sought else ATTEMPTS_KNOWN_LENS
+    farther = LOOKED_FARTHER_SOUGHT_LENS if sought.is_lens_sought else LOOKED_FARTHER_KNOWN_LENS
+    for attempt in range(attempts):
         pulse()
         proposals = [
             one for one in propose(markings, looked.small, through, seed + attempt) if one.agreement >= least_agreement
@@ -123,7 +125,6 @@ def relocalise(
             caught = camera if looked is observed else looked.candidate(camera, sought).camera
             refined.append((caught, observed.candidate(caught, sought)))
         refined.sort(key=lambda one: -one[1].agreement)
-        farther = LOOKED_FARTHER_SOUGHT_LENS if sought.is_lens_sought else LOOKED_FARTHER_KNOWN_LENS
         candidates += [observed.on_lines_farther_off(camera, close, sought) for camera, close in refined[:farther]]
         candidates += [close for _, close in refined[farther:]]
         candidates.sort(key=lambda one: -one.agreement)
