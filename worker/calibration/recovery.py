@@ -17,9 +17,9 @@ import numpy as np
 
 from worker.calibration.detection.view_condition import (
     LEAST_LIGHT,
-    LEAST_LIGHT_OVER_NOISE,
     OF_THE_GROUND,
     ViewCondition,
+    least_light,
     look_at,
 )
 from worker.calibration.diagnostics.registration import Response
@@ -125,8 +125,8 @@ def recover_knocked(
 def _may_be_of_what_lies_beside(problem: Problem, number: int, observer: FrameObserver) -> bool:
     """Whether what the view is refused for may be true of nothing but what the stored pose takes for the field."""
     view = problem.observed.views[number]
-    least_light = max(LEAST_LIGHT_IN_THE_DARK, LEAST_LIGHT_OVER_NOISE * view.figures.noise)
-    if view.cause == "dark" and view.figures.brightness > least_light:
+    figures = view.figures
+    if view.cause == "dark" and figures.brightness > least_light(figures.noise, LEAST_LIGHT_IN_THE_DARK):
         return True
     if view.cause in OF_THE_LIGHT:
         frame = observer.frames[problem.cameras[number].id][0]

@@ -163,6 +163,11 @@ def look_at(frame: Frame, pitch: Field, camera: Camera, usual: UsualView | None 
     return ViewCondition(False, cause, where, _words(cause, where, figures, usual, camera.intrinsics.size[0]), figures)
 
 
+def least_light(noise: float, least: float = LEAST_LIGHT) -> float:
+    """How bright (0..255) a field has to be, at least `least`, to show its lines through the `noise` of a pixel."""
+    return max(least, LEAST_LIGHT_OVER_NOISE * noise)
+
+
 def _cause(
     cells: _Cells,
     field: Mask,
@@ -231,7 +236,7 @@ def _differ(cells: _Cells, one: Mask, other: Mask) -> bool:
 
 def _spoiled(cells: _Cells, field: Mask, lost: Mask, noise: float) -> dict[str, Mask]:
     """Which of the field's cells show what, by the names of `ViewFigures`, wherever that goes with lost lines."""
-    dim = cells.brightest < min(max(LEAST_LIGHT, LEAST_LIGHT_OVER_NOISE * noise), DIM)
+    dim = cells.brightest < min(least_light(noise), DIM)
     blown = cells.blown > 0.5
     pale = (cells.saturation < PALE) & (cells.darkest > FOG_IS_BRIGHTER) & ~blown
     rough = (cells.structure > FLAT) & (cells.brightest > SNOW_IS_BRIGHTER)
@@ -309,8 +314,8 @@ def _words(cause: Spoiled, where: str, figures: ViewFigures, usual: UsualView | 
         case "dark":
             return (
                 f"Dark ({where}): the brightness there is {figures.brightness:.0f} of 255 with a noise of "
-                f"{figures.noise:.1f}, and at least {max(LEAST_LIGHT, LEAST_LIGHT_OVER_NOISE * figures.noise):.0f} is "
-                "needed to see lines; most likely the lights are off, or the exposure is too short."
+                f"{figures.noise:.1f}, and at least {least_light(figures.noise):.0f} is needed to see lines; most "
+                "likely the lights are off, or the exposure is too short."
             )
         case "blinded":
             return (
