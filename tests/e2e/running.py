@@ -21,6 +21,7 @@ from service.store.database import connect, migrate, writing
 from service.store.keys import KeyRepository
 from tests.e2e import warm
 from tests.homes import files
+from tests.ports import free_port
 
 PROGRAM = [sys.executable, str(Path(__file__).parent / "program.py")]
 DEADLINE_S = 90
@@ -48,7 +49,8 @@ class Service:
             "ESC_TAKEOVER_AFTER_S": "3",
             **settings,
         }
-        self.start()
+        # A port that no outgoing connection takes while the service is gone that is started there again.
+        self.start(free_port())
 
     def start(self, port: int = 0) -> None:
         command = [sys.executable, "-m", "service.cli", *self.arguments, "--port", str(port)]

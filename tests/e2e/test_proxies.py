@@ -15,6 +15,7 @@ import pytest
 
 from tests.e2e.routes.test_following import Stream
 from tests.e2e.running import DEADLINE_S, Service, keys_in, png, venue, wait_for
+from tests.ports import free_port
 from tests.worker.duties.test_webhook_delivery import certificate
 
 SAMPLES = Path(__file__).parents[2] / "docker" / "proxy"
@@ -119,12 +120,6 @@ class Caddy(Proxy):
         """Takes the path off, where nginx leaves it on."""
         proxied = f"\treverse_proxy {self.upstream}"
         return {proxied: f"\thandle_path {self.root_path}/* {{\n\t{proxied}\n\t}}"} if self.root_path else {}
-
-
-def free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.ports import free_port
 from tests.worker.calibration.synthetic import CROWNED, moved, pair
 from tests.worker.video.shaking import COUNT, film_shaking, turn
 from worker.calibration.geometry import derivatives
@@ -198,9 +199,7 @@ def test_a_live_stream_is_tracked_and_again_after_it_was_cut(clip, missing, monk
     if shutil.which("ffmpeg") is None:
         missing("ffmpeg")
     monkeypatch.setattr(clips, "WAITING_S", 1.0)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port(socket.SOCK_DGRAM)
     with Tracking(f"udp://127.0.0.1:{port}") as tracking:
         with streamed(clip, port):
             assert tracking.poses.get(timeout=60).tracked.how == "measured"

@@ -1,8 +1,8 @@
 """Clips in, a clip out: what is made, what is said, and what is refused."""
 
 import json
-import os
 import shutil
+import socket
 import subprocess
 import threading
 import time
@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from tests.disks import filled, may_mount, small_disk
+from tests.ports import free_port, is_listened_on
 from tests.worker.video.filming import LEFT, PITCH, RIGHT, cameras, film, frame_at, frames_of
 from worker.calibration.stitching.panorama import BACKDROP, panorama
 from worker.calibration.stitching.photometry import NEUTRAL
@@ -378,7 +379,7 @@ def wait_for(condition):
 
 
 def test_a_receiver_of_udp_sees_the_view(tmp_path, pair):
-    port = 20000 + os.getpid() % 20000
+    port = free_port(socket.SOCK_DGRAM)
     received = tmp_path / "received.mkv"
     address = f"udp://127.0.0.1:{port}"
     receiver = subprocess.Popen(
@@ -410,12 +411,12 @@ def test_a_receiver_of_udp_sees_the_view(tmp_path, pair):
 
 def test_live_streams_that_tell_no_time_are_put_in_time_by_what_moves(tmp_path, monkeypatch):
     monkeypatch.setattr("worker.video.stitch.LOOKED_AT_S", 5.0)
-    port = 40000 + os.getpid() % 20000
     films = {
         "left": film(tmp_path / "l.ts", LEFT, 12.0, rate=10),
         "right": film(tmp_path / "r.ts", RIGHT, 12.0, begun_s=0.7, rate=10),
     }
-    addresses = {camera: f"tcp://127.0.0.1:{port + number}" for number, camera in enumerate(films)}
+    ports = {camera: free_port() for camera in films}
+    addresses = {camera: f"tcp://127.0.0.1:{port}" for camera, port in ports.items()}
     senders = [
         subprocess.Popen(
             ["ffmpeg", "-v", "error", "-re", "-i", path, "-c", "copy", "-f", "mpegts", f"{addresses[camera]}?listen=1"]
@@ -423,7 +424,7 @@ def test_live_streams_that_tell_no_time_are_put_in_time_by_what_moves(tmp_path, 
         for camera, path in films.items()
     ]
     try:
-        wait_for(lambda: all(f":{port + one:04X} " in Path("/proc/net/tcp").read_text() for one in (0, 1)))
+        wait_for(lambda: all(map(is_listened_on, ports.values())))
         plan = Plan(str(tmp_path / "pano.mp4"), rate=Fraction(10), encoding=FINE)
         made = stitch(SCENE, addresses, plan, told)
     finally:
@@ -443,7 +444,7 @@ def test_live_streams_that_tell_no_time_are_put_in_time_by_what_moves(tmp_path, 
 
 
 def test_a_live_stream_needs_an_offset_and_is_read_as_it_comes(tmp_path, pair):
-    port = 40000 + os.getpid() % 20000
+    port = free_port(socket.SOCK_DGRAM)
     address = f"udp://127.0.0.1:{port}"
     clips = {"left": pair["left"], "right": address + "?timeout=5000000&fifo_size=100000"}
     sender = subprocess.Popen(
