@@ -1,6 +1,7 @@
 """Pages that stay right by themselves: a venue by its events, lists by asking again."""
 
 import re
+import time
 
 import pytest
 from playwright.sync_api import expect
@@ -147,6 +148,34 @@ def test_the_head_of_a_job_that_begins_says_so_as_the_panel_below_does(stub, vis
     stub.http.post(f"/jobs/{before}/cancel")
     expect(page.locator(".badge")).to_have_text(["Running", "Running"])
     stub.http.post(f"/jobs/{job}/cancel")
+
+
+def test_a_link_that_is_clicked_as_a_job_ends_is_followed(stub, visit):
+    job = stub.submitted(stub.venue("left-behind", "accept 60"))
+    stub.running(job)
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    expect(page.locator(".badge")).to_have_text(["Running", "Running"])
+
+    def answer_after_the_end(route):
+        stub.http.post(f"/jobs/{job}/cancel").raise_for_status()
+        stub.end(job)
+        time.sleep(2)
+        route.continue_()
+
+    page.route("**/ui/venues/left-behind", answer_after_the_end)
+    page.locator("a[href$='/ui/venues/left-behind']").first.click()
+    expect(page).to_have_url(re.compile("/ui/venues/left-behind$"))
+
+
+def test_a_job_shows_its_end_on_a_page_that_a_download_was_begun_from(stub, visit):
+    job = stub.submitted(stub.venue("downloaded", "accept 60"))
+    stub.running(job)
+    page = visit(stub.url, f"/ui/jobs/{job}")
+    expect(page.locator(".badge")).to_have_text(["Running", "Running"])
+    # A browser says so of each link, and then it shows that what is behind this one is to be kept as a file.
+    page.evaluate("window.dispatchEvent(new Event('beforeunload'))")
+    stub.http.post(f"/jobs/{job}/cancel").raise_for_status()
+    expect(page.locator(".badge").first).to_have_text("Cancelled")
 
 
 def test_the_list_of_venues_goes_on_while_a_link_of_it_has_the_focus(stub, visit):

@@ -1,7 +1,7 @@
 // A job that is going on: its events move the bar, the stages and the curve of its loss; its end shows the page anew.
 
 import {axis, fill} from "./chart.js";
-import {onScheme, styled} from "./page.js";
+import {loadAgain, onScheme, styled} from "./page.js";
 import {refresh, whenShown} from "./parts.js";
 import {listen} from "./stream.js";
 
@@ -22,7 +22,7 @@ class Live {
       end: () => {
         ended.abort();
         if ("partOfVenue" in box.dataset) refresh();
-        else location.reload();
+        else loadAgain();
       },
     }, ended.signal);
   }

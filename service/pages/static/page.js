@@ -4,6 +4,7 @@ const token = document.querySelector('meta[name="token"]').content;
 /** The path of another site below which this one is; empty: none. */
 export const {root} = document.documentElement.dataset;
 const OFTEN = 5000;
+let leftAt = -Infinity;
 
 // What the interface says to programs by its own addresses, for who has the page before them.
 const IN_WORDS = {
@@ -96,6 +97,12 @@ export function tellTimes() {
   }
 }
 
+/** Load the page again because something happened; but not just after a link was clicked, which that would undo. */
+export function loadAgain() {
+  if (performance.now() - leftAt < OFTEN) setTimeout(loadAgain, OFTEN);
+  else location.reload();
+}
+
 async function press(button) {
   if (button.dataset.asks && !confirm(button.dataset.asks)) return;
   button.disabled = true;
@@ -115,5 +122,6 @@ document.addEventListener("click", (event) => {
   const button = event.target.closest("button[data-call]");
   if (button) press(button);
 });
+window.addEventListener("beforeunload", () => { leftAt = performance.now(); });
 tellTimes();
 setInterval(tellTimes, OFTEN);

@@ -1,6 +1,6 @@
 // Parts of a page that follow what happens: fetched anew, and replaced where the service says something else of them.
 
-import {say, tellTimes} from "./page.js";
+import {loadAgain, say, tellTimes} from "./page.js";
 
 const WHOLE = new AbortController();
 const REACHABLE = "a[href], button, input, select, textarea, summary, [tabindex]";
@@ -64,7 +64,7 @@ function replace(part, other) {
 async function fetchAndReplace() {
   const answer = await fetch(location.href).catch(() => null);
   // Whoever is signed out meanwhile, or looks at what was deleted, is shown so.
-  if (answer && (answer.redirected || answer.status === 404)) return location.reload();
+  if (answer && (answer.redirected || answer.status === 404)) return loadAgain();
   if (!answer || !answer.ok) return null;
   const there = new DOMParser().parseFromString(await answer.text(), "text/html");
   let isWhole = true;
