@@ -20,6 +20,6 @@ def free_port(kind=socket.SOCK_STREAM):
         return port
 
 
-def is_listened_on(port):
-    """Whether somebody waits for connections on a port."""
-    return f":{port:04X} 00000000:0000 0A" in Path("/proc/net/tcp").read_text()
+def is_listened_on(port, protocol="tcp"):
+    """Whether a socket is bound to a port and connected to nobody, so that it waits for whoever comes."""
+    return f":{port:04X} 00000000:0000 " in Path(f"/proc/net/{protocol}").read_text()

@@ -49,7 +49,7 @@ class Service:
             "ESC_TAKEOVER_AFTER_S": "3",
             **settings,
         }
-        # A port that no outgoing connection takes while the service is gone that is started there again.
+        # Some tests start a service again at its port: no outgoing connection may take that meanwhile.
         self.start(free_port())
 
     def start(self, port: int = 0) -> None:

@@ -159,6 +159,7 @@ def test_a_link_that_is_clicked_as_a_job_ends_is_followed(stub, visit):
     def answer_after_the_end(route):
         stub.http.post(f"/jobs/{job}/cancel").raise_for_status()
         stub.end(job)
+        # Meanwhile the page hears of the end.
         time.sleep(2)
         route.continue_()
 
@@ -172,7 +173,7 @@ def test_a_job_shows_its_end_on_a_page_that_a_download_was_begun_from(stub, visi
     stub.running(job)
     page = visit(stub.url, f"/ui/jobs/{job}")
     expect(page.locator(".badge")).to_have_text(["Running", "Running"])
-    # A browser says so of each link, and then it shows that what is behind this one is to be kept as a file.
+    # Browsers send it for a download as well, and the page stays.
     page.evaluate("window.dispatchEvent(new Event('beforeunload'))")
     stub.http.post(f"/jobs/{job}/cancel").raise_for_status()
     expect(page.locator(".badge").first).to_have_text("Cancelled")

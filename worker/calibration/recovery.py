@@ -36,12 +36,12 @@ from worker.calibration.relocalisation.relocalise import Relocalisation, mean_sh
 from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
 from worker.calibration.solve import PoseSolution, Problem, is_doubtful
 
-LOST = frozenset({"lines", "few-lines", "moved", "undetermined"})
-"""Reasons for a refusal that a knocked camera may have."""
-OUT_OF_PLACE = frozenset({"moved", "undetermined"})
-"""The reasons in `LOST` that are given although the lines are seen where the pose has them: a camera that is refused
-for one of these is searched for only if it moved farther than the gate allows. One whose field was repainted, and which
-is refused as undetermined for it, would be accepted where the search puts it."""
+LOST = frozenset({"lines", "few-lines"})
+"""Reasons for a refusal of a camera that may have been knocked..."""
+LOST_IF_FAR = frozenset({"moved", "undetermined"})
+"""...and those of one that may have been if it moved farther than the gate allows. These are given although lines are
+seen where the pose has them: a camera whose field was repainted is undetermined where it stands, and would be accepted
+where a search puts it."""
 UNFIT = frozenset({"residual", "zoomed", "undetermined"})
 """Reasons for a refusal that a camera may have where it was found, and would have had if it had not been knocked."""
 LEAST_PAINT, LEAST_UNEXPLAINED, UNEXPLAINED_BY_WEATHER = 200, 0.25, 0.85
@@ -56,7 +56,8 @@ BRIGHTEST, LEAST_LIT = 245, 0.3
 """A field that is too dark or too bright where the stored pose has it may lie elsewhere, and lit, if this share of the
 frame is no brighter, of 255, and not too dark either."""
 LEAST_LIGHT_IN_THE_DARK = 5.0
-"""Of 255: a dark field that is brighter, and clearly brighter than its noise, would show lines that lie elsewhere."""
+"""Brightness (0..255) above which a dark field would show its lines, if it is clearly brighter than its noise: where
+none are seen, the camera may have been knocked and the field lie elsewhere in its frame."""
 ON_ITS_MOUNT_M = 2.5
 """How far from its stored place a camera is searched for first."""
 LEAST_PROPOSED = 0.34
@@ -152,10 +153,10 @@ def _is_lost(problem: Problem, result: CameraResult) -> bool:
     """Whether a result is one of a camera that may have been knocked."""
     if result.refusal is None:
         return is_doubtful(result)
-    if result.refusal.reason not in LOST:
-        return False
-    # A mount that gave way over many nights stands where it was found last night.
-    return result.refusal.reason not in OUT_OF_PLACE or result.moved.beyond(problem.gate)
+    if result.refusal.reason in LOST_IF_FAR:
+        # A mount that gave way over many nights stands where it was found last night.
+        return result.moved.beyond(problem.gate)
+    return result.refusal.reason in LOST
 
 
 def _is_there(result: CameraResult) -> bool:

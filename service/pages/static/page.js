@@ -97,7 +97,7 @@ export function tellTimes() {
   }
 }
 
-/** Load the page again because something happened; but not just after a link was clicked, which that would undo. */
+/** Load the page again because something happened, though not just after a click on a link, which would be lost. */
 export function loadAgain() {
   if (performance.now() - leftAt < OFTEN) setTimeout(loadAgain, OFTEN);
   else location.reload();

@@ -7,7 +7,6 @@ import subprocess
 import threading
 import time
 from fractions import Fraction
-from pathlib import Path
 
 import av
 import cv2
@@ -397,7 +396,7 @@ def test_a_receiver_of_udp_sees_the_view(tmp_path, pair):
         ],
     )
     try:
-        wait_for(lambda: f":{port:04X} " in Path("/proc/net/udp").read_text())
+        wait_for(lambda: is_listened_on(port, "udp"))
         for _ in range(2):
             stitch(SCENE, pair, Plan(address, TOGETHER, encoding=Encoding(crf=20, preset="ultrafast")), told)
         receiver.wait(20)
