@@ -124,10 +124,15 @@ def _solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter
         return problem, *solved, "near"
 
     # Around it, by overviews. Cameras that are all near contradict each other: none of them is known to be right.
-    lost = [n for n in everyone if near is None or n not in near.numbers]
-    problem = replace(problem, observed=mark_swapped_frames(problem, lost, observer.frames, progress))
     if near is None or near.numbers == problem.usable:
         near, lost = None, list(everyone)
+    else:
+        lost = [n for n in everyone if n not in near.numbers]
+    problem = replace(problem, observed=mark_swapped_frames(problem, lost, observer.frames, progress))
+    # All that are lost may have frames of other cameras: then those that are near are all there are.
+    solved = _judged_together(problem, _near_solution(problem, near, progress), progress)
+    if solved is not None:
+        return problem, *solved, "near"
     found_near = NO_CAMERAS if near is None else near.cameras
     solved = _judged_together(problem, search_in_overviews(problem, progress, found_near), progress)
     if solved is not None:
@@ -172,7 +177,31 @@ def _recover(solved: Solved, observer: FrameObserver, progress: ProgressReporter
     # Only such nights pay for loading it.
     from worker.calibration.recovery import recover_knocked
 
-    return recover_knocked(solved, observer, _solve, progress)
+    problem, solution, judged, path = recover_knocked(solved, observer, _solve, progress)
+    if problem.options.recover != "never":
+        judged = _with_proposals(problem, solution, judged, progress)
+    return problem, solution, judged, path
+
+
+def _with_proposals(
+    problem: Problem, solution: PoseSolution, judged: EngineResult, progress: ProgressReporter
+) -> EngineResult:
+    """Return the result that proposes the pose of each camera against which nothing speaks but how far it moved.
+
+    No search has shown that such a pose is the only one, so it is never accepted, whatever the venue says.
+    """
+    from worker.calibration.recovery import as_knocked
+
+    moved = [n for n, one in enumerate(judged.cameras) if one.refusal is not None and one.refusal.reason == "moved"]
+    beyond = [n for n in moved if judged.cameras[n].moved.beyond(problem.gate)]
+    if not beyond:
+        return judged
+    passed = [replace(one, refusal=None) if n in beyond else one for n, one in enumerate(judged.cameras)]
+    together = judge_together(problem, solution.pitch, passed, progress)
+    if any(one.accepted and not two.accepted for one, two in zip(judged.cameras, together.cameras, strict=True)):
+        return judged
+    knocked = {n: as_knocked(together.cameras[n]) for n in beyond if together.cameras[n].accepted}
+    return judged.with_results([knocked.get(n, one) for n, one in enumerate(judged.cameras)])
 
 
 def judge_together(

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.worker.calibration.synthetic import CROWNED, camera, paint_markings, pair
+from tests.worker.calibration.synthetic import CROWNED, camera, moved, paint_markings, pair
 from tests.worker.calibration.test_calibrate import frames, outdated, result, run
+from tests.worker.calibration.test_near_path import WIND
 from worker.calibration.geometry.camera import Pose
 
 pytestmark = pytest.mark.slow
@@ -32,6 +33,15 @@ def test_a_frame_that_was_sent_for_two_cameras_is_refused_for_the_one_it_is_not_
     found = run(pictures={"left": frames()["right"], "right": frames()["right"]})
     assert reasons(found) == [OTHER_CAMERA, None]
     assert "was a frame of right sent for both" in found.cameras[0].rejected_because
+
+
+def test_cameras_that_are_near_are_not_searched_for_beside_a_frame_that_was_sent_twice():
+    left, right = pair()
+    third = camera("third", (30.0, -46.0, 12.0), (38.0, -6.0))
+    stored = [moved(one, *WIND) for one in (left, right, third)]
+    found = run(cameras=stored, pictures={**frames(), "third": frames()["right"]})
+    assert reasons(found) == [None, None, OTHER_CAMERA]
+    assert (found.path, found.timings.seconds["evolution"]) == ("near", 0.0)
 
 
 def test_a_frame_that_its_own_camera_explains_is_never_called_anothers():
