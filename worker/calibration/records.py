@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from worker.calibration.detection.segmentation import Region
 from worker.calibration.detection.view_condition import ViewCondition
 from worker.calibration.diagnostics.seam import Seam
 from worker.calibration.gate.pairs import Pair
-from worker.calibration.gate.quality import CameraResult
+from worker.calibration.gate.quality import CameraResult, in_one_sentence
 from worker.calibration.geometry.camera import Array, Camera, Frame
 from worker.calibration.geometry.field import Field
 from worker.calibration.memory.camera_memory import CameraMemory
@@ -115,6 +115,11 @@ class EngineResult:
     stitch_error_px: float | None
     timings: StageTimings
     pairs: Sequence[tuple[Pair, Seam]] = field(default=(), kw_only=True)
+
+    def with_results(self, cameras: Sequence[CameraResult]) -> Self:
+        """Return the result with other results of its cameras, whose refusals are all that it is rejected for."""
+        reasons = [f"camera {one.camera.id}: {one.rejected_because}" for one in cameras if one.rejected_because]
+        return replace(self, cameras=cameras, rejected_because=in_one_sentence(reasons) or None)
 
     @property
     def accepted(self) -> bool:

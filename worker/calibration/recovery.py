@@ -8,7 +8,6 @@ person, or accepted where the venue says so.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +23,7 @@ from worker.calibration.detection.view_condition import (
 )
 from worker.calibration.diagnostics.registration import Response
 from worker.calibration.gate.pairs import stitch_error_px
-from worker.calibration.gate.quality import CameraResult, Moved, Refusal, in_one_sentence
+from worker.calibration.gate.quality import CameraResult, Moved, Refusal
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.rotation import rotation_angles_deg
 from worker.calibration.observe import FrameObserver
@@ -33,12 +32,12 @@ from worker.calibration.relocalisation.candidate import Candidate
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.paint import Paint
 from worker.calibration.relocalisation.relocalise import Relocalisation, mean_shift_px, relocalise, twin
-from worker.calibration.relocalisation.sought import ANYWHERE, Place, SoughtCamera, SoughtLens
+from worker.calibration.relocalisation.sought import ANYWHERE, KNOCKED_ROLL_DEG, Place, SoughtCamera, SoughtLens
 from worker.calibration.solve import PoseSolution, Problem, is_doubtful
 
 LOST = frozenset({"lines", "few-lines"})
 """Reasons for a refusal of a camera that may have been knocked..."""
-LOST_IF_FAR = frozenset({"moved", "undetermined"})
+LOST_IF_FAR = frozenset({"moved", "undetermined", "stored-better"})
 """...and those of one that may have been if it moved farther than the gate allows. These are given although lines are
 seen where the pose has them: a camera whose field was repainted is undetermined where it stands, and would be accepted
 where a search puts it."""
@@ -63,8 +62,6 @@ ON_ITS_MOUNT_M = 2.5
 LEAST_PROPOSED = 0.34
 """Poses that agree less with the lines before they are refined are not refined, unless a search was asked for. Those of
 real frames that were found agree by 0.44 and more, those of upside-down frames and other sports by 0.17 to 0.36."""
-LONGEST_S = 20.0
-"""Core-seconds after which the search for a camera is not begun anew: what a much slower machine finds less by."""
 CLEARLY_NEARER, MUCH_LESS_TURNED_DEG = 0.5, 60.0
 """Of a camera and its twin on a symmetric field the one is taken that is clearly nearer to the stored place: by less
 than this part of the other's distance; or else the one that is turned by so much less."""
@@ -178,15 +175,15 @@ def _search(
     if problem.options.search == "auto" and not _has_lines_elsewhere(problem, result, response):
         return None
     markings = FieldMap.of(problem.pitch)
+    sought = SoughtCamera(
+        stored.id, [SoughtLens.known(stored.intrinsics)], ignored=stored.ignored, roll_sigma_deg=KNOCKED_ROLL_DEG
+    )
     mount = Place(position=stored.pose.position, radius_m=ON_ITS_MOUNT_M)
-    begun = time.process_time()
     for place in (mount, ANYWHERE) if problem.options.search == "anywhere" else (mount,):
-        if time.process_time() - begun > LONGEST_S:
-            break
         found = relocalise(
             problem.pitch,
             markings,
-            SoughtCamera(stored.id, [SoughtLens.known(stored.intrinsics)], place, stored.ignored),
+            replace(sought, place=place),
             problem.observed.observations.channels[number],
             response,
             problem.options.seed,
@@ -268,15 +265,8 @@ def _joined(before: Solved, again: Solved, found: Mapping[int, FoundAgain]) -> S
     results = [back.get(n, result) for n, result in enumerate(base.cameras)]
     accepted = {result.camera.id for result in results if result.accepted}
     pairs = [pair for pair, _ in judged.pairs if not accepted or accepted.issuperset(pair.cameras)]
-    reasons = [f"camera {one.camera.id}: {one.rejected_because}" for one in results if one.rejected_because]
-    told = replace(
-        base,
-        cameras=results,
-        rejected_because=in_one_sentence(reasons) or None,
-        stitch_error_px=stitch_error_px(pairs, problem.gate),
-        pairs=judged.pairs,
-    )
-    return replace(observed, cameras=problem.cameras), solution, told, "anywhere"
+    joined = replace(base.with_results(results), stitch_error_px=stitch_error_px(pairs, problem.gate), pairs=judged.pairs)
+    return replace(observed, cameras=problem.cameras), solution, joined, "anywhere"
 
 
 def _beside_stored(problem: Problem, number: int, result: CameraResult, before: CameraResult) -> CameraResult:
@@ -288,8 +278,12 @@ def _beside_stored(problem: Problem, number: int, result: CameraResult, before: 
     if result.refusal is not None:
         words = f"{_turned_and_moved(moved)}, and found again there, but {result.refusal.words}"
         return replace(result, knocked=True, refusal=replace(result.refusal, words=words))
-    refusal = None if problem.options.recover == "accept" else Refusal("knocked", _proposal(result))
-    return replace(result, knocked=True, refusal=refusal)
+    return replace(result, knocked=True) if problem.options.recover == "accept" else as_knocked(result)
+
+
+def as_knocked(result: CameraResult) -> CameraResult:
+    """Return the result of a camera that was found beyond the gate's limits of movement, proposed to a person."""
+    return replace(result, knocked=True, refusal=Refusal("knocked", _proposal(result)))
 
 
 def _turned_and_moved(moved: Moved) -> str:

@@ -226,23 +226,23 @@ def alone_rejection(result: CameraResult, gate: Gate) -> Refusal | None:
             f"{gate.largest_sigma_deg} allowed), {sigma.position_m:.2f} m (at most {gate.largest_sigma_m}); let the "
             "camera see lines in more than one direction, or calibrate its lens again",
         )
-    if moved.beyond(gate):
-        return Refusal(
-            "moved",
-            f"{moved.words(gate)}; if somebody moved the camera, store a new first pose",
-        )
-    if result.moved_in_all is not None and result.moved_in_all.beyond(gate):
-        return Refusal(
-            "moved",
-            f"{result.moved_in_all.words(gate)}, over all jobs since its pose was last stored by hand: its mount may "
-            "be giving way; look at it, then store this pose, or accept the job by hand",
-        )
     beaten_by_any = seen.agreement < 1 - gate.agreement_loss
     if beaten_by_any and seen.agreement < (before := result.evidence_before()).agreement - gate.agreement_loss:
         return Refusal(
             "stored-better",
             f"the stored pose fits the frame better: {before.share:.0%} of the markings' length is "
             f"seen where it puts them, with the new pose {seen.share:.0%}",
+        )
+    if moved.beyond(gate):
+        return Refusal(
+            "moved",
+            f"{moved.words(gate)}; if somebody moved the camera, accept the job by hand once its picture is right",
+        )
+    if result.moved_in_all is not None and result.moved_in_all.beyond(gate):
+        return Refusal(
+            "moved",
+            f"{result.moved_in_all.words(gate)}, over all jobs since its pose was last stored by hand: its mount may "
+            "be giving way; look at it, then store this pose, or accept the job by hand",
         )
     return None
 

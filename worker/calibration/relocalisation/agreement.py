@@ -19,9 +19,8 @@ UNSEEN_PX = 40.0
 """Of line that is taken for missing from every view, so that little in view is not all in view."""
 FEWEST_POINTS = 30
 """Points of markings that have to be in view for an agreement to count in full."""
-USUAL_ROLL = np.sin(np.radians(6.0))
-ROLLED = 0.04
-"""What a roll of 6° takes from an agreement: cameras stand about upright."""
+ROLLED = 0.01
+"""What a roll of one standard deviation takes from an agreement."""
 LOWEST_M = 1.2
 """Lower no camera is sought: from the ground everything can be explained by a few lines."""
 
@@ -43,8 +42,8 @@ def _agreement(field: FieldMap, view: LineView, cameras: Hypotheses, tolerance: 
     expected, found, points = _expected_and_found(field, view, cameras, tolerance)
     explained = _explained(field, view, cameras, tolerance) * view.painted_px
     dice = (found + explained) / (expected + view.painted_px + UNSEEN_PX) * np.minimum(1.0, points / FEWEST_POINTS)
-    upright = ROLLED * (cameras.rotations[:, 0, 2] / USUAL_ROLL) ** 2
-    return np.where(cameras.positions[:, 2] > LOWEST_M, dice - upright, 0.0)
+    rolled = ROLLED * (cameras.rotations[:, 0, 2] / np.sin(view.roll_sigma)) ** 2
+    return np.where(cameras.positions[:, 2] > LOWEST_M, dice - rolled, 0.0)
 
 
 def _expected_and_found(

@@ -13,12 +13,15 @@ FARTHEST_BESIDE_M, FARTHEST_BEHIND_M = 60.0, 40.0
 """Beside the long sides, and behind the ends; a field that is larger is looked at from as far as it is large."""
 BESIDE, AIMED_AT = 1.3, 1.1
 """In half sizes of the field: how far along a side cameras stand, and where on the field they look."""
-USUAL_ROLL_DEG, KNOCKED_ROLL_DEG = 2.0, 4.0
-"""Of cameras that somebody aimed, and of those whose mount may have been hit."""
 
 
-def draw(field: FieldMap, focal_px: Array, count: int, rng: np.random.Generator) -> Hypotheses:
-    """Draw so many cameras that look at the field, two thirds of them beside a long side; focal lengths evenly."""
+def draw(
+    field: FieldMap, focal_px: Array, roll_sigma: float, count: int, rng: np.random.Generator
+) -> Hypotheses:
+    """Draw so many cameras that look at the field, two thirds of them beside a long side; focal lengths evenly.
+
+    `roll_sigma`: how far from level they are rolled, rad, one standard deviation.
+    """
     half_x, half_y = field.half_size.tolist()
     behind_an_end = rng.integers(0, 3, count) == 2
     beside = half_y + _log_uniform(NEAREST_M, max(FARTHEST_BESIDE_M, half_y), count, rng)
@@ -31,13 +34,19 @@ def draw(field: FieldMap, focal_px: Array, count: int, rng: np.random.Generator)
     z = _log_uniform(LOWEST_M, HIGHEST_M, count, rng)
     to_x = rng.uniform(-AIMED_AT * half_x, AIMED_AT * half_x, count) - x
     to_y = rng.uniform(-AIMED_AT * half_y, AIMED_AT * half_y, count) - y
-    roll = np.radians(USUAL_ROLL_DEG) * rng.normal(size=count)
+    roll = roll_sigma * rng.normal(size=count)
     rotations = rotations_of(np.arctan2(to_y, to_x), np.arctan2(z, np.hypot(to_x, to_y)), roll)
     return Hypotheses.unbent(rotations, np.stack([x, y, z], axis=1), rng.choice(focal_px, count))
 
 
 def draw_at(
-    field: FieldMap, focal_px: Array, place: Array, radius_m: float, count: int, rng: np.random.Generator
+    field: FieldMap,
+    focal_px: Array,
+    roll_sigma: float,
+    place: Array,
+    radius_m: float,
+    count: int,
+    rng: np.random.Generator,
 ) -> Hypotheses:
     """Draw so many cameras within `radius_m` of a place (3,) m that look at the field."""
     half_x, half_y = field.half_size.tolist()
@@ -46,7 +55,7 @@ def draw_at(
     positions = place + ways
     to_x = rng.uniform(-AIMED_AT * half_x, AIMED_AT * half_x, count) - positions[:, 0]
     to_y = rng.uniform(-AIMED_AT * half_y, AIMED_AT * half_y, count) - positions[:, 1]
-    roll = np.radians(KNOCKED_ROLL_DEG) * rng.normal(size=count)
+    roll = roll_sigma * rng.normal(size=count)
     tilt = np.arctan2(positions[:, 2], np.hypot(to_x, to_y))
     return Hypotheses.unbent(rotations_of(np.arctan2(to_y, to_x), tilt, roll), positions, rng.choice(focal_px, count))
 

@@ -34,7 +34,8 @@ class LineView:
     `focal_px`: of the lens that undistorted it, in view pixels; another focal length f sees the same picture along rays
     (x / f, y / f, 1). `places` (M, 2) on the middles of paint; `painted_px`: their length in all; `distance` (H, W) to
     the nearest of them, which is at `nearest` (H, W, 2), column and row, and `covered` (H, W) what the frame covers,
-    from `corner` (2,) on; `starts`, `ends` (S, 2) of straight segments.
+    from `corner` (2,) on; `starts`, `ends` (S, 2) of straight segments. `roll_sigma`: how far from level the camera may
+    be rolled, rad, one standard deviation.
     """
 
     focal_px: float
@@ -47,9 +48,10 @@ class LineView:
     corner: Array
     starts: Array
     ends: Array
+    roll_sigma: float
 
     @classmethod
-    def of(cls, response: NDArray[np.uint8], lens: Lens) -> LineView:
+    def of(cls, response: NDArray[np.uint8], lens: Lens, roll_sigma_deg: float) -> LineView:
         """Return the view of a response (height, width), 0..255, of the network through `lens`."""
         width, height = lens.size
         scale = WIDTH_PX / width
@@ -80,6 +82,7 @@ class LineView:
             low,
             starts,
             ends,
+            float(np.radians(roll_sigma_deg)),
         )
 
     @property

@@ -50,7 +50,7 @@ def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, 
     found = [
         proposal
         for lens in sought.lenses
-        for proposal in _through(field, LineView.of(response, lens.lens), lens, sought.place, rng)
+        for proposal in _through(field, LineView.of(response, lens.lens, sought.roll_sigma_deg), lens, sought.place, rng)
     ]
     return sorted(found, key=lambda one: -one.agreement)
 
@@ -69,7 +69,7 @@ def _through(
     start = _best(field, view, by_lines, FIRST_TOLERANCE_PX, CLIMBING_KNOWN if known else CLIMBING_UNKNOWN)
     found, scores = climb(field, view, start, steps, rng)
     if scores.max(initial=0.0) < CLEARLY_FOUND:
-        drawn = _drawn(field, focal, place, rng)
+        drawn = _drawn(field, focal, view.roll_sigma, place, rng)
         by_draws = _best(field, view, drawn, DRAWN_TOLERANCE_PX, CLIMBING_DRAWN)
         found, scores = climb(field, view, Hypotheses.joined([by_draws, found]), steps, rng)
     slid = _best(field, view, _at(place, field, slid_along_field(field, found)), LEVELS[-2].tolerance_px, CLIMBING_SLID)
@@ -86,11 +86,14 @@ def _through(
     ]
 
 
-def _drawn(field: FieldMap, focal: Array, place: Place, rng: np.random.Generator) -> Hypotheses:
+def _drawn(
+    field: FieldMap, focal: Array, roll_sigma: float, place: Place, rng: np.random.Generator
+) -> Hypotheses:
     """Cameras drawn at random: where they are known to stand, or else from where fields are filmed."""
-    if place.position is not None:
-        return _at(place, field, draw_at(field, focal, place.position, place.radius_m, DRAWN_AT_PLACE, rng))
-    return _at(place, field, draw(field, focal, DRAWN, rng))
+    if place.position is None:
+        return _at(place, field, draw(field, focal, roll_sigma, DRAWN, rng))
+    drawn = draw_at(field, focal, roll_sigma, place.position, place.radius_m, DRAWN_AT_PLACE, rng)
+    return _at(place, field, drawn)
 
 
 def _with_neighbours(directions: list[Direction], rng: np.random.Generator) -> list[Direction]:

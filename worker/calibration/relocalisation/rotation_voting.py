@@ -17,12 +17,14 @@ from worker.calibration.relocalisation.line_view import LineView
 from worker.calibration.relocalisation.sought import SoughtLens
 
 STEP_DEG = 2.0
-STEEPEST_DEG, MOST_ROLL_DEG, ROLL_STEP_DEG = 78.0, 8.0, 2.0
+STEEPEST_DEG = 78.0
+ROLL_REACH = 8 / 3
+"""How far rolls are tried, in standard deviations of what is expected."""
 COARSE, FINE = 0.02, 0.006
 """How far, rad, a direction may be from the plane of a segment that votes for it: on the grid, and after."""
 APART_DEG = 4.0
-USUAL_ROLL_DEG, ROLLED = 3.0, 0.02
-"""What a roll of so many degrees takes from the votes."""
+ROLLED = 0.02
+"""What a roll of one standard deviation takes from the votes."""
 ROUNDS, OFFSPRING, SPREAD_DEG, NARROWER = 7, 48, 1.4, 0.6
 FOCAL_SPREAD, FOCAL_OFFSPRING = 0.06, 5
 FOCAL_RATIO = 1.19
@@ -71,20 +73,16 @@ def vote(view: LineView, focal_px: Array, most: int, rng: np.random.Generator) -
 
 def _peaks(view: LineView, focal: float, count: int) -> list[Direction]:
     """The peaks of the votes on a grid."""
-    pan, tilt, roll = np.radians(
-        np.stack(
-            np.meshgrid(
-                np.arange(0, 90, STEP_DEG),
-                np.arange(1, STEEPEST_DEG, STEP_DEG),
-                np.arange(-MOST_ROLL_DEG, MOST_ROLL_DEG + 1, ROLL_STEP_DEG),
-                indexing="ij",
-            )
-        ).reshape(3, -1)
-    )
-    votes = _votes(view, np.stack([pan, tilt, roll], axis=1), focal, COARSE)
+    step, most_roll = np.radians(STEP_DEG), ROLL_REACH * view.roll_sigma
+    axes = np.arange(0, np.pi / 2, step), np.arange(step / 2, np.radians(STEEPEST_DEG), step)
+    level = np.stack(np.meshgrid(*axes, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
+    # Roll by roll: all of the grid at once takes hundreds of megabytes.
+    rolled = [level + [0.0, 0.0, roll] for roll in np.arange(-most_roll, most_roll + step / 2, step)]
+    votes = np.concatenate([_votes(view, directions, focal, COARSE) for directions in rolled])
+    directions = np.concatenate(rolled)
     peaks = list[Direction]()
     for n in np.argsort(-votes)[: 60 * count]:
-        here = Direction(np.array([pan[n], tilt[n], roll[n]]), focal, float(votes[n]))
+        here = Direction(directions[n], focal, float(votes[n]))
         if not any(here.is_like(peak, APART_DEG) for peak in peaks):
             peaks.append(here)
         if len(peaks) == count:
@@ -117,7 +115,7 @@ def _votes(view: LineView, pan_tilt_roll: Array, focal: float, tolerance: float)
     normals = view.normals(focal).astype(np.float32)
     lengths = view.lengths
     off = np.minimum(np.abs(rotations[:, :, 0] @ normals.T), np.abs(rotations[:, :, 1] @ normals.T))
-    rolled = ROLLED * (pan_tilt_roll[:, 2] / np.radians(USUAL_ROLL_DEG)) ** 2
+    rolled = ROLLED * (pan_tilt_roll[:, 2] / view.roll_sigma) ** 2
     return np.asarray(np.exp(-((off / tolerance) ** 2)) @ lengths / lengths.sum() - rolled)
 
 

@@ -82,13 +82,17 @@ class Place:
 
 
 ANYWHERE = Place()
+MOUNTED_ROLL_DEG, KNOCKED_ROLL_DEG = 3.0, 15.0
+"""How far from level cameras are rolled, one standard deviation: as somebody mounted them, and after a knock that may
+have turned a clamp about any axis."""
 
 
 @dataclass(frozen=True)
 class SoughtCamera:
     """A camera without a pose: `lenses` through which it may look, where it may stand, what of its frame is ignored.
 
-    `other_lenses`: to be tried in their place if nothing is found through them.
+    `other_lenses`: to be tried in their place if nothing is found through them; `roll_sigma_deg`: how far from level
+    the camera may be rolled about its view, one standard deviation.
     """
 
     id: str
@@ -96,6 +100,7 @@ class SoughtCamera:
     place: Place = ANYWHERE
     ignored: Ignored | None = None
     other_lenses: Sequence[SoughtLens] = ()
+    roll_sigma_deg: float = MOUNTED_ROLL_DEG
 
     @property
     def size(self) -> tuple[int, int]:

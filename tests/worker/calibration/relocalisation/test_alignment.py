@@ -17,6 +17,7 @@ from worker.calibration.relocalisation.alignment import aligned
 from worker.calibration.relocalisation.field_map import FieldMap
 from worker.calibration.relocalisation.hypotheses import LENS_KNOWN, LENS_SOUGHT, Hypotheses
 from worker.calibration.relocalisation.line_view import LineView
+from worker.calibration.relocalisation.sought import MOUNTED_ROLL_DEG
 
 TOLERANCE_PX = 5.0
 MAP = FieldMap.of(PITCH)
@@ -29,7 +30,7 @@ def view_of(distortion, undistorted_by):
     truth = camera("one", (-6.0, -52.0, 16.0), (-10.0, 0.0), distortion=distortion)
     response = white_on_green(paint_frame(PITCH, truth), [Region(0, 0, *truth.intrinsics.size)])
     lens = replace(truth.intrinsics, distortion=np.array(undistorted_by))
-    return truth, LineView.of(response, lens)
+    return truth, LineView.of(response, lens, MOUNTED_ROLL_DEG)
 
 
 def hypothesis(view, truth, turned=(0.0, 0.0, 0.0), moved=(0.0, 0.0, 0.0), zoomed=1.0):
