@@ -13,9 +13,8 @@ from service.schemas.base import OPEN_WORD, Id, Name, Number, Schema, is_none
 from service.schemas.events import hidden_urls
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
+from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera, check_lens
 from service.schemas.health import Alarm, Alarms, CalibrationEnd
-from service.schemas.lens_limits import assumed_lens_warning
 from service.schemas.options import Options
 from service.schemas.schedule import Schedule
 from service.schemas.view import VIEW_EXAMPLE, ViewChoice
@@ -76,6 +75,11 @@ class CameraIn(UnposedCamera):
         "sent back keeps them.",
         examples=["http://user:password@10.1.0.7/snapshot.jpg"],
     )
+
+    @model_validator(mode="after")
+    def _has_a_usable_lens(self) -> Self:
+        check_lens(self.intrinsics, self.image_size)
+        return self
 
     @model_validator(mode="after")
     def _ignores_what_is_in_its_picture(self) -> Self:
@@ -234,8 +238,11 @@ class Venue(NamedField):
 
     @property
     def lens_warnings(self) -> list[str]:
-        """A line for each camera whose lens is taken to be well known because nobody said how well it is."""
-        return [assumed_lens_warning(camera.id) for camera in self.cameras if not camera.intrinsics.sigma]
+        """What is doubtful about the lenses of its cameras, a line each."""
+        # NumPy takes its time to load, and most that reads venues asks nothing of their lenses.
+        from service.schemas.lens_map import lens_warnings
+
+        return [words for camera in self.cameras for words in lens_warnings(camera)]
 
     @property
     def poses_and_lenses(self) -> list[PosedCamera]:
