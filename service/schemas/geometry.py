@@ -197,8 +197,8 @@ class UnposedCamera(Schema):
         (fx, _, cx), (_, fy, cy), _ = self.intrinsics.matrix
         width, height = self.image_size
         for focal, centre, size in ((fx, cx, width), (fy, cy, height)):
-            # From wider than any fisheye to longer than any broadcast lens: millimetres, or exchanged numbers, show here.
-            # A matrix of another resolution is doubted in words (`lens_map`), since it may be one.
+            # From wider than any fisheye to longer than any broadcast lens: millimetres show here. A matrix of another
+            # resolution is doubted in words (`lens_map`): a picture may have been cut.
             if not 0.1 * size <= focal <= 200 * size or not -size <= centre <= 2 * size:
                 raise ValueError(f"the camera matrix does not belong to an image of {width}x{height} pixels")
         return self

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ SPOKES, STEPS, FARTHER_STEPS = 64, 200, 100
 GRID = 64
 """Pixels to each side that are asked whether a ray ends there: shares are good to a per cent."""
 LEAST_SHARE = 0.1
-"""Of the picture, with rays: of less no camera can be calibrated, and the numbers are most likely in the wrong order."""
+"""Of the picture, with rays: of less no camera can be calibrated, and the numbers are likely in the wrong order."""
 LEAST_BLIND_SHARE = 0.005
 """Of the picture, without rays, that is worth a word: less is the very corner, which no line needs."""
 LEAST_DENOMINATOR = 0.05
@@ -40,7 +40,15 @@ LARGEST_STRETCH = 1.5
 and wide lenses squeeze."""
 SQUARE_WITHIN = 0.02
 """By which fx and fy may differ: pixels of cameras are square, and a good board finds that to some thousandths."""
-OTHER_SIZES = {2: "half", 3: "a third", 4: "a quarter", 1.5: "two thirds", 0.5: "twice", 1 / 3: "three times", 0.25: "four times"}  # fmt: skip
+OTHER_SIZES = {
+    2: "half",
+    3: "a third",
+    4: "a quarter",
+    1.5: "two thirds",
+    0.5: "twice",
+    1 / 3: "three times",
+    0.25: "four times",
+}
 """By which the picture is larger than another one of the same camera (2160, 1440, 1080, 720, 540 lines), and how large
 the other one is beside it."""
 CENTRED = 0.1
@@ -53,37 +61,13 @@ _TURNS = np.linspace(0.0, 2 * math.pi, SPOKES, endpoint=False)
 DIRECTIONS = np.stack([np.cos(_TURNS), np.sin(_TURNS)])
 
 
-class LensNumbers(Protocol):
-    """The numbers of a lens, as the models of the wire and the records of jobs have them."""
-
-    @property
-    def model(self) -> LensModel: ...
-    @property
-    def matrix(self) -> list[list[float]]: ...
-    @property
-    def distortion(self) -> list[float]: ...
-    @property
-    def sigma(self) -> dict[str, float] | None: ...
-
-
-class LensCamera(Protocol):
-    """A camera with a lens, as the models of the wire and the records of jobs have it."""
-
-    @property
-    def id(self) -> str: ...
-    @property
-    def image_size(self) -> list[int]: ...
-    @property
-    def intrinsics(self) -> Any: ...
-
-
 @dataclass(frozen=True)
 class LensMap:
     """Where a lens has rays.
 
     `blind_share`: the part (0..1) of the picture where no ray ends; `radius_px`: how far from the principal point the
-    nearest such pixel lies, inf without one. Of the rays of the picture, `least_denominator` is that of a rational lens,
-    and `stretch` how many times as far from the axis as without distortion the farthest of them ends.
+    nearest such pixel lies, inf without one. Of the rays of the picture, `least_denominator` is that of a rational
+    lens, and `stretch` how many times as far from the axis as without distortion the farthest of them ends.
     """
 
     blind_share: float
@@ -102,19 +86,24 @@ class LensMap:
         return self.is_usable and self.stretch <= LARGEST_STRETCH
 
 
-def lens_warnings(camera: LensCamera) -> list[str]:
-    """Return what is doubtful about the lens of a camera, a line each."""
-    lens: LensNumbers = camera.intrinsics
-    width, height = camera.image_size
-    doubts = [
-        *_map_doubts(map_of(lens.model, lens.matrix, lens.distortion, camera.image_size)),
-        *_matrix_doubts(lens.matrix, width, height),
-    ]
-    unknown = [] if lens.sigma else [assumed_lens_warning(camera.id)]
-    return [f"camera {camera.id}: {words}" for words in doubts] + unknown
+def lens_warnings(camera: Any) -> list[str]:
+    """Return what is doubtful about the lens of a camera, a line each.
+
+    `camera`: a model of the wire, or the record of a job that is a part of one.
+    """
+    lens = camera.intrinsics
+    doubts = [f"camera {camera.id}: {words}" for words in lens_doubts(lens, camera.image_size)]
+    return doubts if lens.sigma else [*doubts, assumed_lens_warning(camera.id)]
 
 
-def require_usable_lens(lens: LensNumbers, image_size: Sequence[int]) -> None:
+def lens_doubts(lens: Any, image_size: Sequence[int]) -> list[str]:
+    """Return what the numbers of a lens make doubtful in a picture of `image_size`, in words."""
+    width, height = image_size
+    seen = map_of(lens.model, lens.matrix, lens.distortion, image_size)
+    return [*_map_doubts(seen), *_matrix_doubts(lens.matrix, width, height)]
+
+
+def require_usable_lens(lens: Any, image_size: Sequence[int]) -> None:
     """Raise `ValueError` for a lens that has rays for next to nothing of its picture."""
     width, height = image_size
     seen = map_of(lens.model, lens.matrix, lens.distortion, image_size)
@@ -177,8 +166,8 @@ def _map_doubts(seen: LensMap) -> Iterator[str]:
         )
     if seen.stretch > LARGEST_STRETCH:
         yield (
-            f"this lens takes what it sees at the border {seen.stretch:.3g} times as far out as one without distortion, "
-            "as no lens does: check the order of its distortion, and that it belongs to this matrix"
+            f"this lens shows the border of its view {seen.stretch:.3g} times as far out as one without distortion, as "
+            "no lens does: check the order of its distortion, and that it belongs to this matrix"
         )
 
 

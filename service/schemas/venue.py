@@ -134,6 +134,7 @@ VENUE_EXAMPLE: dict[str, Any] = {
             "intrinsics": {
                 "matrix": [[2122.4, 0, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
                 "distortion": [-0.3402, 0.1042, 0, 0, 0],
+                "sigma": {"fx": 2.0, "fy": 2.0, "cx": 3.0, "cy": 3.0, "k1": 0.002, "k2": 0.003},
             },
             "pose": {"rotation": [1.675, 0.372, -0.462], "position": [-1.48, -49.49, 7.84]},
         }
@@ -307,7 +308,8 @@ class ChangedVenue(Venue):
     warnings: list[str] = Field(
         [],
         description="Of poses from which no field is filmed, with the convention that would explain them, and of "
-        "lenses without a `sigma`. Not kept: GET does not show it, and PUT takes it and ignores it.",
+        "lenses: those without a `sigma`, without rays for a part of the picture, of another resolution. Not kept: GET "
+        "does not show it, and PUT takes it and ignores it.",
         examples=[
             [
                 "camera west: its lens has no sigma and is taken to be as sure as a good board leaves it, "

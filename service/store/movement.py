@@ -23,8 +23,8 @@ from service.schemas.names import LensModel
 Array = NDArray[np.float64]
 # Of all markings together; as many more as there are markings.
 POINTS = 150
-# Where a lens is looked at (tangent from the axis) to find where its formula turns back: the whole picture of a long one
-# lies within some thousandths.
+# Where a lens is looked at (tangent from the axis) to find where its formula turns back: the whole picture of a long
+# one lies within some thousandths.
 NEAREST, WIDEST, STEPS = 1e-4, 6.0, 600
 
 

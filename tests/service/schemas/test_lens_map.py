@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,15 +11,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from service.intake.pose_warnings import warnings_of
 from service.schemas.geometry import DISTORTION_LENGTHS, Intrinsics
 from service.schemas.lens_map import lens_warnings, map_of
-from service.schemas.venue import VENUE_EXAMPLE, CameraIn
+from service.schemas.venue import VENUE_EXAMPLE, CameraIn, VenueIn
 from worker.jobs.from_schemas import lens_of
 
 HD = (1920, 1080)
 BASLER = [-13.238113, -98.012135, 0.001444, 0.002849, 1357.782415, -13.050801, -102.363353, 1383.055291]
-FOLDING = [2.9972164631, -6.0928826332, 0.00057462, -4.857e-05, -1.2618762255, 3.5340938568, -4.2707939148, -5.302351952]
+FOLDING = [
+    2.9972164631,
+    -6.0928826332,
+    0.00057462,
+    -4.857e-05,
+    -1.2618762255,
+    3.5340938568,
+    -4.2707939148,
+    -5.302351952,
+]
 TILTED = [-0.2, 0.05, 1e-3, 1e-3, 0, 0, 0, 0, 0.01, 0.01, -0.01, 0, 0.2, -0.3]
+
+
+POSE = VENUE_EXAMPLE["cameras"][0]["pose"]
 
 
 def matrix(focal, cx, cy, focal_y=None):
@@ -27,8 +41,7 @@ def matrix(focal, cx, cy, focal_y=None):
 
 def camera(matrix, distortion, size, model="opencv", sigma=True):
     lens = {"model": model, "matrix": matrix, "distortion": distortion, "sigma": {"fx": 4.0} if sigma else None}
-    pose = VENUE_EXAMPLE["cameras"][0]["pose"]
-    return CameraIn.model_validate({"id": "a", "image_size": list(size), "intrinsics": lens, "pose": pose})
+    return CameraIn.model_validate({"id": "a", "image_size": list(size), "intrinsics": lens, "pose": POSE})
 
 
 @pytest.mark.parametrize(
@@ -52,7 +65,7 @@ def camera(matrix, distortion, size, model="opencv", sigma=True):
         ),
         (
             camera(matrix(299.54, 254.14, 183.94, 300.14), [], (2064, 1544)),
-            [r"a quarter as large: .* at 516x386\? .* \[\[1198\.16, 0, 1018\.06\], \[0, 1200\.56, 737\.26\], \[0, 0, 1\]\]"],
+            [r"a quarter as large: .* at 516x386\? .* \[\[1198\.16, 0, 1018\.06\], \[0, 1200\.56, 737"],
         ),
         (camera(matrix(1400, 959.5, 539.5), [], (3840, 2160)), [r"half as large: .* at 1920x1080\?"]),
         (camera(matrix(930, 639.5, 359.5), [], HD), [r"two thirds as large: .* at 1280x720\?"]),
@@ -70,7 +83,9 @@ def test_what_a_lens_does_over_its_picture_is_said_in_words(camera, words):
         assert re.search(pattern, line), line
 
 
-@pytest.mark.parametrize("distortion", [[-1e9, 0, 0, 0], [0, -1e9, 0, 0], [-200, 0, 0, 0, 0, 200, 0, 0], [*[0] * 12, 1.7, 0]])
+@pytest.mark.parametrize(
+    "distortion", [[-1e9, 0, 0, 0], [0, -1e9, 0, 0], [-200, 0, 0, 0, 0, 200, 0, 0], [*[0] * 12, 1.7, 0]]
+)
 def test_a_lens_without_rays_for_its_picture_is_refused(distortion):
     with pytest.raises(ValidationError, match=r"has rays for \d % of the 1920x1080 pixels: check the order"):
         camera(matrix(1500, 959.5, 539.5), distortion, HD)
@@ -98,25 +113,31 @@ def lenses(draw):
     model = draw(st.sampled_from(["opencv", "fisheye"]))
     length = draw(st.sampled_from(DISTORTION_LENGTHS[model]))
     focal, skew = draw(st.floats(192, 3e5)), draw(st.one_of(st.just(0.0), NUMBERS))
-    document = {
+    return {
         "model": model,
         "matrix": [[focal, skew, draw(st.floats(-1920, 3840))], [0, focal, draw(st.floats(-1080, 2160))], [0, 0, 1]],
         "distortion": draw(st.lists(NUMBERS, min_size=length, max_size=length)),
     }
-    return document
 
 
 @given(lens=lenses())
-@settings(max_examples=3000, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_numbers_of_any_size_are_refused_or_taken_with_a_lens_that_can_be_computed_with(lens):
-    pose = VENUE_EXAMPLE["cameras"][0]["pose"]
     try:
-        taken = CameraIn.model_validate({"id": "a", "image_size": list(HD), "intrinsics": lens, "pose": pose})
+        taken = CameraIn.model_validate({"id": "a", "image_size": list(HD), "intrinsics": lens, "pose": POSE})
     except ValidationError:
         return
+    venue = VenueIn.model_validate(VENUE_EXAMPLE | {"cameras": [taken.model_dump()]}).to_venue()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert all("nan" not in line for line in lens_warnings(taken))
+        said = warnings_of([taken.pose], venue) + venue.lens_warnings
+        assert all("nan" not in line for line in said)
         engine = lens_of(Intrinsics.model_validate(lens), list(HD))
         rays = engine.undistort(engine.border(16))
         engine.distort(rays.astype(np.float32))
+
+
+def test_the_lenses_of_the_demo_and_of_the_documented_example_leave_nothing_to_be_said():
+    demo = VenueIn.model_validate_json((Path(__file__).parents[2] / "demo" / "venue.json").read_bytes())
+    for venue in (demo, VenueIn.model_validate(VENUE_EXAMPLE)):
+        assert venue.to_venue().lens_warnings == []

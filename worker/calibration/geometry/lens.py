@@ -168,7 +168,8 @@ class Intrinsics(Lens):
                 axis=-1,
             )
             with np.errstate(divide="ignore", invalid="ignore"):
-                move = move / determinant[..., None]
+                # Where the map stands still there is nowhere to go.
+                move = np.where(determinant[..., None] == 0, np.nan, move / determinant[..., None])
             rays = self._pulled_back(rays + move)
             if np.nanmax(np.abs(move), initial=0.0) < 1e-12:
                 break
