@@ -49,8 +49,8 @@ LEFT = ("cameras", 0)
         (
             (*LEFT, "pose", "rotation"),
             [102.2, 12.0, -9.0],
-            "cameras.left.pose.rotation.0: expected 10 rad or less, came 102.2; it is a Rodrigues vector in radians, and "
-            "these look like degrees",
+            "cameras.left.pose.rotation.0: expected 10 rad or less, came 102.2; it is a Rodrigues vector in radians, "
+            "and these look like degrees",
         ),
         (
             (*LEFT, "pose", "position", 1),
