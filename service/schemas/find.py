@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from service.schemas.addresses import SourceUrl
 from service.schemas.base import OPEN_WORD, Id, Number, Schema
-from service.schemas.geometry import Intrinsics, PoseIn, Position, Side, check_lens, require_camera_id
+from service.schemas.geometry import Intrinsics, PoseIn, Position, Side, require_camera_id
 from service.schemas.options import FindOptions
 from service.schemas.results import CandidateResult, FindResult
 from service.schemas.venue import Camera, CameraIn, Ignore, NamedField, Venue, VenueIn, require_distinct_ids
@@ -52,8 +52,6 @@ class SoughtCameraIn(Schema):
             raise ValueError(f"camera {self.id} has a pose, so it needs its intrinsics and image_size, too")
         if self.intrinsics is not None and self.image_size is None:
             raise ValueError(f"camera {self.id} has intrinsics, which belong to an image_size: give that, too")
-        if self.intrinsics is not None and self.image_size is not None:
-            check_lens(self.intrinsics, self.image_size)
         return self
 
 

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from service.intake.pose_warnings import warnings_of
+from service.schemas.find import SoughtSite
 from service.schemas.geometry import DISTORTION_LENGTHS, Intrinsics
-from service.schemas.lens_map import lens_warnings, map_of
+from service.schemas.lens_map import lens_doubts, lens_warnings, map_of
+from service.schemas.options import FindOptions
 from service.schemas.venue import VENUE_EXAMPLE, CameraIn, VenueIn
 from worker.jobs.from_schemas import lens_of
 
@@ -141,3 +143,12 @@ def test_the_lenses_of_the_demo_and_of_the_documented_example_leave_nothing_to_b
     demo = VenueIn.model_validate_json((Path(__file__).parents[2] / "demo" / "venue.json").read_bytes())
     for venue in (demo, VenueIn.model_validate(VENUE_EXAMPLE)):
         assert venue.to_venue().lens_warnings == []
+
+
+def test_a_stored_lens_that_would_be_refused_today_is_searched_with_and_doubted():
+    stored = VenueIn.model_validate(VENUE_EXAMPLE).to_venue()
+    (left,) = stored.cameras
+    blind = left.intrinsics.model_copy(update={"distortion": [-900.0, 0.0, 0.0, 0.0]})
+    stored = stored.model_copy(update={"cameras": [left.model_copy(update={"intrinsics": blind})]})
+    (sought,) = SoughtSite.of(stored, FindOptions(), ["left"]).cameras
+    assert "no ray for 100 % of the picture" in lens_doubts(sought.intrinsics, sought.image_size)[0]
