@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from service.cli.printing import USAGE, fail
-from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, FieldNumber, FormatName, LensChoice
+from service.schemas.names import ID_IN_WORDS, ID_PATTERN, JOB_ID_PATTERN, FieldNumber, FormatName, LensChoice
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -61,7 +61,7 @@ def _key_from_secret_file(context: typer.Context, option: typer.CallbackParam) -
 
 def _check_venue_id(venue_id: str) -> str:
     if not re.fullmatch(ID_PATTERN, venue_id):
-        raise typer.BadParameter(f"{venue_id!r} is no id: up to 64 of a-z, 0-9, - and _, such as esc venue list prints")
+        raise typer.BadParameter(f"{venue_id!r} is no id: {ID_IN_WORDS}, such as esc venue list prints")
     return venue_id
 
 

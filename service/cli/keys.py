@@ -15,7 +15,7 @@ import typer
 from service.cli.arguments import Data, load_settings
 from service.cli.printing import FAILED, USAGE, fail, print_note
 from service.cli.serve import report_database_errors
-from service.schemas.names import ID_PATTERN, Scope
+from service.schemas.names import ID_IN_WORDS, ID_PATTERN, Scope
 
 if TYPE_CHECKING:
     from service.store.keys import KeyRepository
@@ -47,10 +47,10 @@ def add_key(
     from service.store.keys import KeyExists
 
     if not re.fullmatch(ID_PATTERN, name):
-        fail(f"{name!r} is no name of a key: up to 64 of a-z, 0-9, - and _, the first a letter or a digit.", USAGE)
+        fail(f"{name!r} is no name of a key: {ID_IN_WORDS}.", USAGE)
     for venue in venues or ():
         if not re.fullmatch(ID_PATTERN, venue):
-            fail(f"{venue!r} is no id of a venue: up to 64 of a-z, 0-9, - and _, the first a letter or a digit.", USAGE)
+            fail(f"{venue!r} is no id of a venue: {ID_IN_WORDS}.", USAGE)
     with _keys(data) as keys:
         try:
             key = keys.add(name, scope, datetime.now(UTC) + timedelta(days) if days else None, venues or None)

@@ -45,15 +45,17 @@ def _print_points(sport: str | None) -> None:
     """Print every name that a point of a sport's field has, and end."""
     if sport is None:
         return
+    from fields.sports import template_name
     from fields.template import NAMES, load
 
-    if sport not in NAMES:
+    name = template_name(sport)
+    if name is None:
         fail(f"There is no field of {sport!r}; there are {', '.join(NAMES)}", USAGE)
-    template = load(sport)
-    for name, (x, y) in template.places({}).items():
-        print(f"{name}\t{x:.2f}\t{y:.2f}")
-    for name in template.places_at({}, 0.0):
-        print(name)
+    template = load(name)
+    for point, (x, y) in template.places({}).items():
+        print(f"{point}\t{x:.2f}\t{y:.2f}")
+    for point in template.places_at({}, 0.0):
+        print(point)
     raise typer.Exit
 
 

@@ -17,6 +17,7 @@ from service.routes.contract.guarded import Guarded
 from service.schemas.field import FieldOfPlay
 from service.schemas.names import ID_PATTERN, LensModel
 from service.schemas.programs.clicked_pose import ClickedPose, ClickedPoseRequest
+from service.store.jobs.queries import JobPage
 
 ARC_STEP_RAD = math.radians(4)
 router = APIRouter(route_class=Page, include_in_schema=False)
@@ -47,8 +48,19 @@ def _described(request: Request, context: Context, template: str) -> Response:
 
 
 def _free_id(context: Context) -> str:
-    """An id that no venue has, for those who do not care."""
-    return next(name for number in count(1) if context.venues.get(name := f"venue-{number}") is None)
+    """An id that no venue has and no search was for, of which a venue can still be made: for those who do not care."""
+    names = (f"venue-{number}" for number in count(1))
+    return next(name for name in names if context.venues.get(name) is None and not _has_jobs(context, name))
+
+
+def _has_jobs(context: Context, venue_id: str) -> bool:
+    return bool(context.jobs.summaries(JobPage(1, venue=venue_id)))
+
+
+@data.get("/free", openapi_extra=needs_scope("read"))
+def free_id(context: InContext) -> dict[str, str]:
+    """Propose an id for a new venue, for a page on which the one that it was given may have been taken meanwhile."""
+    return {"id": _free_id(context)}
 
 
 @data.get("/taken", openapi_extra=needs_scope("read"))

@@ -20,7 +20,7 @@ from service.api.auth import COOKIE, SCOPES, page_token
 from service.api.root_path import with_root_path
 from service.pages import formatting
 from service.pages.assets import address
-from service.pages.seam import seam_curve
+from service.pages.seam import is_within_uncertainty, seam_curve
 from service.pages.trend_curves import trend_curves
 from service.routes.contract.guarded import Guarded
 from service.schemas.names import Scope
@@ -57,6 +57,7 @@ templates = Environment(
 templates.globals |= {
     "static": address,
     "version": version("esc-calibration"),
+    "is_within_uncertainty": is_within_uncertainty,
     "seam_curve": seam_curve,
     "trend_curves": trend_curves,
     "reasons": REFUSAL_REASONS,

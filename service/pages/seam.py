@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.schemas.results import PairResult
+from service.schemas.results import PairResult, SeamPlace
 
 WIDTH, HEIGHT, LEFT, BELOW, ABOVE = 480.0, 120.0, 34.0, 18.0, 8.0
 LEAST_TOP_CM = 5.0
@@ -13,7 +13,10 @@ LEAST_TOP_CM = 5.0
 
 @dataclass(frozen=True)
 class SeamDot:
-    """A place of the seam in the box: its error, what is one sigma around it, and what to say of it."""
+    """A place of the seam in the box: its error, what is one sigma around it, and what to say of it.
+
+    `worst`: it is the worst one, and worse than its uncertainty explains.
+    """
 
     x: float
     y: float
@@ -34,6 +37,11 @@ class SeamCurve:
     top: float
 
 
+def is_within_uncertainty(place: SeamPlace) -> bool:
+    """True where the error of a place may be none: it is less than two sigma."""
+    return place.error_cm < 2 * place.sigma_cm
+
+
 def seam_curve(pair: PairResult) -> SeamCurve | None:
     """Of a pair of cameras, None where its seam has fewer than two places."""
     places = pair.seam
@@ -52,7 +60,7 @@ def seam_curve(pair: PairResult) -> SeamCurve | None:
             height(place.error_cm - place.sigma_cm),
             height(place.error_cm + place.sigma_cm),
             f"{place.error_cm:.1f} ± {place.sigma_cm:.1f} cm at ({round(place.at[0])}, {round(place.at[1])}) m",
-            place == pair.worst,
+            place == pair.worst and not is_within_uncertainty(place),
         )
         for number, place in enumerate(places)
     ]

@@ -17,6 +17,8 @@ MOST_LEVELS, MOST_DATES = 5, 4
 NIGHTS_WITH_DOTS = 130
 """Of more nights, those alone have a dot that a chart has told, and a smaller one."""
 RADII: dict[TrendState, float] = {"quiet": 2.2, "drifting": 3.2, "alarm": 3.8}
+LEAST_NIGHTS = 2
+"""Of one night there is nothing to draw: its figures are in words."""
 SMALL = 0.5
 
 
@@ -74,7 +76,9 @@ class _Value:
 
 
 def trend_curves(trend: Trend) -> list[TrendCurve]:
-    """The charts of a camera that has a trend; the second one where its focal length was ever asked for."""
+    """The charts of a camera that has nights enough; the second one where its focal length was ever asked for."""
+    if len(trend.points) < LEAST_NIGHTS:
+        return []
     moved = [_moved(point, trend.alarm_m) for point in trend.points]
     lens = [value for point in trend.points if (value := _lens(point, trend.alarm_m)) is not None]
     curves = [_curve(trend.camera, "Moved at the far touchline", moved, "cm", LEAST_TOP_CM)]

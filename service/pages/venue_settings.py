@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request, Response
 
 from service.api import etags
 from service.api.context import InContext
+from service.pages.alarm_suggestions import suggested_limits
 from service.pages.page_rendering import Page, render_page
 from service.routes.contract.documented import needs_scope
 from service.routes.venues import ExistingVenue, venue_etag
@@ -16,15 +17,32 @@ from service.schemas.geometry import Intrinsics
 from service.schemas.health import Alarms
 from service.schemas.names import LensModel
 
+# The last so many calibrations and revisions say what is usual: three months of nights.
+SUGGESTED_BY = 100
 router = APIRouter(route_class=Page, include_in_schema=False)
 
 
 @router.get("/ui/venues/{venue_id}/settings", openapi_extra=needs_scope("admin"))
-def settings(venue: ExistingVenue, request: Request) -> Response:
+def settings(venue: ExistingVenue, request: Request, context: InContext) -> Response:
     """Alarms, lenses, and the end of a venue."""
+    # NumPy takes its time to load.
+    from service.schemas.lens_map import lens_doubts
+
     lenses = {camera.id: _readable(camera.intrinsics) for camera in venue.cameras}
     shown = venue.model_copy(update={"alarms": venue.alarms or Alarms()})
-    return render_page(request, "settings.html", venue=shown, lenses=lenses, tag=etags.quoted(venue_etag(venue)))
+    return render_page(
+        request,
+        "settings.html",
+        venue=shown,
+        lenses=lenses,
+        suggested=suggested_limits(
+            context.past_calibrations.of(venue.id, SUGGESTED_BY),
+            context.venues.history(venue.id, None, SUGGESTED_BY),
+            [context.trends.of(venue, camera.id) for camera in venue.cameras],
+        ),
+        doubts={camera.id: lens_doubts(camera.intrinsics, camera.image_size) for camera in venue.cameras},
+        tag=etags.quoted(venue_etag(venue)),
+    )
 
 
 @router.get("/ui/venues/{venue_id}/first-pose", openapi_extra=needs_scope("admin"))

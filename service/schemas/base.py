@@ -25,7 +25,8 @@ from pydantic import (
 from service.schemas.names import ID_PATTERN
 
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
-Name = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+NAME_PATTERN = r"^[^\x00-\x1f\x7f]*$"
+Name = Annotated[str, StringConstraints(max_length=200, pattern=NAME_PATTERN)]
 # Finite, and a number: neither NaN, which Python's JSON reader lets through, nor true nor "1".
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Integer = Annotated[int, Field(strict=True)]

@@ -21,6 +21,7 @@ from pydantic import (
 
 from fields.plans import TEMPLATE_MEASURES, markings_of, other_shapes, plan_of, size_of
 from fields.shapes import COLOUR_PATTERN, WHITE, Shape
+from fields.sports import LONGEST, nearest_template_name, template_name
 from fields.template import NAMES, Extent, Template, load
 from service.schemas.base import Name, Number, Schema, is_tolerant
 from service.schemas.geometry import Row
@@ -32,6 +33,9 @@ PaintWidth = Annotated[Number, Field(ge=0.01, le=1)]
 Colour = Annotated[str, StringConstraints(pattern=COLOUR_PATTERN)]
 # Further than this beside the field nothing counts as a marking of it.
 MARGIN_M = 2.0
+FOOTBALL = "football"
+# Lengths in which fields are measured besides, in metres.
+OTHER_UNITS = {"centimetres": 0.01, "feet": 0.3048, "yards": 0.9144}
 # Of other sports on the same ground.
 MAX_OTHER_FIELDS = 16
 
@@ -96,13 +100,18 @@ class Layout(Schema):
     points: Annotated[dict[Annotated[Name, Field(min_length=1)], PitchPoint], Field(max_length=1000)] = Field({})
 
 
-def _is_a_template(name: str, info: ValidationInfo) -> str:
-    if name not in NAMES and not is_tolerant(info):
-        raise ValueError(f"{name} is none of the templates {', '.join(NAMES)}, nor markings of your own")
-    return name
+def _as_a_template(name: str, info: ValidationInfo) -> str:
+    meant = template_name(name)
+    if meant is not None or is_tolerant(info):
+        return meant or name
+    near = nearest_template_name(name)
+    suggestion = f"; did you mean {near}?" if near else ""
+    raise ValueError(
+        f"{name[:LONGEST]} is none of the templates {', '.join(NAMES)}, nor markings of your own{suggestion}"
+    )
 
 
-TemplateName = Annotated[str, AfterValidator(_is_a_template), WithJsonSchema({"type": "string", "enum": list(NAMES)})]
+TemplateName = Annotated[str, AfterValidator(_as_a_template), WithJsonSchema({"type": "string", "enum": list(NAMES)})]
 
 
 class OtherField(Schema):
@@ -157,7 +166,11 @@ class FieldOfPlay(Schema):
     template: Annotated[
         Annotated[TemplateName, Tag("name")] | Annotated[Layout, Tag("layout")],
         Discriminator(lambda given: "name" if isinstance(given, str) else "layout"),
-    ] = Field("football", description="The name of a sport's template, or markings of your own.")
+    ] = Field(
+        FOOTBALL,
+        description="The name of a sport's template, or markings of your own. Other names of a sport, such as `soccer` "
+        "or `ice hockey`, are stored as the template's.",
+    )
     length_m: Length = Field(description="Along x; absent: the template's.")
     width_m: Length = Field(description="Along y; absent: the template's.")
     line_width_m: PaintWidth = Field(description="Absent: the template's.")
@@ -178,10 +191,12 @@ class FieldOfPlay(Schema):
     @model_validator(mode="before")
     @classmethod
     def _as_usual(cls, given: Any) -> Any:
-        template = given.get("template", "football") if isinstance(given, dict) else None
-        if not isinstance(template, str) or template not in NAMES:
+        template = given.get("template", FOOTBALL) if isinstance(given, dict) else None
+        if not isinstance(template, str):
             return given
-        return {name: load(template).size[measure].default for name, measure in TEMPLATE_MEASURES.items()} | given
+        # Of a sport that is none, its name alone is told, and not that its measures are missing.
+        size = load(template_name(template) or FOOTBALL).size
+        return {name: size[measure].default for name, measure in TEMPLATE_MEASURES.items()} | given
 
     @field_validator(*TEMPLATE_MEASURES)
     @classmethod
@@ -293,4 +308,6 @@ class FieldOfPlay(Schema):
 
 def _must_lie(given: float, extent: Extent, what: str) -> None:
     if not extent.least <= given <= extent.most:
-        raise ValueError(f"{what}: {extent.least:g} to {extent.most:g} m, not {given:g}")
+        units = [unit for unit, metres in OTHER_UNITS.items() if extent.least <= given * metres <= extent.most]
+        question = f"; are these {' or '.join(units)}?" if units else ""
+        raise ValueError(f"{what}: {extent.least:g} to {extent.most:g} m, not {given:g}{question}")

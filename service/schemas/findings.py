@@ -8,6 +8,11 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
+from fields.shapes import COLOUR_PATTERN, COLOURS
+from service.schemas.base import NAME_PATTERN
+from service.schemas.names import ID_IN_WORDS, ID_PATTERN, JOB_ID_PATTERN, id_like
+from service.schemas.options import CHARUCO_PATTERN
+
 Location = tuple[str | int, ...]
 MAX_PREVIEW_LENGTH = 40
 MAX_NAME_LENGTH = 64
@@ -29,21 +34,39 @@ EXPECTED = {
     "model_type": "an object",
     "model_attributes_type": "an object",
     "literal_error": "{expected}",
-    "greater_than": "more than {gt}",
-    "greater_than_equal": "{ge} or more",
-    "less_than": "less than {lt}",
-    "less_than_equal": "{le} or less",
+    "greater_than": "more than {gt:g}{unit}",
+    "greater_than_equal": "{ge:g}{unit} or more",
+    "less_than": "less than {lt:g}{unit}",
+    "less_than_equal": "{le:g}{unit} or less",
 }
 """By the kinds of pydantic, with what it says of each."""
+UNITS = {
+    "_m": " m",
+    "_px": " px",
+    "_deg": "°",
+    "_s": " s",
+    "_h": " h",
+    "rotation": " rad",
+    "position": " m",
+    "translation": " m",
+}
+"""By the ends of names."""
+EXPECTED_PATTERN = {
+    ID_PATTERN: f"an id, {ID_IN_WORDS}",
+    JOB_ID_PATTERN: "the id of a job, 26 capital letters and digits",
+    NAME_PATTERN: "text without control characters",
+    COLOUR_PATTERN: f"{', '.join(COLOURS)} or #rrggbb",
+    CHARUCO_PATTERN: "the name of a dictionary of OpenCV, such as 4X4_50",
+}
+"""By the patterns of the schemas, which are for programs."""
 EXPECTED_LENGTH = {
     "too_short": "at least {min_length} entries, came {actual_length}",
     "too_long": "at most {max_length} entries, came {actual_length}",
     "string_too_short": "at least {min_length} characters",
     "string_too_long": "at most {max_length} characters",
-    "string_pattern_mismatch": "text of the pattern {pattern}",
 }
 """What came is too long to be shown, or a secret."""
-NOT_METRES = "it is in metres, and these look like centimetres or millimetres"
+NOT_METRES = "it is in metres: are these centimetres or millimetres?"
 OTHER_UNITS = {
     "rotation": "it is a Rodrigues vector in radians, and these look like degrees",
     "position": NOT_METRES,
@@ -66,13 +89,27 @@ def _describe_error(finding: Mapping[str, Any], place: str, meant: Mapping[Locat
         case "extra_forbidden":
             return f"{place} is not known{meant.get(finding['loc'], '')}"
         case kind if kind in EXPECTED:
-            expected = EXPECTED[kind].format(**finding.get("ctx", {}))
+            expected = EXPECTED[kind].format(unit=_unit(finding["loc"]), **finding.get("ctx", {}))
             said = f"expected {expected}, came {_preview(finding['input'])}{_other_unit(finding)}"
         case kind if kind in EXPECTED_LENGTH:
             said = f"expected {EXPECTED_LENGTH[kind].format(**finding['ctx'])}"
+        case "string_pattern_mismatch":
+            said = _described_pattern(finding["ctx"]["pattern"], finding["input"])
         case _:
             said = finding["msg"].removeprefix("Value error, ")
     return f"{place}: {said}" if place else said
+
+
+def _described_pattern(pattern: str, given: str) -> str:
+    words = f"expected {EXPECTED_PATTERN.get(pattern, f'text of the pattern {pattern}')}, came {_preview(given)}"
+    proposed = id_like(given[:MAX_NAME_LENGTH]) if pattern == ID_PATTERN else ""
+    return f"{words}; {proposed} would do" if proposed else words
+
+
+def _unit(place: Location) -> str:
+    """The unit of a number, by the name of the field that it stands in; empty where it has none."""
+    name = next((step for step in reversed(place) if isinstance(step, str)), "")
+    return next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
 
 
 def _other_unit(finding: Mapping[str, Any]) -> str:
@@ -80,6 +117,8 @@ def _other_unit(finding: Mapping[str, Any]) -> str:
     if finding["type"] not in ("less_than_equal", "greater_than_equal"):
         return ""
     of = [OTHER_UNITS[step] for step in finding["loc"] if step in OTHER_UNITS]
+    if not of and finding["type"] == "less_than_equal" and _unit(finding["loc"]) == " m":
+        of = [NOT_METRES]
     return f"; {of[-1]}" if of else ""
 
 
@@ -88,7 +127,8 @@ def _path_with_ids(place: Location, document: Any) -> str:
     steps = []
     for number, step in enumerate(place, start=1):
         inside = _member(document, step)
-        if inside is None and document is not None and number < len(place):
+        is_last = number == len(place)
+        if inside is None and document is not None and not (is_last and isinstance(document, dict | list)):
             continue
         steps.append(str(inside["id"] if isinstance(step, int) and _has_id(inside) else step))
         document = inside

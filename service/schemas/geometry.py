@@ -175,6 +175,15 @@ def require_camera_id(camera_id: str) -> None:
         raise ValueError("a camera cannot be called 'options': that is a part of the upload")
 
 
+def check_lens(lens: Intrinsics, image_size: list[int]) -> None:
+    """Raise `ValueError` for a lens that is sent and has no rays for its picture; one that is stored was taken once."""
+    if lens.model in DISTORTION_LENGTHS:
+        # NumPy takes its time to load, and what is only read needs none of this.
+        from service.schemas.lens_map import require_usable_lens
+
+        require_usable_lens(lens, image_size)
+
+
 class UnposedCamera(Schema):
     """What a camera is, but for its pose."""
 
@@ -188,7 +197,8 @@ class UnposedCamera(Schema):
         (fx, _, cx), (_, fy, cy), _ = self.intrinsics.matrix
         width, height = self.image_size
         for focal, centre, size in ((fx, cx, width), (fy, cy, height)):
-            # From wider than any fisheye to longer than any broadcast lens; a matrix of another resolution shows here.
+            # From wider than any fisheye to longer than any broadcast lens: millimetres show here. A matrix of another
+            # resolution is doubted in words (`lens_map`): a picture may have been cut.
             if not 0.1 * size <= focal <= 200 * size or not -size <= centre <= 2 * size:
                 raise ValueError(f"the camera matrix does not belong to an image of {width}x{height} pixels")
         return self

@@ -1,9 +1,12 @@
-"""What the numbers of a lens may be, and what is said of a lens that nobody says anything about. No models."""
+"""What the numbers of a lens may be, and what is said of one whose accuracy is not known. No models."""
 
 from __future__ import annotations
 
 LEAST_SIGMA, LARGEST_SIGMA = 1e-9, 1e6
-LARGEST_COEFFICIENT = 1000
+# What a coefficient does depends on the lens (`lens_map` judges that): the sixth-order term of the longest one that is
+# taken, whose focal length is 200 times its picture, is some 1e13 where it shifts a corner by a tenth. Of numbers
+# that are no larger, no power of a radius in the engine becomes infinite, not even in single precision.
+LARGEST_COEFFICIENT = 1e15
 # What the engine takes the focal length of a lens without a sigma to be known to, one standard deviation.
 BOARD_FOCAL_PERCENT = 0.03
 

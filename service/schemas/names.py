@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from typing import Literal, get_args
 
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 JOB_ID_PATTERN = r"^[0-9A-HJKMNP-TV-Z]{26}$"
+ID_IN_WORDS = "at most 64 small letters, digits, - and _, the first a letter or a digit"
+# Latin letters that are no letter with a mark, which the browser's frames.js spells alike.
+SPELT_OUT = str.maketrans(
+    {"æ": "ae", "đ": "d", "ð": "d", "ı": "i", "ł": "l", "ø": "o", "œ": "oe", "ß": "ss", "þ": "th"}
+)
 # Parts of an upload.
 OPTIONS_PART = "options"
 PHOTOS_PART = "photos"
@@ -45,6 +52,13 @@ JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 # Of calibrations.
 Verdict = Literal["accepted", "partly", "rejected"]
 OPEN_STATUSES: tuple[JobStatus, ...] = ("queued", "running")
+
+
+def id_like(name: str) -> str:
+    """Return the id that is spelt most like a name: `Süd 01` becomes `sud-01`; empty where none of it can be kept."""
+    spelt = unicodedata.normalize("NFKD", name.lower().translate(SPELT_OUT))
+    plain = "".join(letter for letter in spelt if not unicodedata.combining(letter))
+    return re.sub(r"[^a-z0-9_-]+", "-", plain).strip("-_")[:64]
 
 
 def problem_uri(kind: str) -> str:

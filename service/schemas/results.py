@@ -485,7 +485,9 @@ class FoundCameraResult(Schema):
     accepted: bool
     reason: FindReason | None = Field(description="Why it is not accepted, in a word.")
     rejected_because: str | None
-    remarks: list[str] = Field(description="What was assumed, such as the side of a field that looks the same twice.")
+    remarks: list[str] = Field(
+        description="What was assumed, such as the side of a field that looks the same twice; doubts about its lens."
+    )
     image_size: list[int]
     candidates: list[CandidateResult]
 

@@ -57,7 +57,7 @@ class Displacement(Schema):
 
 
 Quantity = Literal["across", "away", "focal-length"]
-TrendState = Literal["quiet", "drifting", "alarm"]
+TrendState = Literal["too-few-nights", "jumped", "quiet", "drifting", "alarm"]
 
 
 class Chart(Schema):
@@ -132,7 +132,8 @@ class Trend(Schema):
     anchor: int | None = Field(description="The revision of the anchor; null: no pose was accepted since it was put.")
     since: datetime | None = Field(description="When that was accepted.")
     state: Annotated[TrendState, OPEN_WORD] = Field(
-        description="`drifting`: a chart says that the mean has moved; `alarm`: and by at least `alarm_m`."
+        description="`drifting`: a chart says that the mean has moved; `alarm`: and by at least `alarm_m`. Before "
+        "there are four nights `too-few-nights`, or `jumped`: the last pose is `alarm_m` and three sigma off."
     )
     words: str = Field(description="That in a sentence.")
     alarm_m: float = Field(description="At the far touchline; `alarms.trend_m` of the venue, or the usual.")

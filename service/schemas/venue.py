@@ -13,9 +13,8 @@ from service.schemas.base import OPEN_WORD, Id, Name, Number, Schema, is_none
 from service.schemas.events import hidden_urls
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
+from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera, check_lens
 from service.schemas.health import Alarm, Alarms, CalibrationEnd
-from service.schemas.lens_limits import assumed_lens_warning
 from service.schemas.options import Options
 from service.schemas.schedule import Schedule
 from service.schemas.view import VIEW_EXAMPLE, ViewChoice
@@ -78,6 +77,11 @@ class CameraIn(UnposedCamera):
     )
 
     @model_validator(mode="after")
+    def _has_a_usable_lens(self) -> Self:
+        check_lens(self.intrinsics, self.image_size)
+        return self
+
+    @model_validator(mode="after")
     def _ignores_what_is_in_its_picture(self) -> Self:
         width, height = self.image_size
         for x, y in (corner for polygon in self.ignore for corner in polygon):
@@ -130,6 +134,7 @@ VENUE_EXAMPLE: dict[str, Any] = {
             "intrinsics": {
                 "matrix": [[2122.4, 0, 1634.8], [0, 2122.4, 877.7], [0, 0, 1]],
                 "distortion": [-0.3402, 0.1042, 0, 0, 0],
+                "sigma": {"fx": 2.0, "fy": 2.0, "cx": 3.0, "cy": 3.0, "k1": 0.002, "k2": 0.003},
             },
             "pose": {"rotation": [1.675, 0.372, -0.462], "position": [-1.48, -49.49, 7.84]},
         }
@@ -234,8 +239,11 @@ class Venue(NamedField):
 
     @property
     def lens_warnings(self) -> list[str]:
-        """A line for each camera whose lens is taken to be well known because nobody said how well it is."""
-        return [assumed_lens_warning(camera.id) for camera in self.cameras if not camera.intrinsics.sigma]
+        """What is doubtful about the lenses of its cameras, a line each."""
+        # NumPy takes its time to load, and most that reads venues asks nothing of their lenses.
+        from service.schemas.lens_map import lens_warnings
+
+        return [words for camera in self.cameras for words in lens_warnings(camera)]
 
     @property
     def poses_and_lenses(self) -> list[PosedCamera]:
@@ -300,7 +308,8 @@ class ChangedVenue(Venue):
     warnings: list[str] = Field(
         [],
         description="Of poses from which no field is filmed, with the convention that would explain them, and of "
-        "lenses without a `sigma`. Not kept: GET does not show it, and PUT takes it and ignores it.",
+        "lenses: those without a `sigma`, without rays for a part of the picture, of another resolution. Not kept: GET "
+        "does not show it, and PUT takes it and ignores it.",
         examples=[
             [
                 "camera west: its lens has no sigma and is taken to be as sure as a good board leaves it, "

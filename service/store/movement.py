@@ -23,8 +23,9 @@ from service.schemas.names import LensModel
 Array = NDArray[np.float64]
 # Of all markings together; as many more as there are markings.
 POINTS = 150
-# How far from the axis a lens is looked at (tangent), and how finely, to find where its formula turns back.
-WIDEST, STEP = 6.0, 0.02
+# Where a lens is looked at (tangent from the axis) to find where its formula turns back: the whole picture of a long
+# one lies within some thousandths.
+NEAREST, WIDEST, STEPS = 1e-4, 6.0, 600
 
 
 def moved(field: FieldOfPlay, before: PosedCamera, after: PosedCamera) -> Moved:
@@ -117,12 +118,13 @@ def pixels(camera: PosedCamera, points: Array) -> Array:
 
 def _turning_back(model: LensModel, distortion: Array) -> float:
     """The distance from the axis (tangent) from which a lens formula takes points back towards the middle."""
-    distances = np.arange(0.0, WIDEST, STEP)
+    distances = np.concatenate([[0.0], np.geomspace(NEAREST, WIDEST, STEPS)])
     rays = np.column_stack([distances, np.zeros_like(distances), np.ones_like(distances)])
     radial = distortion.copy()
     if model == "opencv":
         radial[2:4] = radial[8:] = 0.0
-    growing = np.diff(_distorted(model, radial, rays)[:, 0]) > 0
+    with np.errstate(invalid="ignore"):
+        growing = np.diff(_distorted(model, radial, rays)[:, 0]) > 0
     return math.inf if growing.all() else float(distances[np.argmin(growing)])
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from service.control_charts import (
     DECISION_SIGMA,
+    LIMIT_SIGMA,
     NIGHTS_OF_BASELINE,
     Baseline,
     ChartPoint,
@@ -26,6 +27,8 @@ from service.schemas.trend import Chart, Quantity, Trend, TrendPoint, TrendState
 
 ALARM_M = 0.05
 """At the far touchline: what a shift amounts to that is an alarm, where the venue says nothing else."""
+NIGHTS_TO_JUDGE = 4
+"""With fewer no chart can ring, however far a camera moves: of three, the spread has the night that moved in it."""
 Rows = Sequence[Any]
 QUANTITIES: Mapping[Quantity, tuple[str, str]] = {
     "across": ("across_m", "repeatability_across_m"),
@@ -103,12 +106,31 @@ class CameraCharts:
 
     def state(self, number: int, alarm_m: float) -> TrendState:
         """How the camera is doing after a night."""
-        return state_of(beyond=bool(self.beyond(number)), moved_m=self.moved_m(number), alarm_m=alarm_m)
+        beyond = bool(self.beyond(number))
+        if beyond or number + 1 >= NIGHTS_TO_JUDGE:
+            return state_of(beyond=beyond, moved_m=self.moved_m(number), alarm_m=alarm_m)
+        jump_m, sigma_m = self.jump(number)
+        return "jumped" if jump_m >= alarm_m and jump_m > LIMIT_SIGMA * sigma_m else "too-few-nights"
+
+    def jump(self, number: int) -> tuple[float, float]:
+        """Return how far the last pose of a night is from the anchor at the far touchline, and its sigma, m."""
+        last = self.nights[number][-1:]
+        across, away = last[0].across_m, last[0].away_m
+        return hypot(across, away), _sigma_m(last, across, away)
 
     def words(self, camera: str) -> str:
         """What there is to say after the last night."""
         number = len(self.nights) - 1
         beyond = self.beyond(number)
+        if not beyond and number + 1 < NIGHTS_TO_JUDGE:
+            few = f"too few nights to judge by ({number + 1} of {NIGHTS_TO_JUDGE})"
+            jump_m, sigma_m = self.jump(number)
+            if jump_m <= LIMIT_SIGMA * sigma_m:
+                return f"Camera {camera}: {few}."
+            return (
+                f"Camera {camera} stands {_cm(jump_m)} ± {_cm(sigma_m)} from its anchor at the far touchline, more "
+                f"than {LIMIT_SIGMA:.0f} sigma; {few} whether it is a trend: if nobody moved it, look at its mount."
+            )
         if not beyond:
             first = self.nights[0][0].at
             return (

@@ -265,7 +265,7 @@ def _trend(venue: Venue, camera: str, anchor: Any, rows: Sequence[Any], since: d
         camera=camera,
         anchor=None,
         since=None,
-        state="quiet",
+        state="too-few-nights",
         words=_nothing_said(camera)["words"],
         alarm_m=alarm_m,
         moved_m=0.0,

@@ -24,6 +24,8 @@ SIZE = (3840, 2160)
 WORLD = 56
 MOVED_M, MOVED_DEG = 0.16, 1.0
 LARGEST_BYTES = 3_000_000
+# What a good board leaves, which a lens without a sigma is taken to be as sure as.
+LENS_SIGMA = {"fx": 0.7, "fy": 0.7, "cx": 1.0, "cy": 1.0, "k1": 0.0005, "k2": 0.0005}
 
 FIELD = Field(105.0, 68.0, 0.12, np.array([[-18.5, 0.0, 0.35], [18.5, 0.0, 0.35]]))
 
@@ -73,6 +75,7 @@ def main() -> None:
                 "intrinsics": {
                     "matrix": camera.intrinsics.matrix.tolist(),
                     "distortion": camera.intrinsics.distortion.tolist(),
+                    "sigma": LENS_SIGMA,
                 },
                 "pose": _written(outdated(camera.pose, MOVED_M, MOVED_DEG, rng)),
             }

@@ -66,6 +66,11 @@ def test_a_lens_is_changed_by_its_file_and_what_is_wrong_with_it_is_said(stub, v
     form.get_by_label("Lens of left, JSON").fill(json.dumps({"matrix": [[-1, 0, 32], [0, 61, 24], [0, 0, 1]]}))
     form.get_by_role("button", name="Store the lens of left").click()
     expect(form.get_by_role("alert")).to_contain_text("focal")
+    folding = {"matrix": matrix, "distortion": [-0.99, 0, 0, 0, 0]}
+    form.get_by_label("Lens of left, JSON").fill(json.dumps(folding))
+    with page.expect_navigation():
+        form.get_by_role("button", name="Store the lens of left").click()
+    expect(form.get_by_text("This lens has no ray for")).to_be_visible()
     form.get_by_label("Lens of left, JSON").fill(json.dumps({"matrix": matrix, "distortion": [-0.1, 0, 0, 0, 0]}))
     with page.expect_navigation():
         form.get_by_role("button", name="Store the lens of left").click()
@@ -77,7 +82,14 @@ def test_a_lens_is_changed_by_its_file_and_what_is_wrong_with_it_is_said(stub, v
 
 def test_alarms_are_set_and_taken_away(stub, visit):
     name = stub.venue("guarded")
-    page = visit(stub.url, f"/ui/venues/{name}/settings")
+    page = visit(stub.url, f"/ui/venues/{name}/settings", forgiven=("422",))
+    moved = page.get_by_label("A calibration moves a camera by more than, px")
+    moved.fill("0")
+    page.get_by_role("button", name="Save alarms").click()
+    expect(page.get_by_role("form", name="Alarms").get_by_role("alert")).to_have_text(
+        "A calibration moves a camera by more than, px: expected more than 0 px, came 0"
+    )
+    moved.fill("")
     row = page.get_by_label("So many calibrations in a row without a pose")
     row.fill("three")
     page.get_by_role("button", name="Save alarms").click()

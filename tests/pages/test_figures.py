@@ -3,6 +3,8 @@
 import re
 from typing import get_args
 
+import pytest
+
 from service.pages import formatting
 from service.pages.page_rendering import templates
 from service.pages.seam import seam_curve
@@ -49,6 +51,11 @@ def test_the_worst_of_a_seam_is_called_that_of_what_is_measured_well():
     assert "worst of what is measured well 1.9 ± 0.5 cm" in told
     assert "Within its uncertainty" not in told
     assert "Within its uncertainty" in caption(pair(0.4, 0.6))
+
+
+@pytest.mark.parametrize(("error_cm", "is_red"), [(0.3, False), (1.1, False), (1.9, True)])
+def test_the_worst_of_a_seam_is_red_only_beyond_its_uncertainty(error_cm, is_red):
+    assert seam_curve(pair(error_cm, 0.6)).dots[0].worst == is_red
 
 
 def test_pairs_beyond_the_six_that_are_farthest_apart_are_folded():

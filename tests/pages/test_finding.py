@@ -5,6 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
+from service.schemas.names import id_like
 from service.store.jobs.queries import ONE
 from tests.e2e.routes.test_find import depth, find, found, site
 from tests.e2e.running import png
@@ -45,6 +46,29 @@ def test_a_venue_is_made_of_frames_by_three_clicks(stub, visit, files, name):
     page.wait_for_url(f"**/ui/venues/{name}")
     expect(page.get_by_text("found from frames")).to_be_visible()
     assert [depth(stub.http.get(f"/venues/{name}").json(), camera) for camera in ("left", "right")] == [40, 40]
+
+
+def test_pages_that_were_proposed_the_same_id_search_for_venues_of_their_own(stub, visit, files):
+    pages = [visit(stub.url, "/ui/new-venue") for _ in range(2)]
+    assert len({page.get_by_label("Id", exact=True).first.input_value() for page in pages}) == 1
+    for page in pages:
+        page.locator("#frames input[type=file]").set_input_files(files)
+        page.get_by_role("button", name="Find the cameras").click()
+        page.wait_for_url("**/ui/jobs/*")
+    for page in pages:
+        page.get_by_role("button", name="Create the venue").click()
+        page.wait_for_url("**/ui/venues/venue-*")
+    assert len({page.url for page in pages}) == 2
+
+
+def test_browser_and_service_spell_an_id_like_a_name_alike(stub, visit):
+    page = visit(stub.url, "/ui/new-venue")
+    names = ["Camera Süd 01", "Cam 1", "Øst_Łódź", "STRASSE – ẞ", "İzmir ıŞIK", "камера", "-a-", "é" * 99]
+    spelt = """async names => {
+        const {idLike} = await import(new URL("steps.js", document.querySelector("script[src*='newvenue.js']").src));
+        return names.map(idLike);
+    }"""
+    assert page.evaluate(spelt, names) == [id_like(name) for name in names]
 
 
 def stored_site(connection, job):

@@ -2,11 +2,15 @@
 
 import re
 from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 
 import pytest
 from playwright.sync_api import expect
 
+from service.pages.alarm_suggestions import suggested_limits
+from service.pages.page_rendering import templates
 from service.pages.trend_curves import trend_curves
+from service.schemas.geometry import Moved
 from service.schemas.trend import Chart, Trend, TrendPoint
 from tests.pages.browsing import differs, in_each_scheme, look
 from tests.trending import nights, noisy
@@ -37,6 +41,8 @@ def test_each_camera_says_how_far_it_has_moved_and_draws_it(stub, drifted, visit
     expect(panel.locator(".badge")).to_have_text(["Alarm", "Alarm"])
     said = stub.http.get("/venues/v/cameras/left/trend").json()["words"]
     expect(panel.get_by_text(said)).to_be_visible()
+    # No alarm of the venue tells it.
+    expect(page.locator("p.note", has_text=said)).to_be_visible()
     for chart in ("Moved at the far touchline", "Focal length"):
         for camera in ("left", "right"):
             expect(panel.get_by_role("img", name=f"Camera {camera}. {chart}")).to_be_visible()
@@ -106,27 +112,51 @@ def point(number, across_m, focal_length=None, *, beyond=False):
     )
 
 
+def trend(points, state="quiet", **told):
+    told = {"words": "", "alarm_m": 0.05, "moved_m": 0.0, "baseline_nights": len(points), **told}
+    return Trend(venue="v", camera="left", anchor=1, since=SUMMER, state=state, points=points, **told)
+
+
 def curves(points):
-    trend = Trend(
-        venue="v",
-        camera="left",
-        anchor=1,
-        since=SUMMER,
-        state="quiet",
-        words="",
-        alarm_m=0.05,
-        moved_m=0.0,
-        baseline_nights=1,
-        points=points,
+    return trend_curves(trend(points))
+
+
+@pytest.mark.parametrize(
+    ("state", "badge"),
+    [("too-few-nights", "plain"), ("jumped", "part"), ("quiet", "good"), ("drifting", "part"), ("alarm", "bad")],
+)
+def test_a_single_night_is_told_in_words_and_not_drawn(state, badge):
+    shown = templates.get_template("parts.html").module.trend(
+        trend([point(0, 3.15)], state, words="Camera left stands")
     )
-    return trend_curves(trend)
+    assert f'class="badge {badge}"' in shown
+    assert ("Quiet" in shown) == (state == "quiet")
+    assert "Camera left stands" in shown
+    assert "<svg viewBox" not in shown
+    assert "<svg viewBox" in templates.get_template("parts.html").module.trend(trend([point(0, 0.0), point(1, 3.15)]))
 
 
-def test_a_single_night_is_a_dot_in_the_middle():
-    (curve,) = curves([point(0, 0.0)])
-    (dot,) = curve.dots
-    assert curve.left < dot.x < curve.right
-    assert [tick.label for tick in curve.dates] == ["1 Jun"]
+NIGHTLY = timedelta(days=1)
+
+
+def end(number, moved_px, *, accepted=True):
+    moved = {"left": Moved(rotation_deg=0.0, position_m=0.0, pixels=moved_px)}
+    return SimpleNamespace(
+        accepted=accepted, dry_run=False, moved=moved, moved_px=moved_px, finished_at=SUMMER - number * NIGHTLY
+    )
+
+
+def test_limits_of_alarms_are_suggested_by_nights_once_there_are_enough_of_them():
+    few = [end(number, 1.0) for number in range(19)]
+    assert suggested_limits(few, [], [trend([point(0, 0.0)])]) == {"trend_m": "0.05"}
+    ends = [end(number, 1.0 + 0.1 * (number % 5), accepted=number not in (7, 8)) for number in range(40)]
+    quiet = trend([point(number, 0.0) for number in range(20)])
+    assert suggested_limits(ends, [], [quiet]) == {
+        "moved_since_last_px": "1.7",
+        "rejected_in_a_row": "3",
+        "not_calibrated_for_h": "48",
+        "trend_m": "0.03",
+    }
 
 
 def test_harmless_noise_looks_harmless():

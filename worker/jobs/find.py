@@ -13,6 +13,7 @@ import numpy as np
 from service.schemas.find import SoughtCameraIn, SoughtSite
 from service.schemas.geometry import Intrinsics, PosedCamera
 from service.schemas.geometry import Pose as PoseSchema
+from service.schemas.lens_map import lens_doubts
 from service.schemas.results import CandidateResult, FindResult, FoundCameraResult
 from service.store.jobs.files import candidate_picture_name
 from worker.calibration.find_cameras import FoundCamera, FoundCameras, find_cameras
@@ -84,7 +85,9 @@ def solve(
         for camera in found.cameras
         for name, picture in _pictures(pitch, found.pitch, camera, frames[camera.id][0]).items()
     }
-    return Solution(_result(found, pitch, sought, provenance_of(means, segmenter, seed, {"seed": seed})), pictures)
+    return Solution(
+        _result(found, pitch, site, sought, provenance_of(means, segmenter, seed, {"seed": seed})), pictures
+    )
 
 
 def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:
@@ -140,12 +143,21 @@ def _pictures(given: Field, found: Field, camera: FoundCamera, frame: Picture) -
     return pictures
 
 
-def _result(found: FoundCameras, given: Field, sought: Sequence[SoughtCamera], provenance: Provenance) -> FindResult:
+def _result(
+    found: FoundCameras, given: Field, site: SoughtSite, sought: Sequence[SoughtCamera], provenance: Provenance
+) -> FindResult:
+    doubts = {
+        camera.id: lens_doubts(camera.intrinsics, camera.image_size)
+        for camera in site.cameras
+        if camera.intrinsics is not None and camera.image_size is not None
+    }
     refusals = [f"camera {one.id}: {one.refusal.words}" for one in found.cameras if one.refusal is not None]
     return FindResult(
         accepted=not refusals,
         rejected_because="; ".join(refusals) or None,
-        cameras=[_camera(one, its.size) for one, its in zip(found.cameras, sought, strict=True)],
+        cameras=[
+            _camera(one, its.size, doubts.get(one.id, [])) for one, its in zip(found.cameras, sought, strict=True)
+        ],
         ridge=ridge_to_schema(found.pitch) if given.ridge is None else None,
         stitch_error_px=finite_or_none(found.stitch_error_px),
         timings_s=round_to_ms(found.timings.seconds),
@@ -154,13 +166,13 @@ def _result(found: FoundCameras, given: Field, sought: Sequence[SoughtCamera], p
     )
 
 
-def _camera(found: FoundCamera, size: tuple[int, int]) -> FoundCameraResult:
+def _camera(found: FoundCamera, size: tuple[int, int], doubts: Sequence[str]) -> FoundCameraResult:
     return FoundCameraResult(
         id=found.id,
         accepted=found.accepted,
         reason=None if found.refusal is None else found.refusal.reason,
         rejected_because=None if found.refusal is None else found.refusal.words,
-        remarks=list(found.remarks),
+        remarks=[*doubts, *found.remarks],
         image_size=list(size),
         candidates=[_candidate(one) for one in found.candidates],
     )

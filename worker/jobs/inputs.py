@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar, Union, dataclass_transform, get_args, 
 from fields.plans import other_shapes, plan_of, size_of
 from fields.shapes import Shape
 from fields.template import Template
-from service.schemas.lens_limits import assumed_lens_warning
+from service.schemas.lens_map import lens_warnings
 from service.schemas.names import LensModel
 
 R = TypeVar("R", bound="Record")
@@ -112,8 +112,8 @@ class Venue(Record):
 
     @property
     def lens_warnings(self) -> list[str]:
-        """A line for each camera whose lens is taken to be well known because nobody said how well it is."""
-        return [assumed_lens_warning(camera.id) for camera in self.cameras if not camera.intrinsics.sigma]
+        """What is doubtful about the lenses of its cameras, a line each."""
+        return [words for camera in self.cameras for words in lens_warnings(camera)]
 
 
 class Options(Record):

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
+from service.schemas.lens_map import map_of
 from worker.calibration.gate.quality import CameraResult
 from worker.calibration.geometry.camera import Array, Camera
 from worker.calibration.geometry.derivatives import POSE_NUMBERS
@@ -54,8 +55,10 @@ def _is_a_camera(camera: Camera) -> bool:
     lens = camera.intrinsics
     numbers = np.concatenate([camera.pose.rotation, camera.pose.position, lens.matrix.ravel(), lens.distortion])
     focal = np.diag(lens.matrix)[:2]
-    bent = np.abs(lens.distortion).max(initial=0.0)
-    return bool(np.isfinite(numbers).all() and (focal > 0).all() and bent <= LARGEST_COEFFICIENT)
+    if not np.isfinite(numbers).all() or not (focal > 0).all():
+        return False
+    seen = map_of(lens.model, lens.matrix.tolist(), lens.distortion.tolist(), lens.size)
+    return bool(np.abs(lens.distortion).max(initial=0.0) <= LARGEST_COEFFICIENT) and seen.is_usual
 
 
 def _lens_sigma(covariance: Array | None) -> dict[str, float] | None:

@@ -3,7 +3,7 @@
 import {call, root} from "./page.js";
 import {objection, sizeOf, thumbnail} from "./frames.js";
 import {missingOfPitch, pitch, pitchForm, readForm} from "./pitch.js";
-import {complain, number} from "./steps.js";
+import {complain, idLike, number} from "./steps.js";
 
 const box = document.getElementById("frames");
 const list = box.querySelector("ul");
@@ -17,7 +17,7 @@ const cameras = [];
 /** What a file is called, as the id of a camera that no other one has. */
 function idOf(file) {
   const known = cameras.map((camera) => camera.id);
-  const named = file.name.toLowerCase().replace(/\.[a-z]+$/, "").replace(/[^a-z0-9_-]+/g, "-").replace(/^[^a-z0-9]+/, "").slice(0, 60);
+  const named = idLike(file.name.replace(/\.[a-z]+$/i, "")).slice(0, 60);
   const first = ["", "options", "site"].includes(named) ? "camera" : named;
   let id = first;
   for (let count = 2; known.includes(id); count += 1) id = `${first}-${count}`;
@@ -78,21 +78,28 @@ function tell() {
 }
 
 async function find() {
-  const id = pitchForm.elements.id.value;
-  const site = {id, name: pitchForm.elements.name.value, field: pitch.plan.field, cameras: cameras.map((camera) => camera.wire)};
-  const body = new FormData();
-  body.append("site", new Blob([JSON.stringify(site)], {type: "application/json"}), "site.json");
-  for (const camera of cameras) body.append(camera.id, camera.file);
+  const proposed = pitchForm.elements.id;
   button.disabled = refused.hidden = true;
   missing.textContent = "Sending the frames …";
   try {
-    const job = await call("POST", `${root}/venues/${id}/find`, body);
+    // Searches of several pages that were given the same proposal would void each other.
+    if (proposed.value === proposed.defaultValue) proposed.value = proposed.defaultValue = (await call("GET", `${root}/ui/new-venue/free`)).id;
+    const job = await call("POST", `${root}/venues/${proposed.value}/find`, upload(proposed.value));
     location.assign(`${root}/ui/jobs/${job.id}`);
   } catch (problem) {
     refused.textContent = problem.message;
     refused.hidden = false;
     tell();
   }
+}
+
+/** The site and its frames, as the interface takes them. */
+function upload(id) {
+  const site = {id, name: pitchForm.elements.name.value, field: pitch.plan.field, cameras: cameras.map((camera) => camera.wire)};
+  const body = new FormData();
+  body.append("site", new Blob([JSON.stringify(site)], {type: "application/json"}), "site.json");
+  for (const camera of cameras) body.append(camera.id, camera.file);
+  return body;
 }
 
 /** Whatever the input has by now: on a slow line, files are chosen before this script has come. */

@@ -37,6 +37,16 @@ export class Refused extends Error {
   }
 }
 
+/** A message in which the fields of a form are called as the form calls them: "Length, m" and not "field.length_m". */
+export function asLabelled(form, message) {
+  let words = message;
+  for (const {name, labels} of form.elements) {
+    const label = name && labels?.[0]?.firstChild.textContent.trim();
+    if (label) words = words.replace(new RegExp(`(^|\\s)(?:\\w+\\.)*${name}:`, "g"), `$1${label}:`);
+  }
+  return words;
+}
+
 /** Headers that a page of a session sends with what it changes. */
 export const signed = token ? {"X-CSRF-Token": token} : {};
 

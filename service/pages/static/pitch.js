@@ -1,6 +1,6 @@
 // The pitch of a new venue: its id, its sport and its measures, looked at as they are typed.
 
-import {call, root} from "./page.js";
+import {asLabelled, call, root} from "./page.js";
 import {complain, drawPlan, later, number} from "./steps.js";
 
 export const pitchForm = document.getElementById("pitch");
@@ -29,7 +29,7 @@ async function readPitch(changed) {
     complain(wrong, "");
   } catch (refused) {
     pitch.plan = null;
-    complain(wrong, refused.message);
+    complain(wrong, asLabelled(pitchForm, refused.message));
     return changed();
   }
   for (const name of ["length_m", "width_m", "line_width_m"]) pitchForm.elements[name].placeholder = pitch.plan.field[name];

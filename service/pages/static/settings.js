@@ -1,6 +1,6 @@
 // The settings of a venue: alarms, lenses, and its end. Each is saved by itself, on the venue that the page shows.
 
-import {call, root} from "./page.js";
+import {asLabelled, call, root} from "./page.js";
 
 const box = document.getElementById("settings");
 const address = `${root}/venues/${box.dataset.venue}`;
@@ -16,7 +16,7 @@ function onSubmit(form, act) {
     try {
       await act();
     } catch (refusal) {
-      refused.textContent = refusal.message;
+      refused.textContent = asLabelled(form, refusal.message);
       refused.hidden = false;
     }
   });

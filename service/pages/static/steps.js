@@ -13,6 +13,16 @@ export function number(text) {
   return text.trim() === "" ? undefined : Number(text.replace(",", "."));
 }
 
+// Latin letters that are no letter with a mark, as `id_like` of the service spells them out.
+const SPELT_OUT = {"æ": "ae", "đ": "d", "ð": "d", "ı": "i", "ł": "l", "ø": "o", "œ": "oe", "ß": "ss", "þ": "th"};
+
+/** The id that is spelt most like a name: "Süd 01" becomes "sud-01"; empty where none of it can be kept. */
+export function idLike(name) {
+  const spelt = [...name.toLowerCase()].map((letter) => SPELT_OUT[letter] ?? letter).join("");
+  const plain = spelt.normalize("NFKD").replace(/\p{Mn}/gu, "");
+  return plain.replace(/[^a-z0-9_-]+/g, "-").replace(/^[-_]+|[-_]+$/g, "").slice(0, 64);
+}
+
 export function later(act) {
   let timer = 0;
   return () => {

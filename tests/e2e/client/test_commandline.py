@@ -251,10 +251,10 @@ def test_the_trend_of_a_venue_is_a_line_per_camera_and_that_of_a_camera_a_line_p
     service.calibrated(service.venue(name))
     service.calibrated(name)
     lines = [line.split("\t") for line in esc("venue", "trend", name).stdout.splitlines()]
-    assert [line[:2] for line in lines] == [["left", "quiet"], ["right", "quiet"]]
-    assert "has not moved beyond what its own spread explains" in lines[0][3]
+    assert [line[:2] for line in lines] == [["left", "too-few-nights"], ["right", "too-few-nights"]]
+    assert "too few nights to judge by (1 of 4)" in lines[0][3]
     (night,) = [line.split("\t") for line in esc("venue", "trend", name, "left").stdout.splitlines()]
-    assert night[1:] == ["quiet", "2.5", "1.7", "+0.010%"]
+    assert night[1:] == ["too-few-nights", "2.5", "1.7", "+0.010%"]
     assert json.loads(esc("venue", "trend", name, "left", "--json").stdout)["points"][0]["jobs"] == 2
     assert esc("venue", "trend", name, "left", "--since", "2999-01-01").stdout == ""
     refused = esc("venue", "trend", name, "--since", "yesterday")

@@ -13,7 +13,7 @@ def test_a_night_has_its_displacement_its_focal_length_and_its_charts(service, n
     service.calibrated(service.venue(name))
     job = service.calibrated(name)["id"]
     found = trend(service, name).json()
-    assert (found["venue"], found["camera"], found["anchor"], found["state"]) == (name, "left", 1, "quiet")
+    assert (found["venue"], found["camera"], found["anchor"], found["state"]) == (name, "left", 1, "too-few-nights")
     (night,) = found["points"]
     # The anchor itself and a job 5 cm from it, on one day.
     assert (night["job"], night["jobs"], night["displacement_m"]) == (job, 2, pytest.approx(0.025))

@@ -82,6 +82,31 @@ def test_markings_of_ones_own_are_white_unless_they_have_a_colour():
     assert [shape.colour for shape in field.plan.markings(field.size)] == ["white", *colours]
 
 
+@pytest.mark.parametrize(
+    ("typed", "template"),
+    [
+        ("soccer", "football"),
+        ("Fußball", "football"),
+        ("icehockey", "ice-hockey"),
+        ("Ice Hockey", "ice-hockey"),
+        ("american football", "american-football"),
+        ("gridiron", "american-football"),
+        ("field_hockey", "hockey"),
+        ("rugby", "rugby-union"),
+        ("beachvolleyball", "beach-volleyball"),
+    ],
+)
+def test_a_sport_by_another_name_is_stored_as_its_template(typed, template):
+    named = FieldOfPlay.model_validate({"template": typed, "other_markings": [{"template": typed}]})
+    assert named == FieldOfPlay.model_validate({"template": template, "other_markings": [{"template": template}]})
+
+
+@pytest.mark.parametrize("typed", ["rugby league", "box lacrosse", "", "a" * 10**6])
+def test_a_sport_that_may_be_another_one_is_not_guessed(typed):
+    with pytest.raises(ValidationError, match="is none of the templates"):
+        FieldOfPlay.model_validate({"template": typed})
+
+
 @pytest.mark.parametrize("colour", ["mauve", "#12", "#0a5fa8ff", "", "White", 3, None])
 def test_a_colour_that_is_none_is_refused(colour):
     with pytest.raises(ValidationError) as refused:

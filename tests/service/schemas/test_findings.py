@@ -49,25 +49,48 @@ LEFT = ("cameras", 0)
         (
             (*LEFT, "pose", "rotation"),
             [102.2, 12.0, -9.0],
-            "cameras.left.pose.rotation.0: expected 10.0 or less, came 102.2; it is a Rodrigues vector in radians, and "
-            "these look like degrees",
+            "cameras.left.pose.rotation.0: expected 10 rad or less, came 102.2; it is a Rodrigues vector in radians, "
+            "and these look like degrees",
         ),
         (
             (*LEFT, "pose", "position", 1),
             -4949.0,
-            "cameras.left.pose.position.1: expected -2000.0 or more, came -4949.0; it is in metres, and these look "
-            "like centimetres or millimetres",
+            "cameras.left.pose.position.1: expected -2000 m or more, came -4949.0; it is in metres: are these "
+            "centimetres or millimetres?",
         ),
         ((*LEFT, "pose"), "there", "cameras.left.pose: expected an object, came 'there'"),
         (("accept",), "ech", "accept: expected 'each' or 'all', came 'ech'"),
         (("cameras",), {}, "cameras: expected a list, came an object"),
         (("schedule",), {}, "schedule.cron is missing"),
         ((*LEFT, "pose", "position"), [0, 0, -1], "cameras.left: camera left stands at z = -1 m"),
-        (("id",), "Left!", "id: expected text of the pattern ^[a-z0-9]"),
+        (("id",), "Left!", "id: expected an id, at most 64 small letters, digits, - and _, the first"),
+        (("name",), "a\nb", "name: expected text without control characters, came 'a\\nb'"),
+        (
+            ("field", "length_m"),
+            10500,
+            "field.length_m: expected 400 m or less, came 10500; it is in metres: are these centimetres",
+        ),
+        (("field", "length_m"), 344, "field.length_m: football: 60 to 130 m, not 344; are these feet?"),
+        (("alarms",), {"moved_since_last_px": 0}, "alarms.moved_since_last_px: expected more than 0 px, came 0"),
     ],
 )
 def test_each_mistake_is_told_in_words_of_the_document(path, value, words):
     assert any(told.startswith(words) for told in wrong(VenueIn, with_value(path, value)))
+
+
+@pytest.mark.parametrize(
+    ("typed", "proposed"),
+    [("Cam 1", "cam-1"), ("Süd 01", "sud-01"), ("Øst/Łódź", "ost-lodz"), ("-Straße_", "strasse"), ("камера", None)],
+)
+def test_an_id_that_is_spelt_like_what_was_typed_is_proposed(typed, proposed):
+    (told,) = wrong(VenueIn, with_value((*LEFT, "id"), typed))
+    assert told.endswith(f"; {proposed} would do" if proposed else f"came {typed!r}")
+
+
+def test_a_sport_that_is_none_is_the_only_complaint_and_the_nearest_one_is_named():
+    (told,) = wrong(VenueIn, with_value(("field",), {"template": "voleyball"}))
+    assert told.startswith("field.template: voleyball is none of")
+    assert told.endswith("did you mean volleyball?")
 
 
 def test_what_is_absent_is_missing():

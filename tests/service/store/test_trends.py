@@ -36,7 +36,7 @@ def rows(stock):
 def test_a_venue_that_was_never_calibrated_has_an_empty_trend(stock):
     stock.venue("v")
     found = trend(stock)
-    assert (found.state, found.anchor, found.points) == ("quiet", None, [])
+    assert (found.state, found.anchor, found.points) == ("too-few-nights", None, [])
     assert found.words == "Camera left has had no pose accepted since it was put."
 
 
@@ -96,7 +96,7 @@ def test_a_person_who_accepts_what_holds_already_says_that_the_camera_is_right_t
     assert len(stock.venues.health("v").alarms) == 2
     for _ in range(2):
         stock.decisions.accept(stock.enqueued[-1], ["left"])
-        assert (moved_m(stock), trend(stock).state, trend(stock, "right").state) == ([0.0], "quiet", "alarm")
+        assert (moved_m(stock), trend(stock).state, trend(stock, "right").state) == ([0.0], "too-few-nights", "alarm")
     assert [alarm.camera for alarm in stock.venues.health("v").alarms] == ["right"]
     assert len(stock.venues.history("v", None, 100)) == 41
 
@@ -120,6 +120,31 @@ def test_restoring_takes_the_trend_back_to_what_it_was_then(stock):
     assert stock.attempts.begin(stock.submitted("v")).anchors == {}
 
 
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_a_camera_that_jumps_is_never_quiet_and_before_charts_can_tell_its_own_sigma_does(stock, count):
+    nights(stock, count, AUTUMN, lambda number: displacement(3.15 if number == count - 1 else 0.0))
+    found = trend(stock)
+    if count == 4:
+        assert (found.state, "beyond what its own spread explains" in found.words) == ("alarm", True)
+        return
+    assert found.state == "jumped"
+    assert found.words.startswith("Camera left stands 315.0 cm ± 1.5 cm from its anchor at the far touchline")
+    assert f"too few nights to judge by ({count} of 4)" in found.words
+    assert stock.venues.health("v").alarms == []
+
+
+def test_a_jump_on_the_day_of_the_anchor_counts_in_full_and_one_within_its_sigma_does_not(stock):
+    night(stock, displacement(0.0), at=AUTUMN)
+    night(stock, displacement(0.04), at=AUTUMN + timedelta(hours=1))
+    assert (trend(stock).state, trend(stock).words) == (
+        "too-few-nights",
+        "Camera left: too few nights to judge by (1 of 4).",
+    )
+    night(stock, displacement(0.3), at=AUTUMN + timedelta(hours=2))
+    assert trend(stock).state == "jumped"
+    assert "stands 30.0 cm" in trend(stock).words
+
+
 def test_a_quiet_camera_is_said_to_be_quiet(stock):
     nights(stock, 40, AUTUMN, noisy(5))
     found = trend(stock)
@@ -139,7 +164,7 @@ def test_a_step_is_told_with_its_size_and_its_day_and_rings_where_it_matters(sto
     assert found.moved_m == pytest.approx(0.045, abs=1.5 * SIGMA_M)
     assert "at the far touchline since 1 October 2026" in found.words
     assert found.words.endswith("beyond what its own spread explains (EWMA and CUSUM).")
-    assert [point.state for point in found.points[:30]] == ["quiet"] * 30
+    assert [point.state for point in found.points[:30]] == ["too-few-nights"] * 3 + ["quiet"] * 27
     alarms = stock.venues.health("v").alarms
     assert [(alarm.rule, alarm.camera) for alarm in alarms] == [("trend", "left"), ("trend", "right")]
     assert alarms[0].why == found.words

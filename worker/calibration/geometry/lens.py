@@ -168,7 +168,8 @@ class Intrinsics(Lens):
                 axis=-1,
             )
             with np.errstate(divide="ignore", invalid="ignore"):
-                move = move / determinant[..., None]
+                # Where the map stands still there is nowhere to go.
+                move = np.where(determinant[..., None] == 0, np.nan, move / determinant[..., None])
             rays = self._pulled_back(rays + move)
             if np.nanmax(np.abs(move), initial=0.0) < 1e-12:
                 break
@@ -181,7 +182,8 @@ class Intrinsics(Lens):
     def largest_radius(self) -> float:
         """Undistorted radius (at depth 1) up to which the radial model grows."""
         k1, k2, _, _, k3, k4, k5, k6 = self.coefficients[:8]
-        radii = np.linspace(0.0, 20.0, 20001)
+        # Of a long lens the whole picture lies within some thousandths.
+        radii = np.concatenate([[0.0], np.geomspace(1e-5, 0.1, 1000)[:-1], np.linspace(0.1, 20.0, 19901)])
         r2 = radii**2
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
         radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / np.where(denominator > 0, denominator, np.nan)
@@ -199,9 +201,10 @@ class Intrinsics(Lens):
         return np.array([[rot[2, 2], 0, -rot[0, 2]], [0, rot[2, 2], -rot[1, 2]], [0, 0, 1]]) @ rot
 
     def _bent(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
-        xd, yd = self._tilted(*self._bent_upright(x, y))
+        # Before the powers of their radius: those of a ray from far outside may be infinite.
         beyond = x * x + y * y > self.largest_radius**2
-        return np.where(beyond, np.nan, xd), np.where(beyond, np.nan, yd)
+        x, y = np.where(beyond, np.nan, x), np.where(beyond, np.nan, y)
+        return self._tilted(*self._bent_upright(x, y))
 
     def _bent_upright(self, x: Plane, y: Plane) -> tuple[Plane, Plane]:
         """Distorted coordinates (...) of rays (...) on a sensor that is not tilted."""
@@ -276,7 +279,7 @@ class Intrinsics(Lens):
         """Rays (..., 2) pulled back to where the radial model still grows: Newton must not jump over its end."""
         radius = np.linalg.norm(rays, axis=-1, keepdims=True)
         limit = 0.9999 * self.largest_radius
-        return np.where(radius > limit, rays * (limit / np.maximum(radius, limit)), rays)
+        return np.where(radius > limit, rays * (limit / np.maximum(radius, max(limit, 1e-12))), rays)
 
     def _undistorted_scale(self, distorted_radius: Array) -> Array:
         """Ratio of undistorted to distorted radius by the radial terms alone: a start for Newton."""
