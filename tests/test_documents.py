@@ -1,10 +1,13 @@
 """The documents: no placeholder left, no link that leads nowhere."""
 
 import re
+import shlex
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from service import build
 from service.settings import SECRETS, Settings
 from tests import settings_page
 from tests.benchmarks import sizing
@@ -28,6 +31,9 @@ DOCUMENTS = [
     OPERATIONS,
     *sorted((ROOT / "docs").glob("*.md")),
 ]
+INSTALL = re.compile(r"\bpip install ([^`#\n|]+)")
+# What others publish, and pages tell readers to install.
+OF_OTHERS = {"pycolmap"}
 # Those of the commands that call a service.
 OF_CLIENTS = {"ESC_URL", "ESC_API_KEY"}
 
@@ -55,6 +61,24 @@ def anchors(document):
     """What the headings of a document are called in links, as GitHub makes it of their words."""
     headings = re.findall(r"^#+ (.+)$", document.read_text(), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading).lower().replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize(
+    "document", [path for path in DOCUMENTS if path.name != "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT))
+)
+def test_install_commands_name_what_a_reader_has_and_nothing_of_ours_on_an_index(document):
+    """Anybody may claim the name of this package on PyPI, where it is not."""
+    wheels = [f"{name}-{build.version()}-py3-none-any.whl" for name in ("esc_calibration", "esc_client")]
+    extras = "|".join(metadata.metadata(build.PACKAGE).get_all("Provides-Extra"))
+    ours = "|".join(map(re.escape, [*(f"./{wheel}" for wheel in wheels), *wheels, "./client", "."]))
+    known = re.compile(rf"({ours})(\[({extras})\])?")
+    for command in INSTALL.findall(document.read_text()):
+        words = iter(shlex.split(command))
+        for word in words:
+            if word == "-r":
+                assert (document.parent / next(words)).is_file(), command
+            elif not word.startswith("-"):
+                assert known.fullmatch(word) or word in OF_OTHERS, command
 
 
 def test_the_page_of_the_settings_is_that_of_the_code():
