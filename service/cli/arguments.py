@@ -194,14 +194,18 @@ def load_settings(**given: Any) -> Settings:
 
     from service.observability import logs
     from service.secret_files import SecretFileError, bucket_credentials
+    from service.schemas.findings import describe_errors
     from service.settings import Settings
 
+    _refuse_unread_variables()
     try:
         bucket_credentials(os.environ)
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
-        found = [(".".join(map(str, e["loc"])).upper(), e["msg"].removeprefix("Value error, ")) for e in error.errors()]
-        fail("\n".join(f"ESC_{name}: {message}" for name, message in found), USAGE)
+        found = error.errors()
+        names = [".".join(map(str, one["loc"])).upper() for one in found]
+        told = describe_errors([one | {"loc": ()} for one in found], None, None)
+        fail("\n".join(f"ESC_{name}: {message}" for name, message in zip(names, told, strict=True)), USAGE)
     except SettingsError as error:
         # Of a list that is no JSON; the error names its field and nothing else.
         name = str(error).partition('field "')[2].partition('"')[0].upper()
@@ -210,6 +214,21 @@ def load_settings(**given: Any) -> Settings:
         fail(str(error), USAGE)
     logs.configure(settings)
     return settings
+
+
+def _refuse_unread_variables() -> None:
+    """End where a variable `ESC_...` is no setting: what it was to change would stay as it is, and nobody would know."""
+    from service.settings import setting_names, unread_variables
+    from service.variable_names import OF_CLIENTS, suggestion
+
+    known = setting_names() | OF_CLIENTS
+    meant = {name: suggestion(name, known) for name in unread_variables()}
+    lines = [
+        f"unknown setting {name}: " + (f"did you mean {near}?" if near else "docs/settings.md has those there are")
+        for name, near in meant.items()
+    ]
+    if lines:
+        fail("\n".join(lines), USAGE)
 
 
 def parse_frame_files(frames: Sequence[str]) -> dict[str, list[Path]]:

@@ -418,8 +418,21 @@ def test_a_port_in_use_is_told(service, tmp_path):
 def test_a_wrong_setting_is_told(tmp_path):
     answer = esc_here(tmp_path, "serve", ESC_QUEUE_LIMIT="many")
     assert answer.returncode == 2
-    assert "ESC_QUEUE_LIMIT" in answer.stderr
+    assert answer.stderr == "ESC_QUEUE_LIMIT: expected a whole number, came 'many'\n"
     assert esc_here(tmp_path, "serve", ESC_DATABASE_URL="mysql://x").stderr.startswith("ESC_DATABASE_URL: expected is ")
+
+
+@pytest.mark.parametrize("command", [("serve",), ("up",), ("worker",), ("key", "list")])
+def test_a_misspelt_setting_is_refused_with_the_name_that_was_meant(tmp_path, command):
+    answer = esc_here(tmp_path, *command, ESC_KEEP_FRAME_DAYS="2")
+    assert (answer.returncode, answer.stdout) == (2, "")
+    assert answer.stderr == "unknown setting ESC_KEEP_FRAME_DAYS: did you mean ESC_KEEP_FRAMES_DAYS?\n"
+
+
+def test_a_misspelt_variable_of_a_command_that_calls_a_service_is_a_warning(service, tmp_path):
+    answer = esc_here(tmp_path, "venue", "list", ESC_URL=service.url, ESC_APIKEY="esc_x")
+    assert answer.returncode == 0
+    assert answer.stderr == "Warning: ESC_APIKEY is not read: did you mean ESC_API_KEY?\n"
 
 
 def test_a_list_among_the_settings_that_is_no_json_is_told_in_a_line(tmp_path):
