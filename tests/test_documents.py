@@ -63,7 +63,9 @@ def anchors(document):
 
 
 @pytest.mark.parametrize(
-    "document", [path for path in DOCUMENTS if path.name != "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT))
+    "document",
+    [path for path in DOCUMENTS if path.name != "CHANGELOG.md"],
+    ids=lambda path: str(path.relative_to(ROOT)),
 )
 def test_install_commands_name_what_a_reader_has_and_nothing_of_ours_on_an_index(document):
     """Anybody may claim the name of this package on PyPI, where it is not."""

@@ -193,8 +193,8 @@ def load_settings(**given: Any) -> Settings:
     from pydantic_settings import SettingsError
 
     from service.observability import logs
-    from service.secret_files import SecretFileError, bucket_credentials
     from service.schemas.findings import describe_errors
+    from service.secret_files import SecretFileError, bucket_credentials
     from service.settings import Settings
 
     _refuse_unread_variables()
@@ -217,7 +217,7 @@ def load_settings(**given: Any) -> Settings:
 
 
 def _refuse_unread_variables() -> None:
-    """End where a variable `ESC_...` is no setting: what it was to change would stay as it is, and nobody would know."""
+    """End where a variable `ESC_...` is no setting: what it was to change would stay as it is, in silence."""
     from service.settings import setting_names, unread_variables
     from service.variable_names import OF_CLIENTS, suggestion
 

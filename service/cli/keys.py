@@ -136,7 +136,7 @@ def _keys(data: Path | None) -> Iterator[KeyRepository]:
     from service.store.keys import KeyRepository
 
     settings = load_settings(data=data)
-    with report_database_errors():
+    with report_database_errors(settings):
         engine = connect(settings.home_database_url)
         # Keys of another folder open nothing, and nothing else would tell.
         print_note(f"Keys in {engine.url.set(query={}).render_as_string(hide_password=True)}")

@@ -36,8 +36,9 @@ def main() -> None:
     child_process.end_with_parent()
     try:
         app_of(sys.argv[1:])()
-    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError, FileExistsError) as error:
-        fail(f"{error.filename}: {error.strerror}", FAILED)
+    except OSError as error:
+        why = error.strerror or str(error)
+        fail(f"{error.filename}: {why}" if error.filename else why, FAILED)
 
 
 def app_of(arguments: Sequence[str]) -> typer.Typer:

@@ -16,6 +16,7 @@ from service.cli.main import app_of
 from service.store.database import SCHEMA_TABLE, connect, migrate, writing
 from tests.e2e.commands import esc_here, esc_process
 from tests.e2e.running import FRAMES, keys_in, png, venue, wait_for
+from tests.unprivileged import drop_capabilities
 
 # An editor in which somebody changes the name, while somebody else may put another one.
 MEDDLING = """
@@ -448,6 +449,38 @@ def test_a_database_out_of_reach_is_told_in_a_line(tmp_path, command):
     assert (answer.returncode, "The database cannot be used: " in answer.stderr) == (1, True)
     assert "Traceback" not in answer.stderr
     assert "secret" not in answer.stderr
+
+
+@pytest.mark.parametrize("command", [("serve", "--port", "0"), ("up", "--port", "0"), ("worker",)])
+@pytest.mark.parametrize(("folder", "why"), [("file", "it is a file"), ("file/below", "Not a directory")])
+def test_a_data_folder_that_cannot_be_made_is_told_by_its_name(tmp_path, command, folder, why):
+    (tmp_path / "file").touch()
+    answer = esc_here(tmp_path, *command, "--data", folder)
+    assert (answer.returncode, answer.stdout) == (1, "")
+    assert answer.stderr.startswith(f"The data folder {folder} cannot be written: {why}"), answer.stderr
+
+
+def test_a_data_folder_without_rights_is_told_by_its_name(tmp_path):
+    folder = tmp_path / "locked"
+    folder.mkdir(mode=0o500)
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", folder]
+    answer = subprocess.run(command, preexec_fn=drop_capabilities, capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 1
+    assert answer.stderr.startswith(f"The data folder {folder} cannot be written: this user has no right to.")
+
+
+def test_an_address_of_a_database_whose_folder_cannot_be_made_is_told_by_its_setting(tmp_path):
+    (tmp_path / "file").touch()
+    answer = esc_here(tmp_path, "serve", "--port", "0", ESC_DATABASE_URL=f"sqlite:///{tmp_path}/file/esc.sqlite")
+    told = f"The data folder {tmp_path}/file cannot be written: it is a file. ESC_DATABASE_URL names another.\n"
+    assert (answer.returncode, answer.stderr) == (1, told)
+
+
+def test_a_file_that_is_no_database_is_told_by_its_name(tmp_path):
+    (tmp_path / "esc.sqlite").write_text("a text, as long as it takes to be no empty database\n" * 9)
+    answer = esc_here(tmp_path, "key", "add", "a", "--scope", "read", "--data", str(tmp_path))
+    assert answer.returncode == 1
+    assert f"The database {tmp_path}/esc.sqlite cannot be used: file is not a database" in answer.stderr
 
 
 def test_a_database_of_another_version_is_told_in_a_line(tmp_path):
