@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from service.cli.printing import USAGE, fail
+from service.cli.printing import FAILED, USAGE, fail
 from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, FieldNumber, FormatName, LensChoice
 
 if TYPE_CHECKING:
@@ -172,6 +173,9 @@ OneCamera = Annotated[
 ]
 Output = Annotated[Path | None, typer.Option("-o", "--output", help="File to write; otherwise standard output.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of lines.")]
+Yes = Annotated[
+    bool, typer.Option("--yes", help="Do not ask; without a terminal, where nobody can be asked, it is required.")
+]
 IdempotencyKey = Annotated[
     str | None,
     typer.Option("--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."),
@@ -185,6 +189,16 @@ OptionsText = Annotated[
         '{"timeout_s": 60} ends it after so many seconds; all are in /docs of a service.',
     ),
 ]
+
+
+def require_yes(yes: bool, question: str) -> None:
+    """End, unless somebody said yes to what cannot be undone: with --yes, or asked at a terminal."""
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        fail(f"Nothing was deleted. {question}? There is no terminal to ask at: confirm with --yes.", USAGE)
+    if not typer.confirm(f"{question}? It cannot be undone", err=True):
+        fail("Nothing was deleted.", FAILED)
 
 
 def load_settings(**given: Any) -> Settings:

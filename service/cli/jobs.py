@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, FormatOption, JobId, LensOption, OneCamera, Output, Url
+from service.cli.arguments import (
+    DEFAULT_URL,
+    ApiKey,
+    AsJson,
+    FormatOption,
+    JobId,
+    LensOption,
+    OneCamera,
+    Output,
+    Url,
+    Yes,
+    require_yes,
+)
 from service.cli.printing import (
     FAILED,
     fail,
@@ -151,8 +163,9 @@ def cancel_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> No
 
 
 @app.command("delete")
-def delete_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def delete_job(job: JobId, yes: Yes = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Forget a job that has ended, with its frames and pictures. Poses that it brought to its venue stay."""
+    require_yes(yes, f"Forget job {job}, its frames and its pictures")
     with open_client(url, api_key) as client:
         client.delete_job(job)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import Data, load_settings
+from service.cli.arguments import Data, Yes, load_settings, require_yes
 from service.cli.printing import FAILED, USAGE, fail, print_note
 from service.cli.serve import report_database_errors
 from service.schemas.names import ID_PATTERN, Scope
@@ -97,11 +97,14 @@ def rotate_key(
 
 @app.command("remove")
 def remove_key(
-    name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")], data: Data = None
+    name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")],
+    yes: Yes = False,
+    data: Data = None,
 ) -> None:
     """Forget a key."""
     from service.api.auth import KEY_CACHED_FOR_S
 
+    require_yes(yes, f"Forget key {name}, which its user then calls with in vain")
     with _known_keys(data) as keys:
         if not keys.remove(name):
             fail(f"There is no key {name}; esc key list names those there are.", FAILED)

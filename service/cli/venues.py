@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import zipfile
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
@@ -29,9 +28,11 @@ from service.cli.arguments import (
     Output,
     Url,
     VenueId,
+    Yes,
     parse_candidates,
     parse_document,
     parse_frame_files,
+    require_yes,
 )
 from service.cli.printing import (
     FAILED,
@@ -160,17 +161,13 @@ def list_venues(as_json: AsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey
 @app.command("delete")
 def delete_venue(
     venue: VenueId,
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask, which is asked only at a terminal.")] = False,
+    yes: Yes = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures, see `esc job delete`."""
+    require_yes(yes, f"Forget venue {venue} and the history of its poses")
     with open_client(url, api_key) as client:
-        asks = sys.stdin.isatty() and not yes
-        if asks and not typer.confirm(
-            f"Forget venue {venue} and the history of its poses? It cannot be undone", err=True
-        ):
-            fail("Nothing was deleted.", FAILED)
         client.delete_venue(venue)
     print_note(f"Venue {venue} and the history of its poses are deleted; its jobs stay: esc job list --venue {venue}")
 

@@ -35,7 +35,7 @@ def test_a_venue_is_put_read_listed_and_deleted(esc, name, tmp_path):
     assert json.loads(esc("venue", "put", "venue.json").stdout)["id"] == name
     assert json.loads(esc("venue", "get", name).stdout)["cameras"][0]["id"] == "left"
     assert f"{name}\taccept\tleft right" in esc("venue", "list").stdout
-    assert esc("venue", "delete", name).returncode == 0
+    assert esc("venue", "delete", name, "--yes").returncode == 0
     gone = esc("venue", "get", name)
     assert gone.returncode == 1
     assert "There is no such venue" in gone.stderr
@@ -63,6 +63,18 @@ def test_a_venue_is_deleted_at_a_terminal_only_after_a_yes(service, tmp_path, na
     assert ("Nothing was deleted." in answer.stderr) == (code == 1)
     assert ("its jobs stay" in answer.stderr) == (code == 0)
     assert ("cannot be undone" in answer.stderr) == (not options)
+
+
+@pytest.mark.parametrize(
+    "command", [("venue", "delete", "main"), ("job", "delete", "0" * 26), ("key", "remove", "cron")]
+)
+def test_nothing_is_deleted_without_a_yes_where_nobody_can_be_asked(tmp_path, command):
+    # Nothing listens there: it is refused before anything is asked of a service.
+    answer = esc_here(tmp_path, *command, ESC_URL="http://127.0.0.1:9")
+    assert (answer.returncode, answer.stdout) == (2, "")
+    assert answer.stderr.startswith("Nothing was deleted. Forget ")
+    assert "confirm with --yes" in answer.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_names_of_a_sports_points_are_listed(esc):
