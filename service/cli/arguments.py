@@ -173,6 +173,9 @@ OneCamera = Annotated[
 ]
 Output = Annotated[Path | None, typer.Option("-o", "--output", help="File to write; otherwise standard output.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of lines.")]
+AnswerAsJson = Annotated[
+    bool, typer.Option("--json", help="Print JSON at a terminal too; what goes to a file or a pipe is JSON anyway.")
+]
 Yes = Annotated[
     bool, typer.Option("--yes", help="Do not ask; without a terminal, where nobody can be asked, it is required.")
 ]

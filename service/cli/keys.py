@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.arguments import Data, Yes, load_settings, require_yes
-from service.cli.printing import FAILED, USAGE, fail, print_note
+from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows
 from service.cli.serve import report_database_errors
 from service.schemas.names import ID_PATTERN, Scope
 
@@ -62,12 +62,14 @@ def add_key(
 @app.command("list")
 def list_keys(data: Data = None) -> None:
     """Print a line per key: name, scope, when it was made, last used (to the minute), good until, and its venues."""
+    rows = []
     with _known_keys(data) as keys:
         for key in keys.all():
             used, until = (f"{at:%Y-%m-%dT%H:%MZ}" if at else "-" for at in (key.last_used_at, key.expires_at))
             venues = "all" if key.venues is None else ",".join(sorted(key.venues))
             state = " (expired)" if key.expired else ""
-            print(f"{key.name}\t{key.scope}\t{key.created_at:%Y-%m-%dT%H:%MZ}\t{used}\t{until}{state}\t{venues}")
+            rows.append([key.name, key.scope, f"{key.created_at:%Y-%m-%dT%H:%MZ}", used, f"{until}{state}", venues])
+    print_rows(["KEY", "SCOPE", "MADE", "LAST USED", "GOOD UNTIL", "VENUES"], rows)
 
 
 @app.command("rotate")

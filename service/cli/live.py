@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.cli.answers import outcome_text
 from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera
-from service.cli.printing import USAGE, OngoingTrouble, fail, outcome_text, print_note
+from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
 from service.cli.service_client import load_venue
 
 if TYPE_CHECKING:

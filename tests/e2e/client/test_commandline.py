@@ -1,3 +1,4 @@
+import contextlib
 import json
 import os
 import pty
@@ -176,6 +177,43 @@ def test_the_exit_code_tells_how_a_calibration_ended(service, esc, name, behavio
         assert "Rejected: the lines do not fit" in answer.stderr
     if behaviour == "partly":
         assert "Accepted: left. Not all cameras: the lines do not fit" in answer.stderr
+
+
+def at_terminal(service, folder, *arguments):
+    """What a command prints on a terminal, and what it exits with."""
+    terminal, its_end = pty.openpty()
+    command = [sys.executable, "-m", "service.cli", *arguments]
+    with subprocess.Popen(
+        command, cwd=folder, env=os.environ | {"ESC_URL": service.url}, stdout=its_end, stderr=subprocess.PIPE
+    ) as process:
+        os.close(its_end)
+        said = b""
+        # Where nobody has the other end any more, Linux answers with an error.
+        with contextlib.suppress(OSError):
+            while chunk := os.read(terminal, 65536):
+                said += chunk
+    os.close(terminal)
+    return process.returncode, said.decode().replace("\r\n", "\n")
+
+
+@pytest.mark.parametrize("behaviour", ["accept", "reject"])
+def test_at_a_terminal_answers_are_lines_and_with_json_they_are_json(service, name, tmp_path, behaviour):
+    for side in ("left", "right"):
+        (tmp_path / f"{side}.png").write_bytes(png())
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name, behaviour)))
+    put = at_terminal(service, tmp_path, "venue", "put", "venue.json")[1].splitlines()
+    assert put[0] == f"Venue {name}, {behaviour}: football, 105 x 68 m"
+    assert [line.split()[0] for line in put[1:4]] == ["CAMERA", "left", "right"]
+    code, said = at_terminal(service, tmp_path, "calibrate", name, *FRAMES, "--wait")
+    job = service.http.get("/jobs", params={"venue": name}).json()["jobs"][0]
+    verdict = {"accept": "accepted", "reject": "rejected"}[behaviour]
+    assert code == (0 if behaviour == "accept" else 3)
+    assert f"left: {verdict}\n  rotation  " in said
+    assert said.endswith(f"Job {job['id']}, calibration of venue {name}: succeeded, {verdict}\n")
+    assert json.loads(at_terminal(service, tmp_path, "job", "get", job["id"], "--json")[1]) == service.job(job["id"])
+    listed = at_terminal(service, tmp_path, "job", "list", "--venue", name)[1].splitlines()
+    assert listed[0].split() == ["JOB", "SUBMITTED", "VENUE", "KIND", "STATUS", "OUTCOME"]
+    assert listed[1].startswith(f"{job['id']}  ")
 
 
 def test_a_job_that_was_cancelled_is_told(service, esc, name):
