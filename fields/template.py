@@ -32,6 +32,8 @@ from fields.shapes import WHITE, Arc, Line, Point, Shape, Spot, dashes
 
 FILES = Path(__file__).parent
 NAMES = tuple(sorted(path.stem for path in FILES.glob("*.toml")))
+# What else people call a sport.
+SYNONYMS = {"soccer": "football", "field-hockey": "hockey"}
 END = "{end}"
 TURF_M = 0.015
 """How uneven turf is. FIFA's and World Rugby's tests allow a centimetre under a straightedge of three metres."""

@@ -80,6 +80,13 @@ def _check_optional_job_id(job_id: str | None) -> str | None:
     return None if job_id is None else _check_job_id(job_id)
 
 
+def require_folder_of(file: Path) -> Path:
+    """Refuse a file to write whose folder is missing, before anything is computed for it."""
+    if not file.parent.is_dir():
+        raise typer.BadParameter(f"there is no folder {file.parent}: make it first")
+    return file
+
+
 Url = Annotated[
     str,
     typer.Option(
@@ -219,10 +226,10 @@ def load_settings(**given: Any) -> Settings:
         bucket_credentials(os.environ)
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
-        found = error.errors()
-        names = [".".join(map(str, one["loc"])).upper() for one in found]
-        told = describe_errors([one | {"loc": ()} for one in found], None, None)
-        fail("\n".join(f"ESC_{name}: {message}" for name, message in zip(names, told, strict=True)), USAGE)
+        told = [message.partition(": ") for message in describe_errors(error.errors(), None, None)]
+        options = {name for name, value in given.items() if value is not None}
+        names = [f"--{name.removeprefix('worker_')}" if name in options else f"ESC_{name.upper()}" for name, *_ in told]
+        fail("\n".join(f"{name}: {message}" for name, (*_, message) in zip(names, told, strict=True)), USAGE)
     except SettingsError as error:
         # Of a list that is no JSON; the error names its field and nothing else.
         name = str(error).partition('field "')[2].partition('"')[0].upper()

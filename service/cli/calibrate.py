@@ -61,7 +61,7 @@ def calibrate(
 def snapshot(
     venue: VenueId,
     camera: OneCamera = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to.")] = Path(),
+    output: Annotated[Path, typer.Option("-o", "--output", file_okay=False, help="Folder to write to.")] = Path(),
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -86,7 +86,9 @@ def run(
         ),
     ],
     frames: Frames,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for result.json and the pictures.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", file_okay=False, help="Folder for result.json and the pictures.")
+    ],
     options: OptionsText = "{}",
     debug: Annotated[
         Path | None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.answers import print_answer
-from service.cli.arguments import AnswerAsJson, Frames, parse_document, parse_frame_files
+from service.cli.arguments import AnswerAsJson, Frames, parse_document, parse_frame_files, require_folder_of
 from service.cli.printing import REJECTED, USAGE, fail, progress_bar
 
 if TYPE_CHECKING:
@@ -28,7 +28,13 @@ def find(
     ],
     frames: Frames,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="JSON file to write the venue to, for `esc venue put` and `esc run`.")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            callback=require_folder_of,
+            help="JSON file to write the venue to, for `esc venue put` and `esc run`.",
+        ),
     ],
     pictures: Annotated[
         Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera.")

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.answers import job_exit_code, print_answer, print_lens_summary, print_outcome, print_pose_summary
-from service.cli.arguments import DEFAULT_URL, AnswerAsJson, ApiKey, Frames, Url, parse_document, parse_frame_files
+from service.cli.arguments import (
+    DEFAULT_URL,
+    AnswerAsJson,
+    ApiKey,
+    Frames,
+    Url,
+    parse_document,
+    parse_frame_files,
+    require_folder_of,
+)
 from service.cli.printing import (
     FAILED,
     REJECTED,
@@ -41,8 +50,9 @@ def _print_points(sport: str | None) -> None:
     """Print every name that a point of a sport's field has, and end."""
     if sport is None:
         return
-    from fields.template import NAMES, load
+    from fields.template import NAMES, SYNONYMS, load
 
+    sport = SYNONYMS.get(sport, sport)
     if sport not in NAMES:
         fail(f"There is no field of {sport!r}; there are {', '.join(NAMES)}", USAGE)
     template = load(sport)
@@ -69,7 +79,12 @@ def intrinsics(
     square: Annotated[
         float, typer.Option("--square", metavar="METRES", help="Side of a square of the board, in metres.")
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="JSON file to write the lens to, for `esc pose`.")],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", callback=require_folder_of, help="JSON file to write the lens to, for `esc pose`."
+        ),
+    ],
     charuco: Annotated[
         str | None,
         typer.Option(
@@ -126,7 +141,13 @@ def pose(
         ),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="JSON file to write the venue to, for `esc venue put` and `esc run`.")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            callback=require_folder_of,
+            help="JSON file to write the venue to, for `esc venue put` and `esc run`.",
+        ),
     ],
     frame: Annotated[
         list[str] | None,
@@ -196,7 +217,10 @@ def fit_field(
     venue: Annotated[str, typer.Argument(metavar="VENUE", help="A venue's file, or the id of one that is stored.")],
     frames: Frames,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="JSON file to write the venue with its fitted field to.")
+        Path,
+        typer.Option(
+            "-o", "--output", callback=require_folder_of, help="JSON file to write the venue with its fitted field to."
+        ),
     ],
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
     seed: Annotated[

@@ -21,7 +21,7 @@ from pydantic import (
 
 from fields.plans import TEMPLATE_MEASURES, markings_of, other_shapes, plan_of, size_of
 from fields.shapes import COLOUR_PATTERN, WHITE, Shape
-from fields.template import NAMES, Extent, Template, load
+from fields.template import NAMES, SYNONYMS, Extent, Template, load
 from service.schemas.base import Name, Number, Schema, is_tolerant
 from service.schemas.geometry import Row
 from service.schemas.names import FieldNumber
@@ -97,6 +97,7 @@ class Layout(Schema):
 
 
 def _is_a_template(name: str, info: ValidationInfo) -> str:
+    name = SYNONYMS.get(name, name)
     if name not in NAMES and not is_tolerant(info):
         raise ValueError(f"{name} is none of the templates {', '.join(NAMES)}, nor markings of your own")
     return name
@@ -177,10 +178,14 @@ class FieldOfPlay(Schema):
 
     @model_validator(mode="before")
     @classmethod
-    def _as_usual(cls, given: Any) -> Any:
+    def _as_usual(cls, given: Any, info: ValidationInfo) -> Any:
         template = given.get("template", "football") if isinstance(given, dict) else None
-        if not isinstance(template, str) or template not in NAMES:
+        if not isinstance(template, str):
             return given
+        template = SYNONYMS.get(template, template)
+        if template not in NAMES:
+            # It is refused: that measures are missing which nobody knows is no second fault.
+            return given if is_tolerant(info) else dict.fromkeys(TEMPLATE_MEASURES, 1.0) | given
         return {name: load(template).size[measure].default for name, measure in TEMPLATE_MEASURES.items()} | given
 
     @field_validator(*TEMPLATE_MEASURES)

@@ -29,10 +29,12 @@ EXPECTED = {
     "model_type": "an object",
     "model_attributes_type": "an object",
     "literal_error": "{expected}",
-    "greater_than": "more than {gt}",
-    "greater_than_equal": "{ge} or more",
-    "less_than": "less than {lt}",
-    "less_than_equal": "{le} or less",
+    "greater_than": "more than {gt}{unit}",
+    "greater_than_equal": "{ge}{unit} or more",
+    "less_than": "less than {lt}{unit}",
+    "less_than_equal": "{le}{unit} or less",
+    "url_parsing": "an address such as https://host.example/path",
+    "url_scheme": "an address that begins with {expected_schemes}",
 }
 """By the kinds of pydantic, with what it says of each."""
 EXPECTED_LENGTH = {
@@ -52,6 +54,21 @@ OTHER_UNITS = {
 """By the name of a vector, what a number beyond its limits says of all of them."""
 
 
+UNITS = {
+    "m": "m",
+    "px": "px",
+    "deg": "degrees",
+    "cm": "cm",
+    "s": "s",
+    "h": "hours",
+    "hours": "hours",
+    "days": "days",
+    "years": "years",
+    "mb": "MB",
+}
+"""By the last part of a name, what its number is in."""
+
+
 def describe_errors(findings: Sequence[Mapping[str, Any]], model: Any, document: Any) -> list[str]:
     """Each of pydantic's errors. `model`: the type that the `document` should have had; None: not known."""
     unknown = [finding["loc"] for finding in findings if finding["type"] == "extra_forbidden"]
@@ -66,7 +83,8 @@ def _describe_error(finding: Mapping[str, Any], place: str, meant: Mapping[Locat
         case "extra_forbidden":
             return f"{place} is not known{meant.get(finding['loc'], '')}"
         case kind if kind in EXPECTED:
-            expected = EXPECTED[kind].format(**finding.get("ctx", {}))
+            limits = {name: _plain(limit) for name, limit in finding.get("ctx", {}).items()}
+            expected = EXPECTED[kind].format(**limits, unit=_unit(finding["loc"]))
             said = f"expected {expected}, came {_preview(finding['input'])}{_other_unit(finding)}"
         case kind if kind in EXPECTED_LENGTH:
             said = f"expected {EXPECTED_LENGTH[kind].format(**finding['ctx'])}"
@@ -80,7 +98,21 @@ def _other_unit(finding: Mapping[str, Any]) -> str:
     if finding["type"] not in ("less_than_equal", "greater_than_equal"):
         return ""
     of = [OTHER_UNITS[step] for step in finding["loc"] if step in OTHER_UNITS]
-    return f"; {of[-1]}" if of else ""
+    if of:
+        return f"; {of[-1]}"
+    is_long = finding["type"] == "less_than_equal" and _unit(finding["loc"]) == " m"
+    return "; is it in centimetres or millimetres?" if is_long else ""
+
+
+def _unit(place: Location) -> str:
+    """The unit that the name of a number ends on."""
+    unit = UNITS.get(str(place[-1]).rpartition("_")[2]) if place else None
+    return f" {unit}" if unit else ""
+
+
+def _plain(limit: Any) -> Any:
+    """A limit as people write it: 400, not 400.0."""
+    return int(limit) if isinstance(limit, float) and limit.is_integer() else limit
 
 
 def _path_with_ids(place: Location, document: Any) -> str:

@@ -83,7 +83,8 @@ def test_the_names_of_a_sports_points_are_listed(esc):
     assert listed.returncode == 0
     assert "left near corner\t-11.88\t-5.49" in listed.stdout.splitlines()
     assert "far doubles sideline, {distance} m from the left baseline" in listed.stdout.splitlines()
-    unknown = esc("pose", "--points", "soccer")
+    assert esc("pose", "--points", "soccer").stdout == esc("pose", "--points", "football").stdout
+    unknown = esc("pose", "--points", "quidditch")
     assert (unknown.returncode, "football" in unknown.stderr) == (2, True)
 
 
@@ -466,10 +467,31 @@ def test_a_port_in_use_is_told(service, tmp_path):
     assert "--port chooses another" in answer.stderr
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (("job", "list", "--limit", "0"), "'--limit': expected 1 or more, came '0'"),
+        (("job", "list", "--status", "asleep"), "'--status': 'asleep' is not one of 'queued', "),
+        (("venue", "restore", "main", "first"), "'revision': expected a whole number, came 'first'"),
+        (("serve", "--port", "http"), "'--port': expected a whole number, came 'http'"),
+        (("serve", "--port", "99999"), "--port: expected 65535 or less, came 99999"),
+        (("serve", "--port", "0", "--host", "nowhere.invalid"), "Cannot listen on nowhere.invalid:0: no such host."),
+        (("live", "venue.json", "--json", "--interface", "300.1.1.1"), "'--interface': expected an IPv4 address"),
+        (("field", "fit", "venue.json", "left=left.png", "-o", "no/venue.json"), "'--output': there is no folder no"),
+    ],
+)
+def test_a_value_that_is_wrong_is_told_in_words(tmp_path, command, words):
+    (tmp_path / "venue.json").write_text(json.dumps(venue("v")))
+    (tmp_path / "left.png").write_bytes(png())
+    answer = esc_here(tmp_path, *command, COLUMNS="200")
+    assert (answer.returncode, words in " ".join(answer.stderr.replace("│", " ").split())) == (2, True), answer.stderr
+
+
 def test_a_wrong_setting_is_told(tmp_path):
     answer = esc_here(tmp_path, "serve", ESC_QUEUE_LIMIT="many")
     assert answer.returncode == 2
     assert answer.stderr == "ESC_QUEUE_LIMIT: expected a whole number, came 'many'\n"
+    assert esc_here(tmp_path, "serve", ESC_DRAIN_S="-1").stderr == "ESC_DRAIN_S: expected 0 s or more, came '-1'\n"
     assert esc_here(tmp_path, "serve", ESC_DATABASE_URL="mysql://x").stderr.startswith("ESC_DATABASE_URL: expected is ")
 
 

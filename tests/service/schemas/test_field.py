@@ -192,3 +192,10 @@ def test_other_markings_that_cannot_be_are_refused(wrong, told):
 def test_a_ground_is_shared_by_so_many_sports_at_most():
     with pytest.raises(ValidationError, match="17 fields of other sports: at most 16"):
         FieldOfPlay.model_validate({"other_markings": [{"template": "padel"}] * 17})
+
+
+@pytest.mark.parametrize(("called", "sport"), [("soccer", "football"), ("field-hockey", "hockey")])
+def test_what_others_call_a_sport_is_stored_as_its_template(called, sport):
+    assert FieldOfPlay.model_validate({"template": called}) == FieldOfPlay.model_validate({"template": sport})
+    other = FieldOfPlay.model_validate({"template": "tennis", "other_markings": [{"template": called}]})
+    assert other.other_markings[0].template == sport

@@ -42,6 +42,13 @@ LEFT = ("cameras", 0)
             1,
             "cameras.left.colour is not known; known are id, image_size, intrinsics, pose, ",
         ),
+        (
+            ("field", "length_m"),
+            10500,
+            "field.length_m: expected 400 m or less, came 10500; is it in centimetres or millimetres?",
+        ),
+        (("alarms",), {"moved_since_last_px": 0}, "alarms.moved_since_last_px: expected more than 0 px, came 0"),
+        (("webhooks",), [{"url": "x"}], "webhooks.0.url: expected an address such as https://"),
         (("field", "length_m"), "abc", "field.length_m: expected a number, came 'abc'"),
         ((*LEFT, "pose", "position", 2), None, "cameras.left.pose.position.2: expected a number, came null"),
         ((*LEFT, "image_size", 0), 10.5, "cameras.left.image_size.0: expected a whole number, came 10.5"),
@@ -49,13 +56,13 @@ LEFT = ("cameras", 0)
         (
             (*LEFT, "pose", "rotation"),
             [102.2, 12.0, -9.0],
-            "cameras.left.pose.rotation.0: expected 10.0 or less, came 102.2; it is a Rodrigues vector in radians, and "
+            "cameras.left.pose.rotation.0: expected 10 or less, came 102.2; it is a Rodrigues vector in radians, and "
             "these look like degrees",
         ),
         (
             (*LEFT, "pose", "position", 1),
             -4949.0,
-            "cameras.left.pose.position.1: expected -2000.0 or more, came -4949.0; it is in metres, and these look "
+            "cameras.left.pose.position.1: expected -2000 or more, came -4949.0; it is in metres, and these look "
             "like centimetres or millimetres",
         ),
         ((*LEFT, "pose"), "there", "cameras.left.pose: expected an object, came 'there'"),
@@ -68,6 +75,11 @@ LEFT = ("cameras", 0)
 )
 def test_each_mistake_is_told_in_words_of_the_document(path, value, words):
     assert any(told.startswith(words) for told in wrong(VenueIn, with_value(path, value)))
+
+
+def test_an_unknown_sport_is_one_mistake():
+    (told,) = wrong(VenueIn, with_value(("field",), {"template": "quidditch"}))
+    assert "quidditch is none of the templates" in told
 
 
 def test_what_is_absent_is_missing():
