@@ -6,8 +6,10 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
 from service import build
+from service.cli.main import app_of
 from service.settings import setting_names
 from service.variable_names import unread
 from tests import settings_page
@@ -32,6 +34,8 @@ DOCUMENTS = [
     OPERATIONS,
     *sorted((ROOT / "docs").glob("*.md")),
 ]
+# The changelog tells what earlier versions said.
+OF_TODAY = [path for path in DOCUMENTS if path.name != "CHANGELOG.md"]
 INSTALL = re.compile(r"\bpip install ([^`#\n|]+)")
 # What others publish, and pages tell readers to install.
 OF_OTHERS = {"pycolmap"}
@@ -62,11 +66,7 @@ def anchors(document):
     return {re.sub(r"[^\w\- ]", "", heading).lower().replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize(
-    "document",
-    [path for path in DOCUMENTS if path.name != "CHANGELOG.md"],
-    ids=lambda path: str(path.relative_to(ROOT)),
-)
+@pytest.mark.parametrize("document", OF_TODAY, ids=lambda path: str(path.relative_to(ROOT)))
 def test_install_commands_name_what_a_reader_has_and_nothing_of_ours_on_an_index(document):
     """Anybody may claim the name of this package on PyPI, where it is not."""
     wheels = [f"{name}-{build.version()}-py3-none-any.whl" for name in ("esc_calibration", "esc_client")]
@@ -82,13 +82,43 @@ def test_install_commands_name_what_a_reader_has_and_nothing_of_ours_on_an_index
                 assert known.fullmatch(word) or word in OF_OTHERS, command
 
 
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_target_of_make_that_a_document_names_is_one(document):
+    targets = set(re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"\bmake ([a-z]+(?:-[a-z]+)*)`", document.read_text())) <= targets
+    assert set(re.findall(r"^make ([a-z]+(?:-[a-z]+)*)", document.read_text(), re.MULTILINE)) <= targets
+
+
+def commands(command, *path):
+    """The options of every command below one, by the words that call it."""
+    for name, one in getattr(command, "commands", {}).items():
+        yield from commands(one, *path, name)
+    if path and not hasattr(command, "commands"):
+        yield " ".join(path), {option for parameter in command.params for option in parameter.opts} | {"--help"}
+
+
+COMMANDS = dict(commands(get_command(app_of([]))))
+
+
+@pytest.mark.parametrize("document", OF_TODAY, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_command_of_esc_that_a_document_shows_has_the_options_it_shows(document):
+    blocks = re.findall(r"^```(?:sh|console)\n(.*?)^```", document.read_text(), re.DOTALL | re.MULTILINE)
+    for line in "".join(blocks).replace("\\\n", " ").splitlines():
+        called = re.search(r"(?:^|[ /])esc ((?:[a-z]+ ?)+)(.*)", line.partition(" # ")[0])
+        if called is None:
+            continue
+        name = max((name for name in COMMANDS if called[1].startswith(name)), key=len, default=None)
+        assert name, line
+        assert set(re.findall(r"(?<=\s)(--[a-z][a-z-]+)", called[2].partition("|")[0])) <= COMMANDS[name], line
+
+
 def test_the_page_of_the_settings_is_that_of_the_code():
     assert SETTINGS.read_text().endswith(settings_page.tables() + "\n")
 
 
 def test_no_document_and_no_file_of_operators_speaks_of_a_variable_that_a_start_would_refuse():
     files = [path for path in (ROOT / "docker").rglob("*") if path.is_file()]
-    for document in {*DOCUMENTS, *files, ROOT / ".ci" / "run"} - {ROOT / "CHANGELOG.md"}:
+    for document in [*OF_TODAY, *files, ROOT / ".ci" / "run"]:
         spoken = set(re.findall(r"\bESC_[A-Z_]+[A-Z]\b", document.read_text()))
         assert unread(spoken, setting_names()) == [], document
 
