@@ -1,12 +1,14 @@
-"""What this program was built from: its version, and the commit of a build that was made in a clone."""
+"""What this program was built from: its version, the commit of its clone, and what installs a part that it lacks."""
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 
+PACKAGE = "esc-calibration"
 HERE = Path(__file__).parent
 # `setup.py` writes it into a wheel.
 COMMIT = HERE / "commit.txt"
@@ -14,7 +16,7 @@ COMMIT = HERE / "commit.txt"
 
 def version() -> str:
     """The version of the release."""
-    return metadata.version("esc-calibration")
+    return metadata.version(PACKAGE)
 
 
 @cache
@@ -35,3 +37,13 @@ def description() -> str:
     """Both, for people: `0.2.0 (commit 76a150ef32b1)`."""
     known = commit()
     return version() if known is None else f"{version()} (commit {known[:12]})"
+
+
+def install_command(extra: str, python: str = "python") -> str:
+    """Return the command that installs the packages of an extra beside this program, whose interpreter is `python`.
+
+    It names these packages and not the extra: this project is on no index, and anybody may claim its name there.
+    """
+    declared = [text.partition(";") for text in metadata.requires(PACKAGE) or ()]
+    packages = [name.strip() for name, _, marker in declared if f'extra == "{extra}"' in marker.replace("'", '"')]
+    return shlex.join([python, "-m", "pip", "install", *packages])

@@ -93,7 +93,9 @@ def _listen(settings: Settings) -> socket.socket:
         )
     except OSError as error:
         taken = " Does the service run already? --port chooses another." if error.errno == errno.EADDRINUSE else ""
-        why = os.strerror(error.errno) if error.errno else str(error)
+        # Names that nobody can look up have numbers of their own, below zero.
+        is_unknown = error.errno is not None and error.errno < 0
+        why = "no such host" if is_unknown else os.strerror(error.errno) if error.errno else str(error)
         raise CannotListen(f"Cannot listen on {_authority(settings.host, settings.port)}: {why}.{taken}") from None
 
 

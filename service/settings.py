@@ -22,6 +22,7 @@ from pydantic_settings import (
 
 from service import cores
 from service.secret_files import read_secret
+from service.variable_names import PREFIX, unread
 
 # Without SQLAlchemy and obstore: the commands of the client read settings too, and start quickly.
 DATABASE_URL = re.compile(r"sqlite://.*|postgresql(\+psycopg)?://[^/]*/[^/?]+(\?.*)?")
@@ -42,7 +43,7 @@ class Settings(BaseSettings):
     """What an operator may change. Sizes in megabytes are 10^6 bytes, times are in seconds."""
 
     model_config = SettingsConfigDict(
-        env_prefix="ESC_", env_file=".env", env_ignore_empty=True, extra="ignore", hide_input_in_errors=True
+        env_prefix=PREFIX, env_file=".env", env_ignore_empty=True, extra="ignore", hide_input_in_errors=True
     )
 
     # Where things live.
@@ -368,6 +369,19 @@ class Settings(BaseSettings):
             return not ipaddress.ip_address(self.host).is_loopback
         except ValueError:
             return self.host != "localhost"
+
+
+def setting_names() -> set[str]:
+    """Return the variables that settings are read from, those that name the file of a secret among them."""
+    return {f"{PREFIX}{name.upper()}" for name in Settings.model_fields} | {
+        f"{PREFIX}{name.upper()}_FILE" for name in SECRETS
+    }
+
+
+def unread_variables() -> list[str]:
+    """Return the variables `ESC_...` of the environment and of `.env` that nothing reads: they are misspelt."""
+    sources = DotEnvSettingsSource(Settings), EnvSettingsSource(Settings)
+    return unread((name for source in sources for name in source.env_vars), setting_names())
 
 
 class _SecretFiles(PydanticBaseSettingsSource):

@@ -55,6 +55,13 @@ def test_a_machine_that_cannot_try_the_image_says_so_and_is_told_apart_from_a_br
     assert "docker/try-image || [ $? = 77 ]" in (ROOT / ".ci" / "run").read_text().splitlines()
 
 
+def test_the_image_is_tried_at_a_port_that_is_free():
+    tried = [line.strip() for line in (DOCKER / "try-image").read_text().splitlines()]
+    starts = [line for line in tried if re.match(r'run .*"\$\{start\[@\]\}"', line)]
+    assert len(starts) == 2
+    assert all(line.startswith("run env ESC_PORT=0 ") for line in starts)
+
+
 @pytest.mark.parametrize(("file", "service"), OURS)
 def test_containers_of_ours_may_write_nowhere_but_where_they_must(file, service):
     its = COMPOSE[file]["services"][service]

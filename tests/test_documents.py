@@ -1,11 +1,17 @@
 """The documents: no placeholder left, no link that leads nowhere."""
 
 import re
+import shlex
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
-from service.settings import SECRETS, Settings
+from service import build
+from service.cli.main import app_of
+from service.settings import setting_names
+from service.variable_names import unread
 from tests import settings_page
 from tests.benchmarks import sizing
 
@@ -28,8 +34,11 @@ DOCUMENTS = [
     OPERATIONS,
     *sorted((ROOT / "docs").glob("*.md")),
 ]
-# Those of the commands that call a service.
-OF_CLIENTS = {"ESC_URL", "ESC_API_KEY"}
+# The changelog tells what earlier versions said.
+OF_TODAY = [path for path in DOCUMENTS if path.name != "CHANGELOG.md"]
+INSTALL = re.compile(r"\bpip install ([^`#\n|]+)")
+# What others publish, and pages tell readers to install.
+OF_OTHERS = {"pycolmap"}
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
@@ -57,16 +66,61 @@ def anchors(document):
     return {re.sub(r"[^\w\- ]", "", heading).lower().replace(" ", "-") for heading in headings}
 
 
+@pytest.mark.parametrize("document", OF_TODAY, ids=lambda path: str(path.relative_to(ROOT)))
+def test_install_commands_name_what_a_reader_has_and_nothing_of_ours_on_an_index(document):
+    """Anybody may claim the name of this package on PyPI, where it is not."""
+    wheels = [f"{name}-{build.version()}-py3-none-any.whl" for name in ("esc_calibration", "esc_client")]
+    extras = "|".join(metadata.metadata(build.PACKAGE).get_all("Provides-Extra"))
+    ours = "|".join(map(re.escape, [*(f"./{wheel}" for wheel in wheels), *wheels, "./client", "."]))
+    known = re.compile(rf"({ours})(\[({extras})\])?")
+    for command in INSTALL.findall(document.read_text()):
+        words = iter(shlex.split(command))
+        for word in words:
+            if word == "-r":
+                assert (document.parent / next(words)).is_file(), command
+            elif not word.startswith("-"):
+                assert known.fullmatch(word) or word in OF_OTHERS, command
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_target_of_make_that_a_document_names_is_one(document):
+    targets = set(re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"\bmake ([a-z]+(?:-[a-z]+)*)`", document.read_text())) <= targets
+    assert set(re.findall(r"^make ([a-z]+(?:-[a-z]+)*)", document.read_text(), re.MULTILINE)) <= targets
+
+
+def commands(command, *path):
+    """The options of every command below one, by the words that call it."""
+    for name, one in getattr(command, "commands", {}).items():
+        yield from commands(one, *path, name)
+    if path and not hasattr(command, "commands"):
+        yield " ".join(path), {option for parameter in command.params for option in parameter.opts} | {"--help"}
+
+
+COMMANDS = dict(commands(get_command(app_of([]))))
+
+
+@pytest.mark.parametrize("document", OF_TODAY, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_command_of_esc_that_a_document_shows_has_the_options_it_shows(document):
+    blocks = re.findall(r"^```(?:sh|console)\n(.*?)^```", document.read_text(), re.DOTALL | re.MULTILINE)
+    for line in "".join(blocks).replace("\\\n", " ").splitlines():
+        called = re.search(r"(?:^|[ /])esc ((?:[a-z]+ ?)+)(.*)", line.partition(" # ")[0])
+        if called is None:
+            continue
+        name = max((name for name in COMMANDS if called[1].startswith(name)), key=len, default=None)
+        assert name, line
+        assert set(re.findall(r"(?<=\s)(--[a-z][a-z-]+)", called[2].partition("|")[0])) <= COMMANDS[name], line
+
+
 def test_the_page_of_the_settings_is_that_of_the_code():
     assert SETTINGS.read_text().endswith(settings_page.tables() + "\n")
 
 
-def test_no_document_speaks_of_a_setting_that_does_not_exist():
-    known = {f"ESC_{name.upper()}" for name in Settings.model_fields} | OF_CLIENTS
-    known |= {f"ESC_{name.upper()}_FILE" for name in (*SECRETS, "api_key")}
-    for document in DOCUMENTS[2:]:
+def test_no_document_and_no_file_of_operators_speaks_of_a_variable_that_a_start_would_refuse():
+    files = [path for path in (ROOT / "docker").rglob("*") if path.is_file()]
+    for document in [*OF_TODAY, *files, ROOT / ".ci" / "run"]:
         spoken = set(re.findall(r"\bESC_[A-Z_]+[A-Z]\b", document.read_text()))
-        assert spoken - known - {"ESC_DATABASE_PASSWORD"} == set()
+        assert unread(spoken, setting_names()) == [], document
 
 
 def test_the_figures_of_the_sizing_page_are_those_that_its_command_prints():

@@ -1,6 +1,7 @@
 """The wheel: all that runs is in it."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -44,6 +45,18 @@ def test_a_wheel_says_the_commit_of_the_clone_it_was_built_in(tmp_path):
 
 def test_without_a_clone_the_environment_says_the_commit(tmp_path):
     assert built(tmp_path, copied(tmp_path / "source"), SOURCE_COMMIT="c0ffee")[1] == "c0ffee"
+
+
+def test_the_documented_commands_install_the_extras_of_the_wheel(tmp_path):
+    """All that they ask for is installed here: with no index at hand, pip finds what it would install."""
+    built(tmp_path, copied(tmp_path / "source"))
+    pages = [ROOT / "docker" / "README.md", *(ROOT / "docs").glob("*.md")]
+    commands = {one for page in pages for one in re.findall(r"pip install '(\./[^']+\.whl\[\w+\])'", page.read_text())}
+    assert {re.search(r"\[(\w+)\]", one)[1] for one in commands} == {"exr", "tracing", "video"}
+    for one in commands:
+        pip = [sys.executable, "-m", "pip", "install", "--dry-run", "--no-index", one]
+        said = subprocess.run(pip, cwd=tmp_path, capture_output=True, text=True)
+        assert (said.returncode, said.stderr) == (0, ""), said.stdout
 
 
 def copied(source):

@@ -15,7 +15,7 @@ from typing import IO, Any
 from pydantic import BaseModel
 
 from service.schemas.job import JobError, Progress
-from service.schemas.results import AnyResult, IntrinsicsResult, Result
+from service.schemas.results import AnyResult, FieldResult, FindResult, IntrinsicsResult, LocateResult, Result
 from service.store.jobs.task import Task
 from worker.compute_resources import ComputeResources
 
@@ -72,6 +72,20 @@ class Message(BaseModel):
                 return "found"
             case _:
                 return "accepted" if self.result.accepted else "rejected"
+
+    @property
+    def outcome(self) -> dict[str, Any]:
+        """Return the verdict, and where it is none to be glad of, why, and the cameras that it is about."""
+        named: dict[str, Any] = {}
+        match self.result:
+            case None if self.error is not None:
+                named = {"why": self.error.detail, "cameras": [self.error.camera] if self.error.camera else []}
+            case Result() | FindResult() as found:
+                named = {"cameras": [camera.id for camera in found.cameras if not camera.accepted]}
+                named["why"] = found.rejected_because
+            case LocateResult() | FieldResult() as found:
+                named = {"why": found.rejected_because}
+        return {"verdict": self.verdict} | {name: value for name, value in named.items() if value}
 
     @property
     def last(self) -> bool:

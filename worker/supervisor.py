@@ -162,7 +162,7 @@ class Worker:
         self._handed_back.add(job_id)
         if self._attempts.hand_back(task):
             self._hand_back(job_id, task.kind)
-            log.info("job handed back", job=job_id)
+            log.info("job handed back", job=job_id, venue=task.venue.id if task.venue else None)
 
     def _take_over(self, dead: Sequence[str]) -> None:
         if dead:
@@ -230,19 +230,20 @@ class Worker:
 
     def _compute_and_record(self, task: Task, begun: float) -> None:
         limit_s = task.options.timeout_s or self._settings.job_timeout_s
-        with structlog.contextvars.bound_contextvars(job=task.job_id, **task.origin.names()), Spans(task) as spans:
-            log.info("job begins", kind=task.kind, venue=task.venue.id if task.venue else None)
+        subject = {"job": task.job_id, "kind": task.kind, "venue": task.venue.id if task.venue else None}
+        with structlog.contextvars.bound_contextvars(**subject, **task.origin.names()), Spans(task) as spans:
+            log.info("job begins")
             try:
                 last = self._compute(task, limit_s, spans)
-                verdict = "taken away" if last is None else last.verdict
                 spans.end(last)
                 _retry_until(lambda: self._record_end(task, last), begun + limit_s + OUTAGE_S)
             except Exception as error:  # an attempt that raises would leave the job open and nobody at it
                 log.exception("job broke off")
-                verdict = "job-crashed"
                 crashed = _error("job-crashed", f"The attempt broke off: {first_line(error)}")
                 _retry_until(lambda: self._attempts.fail(task, crashed), time.monotonic() + OUTAGE_S)
-            log.info("job ends", verdict=verdict, seconds=round(time.monotonic() - begun, 2))
+                last = Message(error=crashed)
+            outcome = {"verdict": "taken away"} if last is None else last.outcome
+            log.info("job ends", **outcome, seconds=round(time.monotonic() - begun, 2))
 
     def _compute(self, task: Task, limit_s: float, spans: Spans) -> Message | None:
         """Return the last message about the job; None if the lease was lost."""

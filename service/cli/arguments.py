@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from service.cli.printing import USAGE, fail
+from service.cli.printing import FAILED, USAGE, fail
 from service.schemas.names import ID_IN_WORDS, ID_PATTERN, JOB_ID_PATTERN, FieldNumber, FormatName, LensChoice
 
 if TYPE_CHECKING:
@@ -77,6 +78,13 @@ def _check_optional_venue_id(camera_id: str | None) -> str | None:
 
 def _check_optional_job_id(job_id: str | None) -> str | None:
     return None if job_id is None else _check_job_id(job_id)
+
+
+def require_folder_of(file: Path) -> Path:
+    """Refuse a file to write whose folder is missing, before anything is computed for it."""
+    if not file.parent.is_dir():
+        raise typer.BadParameter(f"there is no folder {file.parent}: make it first")
+    return file
 
 
 Url = Annotated[
@@ -172,6 +180,12 @@ OneCamera = Annotated[
 ]
 Output = Annotated[Path | None, typer.Option("-o", "--output", help="File to write; otherwise standard output.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of lines.")]
+AnswerAsJson = Annotated[
+    bool, typer.Option("--json", help="Print JSON at a terminal too; what goes to a file or a pipe is JSON anyway.")
+]
+Yes = Annotated[
+    bool, typer.Option("--yes", help="Do not ask; without a terminal, where nobody can be asked, it is required.")
+]
 IdempotencyKey = Annotated[
     str | None,
     typer.Option("--idempotency-key", metavar="KEY", help="Any word: sent twice with the same word, it is one job."),
@@ -187,21 +201,35 @@ OptionsText = Annotated[
 ]
 
 
+def require_yes(yes: bool, question: str) -> None:
+    """End, unless somebody said yes to what cannot be undone: with --yes, or asked at a terminal."""
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        fail(f"Nothing was deleted. {question}? There is no terminal to ask at: confirm with --yes.", USAGE)
+    if not typer.confirm(f"{question}? It cannot be undone", err=True):
+        fail("Nothing was deleted.", FAILED)
+
+
 def load_settings(**given: Any) -> Settings:
     """The settings, those given on the command line before all others; with them the log is set up."""
     from pydantic import ValidationError
     from pydantic_settings import SettingsError
 
     from service.observability import logs
+    from service.schemas.findings import describe_errors
     from service.secret_files import SecretFileError, bucket_credentials
     from service.settings import Settings
 
+    _refuse_unread_variables()
     try:
         bucket_credentials(os.environ)
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
-        found = [(".".join(map(str, e["loc"])).upper(), e["msg"].removeprefix("Value error, ")) for e in error.errors()]
-        fail("\n".join(f"ESC_{name}: {message}" for name, message in found), USAGE)
+        told = [message.partition(": ") for message in describe_errors(error.errors(), None, None)]
+        options = {name for name, value in given.items() if value is not None}
+        names = [f"--{name.removeprefix('worker_')}" if name in options else f"ESC_{name.upper()}" for name, *_ in told]
+        fail("\n".join(f"{name}: {message}" for name, (*_, message) in zip(names, told, strict=True)), USAGE)
     except SettingsError as error:
         # Of a list that is no JSON; the error names its field and nothing else.
         name = str(error).partition('field "')[2].partition('"')[0].upper()
@@ -210,6 +238,21 @@ def load_settings(**given: Any) -> Settings:
         fail(str(error), USAGE)
     logs.configure(settings)
     return settings
+
+
+def _refuse_unread_variables() -> None:
+    """End where a variable `ESC_...` is no setting: what it was to change would stay as it is, in silence."""
+    from service.settings import setting_names, unread_variables
+    from service.variable_names import OF_CLIENTS, suggestion
+
+    known = setting_names() | OF_CLIENTS
+    meant = {name: suggestion(name, known) for name in unread_variables()}
+    lines = [
+        f"unknown setting {name}: " + (f"did you mean {near}?" if near else "docs/settings.md has those there are")
+        for name, near in meant.items()
+    ]
+    if lines:
+        fail("\n".join(lines), USAGE)
 
 
 def parse_frame_files(frames: Sequence[str]) -> dict[str, list[Path]]:

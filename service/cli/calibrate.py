@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from service.cli.answers import job_exit_code, print_answer, print_submitted
 from service.cli.arguments import (
     DEFAULT_URL,
+    AnswerAsJson,
     ApiKey,
     Frames,
     IdempotencyKey,
@@ -20,14 +22,7 @@ from service.cli.arguments import (
     parse_frame_files,
     parse_options,
 )
-from service.cli.printing import (
-    calibration_exit_code,
-    follow_to_end,
-    job_exit_code,
-    print_json,
-    print_note,
-    progress_bar,
-)
+from service.cli.printing import ACCEPTED, REJECTED, follow_to_end, print_note, progress_bar
 from service.cli.service_client import open_client
 
 
@@ -44,6 +39,7 @@ def calibrate(
     options: OptionsText = "{}",
     wait: Annotated[bool, typer.Option("--wait", help="Follow the job to its end and print it.")] = False,
     key: IdempotencyKey = None,
+    as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -55,17 +51,17 @@ def calibrate(
     with open_client(url, api_key) as client:
         job = client.calibrate(venue, files, chosen.model_dump(mode="json", exclude_unset=True), key)
         if not wait:
-            print_json({"job": job.id, "url": client.url_of(job.links["self"])})
+            print_submitted(client, job, as_json=as_json)
             return
         job = follow_to_end(client, job)
-    print_json(job)
+    print_answer(job, as_json=as_json)
     raise typer.Exit(job_exit_code(job))
 
 
 def snapshot(
     venue: VenueId,
     camera: OneCamera = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to.")] = Path(),
+    output: Annotated[Path, typer.Option("-o", "--output", file_okay=False, help="Folder to write to.")] = Path(),
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -90,7 +86,9 @@ def run(
         ),
     ],
     frames: Frames,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for result.json and the pictures.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", file_okay=False, help="Folder for result.json and the pictures.")
+    ],
     options: OptionsText = "{}",
     debug: Annotated[
         Path | None,
@@ -99,6 +97,7 @@ def run(
             help="Folder for what each stage saw, as pictures and JSON; its index.json says what is what.",
         ),
     ] = None,
+    as_json: AnswerAsJson = False,
 ) -> None:
     """Calibrate a venue's file by frames, without a service. Exit codes as of `calibrate`."""
     import secrets
@@ -144,5 +143,5 @@ def run(
     (output / "result.json").write_text(result.model_dump_json(indent=2) + "\n")
     for name, picture in solution.pictures.items():
         (output / picture_file(name)).write_bytes(picture)
-    print_json(result)
-    raise typer.Exit(calibration_exit_code(result))
+    print_answer(result, as_json=as_json)
+    raise typer.Exit(ACCEPTED if result.accepted else REJECTED)

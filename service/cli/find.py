@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import Frames, parse_document, parse_frame_files
-from service.cli.printing import REJECTED, USAGE, fail, print_found_summary, print_json, progress_bar
+from service.cli.answers import print_answer
+from service.cli.arguments import AnswerAsJson, Frames, parse_document, parse_frame_files, require_folder_of
+from service.cli.printing import REJECTED, USAGE, fail, progress_bar
 
 if TYPE_CHECKING:
     from service.schemas.find import SoughtSite
@@ -27,12 +28,19 @@ def find(
     ],
     frames: Frames,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="JSON file to write the venue to, for `esc venue put` and `esc run`.")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            callback=require_folder_of,
+            help="JSON file to write the venue to, for `esc venue put` and `esc run`.",
+        ),
     ],
     pictures: Annotated[
         Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera.")
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Any number: the same one finds the same.")] = 0,
+    as_json: AnswerAsJson = False,
 ) -> None:
     """Find cameras from their frames and the field alone. Exit: 0 all found, 1 failed, 2 usage, 3 not all, or not sure.
 
@@ -55,8 +63,7 @@ def find(
         pictures.mkdir(parents=True, exist_ok=True)
         for name, picture in solution.pictures.items():
             (pictures / f"{name}.jpg").write_bytes(picture)
-    print_json(solution.result)
-    print_found_summary(solution.result)
+    print_answer(solution.result, as_json=as_json)
     if not solution.result.accepted:
         raise typer.Exit(REJECTED)
     venue = place.completed(solution.result, solution.result.chosen())

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.arguments import load_settings
-from service.cli.printing import FAILED, USAGE, fail, print_note
+from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows
 from service.cli.serve import report_database_errors
 
 if TYPE_CHECKING:
@@ -77,9 +77,8 @@ def copy_home(
             fail(f"Nothing was copied. {refusal}", USAGE)
         except BLOB_OUTAGES as error:
             fail(f"Nothing was copied. The files cannot be copied: {error}", FAILED)
-    for table, count in rows.items():
-        print(f"{table}\t{count}")
-    print(f"files\t{'they stay' if files is None else files}")
+    counts = [(table, str(count)) for table, count in rows.items()]
+    print_rows(["TABLE", "ROWS"], [*counts, ("files", "they stay" if files is None else str(files))])
     print_note("Start the service with what its settings now must say:")
     print_note(f"  ESC_DATABASE_URL={_without_password(there.database)}\n  ESC_BLOB_URL={blobs_there}")
 

@@ -7,16 +7,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import DEFAULT_URL, ApiKey, AsJson, FormatOption, JobId, LensOption, OneCamera, Output, Url
-from service.cli.printing import (
-    FAILED,
-    fail,
-    follow_to_end,
-    job_exit_code,
-    outcome_text,
-    print_json,
-    write_document,
+from service.cli.answers import job_exit_code, outcome_text, print_answer, print_json, print_submitted
+from service.cli.arguments import (
+    DEFAULT_URL,
+    AnswerAsJson,
+    ApiKey,
+    AsJson,
+    FormatOption,
+    JobId,
+    LensOption,
+    OneCamera,
+    Output,
+    Url,
+    Yes,
+    require_yes,
 )
+from service.cli.printing import FAILED, fail, follow_to_end, print_rows, write_document
 from service.cli.service_client import open_client
 from service.schemas.names import JobKind, JobStatus
 from service.store.jobs.files import picture_file
@@ -49,23 +55,25 @@ def list_jobs(
 
         print_json(Jobs(jobs=jobs))
         return
-    for job in jobs:
-        came = f"{job.created_at:%Y-%m-%dT%H:%M:%SZ}"
-        print(f"{job.id}\t{came}\t{job.venue or '-'}\t{job.kind}\t{job.status}\t{outcome_text(job)}")
+    rows = [
+        (job.id, f"{job.created_at:%Y-%m-%dT%H:%M:%SZ}", job.venue or "-", job.kind, job.status, outcome_text(job))
+        for job in jobs
+    ]
+    print_rows(["JOB", "SUBMITTED", "VENUE", "KIND", "STATUS", "OUTCOME"], rows)
 
 
 @app.command("get")
-def get_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
-    """Print a job as JSON."""
+def get_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+    """Print a job."""
     with open_client(url, api_key) as client:
-        print_json(client.job(job))
+        print_answer(client.job(job), as_json=as_json)
 
 
 @app.command("wait")
-def wait_for_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def wait_for_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Follow a job to its end and print it. Exit: 0 accepted, 1 failed or cancelled, 3 rejected, 75 busy."""
     with open_client(url, api_key) as client:
-        _follow_and_exit(client, client.job(job))
+        _follow_and_exit(client, client.job(job), as_json=as_json)
 
 
 @app.command("again")
@@ -74,6 +82,7 @@ def submit_again(
     wait: Annotated[
         bool, typer.Option("--wait", help="Follow the new job to its end, as `esc job wait` does.")
     ] = False,
+    as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -81,9 +90,9 @@ def submit_again(
     with open_client(url, api_key) as client:
         new = client.again(job)
         if wait:
-            _follow_and_exit(client, new)
+            _follow_and_exit(client, new, as_json=as_json)
         else:
-            print_json({"job": new.id, "url": client.url_of(new.links["self"])})
+            print_submitted(client, new, as_json=as_json)
 
 
 @app.command("picture")
@@ -130,34 +139,41 @@ def job_poses(
 
 
 @app.command("accept")
-def accept_job(job: JobId, camera: OneCamera = None, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def accept_job(
+    job: JobId,
+    camera: OneCamera = None,
+    as_json: AnswerAsJson = False,
+    url: Url = DEFAULT_URL,
+    api_key: ApiKey = None,
+) -> None:
     """Let the poses of a job hold that the gate rejected, or that was a dry run."""
     with open_client(url, api_key) as client:
-        print_json(client.accept(job, camera))
+        print_answer(client.accept(job, camera), as_json=as_json, with_outcome=False)
 
 
 @app.command("reject")
-def reject_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def reject_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Put back the poses that held before those of a job."""
     with open_client(url, api_key) as client:
-        print_json(client.reject(job))
+        print_answer(client.reject(job), as_json=as_json, with_outcome=False)
 
 
 @app.command("cancel")
-def cancel_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def cancel_job(job: JobId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """End a job that is still open."""
     with open_client(url, api_key) as client:
-        print_json(client.cancel(job))
+        print_answer(client.cancel(job), as_json=as_json, with_outcome=False)
 
 
 @app.command("delete")
-def delete_job(job: JobId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def delete_job(job: JobId, yes: Yes = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Forget a job that has ended, with its frames and pictures. Poses that it brought to its venue stay."""
+    require_yes(yes, f"Forget job {job}, its frames and its pictures")
     with open_client(url, api_key) as client:
         client.delete_job(job)
 
 
-def _follow_and_exit(client: Client, job: Job) -> None:
+def _follow_and_exit(client: Client, job: Job, *, as_json: bool) -> None:
     job = follow_to_end(client, job)
-    print_json(job)
+    print_answer(job, as_json=as_json)
     raise typer.Exit(job_exit_code(job))

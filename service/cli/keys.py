@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.arguments import Data, load_settings
-from service.cli.printing import FAILED, USAGE, fail, print_note
+from service.cli.arguments import Data, Yes, load_settings, require_yes
+from service.cli.printing import FAILED, USAGE, fail, print_note, print_rows
 from service.cli.serve import report_database_errors
 from service.schemas.names import ID_IN_WORDS, ID_PATTERN, Scope
 
@@ -62,12 +62,14 @@ def add_key(
 @app.command("list")
 def list_keys(data: Data = None) -> None:
     """Print a line per key: name, scope, when it was made, last used (to the minute), good until, and its venues."""
+    rows = []
     with _known_keys(data) as keys:
         for key in keys.all():
             used, until = (f"{at:%Y-%m-%dT%H:%MZ}" if at else "-" for at in (key.last_used_at, key.expires_at))
             venues = "all" if key.venues is None else ",".join(sorted(key.venues))
             state = " (expired)" if key.expired else ""
-            print(f"{key.name}\t{key.scope}\t{key.created_at:%Y-%m-%dT%H:%MZ}\t{used}\t{until}{state}\t{venues}")
+            rows.append([key.name, key.scope, f"{key.created_at:%Y-%m-%dT%H:%MZ}", used, f"{until}{state}", venues])
+    print_rows(["KEY", "SCOPE", "MADE", "LAST USED", "GOOD UNTIL", "VENUES"], rows)
 
 
 @app.command("rotate")
@@ -97,11 +99,14 @@ def rotate_key(
 
 @app.command("remove")
 def remove_key(
-    name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")], data: Data = None
+    name: Annotated[str, typer.Argument(help="Name of the key, as `esc key list` prints it.")],
+    yes: Yes = False,
+    data: Data = None,
 ) -> None:
     """Forget a key."""
     from service.api.auth import KEY_CACHED_FOR_S
 
+    require_yes(yes, f"Forget key {name}, which its user then calls with in vain")
     with _known_keys(data) as keys:
         if not keys.remove(name):
             fail(f"There is no key {name}; esc key list names those there are.", FAILED)
@@ -136,7 +141,7 @@ def _keys(data: Path | None) -> Iterator[KeyRepository]:
     from service.store.keys import KeyRepository
 
     settings = load_settings(data=data)
-    with report_database_errors():
+    with report_database_errors(settings):
         engine = connect(settings.home_database_url)
         # Keys of another folder open nothing, and nothing else would tell.
         print_note(f"Keys in {engine.url.set(query={}).render_as_string(hide_password=True)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import re
 import signal
 import sys
@@ -13,8 +14,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.cli.answers import outcome_text
 from service.cli.arguments import DEFAULT_URL, ApiKey, Url, load_settings, parse_by_camera
-from service.cli.printing import USAGE, OngoingTrouble, fail, outcome_text, print_note
+from service.cli.printing import USAGE, OngoingTrouble, fail, print_note
 from service.cli.service_client import load_venue
 
 if TYPE_CHECKING:
@@ -31,6 +33,13 @@ LOOK_AGAIN_S = 2.0
 LAST_REPORT_S = 2.0
 HIGHEST_RATE = 1000
 MULTICAST = "multicast"
+
+
+def _check_interface(address: str | None) -> str | None:
+    try:
+        return None if address is None else str(ipaddress.IPv4Address(address))
+    except ValueError:
+        raise typer.BadParameter(f"expected an IPv4 address of this machine, came {address!r}") from None
 
 
 def live(
@@ -81,7 +90,12 @@ def live(
     ] = False,
     interface: Annotated[
         str | None,
-        typer.Option("--interface", metavar="IP", help="Address of the network interface that multicast leaves by."),
+        typer.Option(
+            "--interface",
+            metavar="IP",
+            callback=_check_interface,
+            help="Address of the network interface that multicast leaves by.",
+        ),
     ] = None,
     recover: Annotated[
         bool,

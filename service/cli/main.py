@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from service import child_process
 from service.cli import calibrate, find, home, jobs, keys, live, onboarding, serve, stitch, venues
@@ -36,8 +37,9 @@ def main() -> None:
     child_process.end_with_parent()
     try:
         app_of(sys.argv[1:])()
-    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError, FileExistsError) as error:
-        fail(f"{error.filename}: {error.strerror}", FAILED)
+    except OSError as error:
+        why = error.strerror or str(error)
+        fail(f"{error.filename}: {why}" if error.filename else why, FAILED)
 
 
 def app_of(arguments: Sequence[str]) -> typer.Typer:
@@ -47,13 +49,29 @@ def app_of(arguments: Sequence[str]) -> typer.Typer:
     nouns = {name: noun for name, noun in NOUNS.items() if name == asked}
     if not commands and not nouns:
         commands, nouns = [*COMMANDS], NOUNS
-    app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
+    app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, cls=_Commands)
     app.callback()(esc)
     for command in commands:
         app.command()(command)
     for name, noun in nouns.items():
         app.add_typer(noun, name=name)
     return app
+
+
+class _Commands(TyperGroup):
+    """The commands, whose values are refused in the words of ours, not in those of what checks them."""
+
+    def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]
+        """Run the command that was asked for."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as refusal:
+            if isinstance(refusal.__cause__, ValueError) and hasattr(refusal.__cause__, "errors"):
+                from service.schemas.findings import describe_errors
+
+                found = [one | {"loc": ()} for one in refusal.__cause__.errors()]
+                refusal.message = "; ".join(describe_errors(found, None, None))
+            raise
 
 
 def _print_version(asked: bool) -> None:

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.arguments import DEFAULT_URL, ApiKey, Frames, Url, parse_document, parse_frame_files
+from service.cli.answers import job_exit_code, print_answer, print_lens_summary, print_outcome, print_pose_summary
+from service.cli.arguments import (
+    DEFAULT_URL,
+    AnswerAsJson,
+    ApiKey,
+    Frames,
+    Url,
+    parse_document,
+    parse_frame_files,
+    require_folder_of,
+)
 from service.cli.printing import (
     FAILED,
     REJECTED,
     USAGE,
     fail,
     follow_to_end,
-    job_exit_code,
-    print_field_summary,
-    print_json,
-    print_lens_summary,
-    print_note,
-    print_pose_summary,
     progress_bar,
 )
 from service.cli.service_client import open_client
@@ -75,7 +80,12 @@ def intrinsics(
     square: Annotated[
         float, typer.Option("--square", metavar="METRES", help="Side of a square of the board, in metres.")
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="JSON file to write the lens to, for `esc pose`.")],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", callback=require_folder_of, help="JSON file to write the lens to, for `esc pose`."
+        ),
+    ],
     charuco: Annotated[
         str | None,
         typer.Option(
@@ -132,13 +142,20 @@ def pose(
         ),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="JSON file to write the venue to, for `esc venue put` and `esc run`.")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            callback=require_folder_of,
+            help="JSON file to write the venue to, for `esc venue put` and `esc run`.",
+        ),
     ],
     frame: Annotated[
         list[str] | None,
         typer.Option("--frame", metavar="CAMERA=FILE", help="The frame that the points of a camera were clicked in."),
     ] = None,
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
+    as_json: AnswerAsJson = False,
     _: Annotated[
         str | None,
         typer.Option(
@@ -188,7 +205,8 @@ def pose(
             found[camera] = CameraIn(id=camera, image_size=result.image_size, intrinsics=result.intrinsics, pose=stands)
     if failures:
         fail("\n".join(failures), FAILED)
-    print(json.dumps([result.model_dump(mode="json") for result in results], indent=2))
+    if as_json or not sys.stdout.isatty():
+        print(json.dumps([result.model_dump(mode="json") for result in results], indent=2))
     if not all(result.accepted for result in results):
         raise typer.Exit(REJECTED)
     venue = VenueIn(id=place.id, name=place.name, field=place.field, cameras=list(found.values()))
@@ -200,13 +218,17 @@ def fit_field(
     venue: Annotated[str, typer.Argument(metavar="VENUE", help="A venue's file, or the id of one that is stored.")],
     frames: Frames,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="JSON file to write the venue with its fitted field to.")
+        Path,
+        typer.Option(
+            "-o", "--output", callback=require_folder_of, help="JSON file to write the venue with its fitted field to."
+        ),
     ],
     pictures: Annotated[Path | None, typer.Option("--pictures", help="Folder for a picture per camera.")] = None,
     seed: Annotated[
         int | None,
         typer.Option("--seed", min=0, help="Any number: the same one finds the same. Otherwise one is chosen."),
     ] = None,
+    as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -227,10 +249,8 @@ def fit_field(
         pictures.mkdir(parents=True, exist_ok=True)
         for name, picture in drawn.items():
             (pictures / f"{name}.jpg").write_bytes(picture)
-    print_json(result)
-    print_field_summary(result)
+    print_answer(result, as_json=as_json)
     if not result.accepted:
-        print_note(f"Rejected: {result.rejected_because}")
         raise typer.Exit(REJECTED)
     fitted = stored.with_poses({camera.id: camera.pose for camera in result.cameras})
     fitted = fitted.model_copy(update={"field": result.field})
@@ -267,6 +287,7 @@ def _fit_by_service(
         job = client.fit_field(venue, files, options.model_dump(mode="json", exclude_unset=True))
         job = follow_to_end(client, job)
         if not isinstance(job.result, FieldResult):
+            print_outcome(job)
             raise typer.Exit(job_exit_code(job))
         drawn = {f"overlay_{camera.id}": client.picture(job, f"overlay/{camera.id}") for camera in stored.cameras}
     return stored, job.result, {name: picture for name, picture in drawn.items() if picture is not None}

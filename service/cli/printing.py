@@ -1,29 +1,18 @@
-"""What commands print: results and progress, and what went wrong, as lines with an exit code."""
+"""What commands print: lines and progress, and what went wrong, as lines with an exit code."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from service.client import Client
     from service.schemas.job import Job
     from service.schemas.job import Progress as Step
-    from service.schemas.results import (
-        FieldResult,
-        FindResult,
-        FoundCameraResult,
-        IntrinsicsResult,
-        LocateResult,
-        Result,
-    )
-    from service.schemas.venue import ChangedVenue
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
 ZIP_START = b"PK"
@@ -53,16 +42,16 @@ class OngoingTrouble:
         self._said = ""
 
 
-def print_json(what: BaseModel | dict[str, str]) -> None:
-    """Print an answer, as JSON."""
-    print(json.dumps(what, indent=2) if isinstance(what, dict) else what.model_dump_json(indent=2))
-
-
-def print_changed_venue(venue: ChangedVenue) -> None:
-    """Print a venue that was put or patched, as JSON, and what it leaves to be assumed for whoever looks."""
-    print(venue.model_dump_json(indent=2, exclude={"warnings"}))
-    for warning in venue.warnings:
-        print_note(f"Warning: {warning}")
+def print_rows(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a line for each row: in columns below their headings at a terminal, elsewhere separated by tabs."""
+    if not sys.stdout.isatty():
+        for row in rows:
+            print(*row, sep="\t")
+        return
+    lines = [headings, *rows]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        print("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
 
 
 def write_document(document: bytes, output: Path | None) -> None:
@@ -100,130 +89,6 @@ def key_hint(status: int) -> str:
             return "\n  Set ESC_API_KEY to a key that may. On the machine of the service: esc key list"
         case _:
             return ""
-
-
-# How a job ended
-
-
-def job_exit_code(job: Job) -> int:
-    """The exit code for a job that has ended, and a line for whoever looks."""
-    from service.schemas.results import IntrinsicsResult, Result
-
-    match job.result:
-        case None:
-            pass
-        case Result():
-            return calibration_exit_code(job.result)
-        case IntrinsicsResult():
-            return ACCEPTED
-        case _:
-            if not job.result.accepted:
-                print_note(f"Rejected: {job.result.rejected_because}")
-            return ACCEPTED if job.result.accepted else REJECTED
-    if job.status == "cancelled":
-        print_note(f"Job {job.id} was cancelled before it had a result.")
-    if job.error is not None:
-        print_note(f"{job.error.title}: {job.error.detail}")
-    return FAILED
-
-
-def calibration_exit_code(result: Result) -> int:
-    """The exit code for what a calibration found."""
-    if result.accepted:
-        return ACCEPTED
-    if result.verdict == "partly":
-        print_note(f"Accepted: {', '.join(result.accepted_cameras)}. Not all cameras: {result.rejected_because}")
-    else:
-        print_note(f"Rejected: {result.rejected_because}")
-    return REJECTED
-
-
-def outcome_text(job: Job) -> str:
-    """The verdict, or what went wrong, in a line."""
-    from service.schemas.results import IntrinsicsResult, Result
-
-    if job.error is not None:
-        return f"{job.error.title}: {job.error.detail}"
-    if job.result is None or isinstance(job.result, IntrinsicsResult):
-        return "-"
-    if isinstance(job.result, Result) and job.result.verdict == "partly":
-        return f"partly: {', '.join(job.result.accepted_cameras)} accepted; {job.result.rejected_because}"
-    return "accepted" if job.result.accepted else f"rejected: {job.result.rejected_because}"
-
-
-def print_lens_summary(result: IntrinsicsResult) -> None:
-    """What a person looks at first."""
-    used = sum(photo.fate == "used" for photo in result.photos)
-    print_note(
-        f"{used} of {len(result.photos)} photos, {result.rms_px:.2f} px rms; left out, {result.left_out_px:.2f} px"
-    )
-    (fx, _, cx), (_, fy, cy), _ = result.intrinsics.matrix
-    print_note(f"Focal length {fx:.1f}, {fy:.1f} px; principal point {cx:.1f}, {cy:.1f}; {' '.join(result.terms)}")
-    for photo in result.photos:
-        told = {
-            "used": None,
-            "no-board": "shows no board",
-            "wrong-size": "has another size",
-            "hurts": f"hurts: the others foretell it to {photo.left_out_px or 0:.1f} px only; left out",
-        }.get(photo.fate, photo.fate)
-        for words in (told, "is blurred" if photo.blurred else None):
-            if words:
-                print_note(f"  {photo.name} {words}")
-    for warning in result.warnings:
-        print_note(f"Warning: {warning}")
-
-
-def print_pose_summary(result: LocateResult) -> None:
-    """Where a camera stands, and which clicks are doubted."""
-    x, y, z = result.pose.position
-    print_note(f"Camera {result.camera}: ({x:.2f}, {y:.2f}, {z:.2f}) m, points {result.rms_px:.1f} px rms")
-    for point in result.points:
-        if point.doubted:
-            off = "out of view" if point.residual_px is None else f"{point.residual_px:.0f} px off"
-            why = ""
-            if point.exchanged_with is not None:
-                why = f"; its label and that of {point.exchanged_with} are exchanged"
-            elif point.looks_like is not None:
-                why = f"; it is on {point.looks_like}"
-            print_note(f"  {point.world} is {off}{why}")
-    for warning in result.warnings:
-        print_note(f"  {warning[0].upper()}{warning[1:]}.")
-    if result.rejected_because is not None:
-        print_note(f"  Rejected: {result.rejected_because}")
-
-
-def print_field_summary(result: FieldResult) -> None:
-    """Each measure of a pitch, or why it cannot be told."""
-    for measure in result.measures:
-        what = measure.name.removesuffix("_m").replace("_", " ")
-        if measure.known:
-            within = abs(measure.value - measure.given) < 2 * measure.sigma
-            differs = f"given {measure.given:.3f}" + (", within its uncertainty" if within else "")
-            print_note(f"{what}: {measure.value:.3f} ± {measure.sigma:.3f} m ({differs})")
-        else:
-            print_note(f"{what}: unknowable from these frames, {measure.detail} (kept {measure.given:.3f})")
-
-
-def print_found_summary(result: FindResult) -> None:
-    """A line for each camera: where it stands, or why it was not found."""
-    for camera in result.cameras:
-        print_note(_found_text(camera))
-        for remark in camera.remarks:
-            print_note(f"  {remark}")
-    if result.ridge is not None:
-        print_note(
-            f"The field is not flat: the lines tell a ridge {result.ridge[0][2]:.2f} m high, which the venue gets"
-        )
-
-
-def _found_text(camera: FoundCameraResult) -> str:
-    if not camera.accepted:
-        return f"Camera {camera.id} was not found: {camera.rejected_because}"
-    best = camera.candidates[0]
-    x, y, z = best.pose.position
-    focal = best.intrinsics.matrix[0][0]
-    lines = f"{best.lines_found:.0%} of the lines"
-    return f"Camera {camera.id}: ({x:.2f}, {y:.2f}, {z:.2f}) m, focal length {focal:.0f} px, {lines}"
 
 
 # How far a job is

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -44,8 +46,9 @@ def worker(
     from worker import supervisor
 
     try:
-        with report_database_errors():
-            supervisor.run(load_settings(data=data, worker_name=name))
+        settings = load_settings(data=data, worker_name=name)
+        with report_database_errors(settings, with_worker=True):
+            supervisor.run(settings)
     except AlreadyRunning as error:
         fail(str(error), USAGE)
 
@@ -55,22 +58,54 @@ def _serve(settings: Settings, *, with_worker: bool) -> None:
     from service.worker_lock import AlreadyRunning
 
     try:
-        with report_database_errors():
+        with report_database_errors(settings, with_worker=with_worker):
             serving.serve(settings, with_worker=with_worker)
     except (serving.CannotListen, AlreadyRunning) as error:
         fail(str(error), USAGE)
 
 
 @contextmanager
-def report_database_errors() -> Iterator[None]:
-    """What is wrong with the database is a line: it is wrong at the start, or not of this program's making."""
+def report_database_errors(settings: Settings | None = None, *, with_worker: bool = False) -> Iterator[None]:
+    """What is wrong with the database is a line: it is wrong at the start, or not of this program's making.
+
+    `settings`: of the service that is about to be used, whose folders must be writable.
+    """
     import sqlalchemy as sa
 
     from service.store.database import UnsupportedDatabase
 
+    if settings is not None:
+        _require_folders(settings, with_worker=with_worker)
     try:
         yield
     except UnsupportedDatabase as error:
         fail(str(error), USAGE)
-    except (sa.exc.DBAPIError, OSError) as error:
-        fail(f"The database cannot be used: {getattr(error, 'orig', error)}", FAILED)
+    except sa.exc.DBAPIError as error:
+        url = settings and settings.home_database_url
+        # SQLite does not say which file it cannot open.
+        which = f" {url.removeprefix('sqlite:///')}" if url and url.startswith("sqlite:///") else ""
+        fail(f"The database{which} cannot be used: {error.orig}", FAILED)
+
+
+def _require_folders(settings: Settings, *, with_worker: bool) -> None:
+    """End where a folder that the service writes to cannot be made or written."""
+    folders = {}
+    if settings.database_url is not None and settings.database_url.startswith("sqlite:///"):
+        folders["ESC_DATABASE_URL"] = Path(settings.database_url.removeprefix("sqlite:///")).parent
+    # A worker locks its name there, wherever database and files are.
+    if with_worker or settings.database_url is None:
+        folders["--data (ESC_DATA)"] = settings.data
+    for setting, folder in folders.items():
+        why = _why_unwritable(folder)
+        if why is not None:
+            fail(f"The data folder {folder} cannot be written: {why}. {setting} names another.", FAILED)
+
+
+def _why_unwritable(folder: Path) -> str | None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        return "it is a file"
+    except OSError as error:
+        return f"{error.filename}: {error.strerror}" if error.filename != str(folder) else error.strerror
+    return None if os.access(folder, os.W_OK | os.X_OK) else "this user has no right to"

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 
 from service import build
 from service.cli.arguments import parse_document
-from service.cli.printing import BUSY, FAILED, USAGE, fail, key_hint, problem_text
+from service.cli.printing import BUSY, FAILED, USAGE, fail, key_hint, print_note, problem_text
 from service.schemas.names import ID_PATTERN
+from service.variable_names import misspelt_for_client
 
 if TYPE_CHECKING:
     from service.client import Client
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 @contextmanager
 def open_client(url: str, api_key: str | None) -> Iterator[Client]:
     """A client; what goes wrong with the service is a line and an exit code."""
+    for name, meant in misspelt_for_client(os.environ).items():
+        print_note(f"Warning: {name} is not read: did you mean {meant}?")
     _skip_unused_imports()
     import httpx
 

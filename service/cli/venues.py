@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import zipfile
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
@@ -12,12 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.cli.answers import job_exit_code, outcome_text, print_answer, print_json, print_submitted
 from service.cli.arguments import (
     DEFAULT_URL,
     AdoptedCamera,
     AdoptedField,
     AdoptedFinding,
     AdoptedJob,
+    AnswerAsJson,
     ApiKey,
     AsJson,
     Candidates,
@@ -29,9 +30,11 @@ from service.cli.arguments import (
     Output,
     Url,
     VenueId,
+    Yes,
     parse_candidates,
     parse_document,
     parse_frame_files,
+    require_yes,
 )
 from service.cli.printing import (
     FAILED,
@@ -39,12 +42,8 @@ from service.cli.printing import (
     USAGE,
     fail,
     follow_to_end,
-    job_exit_code,
-    outcome_text,
-    print_changed_venue,
-    print_found_summary,
-    print_json,
     print_note,
+    print_rows,
     write_document,
 )
 from service.cli.service_client import open_client
@@ -80,6 +79,7 @@ def put_venue(
         ),
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Put it whatever would be lost by that.")] = False,
+    as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -90,14 +90,14 @@ def put_venue(
     with open_client(url, api_key) as client:
         before = _stored_venue(client, venue.id)
         if before is None:
-            print_changed_venue(client.put_venue(venue))
+            print_answer(client.put_venue(venue), as_json=as_json)
             return
         stored, tag = before
         wanted = with_poses_of(venue, stored) if keep_poses else venue
         lost = describe_losses(wanted.to_venue(), stored, client.history(venue.id, 1)[0])
         if lost and not force:
             fail("\n  ".join([f"Nothing was put. Venue {venue.id} would lose", *lost, WAYS_TO_PUT]), FAILED)
-        print_changed_venue(client.put_venue(wanted, tag))
+        print_answer(client.put_venue(wanted, tag), as_json=as_json)
 
 
 @app.command("set")
@@ -111,17 +111,18 @@ def set_venue(
             "schedule=null takes it away. Values are JSON, or else text.",
         ),
     ],
+    as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Change parts of a venue and leave the others as they are, its poses among them."""
     patch = parse_patch(changes)
     with open_client(url, api_key) as client:
-        print_changed_venue(client.patch_venue(venue, patch))
+        print_answer(client.patch_venue(venue, patch), as_json=as_json)
 
 
 @app.command("edit")
-def edit_venue(venue: VenueId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def edit_venue(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Open a venue in $EDITOR and change what was changed there, unless somebody else has changed it meanwhile."""
     with open_client(url, api_key) as client:
         stored, tag = client.tagged_venue(venue)
@@ -133,14 +134,14 @@ def edit_venue(venue: VenueId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -
         if not patch:
             print_note("Nothing was changed.")
             return
-        print_changed_venue(client.patch_venue(venue, patch, tag))
+        print_answer(client.patch_venue(venue, patch, tag), as_json=as_json)
 
 
 @app.command("get")
-def get_venue(venue: VenueId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def get_venue(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Print a venue with the poses that hold now."""
     with open_client(url, api_key) as client:
-        print_json(client.venue(venue))
+        print_answer(client.venue(venue), as_json=as_json)
 
 
 @app.command("list")
@@ -153,24 +154,20 @@ def list_venues(as_json: AsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey
 
         print_json(Venues(venues=venues))
         return
-    for venue in venues:
-        print(f"{venue.id}\t{venue.name}\t{' '.join(camera.id for camera in venue.cameras)}")
+    rows = [(venue.id, venue.name, " ".join(camera.id for camera in venue.cameras)) for venue in venues]
+    print_rows(["VENUE", "NAME", "CAMERAS"], rows)
 
 
 @app.command("delete")
 def delete_venue(
     venue: VenueId,
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask, which is asked only at a terminal.")] = False,
+    yes: Yes = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Forget a venue and the history of its poses. Its jobs stay, with frames and pictures, see `esc job delete`."""
+    require_yes(yes, f"Forget venue {venue} and the history of its poses")
     with open_client(url, api_key) as client:
-        asks = sys.stdin.isatty() and not yes
-        if asks and not typer.confirm(
-            f"Forget venue {venue} and the history of its poses? It cannot be undone", err=True
-        ):
-            fail("Nothing was deleted.", FAILED)
         client.delete_venue(venue)
     print_note(f"Venue {venue} and the history of its poses are deleted; its jobs stay: esc job list --venue {venue}")
 
@@ -249,11 +246,13 @@ def venue_history(
 
         print_json(History(revisions=revisions))
         return
+    rows = []
     for revision in revisions:
         cause = revision.cause if revision.restored_from is None else f"restored {revision.restored_from}"
         cameras = " ".join(f"{c.id}:{_pixels_text(c.moved)}/{_pixels_text(c.drift)}" for c in revision.cameras)
-        parts = revision.revision, f"{revision.at:%Y-%m-%dT%H:%M:%SZ}", cause, revision.job or "-", cameras
-        print(*parts, _actor_text(revision.by), sep="\t")
+        at = f"{revision.at:%Y-%m-%dT%H:%M:%SZ}"
+        rows.append([str(revision.revision), at, cause, revision.job or "-", cameras, _actor_text(revision.by)])
+    print_rows(["REVISION", "AT", "CAUSE", "JOB", "MOVED/DRIFTED, PX", "BY"], rows)
 
 
 @app.command("trend")
@@ -277,21 +276,21 @@ def venue_trend(
     with open_client(url, api_key) as client:
         ids = [camera] if camera else [one.id for one in client.venue(venue).cameras]
         trends = [client.trend(venue, one, first) for one in ids]
-    for trend in trends:
-        if as_json:
-            print(trend.model_dump_json())
-        elif camera is None:
-            print(f"{trend.camera}\t{trend.state}\t{100 * trend.moved_m:.1f}\t{trend.words}")
-        else:
-            _print_nights(trend)
+    if as_json:
+        print(*(trend.model_dump_json() for trend in trends), sep="\n")
+    elif camera is None:
+        rows = [(trend.camera, trend.state, f"{100 * trend.moved_m:.1f}", trend.words) for trend in trends]
+        print_rows(["CAMERA", "STATE", "MOVED, CM", "IN WORDS"], rows)
+    else:
+        _print_nights(trends[0])
 
 
 @app.command("health")
-def venue_health(venue: VenueId, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
+def venue_health(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Print how a venue is doing: alarms, drift, schedule. Exit: 0 ok, 3 an alarm rings."""
     with open_client(url, api_key) as client:
         health = client.venue_health(venue)
-    print_json(health)
+    print_answer(health, as_json=as_json)
     if health.state != "ok":
         raise typer.Exit(REJECTED)
 
@@ -321,12 +320,13 @@ def follow_venue(
 def restore_venue(
     venue: VenueId,
     revision: Annotated[int, typer.Argument(min=1, help="Number of the revision, as `esc venue history` prints it.")],
+    as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
     """Let the poses of a revision hold again, see `esc venue history`."""
     with open_client(url, api_key) as client:
-        print_json(client.restore(venue, revision))
+        print_answer(client.restore(venue, revision), as_json=as_json)
 
 
 @app.command("find")
@@ -364,6 +364,7 @@ def find_cameras(
         Path | None, typer.Option("--pictures", help="Folder for a picture of each candidate of each camera; waits.")
     ] = None,
     key: IdempotencyKey = None,
+    as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -381,12 +382,11 @@ def find_cameras(
     with open_client(url, api_key) as client:
         job = client.find(venue, files, chosen.model_dump(mode="json", exclude_unset=True), sought, key)
         if not (wait or adopt_them or pictures):
-            print_json({"job": job.id, "url": client.url_of(job.links["self"])})
+            print_submitted(client, job, as_json=as_json)
             return
         job = follow_to_end(client, job)
-        print_json(job)
+        print_answer(job, as_json=as_json)
         if isinstance(job.result, FindResult):
-            print_found_summary(job.result)
             if pictures is not None:
                 _save_candidates(client, job, pictures)
             if adopt_them and job.result.accepted:
@@ -407,6 +407,7 @@ def adopt(
     job: AdoptedJob = None,
     found: AdoptedFinding = None,
     candidate: Candidates = None,
+    as_json: AnswerAsJson = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
@@ -423,11 +424,11 @@ def adopt(
     choice = parse_candidates(candidate or ())
     with open_client(url, api_key) as client:
         if camera is not None:
-            print_json(client.adopt_refined(venue, camera))
+            print_answer(client.adopt_refined(venue, camera), as_json=as_json)
         elif field is not None and job is not None:
-            print_json(client.adopt_field(venue, job, field))
+            print_answer(client.adopt_field(venue, job, field), as_json=as_json)
         elif found is not None:
-            print_json(client.adopt_found(venue, found, choice))
+            print_answer(client.adopt_found(venue, found, choice), as_json=as_json)
 
 
 def _sought_site(
@@ -503,10 +504,12 @@ def _parse_day(text: str | None) -> date | None:
 
 
 def _print_nights(trend: Trend) -> None:
+    rows = []
     for night in trend.points:
         focal = "-" if night.focal_length is None else f"{night.focal_length:+.3%}"
-        figures = f"{100 * night.displacement_m:.1f}\t{100 * night.sigma_m:.1f}\t{focal}"
-        print(f"{night.at:%Y-%m-%dT%H:%M:%SZ}\t{night.state}\t{figures}")
+        centimetres = [f"{100 * metres:.1f}" for metres in (night.displacement_m, night.sigma_m)]
+        rows.append([f"{night.at:%Y-%m-%dT%H:%M:%SZ}", night.state, *centimetres, focal])
+    print_rows(["NIGHT", "STATE", "MOVED, CM", "SIGMA, CM", "FOCAL LENGTH"], rows)
     print_note(trend.words)
 
 

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import os
 import re
-from importlib.metadata import version
+import sys
 
 import structlog
 from opentelemetry import trace
 from opentelemetry.context import Context
 from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
+
+from service import build
 
 # Of the only version there is.
 TRACEPARENT = re.compile(r"00-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}")
@@ -34,12 +36,15 @@ def configure(service: str, instance: str) -> None:
         from opentelemetry.sdk.trace import TracerProvider
         from opentelemetry.sdk.trace.export import BatchSpanProcessor
     except ImportError:
-        log.warning("no traces: OpenTelemetry is configured but not installed, see the extra `tracing`")
+        log.warning(
+            "no traces: OpenTelemetry is configured but not installed",
+            install=build.install_command("tracing", sys.executable),
+        )
         return
 
     names = {
         "service.name": os.environ.get("OTEL_SERVICE_NAME", service),
-        "service.version": version("esc-calibration"),
+        "service.version": build.version(),
         "service.instance.id": instance,
     }
     provider = TracerProvider(resource=Resource.create(names))

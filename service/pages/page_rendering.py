@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Coroutine
 from http import HTTPStatus
 from importlib.metadata import version
+from importlib.util import find_spec
 from typing import Any
 from urllib.parse import quote
 
@@ -62,6 +63,8 @@ templates.globals |= {
     "trend_curves": trend_curves,
     "reasons": REFUSAL_REASONS,
     "alarm_words": formatting.ALARMS,
+    # The extra `exr`, without which the service answers each ST map with 503.
+    "makes_st_maps": find_spec("OpenEXR") is not None,
 }
 templates.filters |= {
     "figure": formatting.figure,

@@ -38,6 +38,8 @@ EXPECTED = {
     "greater_than_equal": "{ge:g}{unit} or more",
     "less_than": "less than {lt:g}{unit}",
     "less_than_equal": "{le:g}{unit} or less",
+    "url_parsing": "an address such as https://host.example/path",
+    "url_scheme": "an address that begins with {expected_schemes}",
 }
 """By the kinds of pydantic, with what it says of each."""
 UNITS = {
@@ -46,6 +48,11 @@ UNITS = {
     "_deg": "°",
     "_s": " s",
     "_h": " h",
+    "_hours": " hours",
+    "_days": " days",
+    "_years": " years",
+    "_mb": " MB",
+    "_cm": " cm",
     "rotation": " rad",
     "position": " m",
     "translation": " m",

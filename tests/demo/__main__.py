@@ -15,8 +15,10 @@ import httpx
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from service.cli.answers import print_calibration
 from service.client import Client
 from service.schemas.job import Job
+from service.schemas.results import Result
 from service.schemas.venue import VenueIn
 
 HERE = Path(__file__).parent
@@ -78,29 +80,12 @@ def follow(client: Client, job: Job) -> Job:
 
 def show(job: Job) -> None:
     """Print what came out."""
-    if job.result is None:
+    if not isinstance(job.result, Result):
         console.print(f"[red]{job.status}[/]: {job.error.detail if job.error else ''}")
         return
-    for camera in job.result.cameras:
-        moved, sigma = camera.moved, camera.sigma
-        sure = f"{sigma.rotation_deg:.3f}°, {100 * sigma.position_m:.1f} cm" if sigma else "unknown"
-        residual = f"{camera.residual_px:.2f} px" if camera.residual_px is not None else "unknown"
-        console.print(
-            f"[bold]{camera.id}[/]\n"
-            f"  rotation     {' '.join(f'{number:9.5f}' for number in camera.pose.rotation)} rad, world to camera\n"
-            f"  position     {' '.join(f'{number:9.3f}' for number in camera.pose.position)} m from the pitch centre\n"
-            f"  moved        {moved.rotation_deg:.2f}°, {100 * moved.position_m:.1f} cm, {moved.pixels:.0f} px\n"
-            f"  sigma        {sure}; lines fit to {residual}; {100 * camera.found:.0f} % of the markings seen"
-        )
-    before, after = job.result.stitch_error_before_px, job.result.stitch_error_px
-    console.print(f"Stitch error   before {_px(before)}, after [bold]{_px(after)}[/] (1 px = 10 cm on the pitch)")
+    print_calibration(job.result)
     verdict = "[green]accepted[/]" if job.result.accepted else f"[red]rejected[/]: {job.result.rejected_because}"
-    took = sum(job.result.timings_s.values())
-    console.print(f"Job            {job.id} {verdict} after {took:.1f} s")
-
-
-def _px(error: float | None) -> str:
-    return "unknown" if error is None else f"{error:.2f} px"
+    console.print(f"Job {job.id} {verdict}")
 
 
 def save(url: str, job: Job, name: str) -> Path:

@@ -2,7 +2,8 @@ import pytest
 from pydantic import ValidationError
 
 from service.secret_files import SecretFileError
-from service.settings import Settings
+from service.settings import Settings, setting_names, unread_variables
+from service.variable_names import misspelt_for_client, suggestion, unread
 
 
 @pytest.mark.parametrize(
@@ -96,3 +97,34 @@ def test_a_secret_in_a_file_is_checked_as_one_in_a_variable_is(tmp_path, monkeyp
     with pytest.raises(ValidationError, match=r"expected is postgresql://") as refused:
         Settings()
     assert "pa55" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("misspelt", "meant"),
+    [
+        ("ESC_KEEP_FRAME_DAYS", "ESC_KEEP_FRAMES_DAYS"),
+        ("esc_keep_frame_days", "ESC_KEEP_FRAMES_DAYS"),
+        ("ESC_WEBHOOK_SECRETS_FILE", "ESC_WEBHOOK_SECRET_FILE"),
+        ("ESC_QUEUE_LIMIT_FILE", "ESC_QUEUE_LIMIT"),
+        ("ESC_XYZZY", None),
+    ],
+)
+@pytest.mark.parametrize("where", ["environment", ".env"])
+def test_a_misspelt_variable_is_found_wherever_it_stands(tmp_path, monkeypatch, misspelt, meant, where):
+    monkeypatch.chdir(tmp_path)
+    if where == ".env":
+        (tmp_path / ".env").write_text(f"ESC_QUEUE_LIMIT=5\n{misspelt}=2\n")
+    else:
+        monkeypatch.setenv(misspelt, "2")
+    assert unread_variables() == [misspelt.upper()]
+    assert suggestion(misspelt.upper(), setting_names()) == meant
+
+
+def test_what_kubernetes_tells_of_its_services_is_no_misspelt_setting():
+    of_a_service = ["ESC_API_SERVICE_HOST", "ESC_API_SERVICE_PORT_HTTP", "ESC_API_PORT", "ESC_API_PORT_8000_TCP_ADDR"]
+    assert unread([*of_a_service, "ESC_APIS"], setting_names()) == ["ESC_APIS"]
+
+
+def test_a_command_of_the_client_takes_no_setting_for_a_misspelt_address():
+    assert misspelt_for_client(setting_names()) == {}
+    assert misspelt_for_client(["ESC_APIKEY", "ESC_ULR"]) == {"ESC_APIKEY": "ESC_API_KEY", "ESC_ULR": "ESC_URL"}

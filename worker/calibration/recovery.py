@@ -265,7 +265,9 @@ def _joined(before: Solved, again: Solved, found: Mapping[int, FoundAgain]) -> S
     results = [back.get(n, result) for n, result in enumerate(base.cameras)]
     accepted = {result.camera.id for result in results if result.accepted}
     pairs = [pair for pair, _ in judged.pairs if not accepted or accepted.issuperset(pair.cameras)]
-    joined = replace(base.with_results(results), stitch_error_px=stitch_error_px(pairs, problem.gate), pairs=judged.pairs)
+    joined = replace(
+        base.with_results(results), stitch_error_px=stitch_error_px(pairs, problem.gate), pairs=judged.pairs
+    )
     return replace(observed, cameras=problem.cameras), solution, joined, "anywhere"
 
 

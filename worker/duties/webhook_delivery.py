@@ -10,10 +10,12 @@ import random
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from functools import partial
+from typing import Any
 
 import httpx
 import structlog
 
+from service.schemas.events.venue_event import Event
 from service.schemas.job import JobEvent
 from service.settings import Settings
 from service.store.events.feed import EventRepository
@@ -82,14 +84,15 @@ class WebhookDelivery:
         self._senders.wait_all()
 
     def _attempt(self, delivery: Delivery) -> None:
-        body = self._body(delivery)
-        if body is None:
-            self._deliveries.give_up(delivery, "what was to be told is no longer kept")
-            return
-        named = {"job": delivery.id} if delivery.event is None else {"event": delivery.event}
-        with structlog.contextvars.bound_contextvars(**named, receiver=delivery.receiver, attempt=delivery.attempt):
+        told = self._event(delivery)
+        with structlog.contextvars.bound_contextvars(
+            **_names(delivery, told), receiver=delivery.receiver, attempt=delivery.attempt
+        ):
+            if told is None:
+                self._give_up(delivery, "what was to be told is no longer kept")
+                return
             try:
-                answer = self._send(delivery, body)
+                answer = self._send(delivery, told.model_dump_json().encode())
             except Exception as error:  # whatever comes of this address, it is one attempt of one delivery
                 self._failed(delivery, str(error) or type(error).__name__)
                 return
@@ -101,13 +104,12 @@ class WebhookDelivery:
             else:
                 self._failed(delivery, f"answered {answer.status}", answer.retry_after_s)
 
-    def _body(self, delivery: Delivery) -> bytes | None:
-        """Return the JSON body of a delivery; None if its event or job is no longer kept."""
+    def _event(self, delivery: Delivery) -> Event | None:
+        """Return what a delivery tells; None if its event or job is no longer kept."""
         if delivery.event is not None:
-            event = self._following.get(delivery.event)
-            return None if event is None else event.model_dump_json().encode()
+            return self._following.get(delivery.event)
         job = self._jobs.get(delivery.id)
-        return None if job is None else JobEvent.of(job).model_dump_json().encode()
+        return None if job is None else JobEvent.of(job)
 
     def _send(self, delivery: Delivery, body: bytes) -> webhook_request.WebhookResponse:
         # A job ends once: its id is the id of the event, the same at every attempt.
@@ -125,3 +127,14 @@ class WebhookDelivery:
     def _give_up(self, delivery: Delivery, why: str) -> None:
         self._deliveries.give_up(delivery, why)
         log.error("callback given up", why=why)
+
+
+def _names(delivery: Delivery, told: Event | None) -> dict[str, Any]:
+    """Return what a line of the log says of a delivery: what it tells, of which venue and job."""
+    # `event` is the line's own text.
+    names: dict[str, Any] = {"event_id": delivery.event} if delivery.event is not None else {"job": delivery.id}
+    if told is not None:
+        names |= {"what": told.type, "venue": told.data.venue}
+    if isinstance(told, JobEvent):
+        names["job"] = told.data.id
+    return names

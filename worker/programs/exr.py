@@ -12,11 +12,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from service import build
+
 
 def end_without_openexr() -> None:
     """Say what to install where it is missing."""
     if find_spec("OpenEXR") is None:
-        print("ST maps need OpenEXR: pip install 'esc-calibration[exr]'", file=sys.stderr)
+        # Whoever asks the service reads it: not where its Python lies.
+        print(f"ST maps need OpenEXR, which `{build.install_command('exr')}` brings to the service", file=sys.stderr)
         sys.exit(os.EX_UNAVAILABLE)
 
 

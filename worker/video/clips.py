@@ -6,6 +6,7 @@ picture arrives, or is that of `CameraClocks`.
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from service import build
 from worker.calibration.geometry.camera import Camera
 from worker.video.camera_clocks import CameraClocks
 from worker.video.errors import VideoError
@@ -38,7 +40,6 @@ SAME_ASPECT = 0.005
 USUAL_RATE, HIGHEST_RATE = Fraction(25), 1000
 # libav's AV_CODEC_FLAG_LOW_DELAY.
 LOW_DELAY = 1 << 19
-NO_PYAV = "Video needs PyAV: pip install 'esc-calibration[video]'"
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class Clip:
     def open(cls, camera: str, address: str, since: float = 0.0) -> Self:
         """A clip as it is; `since`, of `time.monotonic`, is for live streams. `VideoError` where none can be read."""
         if find_spec("av") is None:
-            raise VideoError(NO_PYAV)
+            raise VideoError(f"Video needs PyAV: {build.install_command('video', sys.executable)}")
         import av
 
         live = is_live(address)

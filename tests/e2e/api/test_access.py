@@ -229,20 +229,20 @@ def test_keys_are_made_listed_and_removed_on_the_machine_of_the_service(start):
     assert made_at <= used_at < until
     again = esc(service.data, "key", "add", "cron", "--scope", "read")
     assert (again.returncode, "There is a key cron already" in again.stderr) == (2, True)
-    removed = esc(service.data, "key", "remove", "cron")
+    removed = esc(service.data, "key", "remove", "cron", "--yes")
     assert (removed.returncode, "No key is left" in removed.stderr) == (0, True)
-    assert esc(service.data, "key", "remove", "cron").returncode == 1
+    assert esc(service.data, "key", "remove", "cron", "--yes").returncode == 1
     assert key not in (service.data / "log").read_text()
 
 
 def test_a_key_that_is_removed_opens_nothing_for_long(guarded):
     key = esc(guarded.data, "key", "add", "cron", "--scope", "read").stdout.strip()
     assert guarded.http.get("/jobs", headers=bearer(key)).status_code == 200
-    assert esc(guarded.data, "key", "remove", "cron").returncode == 0
+    assert esc(guarded.data, "key", "remove", "cron", "--yes").returncode == 0
     wait_for(lambda: guarded.http.get("/jobs", headers=bearer(key)).status_code == 401)
 
 
-@pytest.mark.parametrize("command", [("list",), ("remove", "cron")])
+@pytest.mark.parametrize("command", [("list",), ("remove", "cron", "--yes")])
 def test_to_ask_for_the_keys_of_no_service_makes_none(tmp_path, command):
     answer = esc(tmp_path, "key", *command)
     assert (answer.returncode, "There is no service here" in answer.stderr) == (1, True)

@@ -1,3 +1,4 @@
+import contextlib
 import json
 import os
 import pty
@@ -16,6 +17,7 @@ from service.cli.main import app_of
 from service.store.database import SCHEMA_TABLE, connect, migrate, writing
 from tests.e2e.commands import esc_here, esc_process
 from tests.e2e.running import FRAMES, keys_in, png, venue, wait_for
+from tests.unprivileged import drop_capabilities
 
 # An editor in which somebody changes the name, while somebody else may put another one.
 MEDDLING = """
@@ -34,7 +36,7 @@ def test_a_venue_is_put_read_listed_and_deleted(esc, name, tmp_path):
     assert json.loads(esc("venue", "put", "venue.json").stdout)["id"] == name
     assert json.loads(esc("venue", "get", name).stdout)["cameras"][0]["id"] == "left"
     assert f"{name}\taccept\tleft right" in esc("venue", "list").stdout
-    assert esc("venue", "delete", name).returncode == 0
+    assert esc("venue", "delete", name, "--yes").returncode == 0
     gone = esc("venue", "get", name)
     assert gone.returncode == 1
     assert "There is no such venue" in gone.stderr
@@ -64,12 +66,25 @@ def test_a_venue_is_deleted_at_a_terminal_only_after_a_yes(service, tmp_path, na
     assert ("cannot be undone" in answer.stderr) == (not options)
 
 
+@pytest.mark.parametrize(
+    "command", [("venue", "delete", "main"), ("job", "delete", "0" * 26), ("key", "remove", "cron")]
+)
+def test_nothing_is_deleted_without_a_yes_where_nobody_can_be_asked(tmp_path, command):
+    # Nothing listens there: it is refused before anything is asked of a service.
+    answer = esc_here(tmp_path, *command, ESC_URL="http://127.0.0.1:9")
+    assert (answer.returncode, answer.stdout) == (2, "")
+    assert answer.stderr.startswith("Nothing was deleted. Forget ")
+    assert "confirm with --yes" in answer.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_names_of_a_sports_points_are_listed(esc):
     listed = esc("pose", "--points", "tennis")
     assert listed.returncode == 0
     assert "left near corner\t-11.88\t-5.49" in listed.stdout.splitlines()
     assert "far doubles sideline, {distance} m from the left baseline" in listed.stdout.splitlines()
-    unknown = esc("pose", "--points", "soccer")
+    assert esc("pose", "--points", "soccer").stdout == esc("pose", "--points", "football").stdout
+    unknown = esc("pose", "--points", "quidditch")
     assert (unknown.returncode, "football" in unknown.stderr) == (2, True)
 
 
@@ -163,6 +178,43 @@ def test_the_exit_code_tells_how_a_calibration_ended(service, esc, name, behavio
         assert "Rejected: the lines do not fit" in answer.stderr
     if behaviour == "partly":
         assert "Accepted: left. Not all cameras: the lines do not fit" in answer.stderr
+
+
+def at_terminal(service, folder, *arguments):
+    """What a command prints on a terminal, and what it exits with."""
+    terminal, its_end = pty.openpty()
+    command = [sys.executable, "-m", "service.cli", *arguments]
+    with subprocess.Popen(
+        command, cwd=folder, env=os.environ | {"ESC_URL": service.url}, stdout=its_end, stderr=subprocess.PIPE
+    ) as process:
+        os.close(its_end)
+        said = b""
+        # Where nobody has the other end any more, Linux answers with an error.
+        with contextlib.suppress(OSError):
+            while chunk := os.read(terminal, 65536):
+                said += chunk
+    os.close(terminal)
+    return process.returncode, said.decode().replace("\r\n", "\n")
+
+
+@pytest.mark.parametrize("behaviour", ["accept", "reject"])
+def test_at_a_terminal_answers_are_lines_and_with_json_they_are_json(service, name, tmp_path, behaviour):
+    for side in ("left", "right"):
+        (tmp_path / f"{side}.png").write_bytes(png())
+    (tmp_path / "venue.json").write_text(json.dumps(venue(name, behaviour)))
+    put = at_terminal(service, tmp_path, "venue", "put", "venue.json")[1].splitlines()
+    assert put[0] == f"Venue {name}, {behaviour}: football, 105 x 68 m"
+    assert [line.split()[0] for line in put[1:4]] == ["CAMERA", "left", "right"]
+    code, said = at_terminal(service, tmp_path, "calibrate", name, *FRAMES, "--wait")
+    job = service.http.get("/jobs", params={"venue": name}).json()["jobs"][0]
+    verdict = {"accept": "accepted", "reject": "rejected"}[behaviour]
+    assert code == (0 if behaviour == "accept" else 3)
+    assert f"left: {verdict}\n  rotation  " in said
+    assert said.endswith(f"Job {job['id']}, calibration of venue {name}: succeeded, {verdict}\n")
+    assert json.loads(at_terminal(service, tmp_path, "job", "get", job["id"], "--json")[1]) == service.job(job["id"])
+    listed = at_terminal(service, tmp_path, "job", "list", "--venue", name)[1].splitlines()
+    assert listed[0].split() == ["JOB", "SUBMITTED", "VENUE", "KIND", "STATUS", "OUTCOME"]
+    assert listed[1].startswith(f"{job['id']}  ")
 
 
 def test_a_job_that_was_cancelled_is_told(service, esc, name):
@@ -415,11 +467,45 @@ def test_a_port_in_use_is_told(service, tmp_path):
     assert "--port chooses another" in answer.stderr
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (("job", "list", "--limit", "0"), "'--limit': expected 1 or more, came '0'"),
+        (("job", "list", "--status", "asleep"), "'--status': 'asleep' is not one of 'queued', "),
+        (("venue", "restore", "main", "first"), "'revision': expected a whole number, came 'first'"),
+        (("serve", "--port", "http"), "'--port': expected a whole number, came 'http'"),
+        (("serve", "--port", "99999"), "--port: expected 65535 or less, came 99999"),
+        (("serve", "--port", "0", "--host", "nowhere.invalid"), "Cannot listen on nowhere.invalid:0: no such host."),
+        (("live", "venue.json", "--json", "--interface", "300.1.1.1"), "'--interface': expected an IPv4 address"),
+        (("field", "fit", "venue.json", "left=left.png", "-o", "no/venue.json"), "'--output': there is no folder no"),
+    ],
+)
+def test_a_value_that_is_wrong_is_told_in_words(tmp_path, command, words):
+    (tmp_path / "venue.json").write_text(json.dumps(venue("v")))
+    (tmp_path / "left.png").write_bytes(png())
+    answer = esc_here(tmp_path, *command, COLUMNS="200")
+    assert (answer.returncode, words in " ".join(answer.stderr.replace("│", " ").split())) == (2, True), answer.stderr
+
+
 def test_a_wrong_setting_is_told(tmp_path):
     answer = esc_here(tmp_path, "serve", ESC_QUEUE_LIMIT="many")
     assert answer.returncode == 2
-    assert "ESC_QUEUE_LIMIT" in answer.stderr
+    assert answer.stderr == "ESC_QUEUE_LIMIT: expected a whole number, came 'many'\n"
+    assert esc_here(tmp_path, "serve", ESC_DRAIN_S="-1").stderr == "ESC_DRAIN_S: expected 0 s or more, came '-1'\n"
     assert esc_here(tmp_path, "serve", ESC_DATABASE_URL="mysql://x").stderr.startswith("ESC_DATABASE_URL: expected is ")
+
+
+@pytest.mark.parametrize("command", [("serve",), ("up",), ("worker",), ("key", "list")])
+def test_a_misspelt_setting_is_refused_with_the_name_that_was_meant(tmp_path, command):
+    answer = esc_here(tmp_path, *command, ESC_KEEP_FRAME_DAYS="2")
+    assert (answer.returncode, answer.stdout) == (2, "")
+    assert answer.stderr == "unknown setting ESC_KEEP_FRAME_DAYS: did you mean ESC_KEEP_FRAMES_DAYS?\n"
+
+
+def test_a_misspelt_variable_of_a_command_that_calls_a_service_is_a_warning(service, tmp_path):
+    answer = esc_here(tmp_path, "venue", "list", ESC_URL=service.url, ESC_APIKEY="esc_x")
+    assert answer.returncode == 0
+    assert answer.stderr == "Warning: ESC_APIKEY is not read: did you mean ESC_API_KEY?\n"
 
 
 def test_a_list_among_the_settings_that_is_no_json_is_told_in_a_line(tmp_path):
@@ -435,6 +521,40 @@ def test_a_database_out_of_reach_is_told_in_a_line(tmp_path, command):
     assert (answer.returncode, "The database cannot be used: " in answer.stderr) == (1, True)
     assert "Traceback" not in answer.stderr
     assert "secret" not in answer.stderr
+
+
+@pytest.mark.parametrize("command", [("serve", "--port", "0"), ("up", "--port", "0"), ("worker",)])
+@pytest.mark.parametrize(("folder", "why"), [("file", "it is a file"), ("file/below", "Not a directory")])
+def test_a_data_folder_that_cannot_be_made_is_told_by_its_name(tmp_path, command, folder, why):
+    (tmp_path / "file").touch()
+    answer = esc_here(tmp_path, *command, "--data", folder)
+    assert (answer.returncode, answer.stdout) == (1, "")
+    assert answer.stderr.startswith(f"The data folder {folder} cannot be written: {why}"), answer.stderr
+
+
+def test_a_data_folder_without_rights_is_told_by_its_name(tmp_path):
+    folder = tmp_path / "locked"
+    folder.mkdir(mode=0o500)
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--data", folder]
+    # What a thread may not do, what it starts may not do.
+    with ThreadPoolExecutor(1, initializer=drop_capabilities) as thread:
+        answer = thread.submit(subprocess.run, command, capture_output=True, text=True).result()
+    assert answer.returncode == 1
+    assert answer.stderr.startswith(f"The data folder {folder} cannot be written: this user has no right to.")
+
+
+def test_an_address_of_a_database_whose_folder_cannot_be_made_is_told_by_its_setting(tmp_path):
+    (tmp_path / "file").touch()
+    answer = esc_here(tmp_path, "serve", "--port", "0", ESC_DATABASE_URL=f"sqlite:///{tmp_path}/file/esc.sqlite")
+    told = f"The data folder {tmp_path}/file cannot be written: it is a file. ESC_DATABASE_URL names another.\n"
+    assert (answer.returncode, answer.stderr) == (1, told)
+
+
+def test_a_file_that_is_no_database_is_told_by_its_name(tmp_path):
+    (tmp_path / "esc.sqlite").write_text("a text, as long as it takes to be no empty database\n" * 9)
+    answer = esc_here(tmp_path, "key", "add", "a", "--scope", "read", "--data", str(tmp_path))
+    assert answer.returncode == 1
+    assert f"The database {tmp_path}/esc.sqlite cannot be used: file is not a database" in answer.stderr
 
 
 def test_a_database_of_another_version_is_told_in_a_line(tmp_path):

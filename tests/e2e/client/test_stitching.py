@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 
 import av
 import pytest
@@ -138,7 +139,7 @@ def test_without_pyav_it_says_how_to_get_it(esc, venue_file, clips, monkeypatch)
     monkeypatch.setattr(clips_of, "find_spec", lambda name: None)
     answer = esc("stitch", venue_file, *clips, "-o", "pano.mp4")
     assert answer.returncode == 1
-    assert "pip install 'esc-calibration[video]'" in answer.stderr
+    assert f"{sys.executable} -m pip install 'av<19,>=18.1'" in answer.stderr
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from tests.e2e.observe.figures import families, figures
 from tests.e2e.running import wait_for
 from tests.homes import in_both_homes
@@ -98,5 +100,23 @@ def test_the_worker_calls_a_job_what_its_request_was_called(service, name):
     )
     assert {(line["request"], line["trace"]) for line in lines} == {("night-run-7", trace)}
     assert [line["verdict"] for line in lines if line["event"] == "job ends"] == ["accepted"]
+    assert {line["venue"] for line in lines} == {name}
     (asked,) = [line for line in log(service) if line.get("path") == f"/venues/{name}/calibrate"]
     assert (asked["request"], asked["trace"], asked["status"]) == ("night-run-7", trace, 202)
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "outcome"),
+    [
+        ("reject", {"verdict": "rejected", "why": "the lines do not fit", "cameras": ["left", "right"]}),
+        ("partly", {"verdict": "partly", "why": "the lines do not fit", "cameras": ["right"]}),
+        ("fail", {"verdict": "no-markings-in-view", "why": "It is black.", "cameras": ["left"]}),
+        ("accept", {"verdict": "accepted", "why": None, "cameras": None}),
+    ],
+)
+def test_the_end_of_a_job_is_logged_with_its_venue_and_why(service, name, behaviour, outcome):
+    job = service.calibrated(service.venue(name, behaviour))["id"]
+    of = {"event": "job ends", "job": job}
+    line = wait_for(lambda: next((line for line in log(service) if of.items() <= line.items()), None))
+    assert {"venue": line["venue"], "kind": line["kind"]} == {"venue": name, "kind": "calibration"}
+    assert {part: line.get(part) for part in outcome} == outcome

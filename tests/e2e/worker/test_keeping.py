@@ -40,9 +40,9 @@ def test_a_job_that_is_open_is_cancelled_before_it_is_deleted(service, esc, name
     job = service.submitted(service.venue(name, "hang"))
     refused = service.http.delete(f"/jobs/{job}")
     assert (refused.status_code, refused.json()["type"]) == (409, "/problems/job-open")
-    assert esc("job", "delete", job).returncode == 1
+    assert esc("job", "delete", job, "--yes").returncode == 1
     service.http.post(f"/jobs/{job}/cancel")
-    assert esc("job", "delete", job).returncode == 0
+    assert esc("job", "delete", job, "--yes").returncode == 0
     assert service.http.get(f"/jobs/{job}").status_code == 404
 
 

@@ -58,7 +58,7 @@ def test_a_key_has_one_package_made_at_a_time_and_other_keys_have_theirs_after_i
 
 def test_st_maps_need_openexr_and_say_what_to_install():
     made_by = stitches(WITHOUT_OPENEXR)
-    with pytest.raises(Problem, match=r"pip install 'esc-calibration\[exr\]'") as told:
+    with pytest.raises(Problem, match=r"python -m pip install 'OpenEXR<4,>=3.4'") as told:
         asyncio.run(made_by.package(question(made_by, "st-map"), ""))
     assert told.value.kind == "extra-missing"
 

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from service.cli.printing import outcome_text, print_field_summary
+from service.cli.answers import outcome_text, print_field_summary
 from service.schemas.job import Job
 from service.schemas.results import FieldResult, MeasureResult, Provenance
 from service.schemas.venue import VenueIn

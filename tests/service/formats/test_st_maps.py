@@ -50,7 +50,7 @@ def read_maps(shot, form, tmp_path):
 def test_without_openexr_it_is_told_what_to_install():
     program = "import sys; sys.modules['OpenEXR'] = None; from worker.programs.stmap import main; main(sys.argv[1])"
     settings = Settings(map_program=[sys.executable, "-P", "-c", program])
-    with pytest.raises(Problem, match=r"pip install 'esc-calibration\[exr\]'") as told:
+    with pytest.raises(Problem, match=r"python -m pip install 'OpenEXR<4,>=3.4'") as told:
         export_formats(settings)["st-map"].document([small([])])
     assert told.value.kind == "extra-missing"
 

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import pytest
@@ -37,3 +38,12 @@ def test_the_page_names_every_format_and_offers_all_cameras_where_one_file_has_t
     (title,) = re.findall(r'<th scope="row">(.+?)</th>', page)
     assert title
     assert ("Download" in page) is not isinstance(FORMATS[name], OneCameraFormat)
+
+
+@pytest.mark.parametrize("made", [True, False])
+def test_a_page_offers_st_maps_only_where_openexr_is_installed(made, monkeypatch):
+    monkeypatch.setitem(templates.globals, "makes_st_maps", made)
+    parts = templates.overlay(cache_size=0).get_template("parts.html").module
+    row = parts.downloads("/venues/demo/poses", ["st-map"], [SimpleNamespace(id="left")], "Poses")
+    assert ("format=st-map&amp;camera=left" in row) is made
+    assert ("needs OpenEXR, which is not installed here" in row) is not made

@@ -42,6 +42,13 @@ LEFT = ("cameras", 0)
             1,
             "cameras.left.colour is not known; known are id, image_size, intrinsics, pose, ",
         ),
+        (
+            ("field", "length_m"),
+            10500,
+            "field.length_m: expected 400 m or less, came 10500; it is in metres: are these centimetres or millimetres?",
+        ),
+        (("alarms",), {"moved_since_last_px": 0}, "alarms.moved_since_last_px: expected more than 0 px, came 0"),
+        (("webhooks",), [{"url": "x"}], "webhooks.0.url: expected an address such as https://"),
         (("field", "length_m"), "abc", "field.length_m: expected a number, came 'abc'"),
         ((*LEFT, "pose", "position", 2), None, "cameras.left.pose.position.2: expected a number, came null"),
         ((*LEFT, "image_size", 0), 10.5, "cameras.left.image_size.0: expected a whole number, came 10.5"),
@@ -71,7 +78,6 @@ LEFT = ("cameras", 0)
             "field.length_m: expected 400 m or less, came 10500; it is in metres: are these centimetres",
         ),
         (("field", "length_m"), 344, "field.length_m: football: 60 to 130 m, not 344; are these feet?"),
-        (("alarms",), {"moved_since_last_px": 0}, "alarms.moved_since_last_px: expected more than 0 px, came 0"),
     ],
 )
 def test_each_mistake_is_told_in_words_of_the_document(path, value, words):

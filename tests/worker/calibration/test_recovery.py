@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import count
 from types import SimpleNamespace
 
 import cv2
@@ -130,7 +131,7 @@ def test_a_search_anywhere_does_not_look_at_the_clock(monkeypatch):
         return Relocalisation([], NotFound("lines", "no pose explains the lines"))
 
     monkeypatch.setattr(recovery, "relocalise", elsewhere)
-    monkeypatch.setattr("time.process_time", lambda now=iter(range(0, 10**9, 1000)): float(next(now)))
+    monkeypatch.setattr("time.process_time", count(0.0, 1000.0).__next__)
     run(knocked_venue()[:1], {"left": frames()["left"]}, seed=3, search="anywhere")
     assert [place.is_anywhere for place in places] == [False, True]
 

@@ -9,6 +9,8 @@ from threading import Barrier
 
 import pytest
 import sqlalchemy as sa
+from structlog.contextvars import merge_contextvars
+from structlog.testing import capture_logs
 
 from service.schemas.health import Alarms
 from service.settings import Settings
@@ -147,6 +149,27 @@ def test_an_alarm_is_told_when_it_begins_and_when_it_is_over_and_nothing_is_left
     signed = webhook_request.headers(ended.headers["webhook-id"], clock.now, ended.body, home.settings.webhook_keys)
     assert ended.headers.items() >= signed.items()
     assert home.callbacks() == {}
+
+
+def test_the_log_says_what_was_delivered_and_of_which_venue(stock, receiver, clock):
+    home, hook = stock(), receiver(Receiver, 204, 500, 204, 204)
+    rules = Alarms(rejected_in_a_row=1, callback_url=hook.url)
+    job = ended(home, hook.url)
+    home.venues.put(home.venue("w").model_copy(update={"alarms": rules}), anyway)
+    duty = callbacks(home, clock)
+    with capture_logs(processors=[merge_contextvars]) as lines:
+        look(duty)
+        home.calibrated("w", accepted=False)
+        look(duty)
+        clock.goes_on(minutes=1)
+        look(duty)
+    said = [{name: line.get(name) for name in ("event", "what", "venue", "job", "why")} for line in lines]
+    alarm = {"what": "alarm.began", "venue": "w", "job": None}
+    assert said == [
+        {"event": "callback delivered", "what": "job.succeeded", "venue": "v", "job": job, "why": None},
+        {"event": "callback failed", "why": "answered 500"} | alarm,
+        {"event": "callback delivered", "why": None} | alarm,
+    ]
 
 
 def test_a_job_that_asked_for_nothing_is_not_told_of(stock):

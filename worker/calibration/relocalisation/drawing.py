@@ -15,9 +15,7 @@ BESIDE, AIMED_AT = 1.3, 1.1
 """In half sizes of the field: how far along a side cameras stand, and where on the field they look."""
 
 
-def draw(
-    field: FieldMap, focal_px: Array, roll_sigma: float, count: int, rng: np.random.Generator
-) -> Hypotheses:
+def draw(field: FieldMap, focal_px: Array, roll_sigma: float, count: int, rng: np.random.Generator) -> Hypotheses:
     """Draw so many cameras that look at the field, two thirds of them beside a long side; focal lengths evenly.
 
     `roll_sigma`: how far from level they are rolled, rad, one standard deviation.

@@ -50,7 +50,9 @@ def propose(field: FieldMap, response: NDArray[np.uint8], sought: SoughtCamera, 
     found = [
         proposal
         for lens in sought.lenses
-        for proposal in _through(field, LineView.of(response, lens.lens, sought.roll_sigma_deg), lens, sought.place, rng)
+        for proposal in _through(
+            field, LineView.of(response, lens.lens, sought.roll_sigma_deg), lens, sought.place, rng
+        )
     ]
     return sorted(found, key=lambda one: -one.agreement)
 
@@ -86,9 +88,7 @@ def _through(
     ]
 
 
-def _drawn(
-    field: FieldMap, focal: Array, roll_sigma: float, place: Place, rng: np.random.Generator
-) -> Hypotheses:
+def _drawn(field: FieldMap, focal: Array, roll_sigma: float, place: Place, rng: np.random.Generator) -> Hypotheses:
     """Cameras drawn at random: where they are known to stand, or else from where fields are filmed."""
     if place.position is None:
         return _at(place, field, draw(field, focal, roll_sigma, DRAWN, rng))

@@ -7,7 +7,6 @@ from tests.worker.calibration.synthetic import PITCH
 from worker.calibration.relocalisation.drawing import AIMED_AT, HIGHEST_M, LOWEST_M, draw
 from worker.calibration.relocalisation.field_map import FieldMap
 
-
 ROLL_DEG = 4.0
 
 
