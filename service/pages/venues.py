@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 from service.api import etags
 from service.api.context import InContext, VenueIdPath
 from service.pages.live import CLOCKS, STATUSES, live_card
+from service.pages.outcome import CAME_BY, outcome_of, poses_in_use
 from service.pages.page_rendering import Page, render_page
 from service.pages.sparkline import Sparkline, sparkline
 from service.routes.contract.documented import needs_scope
@@ -25,7 +26,6 @@ from service.schemas.names import ID_PATTERN, FormatName
 from service.schemas.venue import Venue
 from service.schemas.view import ViewChoice
 from service.store.repositories import Repositories
-from service.store.revisions import CALIBRATION_CAUSES
 from service.store.statistics.venue_summary import CalibrationSummary
 
 PER_PAGE = 50
@@ -91,6 +91,7 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
     job = context.jobs.get(newest) if newest else None
     revisions = context.venues.history(venue_id, None, IN_TABLE)
     health = context.venues.health(venue_id)
+    in_use = poses_in_use(context, venue_id)
     active = context.past_calibrations.active([venue_id]).get(venue_id)
     a_year_ago = datetime.now(UTC) - IN_TRENDS
     return render_page(
@@ -101,9 +102,11 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         job=job,
         revisions=revisions,
         health=health,
-        holds=job is not None and poses_are_current(job, revisions[0]),
+        in_use=in_use,
+        outcome=outcome_of(context, job, in_use),
+        came_by=CAME_BY,
+        undone=undone_jobs(revisions),
         sizes=sizes_of(stored),
-        decidable=context.decisions.decidable(job.id) if job else None,
         adoptable=context.adopted_fields.adoptable(job.id) if job else {},
         restorable=context.venues.restorable(stored, [one.revision for one in revisions]),
         kept_jobs=kept_jobs(context, revisions, health),
@@ -118,6 +121,12 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         tag=etags.quoted(venue_etag(stored)),
         seen=seen,
     )
+
+
+def undone_jobs(revisions: list[Revision]) -> Collection[str]:
+    """Return the jobs whose poses somebody gave back and has not accepted again; `revisions`: newest first."""
+    last = {one.job: one.cause for one in reversed(revisions) if one.job}
+    return {job for job, cause in last.items() if cause == "restored"}
 
 
 def kept_jobs(context: Repositories, revisions: list[Revision], health: VenueHealth | None) -> Collection[str]:
@@ -149,8 +158,3 @@ def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
 def sizes_of(venue: Venue | None) -> dict[str, list[int]]:
     """The width and height of each camera's frames."""
     return {camera.id: camera.image_size for camera in venue.cameras} if venue else {}
-
-
-def poses_are_current(job: Job, newest: Revision) -> bool:
-    """Whether the poses that a job found are those that its venue has."""
-    return newest.job == job.id and newest.cause in CALIBRATION_CAUSES

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.pages import newcomer
-from tests.pages.browsing import grave
+from tests.pages.browsing import grave, press_and_confirm
 
 OFF = [1.9, 0.3, -0.2]
 
@@ -115,7 +115,7 @@ def test_a_venue_is_deleted_once_its_id_was_typed(stub, visit):
     typed.press("Enter")
     assert stub.http.get(f"/venues/{name}").status_code == 200
     typed.fill("doomed")
-    delete.click()
+    assert "Nobody can restore them" in press_and_confirm(delete)
     page.wait_for_url(f"{stub.url}/")
     assert stub.http.get(f"/venues/{name}").status_code == 404
 

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.e2e import running
 from tests.e2e.running import SIZE, Service, png, wait_for
-from tests.pages.browsing import differs, grave, look, tab, wait_until
+from tests.pages.browsing import differs, grave, look, press_and_confirm, tab, wait_until
 from tests.pages.stocked import calibrations
 
 DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 800}
@@ -97,7 +97,7 @@ def test_a_result_that_is_accepted_in_part_says_of_which_camera_and_the_rest_can
     expect(right.locator(".badge")).to_have_text("Rejected")
     expect(right.get_by_text("the lines do not fit")).to_be_visible()
     assert stub.http.get("/venues/part").json()["cameras"][1]["pose"] != job["result"]["cameras"][1]["pose"]
-    right.get_by_role("button", name="Accept right anyway").click()
+    press_and_confirm(right.get_by_role("button", name="Accept right anyway"))
     expect(page.get_by_text("as revision 3")).to_be_visible()
     assert stub.http.get("/venues/part").json()["cameras"][1]["pose"] == job["result"]["cameras"][1]["pose"]
 
@@ -198,7 +198,7 @@ def test_a_running_job_is_followed_and_cancelled(stub, visit):
     expect(page.locator(".stages [aria-current]")).to_have_text("evolution")
     expect(page.locator("progress")).to_have_attribute("value", "0.5")
     expect(page.locator("[data-live=loss] canvas")).to_be_visible()
-    page.get_by_role("button", name="Cancel").click()
+    press_and_confirm(page.get_by_role("button", name="Cancel"))
     expect(page.locator(".title .badge")).to_have_text("Cancelled")
     assert stub.job(job)["status"] == "cancelled"
 

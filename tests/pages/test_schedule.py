@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.e2e.intake.cameras import NetworkCamera
 from tests.e2e.running import Service
-from tests.pages.browsing import grave
+from tests.pages.browsing import grave, press_and_confirm
 
 ZONE = "Asia/Tokyo"
 
@@ -47,7 +47,7 @@ def test_a_schedule_is_made_tried_and_ended(fetching, camera, visit):
     page.get_by_label("To the second").check()
     page.get_by_role("button", name="Save schedule").click()
     expect(schedule.get_by_role("definition").nth(1)).to_have_text(re.compile("03:00:00"))
-    page.get_by_role("button", name="End schedule").click()
+    press_and_confirm(page.get_by_role("button", name="End schedule"))
     expect(page.get_by_role("button", name="End schedule")).to_have_count(0)
     assert fetching.http.get("/venues/timed").json()["schedule"] is None
 

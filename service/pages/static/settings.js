@@ -1,6 +1,6 @@
 // The settings of a venue: alarms, lenses, and its end. Each is saved by itself, on the venue that the page shows.
 
-import {call, root} from "./page.js";
+import {ask, call, root} from "./page.js";
 
 const box = document.getElementById("settings");
 const address = `${root}/venues/${box.dataset.venue}`;
@@ -61,7 +61,8 @@ end.elements.typed.addEventListener("input", () => { end.querySelector("button")
 onSubmit(end, async () => {
   // By keys a form is sent whatever its button says.
   if (end.elements.typed.value !== box.dataset.venue) throw new Error(`Type ${box.dataset.venue}.`);
-  if (!confirm(`Delete ${box.dataset.venue} for good?`)) return;
+  const effect = "Its poses, their history and its trends are gone for good. Nobody can restore them.";
+  if (!await ask({asks: `Delete ${box.dataset.venue}?`, effect, does: "Delete for good", isDanger: true})) return;
   await call("DELETE", address, undefined, ifSame());
-  location.assign("/");
+  location.assign(`${root}/`);
 });
