@@ -7,6 +7,8 @@ from typing import Literal
 
 from service.schemas.history import Cause, Revision
 from service.schemas.job import Job
+from service.schemas.names import Verdict
+from service.schemas.results import Result
 from service.store.jobs.decisions import OpenDecisions
 from service.store.repositories import Repositories
 from service.store.revisions import CALIBRATION_CAUSES
@@ -68,10 +70,12 @@ class Outcome:
 
 def outcome_of(context: Repositories, job: Job | None, in_use: PosesInUse | None) -> Outcome | None:
     """Return what became of a calibration's poses; None for a job without any, or whose venue was deleted."""
-    if job is None or job.kind != "calibration" or job.result is None or in_use is None:
+    if job is None or in_use is None or not isinstance(job.result, Result):
         return None
     use, decidable = _use(context, job, in_use), context.decisions.decidable(job.id)
-    return Outcome(use, _headline(job, use, in_use, decidable), in_use, decidable)
+    dry_run = bool(job.options.get("dry_run"))
+    headline = _headline(job.result.verdict, use, in_use, decidable, dry_run=dry_run)
+    return Outcome(use, headline, in_use, decidable)
 
 
 def poses_in_use(context: Repositories, venue_id: str | None) -> PosesInUse | None:
@@ -90,9 +94,9 @@ def _use(context: Repositories, job: Job, in_use: PosesInUse) -> Use:
     return "undone" if after.cause == "restored" else "replaced"
 
 
-def _headline(job: Job, use: Use, in_use: PosesInUse, decidable: OpenDecisions) -> Headline:
-    assert job.result is not None
-    verdict = job.result.verdict
+def _headline(
+    verdict: Verdict, use: Use, in_use: PosesInUse, decidable: OpenDecisions, *, dry_run: bool
+) -> Headline:
     if use in ("undone", "replaced"):
         return Headline(use.capitalize(), "plain", "again")
     if use == "in-use" and in_use.origin.cause == "accepted" and not decidable.accept:
@@ -101,6 +105,5 @@ def _headline(job: Job, use: Use, in_use: PosesInUse, decidable: OpenDecisions) 
     if verdict == "partly" or (use == "in-use" and in_use.origin.cause == "accepted"):
         return Headline("Partly accepted", "part", "alert")
     if verdict == "accepted":
-        dry_run = use == "never" and job.options.get("dry_run")
-        return Headline("Accepted, dry run" if dry_run else "Accepted", "good", "check")
+        return Headline("Accepted, dry run" if dry_run and use == "never" else "Accepted", "good", "check")
     return Headline("Rejected", "bad", "cross")

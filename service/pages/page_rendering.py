@@ -61,9 +61,11 @@ templates.globals |= {
     "trend_curves": trend_curves,
     "reasons": REFUSAL_REASONS,
     "alarm_words": formatting.ALARMS,
+    "kind_words": formatting.KINDS,
 }
 templates.filters |= {
     "figure": formatting.figure,
+    "for_people": formatting.for_people,
     "cm": formatting.centimetres,
     "on_the_pitch": formatting.on_the_pitch,
     "degrees": formatting.degrees,

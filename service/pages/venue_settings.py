@@ -7,6 +7,7 @@ from typing import get_args
 
 from fastapi import APIRouter, Request, Response
 
+from fields.template import NAMES
 from service.api import etags
 from service.api.context import InContext
 from service.pages.page_rendering import Page, render_page
@@ -21,10 +22,12 @@ router = APIRouter(route_class=Page, include_in_schema=False)
 
 @router.get("/ui/venues/{venue_id}/settings", openapi_extra=needs_scope("admin"))
 def settings(venue: ExistingVenue, request: Request) -> Response:
-    """Alarms, lenses, and the end of a venue."""
+    """Name and field, alarms, lenses, and the end of a venue."""
     lenses = {camera.id: _readable(camera.intrinsics) for camera in venue.cameras}
     shown = venue.model_copy(update={"alarms": venue.alarms or Alarms()})
-    return render_page(request, "settings.html", venue=shown, lenses=lenses, tag=etags.quoted(venue_etag(venue)))
+    return render_page(
+        request, "settings.html", venue=shown, lenses=lenses, templates=NAMES, tag=etags.quoted(venue_etag(venue))
+    )
 
 
 @router.get("/ui/venues/{venue_id}/first-pose", openapi_extra=needs_scope("admin"))

@@ -39,12 +39,13 @@ data = APIRouter(route_class=Guarded, include_in_schema=False)
 
 @dataclass(frozen=True)
 class VenueRow:
-    """A venue in the list: its last calibration that ended, the one that is going on, and what rings."""
+    """A venue in the list: its last calibration that ended, the one that is going on, what rings, and whether it was undone."""
 
     venue: Venue
     glance: CalibrationSummary | None
     active: Job | None
     alarms: list[Alarm]
+    is_undone: bool
 
     @property
     def curve(self) -> Sparkline | None:
@@ -72,10 +73,16 @@ def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
     """A few queries for all of them, however many jobs there are."""
     ids = [venue.id for venue in venues]
     glances, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
-    active = context.past_calibrations.active(ids)
+    active, undone = context.past_calibrations.active(ids), context.past_calibrations.undone(ids)
     jobs = context.jobs.several(active.values())
     return [
-        VenueRow(venue, glances.get(venue.id), jobs.get(active.get(venue.id, "")), alarms.get(venue.id, []))
+        VenueRow(
+            venue,
+            glances.get(venue.id),
+            jobs.get(active.get(venue.id, "")),
+            alarms.get(venue.id, []),
+            venue.id in undone,
+        )
         for venue in venues
     ]
 

@@ -74,16 +74,35 @@ def test_the_list_shows_each_venue_with_its_last_result(stub, ended, years, visi
     expect(row.get_by_role("img", name="Stitch error")).to_be_visible()
 
 
+def test_the_list_says_of_a_calibration_that_was_undone(stub, visit):
+    name = stub.venue("regretted")
+    job = stub.calibrated(name)["id"]
+    stub.http.post(f"/jobs/{job}/reject").raise_for_status()
+    page = visit(stub.url)
+    row = page.locator(".venue-row", has=page.locator(f"a[href='/ui/venues/{name}']"))
+    expect(row.locator(".badge")).to_have_text("Undone")
+
+
+def test_the_list_of_jobs_begins_with_venue_and_time(stub, visit):
+    job = stub.calibrated(stub.venue("listed"))["id"]
+    page = visit(stub.url, "/ui/jobs?venue=listed")
+    expect(page.locator("thead th")).to_have_text(
+        ["Venue", "Submitted", "Kind", "State", "Took", "Stitch error", "Job"]
+    )
+    page.get_by_role("link", name="Calibration").click()
+    expect(page).to_have_url(f"{stub.url}/ui/jobs/{job}")
+
+
 def test_a_rejected_result_is_accepted_by_hand(stub, ended, visit):
     page = visit(stub.url, "/ui/venues/poor")
     reasons = page.locator(".verdict .reason li")
     expect(reasons).to_have_text([f"{camera}: the lines do not fit" for camera in ("left", "right")])
-    expect(page.get_by_text("The poses from before still hold")).to_be_visible()
+    expect(page.get_by_text("In use: revision 1 (set by hand)")).to_be_visible()
     anyway = page.get_by_role("button", name="Accept anyway")
     # Nobody is invited to it.
     expect(anyway).to_have_class("quiet")
-    anyway.click()
-    expect(page.get_by_text("These poses hold now")).to_be_visible()
+    press_and_confirm(anyway)
+    expect(page.get_by_text("These poses are in use")).to_be_visible()
     assert stub.http.get("/venues/poor").json()["cameras"][0]["pose"]["position"][0] == -0.875
 
 
@@ -91,7 +110,7 @@ def test_a_result_that_is_accepted_in_part_says_of_which_camera_and_the_rest_can
     job = stub.calibrated(stub.venue("part", "partly"))
     page = visit(stub.url, "/ui/venues/part")
     expect(page.locator(".verdict-big")).to_have_text(re.compile("Partly accepted"))
-    expect(page.get_by_text("Those that were accepted hold now")).to_be_visible()
+    expect(page.get_by_text("Those that were accepted are in use")).to_be_visible()
     left, right = (page.get_by_role("article", name=camera) for camera in ("left", "right"))
     expect(left.locator(".badge")).to_have_text("Accepted")
     expect(right.locator(".badge")).to_have_text("Rejected")
@@ -298,7 +317,7 @@ def test_the_keyboard_reaches_what_a_page_offers(stub, ended, visit):
     for _ in range(40):
         page.keyboard.press("Tab")
         reached.add(page.evaluate("document.activeElement.textContent.trim() || document.activeElement.name"))
-    assert {"Skip to the content", "Venues", "Jobs", "Calibrate", "Reject"} <= reached
+    assert {"Skip to the content", "Venues", "Jobs", "Calibrate", "Undo"} <= reached
 
 
 def test_a_job_that_failed_shows_its_frames_with_what_was_wrong_and_what_was_asked(stub, ended, visit):

@@ -29,7 +29,7 @@ def test_a_schedule_is_made_tried_and_ended(fetching, camera, visit):
     page = visit(fetching.url, f"/ui/venues/{fetching.venue('timed')}", zone=ZONE)
     expect(page.get_by_role("button", name="Try it now")).to_have_count(0)
     expect(page.get_by_label("Time zone")).to_have_value(ZONE)
-    page.get_by_label("as of cron").fill("0 3 * * *")
+    page.get_by_label("Cron schedule").fill("0 3 * * *")
     for side in ("left", "right"):
         page.get_by_label(f"Source of {side}").fill(camera.url("/ok"))
     page.get_by_role("button", name="Save schedule").click()
@@ -59,7 +59,7 @@ def test_what_is_wrong_with_a_schedule_is_said_beside_it(fetching, camera, visit
     expect(refused).to_contain_text("a schedule needs a source of every camera, and left, right have none")
     for side in ("left", "right"):
         page.get_by_label(f"Source of {side}").fill(camera.url("/ok"))
-    page.get_by_label("as of cron").fill("99 * * * *")
+    page.get_by_label("Cron schedule").fill("99 * * * *")
     page.get_by_role("button", name="Save schedule").click()
     expect(refused).to_contain_text("'99 * * * *' is no schedule")
 

@@ -88,6 +88,16 @@ class PastCalibrationRepository(Repository):
         with reading(self._engine) as connection:
             return {row.venue: row.id for row in connection.execute(query)}
 
+    def undone(self, venues: Collection[str]) -> set[str]:
+        """Return the venues whose poses in use are those from before a calibration that somebody has undone."""
+        others = sa.alias(tables.revisions)
+        newest = sa.select(sa.func.max(others.c.number)).where(others.c.venue == r.venue).scalar_subquery()
+        query = sa.select(r.venue).where(
+            r.venue.in_(venues), r.number == newest, r.cause == "restored", r.job.is_not(None)
+        )
+        with reading(self._engine) as connection:
+            return set(connection.scalars(query))
+
 
 def _past(row: Any) -> PastCalibration:
     result = row.result or {}
