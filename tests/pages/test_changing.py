@@ -108,7 +108,7 @@ def test_a_change_that_somebody_else_made_meanwhile_is_not_undone(stub, visit):
 def test_name_and_size_of_the_field_are_changed_after_a_question_that_says_what_ends(stub, visit):
     name = stub.venue("resized")
     page = visit(stub.url, f"/ui/venues/{name}/settings")
-    form = page.get_by_role("form", name="Venue")
+    form = page.get_by_role("form", name="Venue", exact=True)
     form.get_by_label("Name").fill("Main pitch")
     form.get_by_role("button").click()
     expect(page.get_by_role("link", name="Main pitch")).to_be_visible()

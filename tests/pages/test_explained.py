@@ -110,7 +110,7 @@ def test_all_reasons_are_listed_for_browsers(stub, visit, kind):
     [
         ("/nowhere", "Nothing is at /nowhere."),
         ("/ui/venues/nope", "There is no venue of this id: somebody has deleted it, or the address is mistyped."),
-        ("/ui/jobs/nope", "The address is not one of this service's."),
+        ("/ui/jobs/nope", "There is no job of this id: somebody has deleted it, or the address is mistyped."),
     ],
 )
 def test_where_nothing_is_people_find_a_page_without_a_word_of_requests(stub, visit, path, words):

@@ -84,8 +84,8 @@ def test_the_list_says_of_a_calibration_that_was_undone(stub, visit):
 
 
 def test_the_list_of_jobs_begins_with_venue_and_time(stub, visit):
-    job = stub.calibrated(stub.venue("listed"))["id"]
-    page = visit(stub.url, "/ui/jobs?venue=listed")
+    job = stub.calibrated(stub.venue("in-a-row"))["id"]
+    page = visit(stub.url, "/ui/jobs?venue=in-a-row")
     expect(page.locator("thead th")).to_have_text(
         ["Venue", "Submitted", "Kind", "State", "Took", "Stitch error", "Job"]
     )
@@ -153,7 +153,7 @@ def test_frames_are_looked_at_before_they_travel(stub, frames, visit):
     page.get_by_label("Seed").fill("11")
     send.click()
     page.wait_for_url("**/ui/jobs/*")
-    expect(page.locator(".title .badge")).to_have_text("Accepted")
+    expect(page.locator(".title .badge")).to_have_text("Accepted, dry run")
     job = stub.job(page.url.rpartition("/")[2])
     options = job["result"]["provenance"]["options"]
     assert (options["dry_run"], options["seed"]) == (True, 11)

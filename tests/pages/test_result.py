@@ -112,6 +112,7 @@ def test_the_seam_has_a_curve_with_its_worst_place(venue):
 
 
 def test_every_format_is_offered_and_comes_as_a_file(venue):
+    venue.locator("summary", has_text="Download the poses in use").click()
     with venue.expect_download() as saved:
         venue.get_by_role("link", name="opentrackio, all cameras").click()
     assert saved.value.suggested_filename == "newcomer-opentrackio.zip"

@@ -44,7 +44,7 @@ def test_a_schedule_is_made_tried_and_ended(fetching, camera, visit):
     expect(page.get_by_text("Accepted")).to_be_visible()
     page.goto("/ui/venues/timed")
     assert grave(page) == []
-    page.get_by_label("To the second").check()
+    page.get_by_label("Start exactly on time").check()
     page.get_by_role("button", name="Save schedule").click()
     expect(schedule.get_by_role("definition").nth(1)).to_have_text(re.compile("03:00:00"))
     press_and_confirm(page.get_by_role("button", name="End schedule"))
