@@ -1,4 +1,4 @@
-"""What became of the poses that a calibration found: in use, undone, replaced, or never in use; and the words for it."""
+"""Outcomes of calibrations: their poses are in use, undone, replaced or never used; and the words for it."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class PosesInUse:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of the poses that a calibration found, and what can still be decided about them."""
+    """The fate of the poses that a calibration found, and what can still be decided about them."""
 
     use: Use
     headline: Headline
@@ -94,9 +94,7 @@ def _use(context: Repositories, job: Job, in_use: PosesInUse) -> Use:
     return "undone" if after.cause == "restored" else "replaced"
 
 
-def _headline(
-    verdict: Verdict, use: Use, in_use: PosesInUse, decidable: OpenDecisions, *, dry_run: bool
-) -> Headline:
+def _headline(verdict: Verdict, use: Use, in_use: PosesInUse, decidable: OpenDecisions, *, dry_run: bool) -> Headline:
     if use in ("undone", "replaced"):
         return Headline(use.capitalize(), "plain", "again")
     if use == "in-use" and in_use.origin.cause == "accepted" and not decidable.accept:

@@ -59,14 +59,14 @@ def _quality(parameters: list[str]) -> float:
 
 @router.get("/refusals", openapi_extra=FOR_ALL)
 def refusals(request: Request) -> Response:
-    """Every reason for a refusal, with what to do."""
+    """List every reason for a refusal, with what to do."""
     reasons = {f"/refusals/{name}": (known.title, known.do) for name, known in REFUSAL_REASONS.items()}
     return _for_browsers(render_page(request, "reasons.html", title="Reasons for refusals", reasons=reasons))
 
 
 @router.get("/problems", openapi_extra=FOR_ALL)
 def problems(request: Request) -> Response:
-    """Every kind of problem."""
+    """List every kind of problem."""
     kinds = {f"/problems/{name}": (known.title, None) for name, known in PROBLEM_TYPES.items()}
     return _for_browsers(render_page(request, "reasons.html", title="Problems", reasons=kinds))
 
@@ -121,7 +121,7 @@ def _explained(request: Request, title: str, body: Any, anchor: str, **more: Any
 
 
 def _for_browsers(page: Response) -> Response:
-    """The same address is JSON for others."""
+    """Mark a page whose address is JSON for others."""
     page.headers["Vary"] = "Accept"
     return page
 

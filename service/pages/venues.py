@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
@@ -20,7 +20,7 @@ from service.routes.contract.guarded import Guarded
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.venues import ExistingVenue, venue_etag
 from service.schemas.health import Alarm, VenueHealth
-from service.schemas.history import Revision
+from service.schemas.history import Cause, Revision
 from service.schemas.job import Job
 from service.schemas.names import ID_PATTERN, FormatName
 from service.schemas.venue import Venue
@@ -39,13 +39,20 @@ data = APIRouter(route_class=Guarded, include_in_schema=False)
 
 @dataclass(frozen=True)
 class VenueRow:
-    """A venue in the list: its last calibration that ended, the one that is going on, what rings, and whether it was undone."""
+    """A venue in the list: its last calibration that ended, the one that is going on, what rings, what was decided."""
 
     venue: Venue
     glance: CalibrationSummary | None
     active: Job | None
     alarms: list[Alarm]
-    is_undone: bool
+    decided: tuple[Cause, datetime] | None
+
+    @property
+    def decision(self) -> Literal["Undone", "Accepted by hand"] | None:
+        """Return what somebody has decided since the last calibration ended."""
+        if self.decided is None or self.glance is None or self.decided[1] < self.glance.last.finished_at:
+            return None
+        return "Undone" if self.decided[0] == "restored" else "Accepted by hand"
 
     @property
     def curve(self) -> Sparkline | None:
@@ -73,7 +80,7 @@ def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
     """A few queries for all of them, however many jobs there are."""
     ids = [venue.id for venue in venues]
     glances, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
-    active, undone = context.past_calibrations.active(ids), context.past_calibrations.undone(ids)
+    active, decided = context.past_calibrations.active(ids), context.past_calibrations.decided(ids)
     jobs = context.jobs.several(active.values())
     return [
         VenueRow(
@@ -81,7 +88,7 @@ def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
             glances.get(venue.id),
             jobs.get(active.get(venue.id, "")),
             alarms.get(venue.id, []),
-            venue.id in undone,
+            decided.get(venue.id),
         )
         for venue in venues
     ]

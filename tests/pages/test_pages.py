@@ -74,13 +74,18 @@ def test_the_list_shows_each_venue_with_its_last_result(stub, ended, years, visi
     expect(row.get_by_role("img", name="Stitch error")).to_be_visible()
 
 
-def test_the_list_says_of_a_calibration_that_was_undone(stub, visit):
-    name = stub.venue("regretted")
+@pytest.mark.parametrize(
+    ("behaviour", "decision", "says"), [("accept", "reject", "Undone"), ("reject", "accept", "Accepted by hand")]
+)
+def test_the_list_says_what_was_decided_since_the_last_calibration(stub, visit, behaviour, decision, says):
+    name = stub.venue(f"decided-{decision}", behaviour)
     job = stub.calibrated(name)["id"]
-    stub.http.post(f"/jobs/{job}/reject").raise_for_status()
+    stub.http.post(f"/jobs/{job}/{decision}").raise_for_status()
     page = visit(stub.url)
     row = page.locator(".venue-row", has=page.locator(f"a[href='/ui/venues/{name}']"))
-    expect(row.locator(".badge")).to_have_text("Undone")
+    expect(row.locator(".badge")).to_have_text(says)
+    stub.calibrated(name, shade=1, dry_run=True)
+    expect(row.locator(".badge")).to_have_text("Rejected" if behaviour == "reject" else "Accepted, dry run")
 
 
 def test_the_list_of_jobs_begins_with_venue_and_time(stub, visit):
