@@ -18,7 +18,7 @@ from service.api.context import Context
 from service.api.http_defaults import HttpDefaults
 from service.api.request_log import RequestLog, is_quiet
 from service.api.root_path import RootPath
-from service.pages import FOR_BROWSERS
+from service.pages import FOR_BROWSERS, show_browsers_what_is_missing
 from service.pages import ROUTERS as PAGES
 from service.routes import docs, event_streams, health, jobs, live, pictures, snapshot, stitch, venues
 from service.routes.contract import documented
@@ -63,6 +63,7 @@ def create_app(settings: Settings) -> FastAPI:
     documented.document_alarms(app)
     documented.document_events(app)
     problems.install_handlers(app)
+    show_browsers_what_is_missing(app)
     _answer_outages(app)
     app.include_router(FOR_BROWSERS)
     for routes in (

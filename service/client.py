@@ -154,7 +154,7 @@ class AsyncClient:
         return _read(Trend, answer)
 
     async def restore(self, venue_id: str, revision: int) -> Venue:
-        """Let the poses of a revision hold again."""
+        """Put the poses of a revision to use again."""
         answer = await self._ask("POST", f"/venues/{venue_id}/restore", json={"revision": revision})
         return _read(Venue, answer)
 
@@ -179,7 +179,7 @@ class AsyncClient:
     async def venue_poses(
         self, venue_id: str, form: FormatName, camera: str | None = None, lens: LensChoice = "stored"
     ) -> bytes:
-        """The poses that hold now, of one camera or all, as a file of another tool's format."""
+        """Return the poses in use, of one camera or all, as a file of another tool's format."""
         return await self._ask("GET", f"/venues/{venue_id}/poses", params=_wanted(form, camera, lens))
 
     async def venue_stitch(
@@ -334,7 +334,7 @@ class AsyncClient:
         return found[:most]
 
     async def again(self, job_id: str) -> Job:
-        """Submit the frames of a job once more, from the poses that hold now: another job."""
+        """Submit the frames of a job once more, from the poses in use: another job."""
         return _job(await self._ask("POST", f"/jobs/{job_id}/again"))
 
     async def delete_job(self, job_id: str) -> None:
@@ -346,7 +346,7 @@ class AsyncClient:
         return _job(await self._ask("POST", f"/jobs/{job_id}/cancel"))
 
     async def accept(self, job_id: str, camera: str | None = None) -> Job:
-        """Let the poses that a calibration found hold, of one camera or all, whatever the gate said."""
+        """Put the poses that a calibration found to use, of one camera or all, whatever the gate said."""
         params = {"camera": camera} if camera else {}
         return _job(await self._ask("POST", f"/jobs/{job_id}/accept", params=params))
 

@@ -86,7 +86,7 @@ def submit_again(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Compute the frames of a job once more, with its options, from the poses that hold now: a new job."""
+    """Compute the frames of a job once more, with its options, from the poses in use: a new job."""
     with open_client(url, api_key) as client:
         new = client.again(job)
         if wait:
@@ -146,7 +146,7 @@ def accept_job(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Let the poses of a job hold that the gate rejected, or that was a dry run."""
+    """Put the poses of a job to use that the gate rejected, or that was a dry run."""
     with open_client(url, api_key) as client:
         print_answer(client.accept(job, camera), as_json=as_json, with_outcome=False)
 

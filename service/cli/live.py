@@ -194,7 +194,7 @@ def _report(reporter: LiveReporter, url: str, api_key: str | None, stop: threadi
 def _ask_for_poses(
     poses: StoredPoses, streams: TrackedStreams, url: str, api_key: str | None, stop: threading.Event
 ) -> None:
-    """Ask for the venue's poses again and again; where the service does not answer, the last ones hold."""
+    """Ask for the venue's poses again and again; where the service does not answer, the last ones stay in use."""
     import time
 
     import httpx

@@ -139,7 +139,7 @@ def edit_venue(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT
 
 @app.command("get")
 def get_venue(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
-    """Print a venue with the poses that hold now."""
+    """Print a venue with the poses in use."""
     with open_client(url, api_key) as client:
         print_answer(client.venue(venue), as_json=as_json)
 
@@ -182,7 +182,7 @@ def venue_poses(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Write the poses that hold now in the format of another tool."""
+    """Write the poses in use in the format of another tool."""
     with open_client(url, api_key) as client:
         write_document(client.venue_poses(venue, form, camera, lens), output)
 
@@ -201,7 +201,7 @@ def venue_stitch(
     horizon: Annotated[str | None, typer.Option("--horizon", help="0: at the top, 1: at the bottom, or auto.")] = None,
     output: Output = None,
     if_changed: Annotated[
-        bool, typer.Option("--if-changed", help="Fetch it only if the file of -o is no longer what holds.")
+        bool, typer.Option("--if-changed", help="Fetch it only if the file of -o is out of date.")
     ] = False,
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
@@ -211,7 +211,7 @@ def venue_stitch(
     What is not said of the view is as the venue has it, see `view` of esc venue get.
     """
     if if_changed and output is None:
-        fail("--if-changed needs -o FILE, the zip that may still hold", USAGE)
+        fail("--if-changed needs -o FILE, the zip that may still be up to date", USAGE)
     known = package_etag(output) if if_changed and output is not None else None
     parts = {
         "projection": projection,
@@ -225,7 +225,7 @@ def venue_stitch(
     with open_client(url, api_key) as client:
         package = client.venue_stitch(venue, form, wanted, known)
     if package is None:
-        print_note(f"{output} still holds.")
+        print_note(f"{output} is up to date.")
     else:
         write_document(package, output)
 
@@ -303,7 +303,7 @@ def follow_venue(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Print a line for whatever happens to a venue: time, type, what; first for the poses that hold.
+    """Print a line for whatever happens to a venue: time, type, what; first for the poses in use.
 
     Nothing is missed when the service restarts. Exit: 0 the venue was deleted, 75 the service was away for a minute.
     """
@@ -324,7 +324,7 @@ def restore_venue(
     url: Url = DEFAULT_URL,
     api_key: ApiKey = None,
 ) -> None:
-    """Let the poses of a revision hold again, see `esc venue history`."""
+    """Put the poses of a revision to use again, see `esc venue history`."""
     with open_client(url, api_key) as client:
         print_answer(client.restore(venue, revision), as_json=as_json)
 

@@ -17,6 +17,7 @@ from service.pages import (
 
 # Before the routes of the interface: for browsers alone, at addresses that the interface has as well.
 FOR_BROWSERS: APIRouter = problem_pages.router
+show_browsers_what_is_missing = problem_pages.show_browsers_what_is_missing
 ROUTERS: tuple[APIRouter, ...] = (
     assets.router,
     assets.at_the_root,

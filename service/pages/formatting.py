@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from datetime import UTC, datetime
 
 from service.schemas.health import AlarmRule
+from service.schemas.names import JobKind
+from service.schemas.problems import Problem
 
 NONE = "–"
 # A stitch error of 1 px is so much on the pitch.
@@ -20,7 +23,29 @@ ALARMS: dict[AlarmRule, str] = {
     "live-late": "Live: late",
     "live-silent": "Live: silent",
 }
+KINDS: dict[JobKind, str] = {
+    "calibration": "Calibration",
+    "intrinsics": "Lens from photos",
+    "locate": "First pose",
+    "field": "Fit of the field",
+    "find": "Search for cameras",
+}
 STEPS = ((60.0, 1.0, "s"), (3600.0, 60.0, "min"), (86400.0, 3600.0, "h"), (float("inf"), 86400.0, "d"))
+
+
+# What a problem says whose words are for programs.
+FOR_PEOPLE: dict[str, str] = {
+    "venue-not-found": "There is no venue of this id: somebody has deleted it, or the address is mistyped.",
+    "job-not-found": "There is no job of this id: somebody has deleted it, or the address is mistyped.",
+}
+OF_PROGRAMS = re.compile(r"\b(GET|PUT|POST|PATCH|DELETE) /")
+
+
+def for_people(problem: Problem) -> str:
+    """Return what a problem says to somebody before a page: sentences that speak of requests are left out."""
+    sentences = re.split(r"(?<=[.!?])\s+", problem.detail)
+    said = " ".join(sentence for sentence in sentences if not OF_PROGRAMS.search(sentence))
+    return said or FOR_PEOPLE.get(problem.kind, "")
 
 
 def figure(value: float | None, unit: str = "", digits: int = 2) -> str:

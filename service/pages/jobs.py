@@ -7,8 +7,9 @@ from typing import Annotated, get_args
 from fastapi import APIRouter, Query, Request, Response
 
 from service.api.context import InContext, JobIdPath
+from service.pages.outcome import outcome_of, poses_in_use
 from service.pages.page_rendering import Page, render_page
-from service.pages.venues import poses_are_current, sizes_of
+from service.pages.venues import sizes_of
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.schemas.job import Job
@@ -58,16 +59,14 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
     if found is None:
         kept = f"{context.settings.keep_jobs_days:g} days"
         raise Problem("job-not-found", f"It was deleted: by somebody, or since it ended more than {kept} ago.")
-    newest = context.venues.history(found.venue, None, 1) if found.venue and found.kind == "calibration" else []
     return render_page(
         request,
         "job.html",
         job=found,
         stages=STAGES,
         formats=get_args(FormatName),
-        holds=bool(newest) and poses_are_current(found, newest[0]),
+        outcome=outcome_of(context, found, poses_in_use(context, found.venue)),
         sizes=sizes_of(context.venues.get(found.venue) if found.venue else None),
-        decidable=context.decisions.decidable(job_id),
         adoptable=context.adopted_fields.adoptable(job_id),
         can_take=found.kind == "find" and context.found_venues.is_adoptable(job_id),
         is_stored=found.venue is not None and context.venues.get(found.venue) is not None,

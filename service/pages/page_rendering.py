@@ -63,11 +63,13 @@ templates.globals |= {
     "trend_curves": trend_curves,
     "reasons": REFUSAL_REASONS,
     "alarm_words": formatting.ALARMS,
+    "kind_words": formatting.KINDS,
     # The extra `exr`, without which the service answers each ST map with 503.
     "makes_st_maps": find_spec("OpenEXR") is not None,
 }
 templates.filters |= {
     "figure": formatting.figure,
+    "for_people": formatting.for_people,
     "cm": formatting.centimetres,
     "on_the_pitch": formatting.on_the_pitch,
     "degrees": formatting.degrees,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, FastAPI, Path, Request, Response
 from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from service.pages import documents
-from service.pages.page_rendering import Page, render_page
+from service.pages.page_rendering import Page, problem_page, render_page
 from service.routes.contract.documented import FOR_ALL
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, REFUSALS_DOCUMENT, Problem
 
@@ -55,6 +57,20 @@ def _quality(parameters: list[str]) -> float:
     return 1.0
 
 
+@router.get("/refusals", openapi_extra=FOR_ALL)
+def refusals(request: Request) -> Response:
+    """List every reason for a refusal, with what to do."""
+    reasons = {f"/refusals/{name}": (known.title, known.do) for name, known in REFUSAL_REASONS.items()}
+    return _for_browsers(render_page(request, "reasons.html", title="Reasons for refusals", reasons=reasons))
+
+
+@router.get("/problems", openapi_extra=FOR_ALL)
+def problems(request: Request) -> Response:
+    """List every kind of problem."""
+    kinds = {f"/problems/{name}": (known.title, None) for name, known in PROBLEM_TYPES.items()}
+    return _for_browsers(render_page(request, "reasons.html", title="Problems", reasons=kinds))
+
+
 @router.get("/refusals/{reason}", openapi_extra=FOR_ALL)
 def refusal(reason: Name, request: Request) -> Response:
     """What a reason for a refusal means, looks like, and what to do."""
@@ -92,7 +108,7 @@ def document(name: Name, request: Request) -> Response:
 
 
 def _explained(request: Request, title: str, body: Any, anchor: str, **more: Any) -> Response:
-    answer = render_page(
+    page = render_page(
         request,
         "explained.html",
         title=title,
@@ -101,6 +117,23 @@ def _explained(request: Request, title: str, body: Any, anchor: str, **more: Any
         document_title=documents.title(DOCUMENT_NAME),
         **{"looks_like": None, "do": None, "answered_with": None} | more,
     )
-    # The same address is JSON for others.
-    answer.headers["Vary"] = "Accept"
-    return answer
+    return _for_browsers(page)
+
+
+def _for_browsers(page: Response) -> Response:
+    """Mark a page whose address is JSON for others."""
+    page.headers["Vary"] = "Accept"
+    return page
+
+
+def show_browsers_what_is_missing(app: FastAPI) -> None:
+    """Answer a browser at an address where nothing is with a page, and everybody else as before."""
+    as_json: Any = app.exception_handlers[HTTPException]
+
+    async def answer(request: Request, error: HTTPException) -> Response:
+        if error.status_code == HTTPStatus.NOT_FOUND and wants_page(request.headers.get("accept", "")):
+            return _for_browsers(problem_page(request, Problem("not-found", f"Nothing is at {request.url.path}.")))
+        response: Response = await as_json(request, error)
+        return response
+
+    app.add_exception_handler(HTTPException, answer)  # type: ignore[arg-type]

@@ -7,6 +7,7 @@ from typing import get_args
 
 from fastapi import APIRouter, Request, Response
 
+from fields.template import NAMES
 from service.api import etags
 from service.api.context import InContext
 from service.pages.alarm_suggestions import suggested_limits
@@ -24,7 +25,7 @@ router = APIRouter(route_class=Page, include_in_schema=False)
 
 @router.get("/ui/venues/{venue_id}/settings", openapi_extra=needs_scope("admin"))
 def settings(venue: ExistingVenue, request: Request, context: InContext) -> Response:
-    """Alarms, lenses, and the end of a venue."""
+    """Name and field, alarms, lenses, and the end of a venue."""
     # NumPy takes its time to load.
     from service.schemas.lens_map import lens_doubts
 
@@ -35,6 +36,7 @@ def settings(venue: ExistingVenue, request: Request, context: InContext) -> Resp
         "settings.html",
         venue=shown,
         lenses=lenses,
+        templates=NAMES,
         suggested=suggested_limits(
             context.past_calibrations.of(venue.id, SUGGESTED_BY),
             context.venues.history(venue.id, None, SUGGESTED_BY),

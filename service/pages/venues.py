@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from fastapi import APIRouter, Query, Request, Response
 
 from service.api import etags
 from service.api.context import InContext, VenueIdPath
 from service.pages.live import CLOCKS, STATUSES, live_card
+from service.pages.outcome import CAME_BY, outcome_of, poses_in_use
 from service.pages.page_rendering import Page, render_page
 from service.pages.sparkline import Sparkline, sparkline
 from service.routes.contract.documented import needs_scope
@@ -19,13 +20,12 @@ from service.routes.contract.guarded import Guarded
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.routes.venues import ExistingVenue, venue_etag
 from service.schemas.health import Alarm, VenueHealth
-from service.schemas.history import Revision
+from service.schemas.history import Cause, Revision
 from service.schemas.job import Job
 from service.schemas.names import ID_PATTERN, FormatName
 from service.schemas.venue import Venue
 from service.schemas.view import ViewChoice
 from service.store.repositories import Repositories
-from service.store.revisions import CALIBRATION_CAUSES
 from service.store.statistics.venue_summary import CalibrationSummary
 
 PER_PAGE = 50
@@ -39,12 +39,20 @@ data = APIRouter(route_class=Guarded, include_in_schema=False)
 
 @dataclass(frozen=True)
 class VenueRow:
-    """A venue in the list: its last calibration that ended, the one that is going on, and what rings."""
+    """A venue in the list: its last calibration that ended, the one that is going on, what rings, what was decided."""
 
     venue: Venue
     glance: CalibrationSummary | None
     active: Job | None
     alarms: list[Alarm]
+    decided: tuple[Cause, datetime] | None
+
+    @property
+    def decision(self) -> Literal["Undone", "Accepted by hand"] | None:
+        """Return what somebody has decided since the last calibration ended."""
+        if self.decided is None or self.glance is None or self.decided[1] < self.glance.last.finished_at:
+            return None
+        return "Undone" if self.decided[0] == "restored" else "Accepted by hand"
 
     @property
     def curve(self) -> Sparkline | None:
@@ -72,10 +80,16 @@ def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
     """A few queries for all of them, however many jobs there are."""
     ids = [venue.id for venue in venues]
     glances, alarms = context.venue_summaries.of(ids), context.venue_summaries.alarms(ids)
-    active = context.past_calibrations.active(ids)
+    active, decided = context.past_calibrations.active(ids), context.past_calibrations.decided(ids)
     jobs = context.jobs.several(active.values())
     return [
-        VenueRow(venue, glances.get(venue.id), jobs.get(active.get(venue.id, "")), alarms.get(venue.id, []))
+        VenueRow(
+            venue,
+            glances.get(venue.id),
+            jobs.get(active.get(venue.id, "")),
+            alarms.get(venue.id, []),
+            decided.get(venue.id),
+        )
         for venue in venues
     ]
 
@@ -91,6 +105,7 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
     job = context.jobs.get(newest) if newest else None
     revisions = context.venues.history(venue_id, None, IN_TABLE)
     health = context.venues.health(venue_id)
+    in_use = poses_in_use(context, venue_id)
     active = context.past_calibrations.active([venue_id]).get(venue_id)
     a_year_ago = datetime.now(UTC) - IN_TRENDS
     return render_page(
@@ -101,9 +116,11 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         job=job,
         revisions=revisions,
         health=health,
-        holds=job is not None and poses_are_current(job, revisions[0]),
+        in_use=in_use,
+        outcome=outcome_of(context, job, in_use),
+        came_by=CAME_BY,
+        undone=undone_jobs(revisions),
         sizes=sizes_of(stored),
-        decidable=context.decisions.decidable(job.id) if job else None,
         adoptable=context.adopted_fields.adoptable(job.id) if job else {},
         restorable=context.venues.restorable(stored, [one.revision for one in revisions]),
         kept_jobs=kept_jobs(context, revisions, health),
@@ -118,6 +135,12 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         tag=etags.quoted(venue_etag(stored)),
         seen=seen,
     )
+
+
+def undone_jobs(revisions: list[Revision]) -> Collection[str]:
+    """Return the jobs whose poses somebody gave back and has not accepted again; `revisions`: newest first."""
+    last = {one.job: one.cause for one in reversed(revisions) if one.job}
+    return {job for job, cause in last.items() if cause == "restored"}
 
 
 def kept_jobs(context: Repositories, revisions: list[Revision], health: VenueHealth | None) -> Collection[str]:
@@ -149,8 +172,3 @@ def history(venue_id: VenueIdPath, context: InContext) -> dict[str, Any]:
 def sizes_of(venue: Venue | None) -> dict[str, list[int]]:
     """The width and height of each camera's frames."""
     return {camera.id: camera.image_size for camera in venue.cameras} if venue else {}
-
-
-def poses_are_current(job: Job, newest: Revision) -> bool:
-    """Whether the poses that a job found are those that its venue has."""
-    return newest.job == job.id and newest.cause in CALIBRATION_CAUSES

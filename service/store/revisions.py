@@ -131,6 +131,19 @@ def revisions_of(connection: sa.Connection, venue_id: str, before: int | None, l
     return [_revision(row) for row in connection.execute(query)]
 
 
+def origin_of(connection: sa.Connection, venue_id: str, revision: Revision) -> Revision:
+    """Return the revision that was put back, through any number of restorations; any other revision is its own origin.
+
+    Of one that has expired its last restoration stands for it.
+    """
+    while revision.restored_from is not None:
+        restored = revisions_of(connection, venue_id, revision.restored_from + 1, 1)
+        if not restored or restored[0].revision != revision.restored_from:
+            break
+        revision = restored[0]
+    return revision
+
+
 def revision_of_job(connection: sa.Connection, job_id: str) -> int | None:
     """The number of the revision that a job's poses became last."""
     query = sa.select(sa.func.max(r.number)).where(r.job == job_id, r.cause.in_(CALIBRATION_CAUSES))

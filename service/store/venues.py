@@ -31,7 +31,14 @@ from service.store.memories import (
     newest_memories,
     without_those_that_changed,
 )
-from service.store.revisions import add_revision, revisions_of, revisions_that_fit, state_at
+from service.store.revisions import (
+    add_revision,
+    newest_revision,
+    origin_of,
+    revisions_of,
+    revisions_that_fit,
+    state_at,
+)
 from service.store.schedules import plan_schedule
 from service.store.statistics.venue_quality import VenueQuality, update_quality
 from service.store.trends import forget_trends, note_night
@@ -200,6 +207,12 @@ class VenueRepository(Repository):
         """Up to `limit` revisions of a venue, newest first, those before number `before`."""
         with reading(self._engine) as connection:
             return revisions_of(connection, venue_id, before, limit)
+
+    def newest_with_origin(self, venue_id: str) -> tuple[Revision, Revision] | None:
+        """Return the revision in use and the one that its poses first came with; None without such a venue."""
+        with reading(self._engine) as connection:
+            newest = newest_revision(connection, venue_id)
+            return None if newest is None else (newest, origin_of(connection, venue_id, newest))
 
 
 @contextmanager

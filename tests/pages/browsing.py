@@ -76,13 +76,21 @@ def tab(context: BrowserContext, forgiven: tuple[str, ...] = ()) -> Iterator[Pag
     page.add_init_script(WATCH_POLICY)
     page.on("console", lambda said: complaints.append(f"{said.type}: {said.text}") if said.type == "error" else None)
     page.on("pageerror", lambda error: complaints.append(f"script: {error}"))
-    page.on("dialog", lambda dialog: dialog.accept())
     try:
         yield page
     finally:
         page.close()
     unforgiven = [one for one in complaints if not any(part in one for part in forgiven)]
     assert not unforgiven, unforgiven
+
+
+def press_and_confirm(button: Locator) -> str:
+    """Press a button that asks first, and let it happen; returns what was asked and what was said to come."""
+    button.click()
+    box = button.page.get_by_role("dialog")
+    words = " ".join(box.locator("h2, p").all_inner_texts())
+    box.get_by_role("button").first.click()
+    return words
 
 
 def keep_one_path(page: Page, kept: str) -> None:

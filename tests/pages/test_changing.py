@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.pages import newcomer
-from tests.pages.browsing import grave
+from tests.pages.browsing import grave, press_and_confirm
 
 OFF = [1.9, 0.3, -0.2]
 
@@ -117,6 +117,44 @@ def test_a_change_that_somebody_else_made_meanwhile_is_not_undone(stub, visit):
     assert stub.http.get(f"/venues/{name}").json()["alarms"]["trend_m"] == 0.1
 
 
+def test_name_and_size_of_the_field_are_changed_after_a_question_that_says_what_ends(stub, visit):
+    name = stub.venue("resized")
+    page = visit(stub.url, f"/ui/venues/{name}/settings")
+    form = page.get_by_role("form", name="Venue", exact=True)
+    form.get_by_label("Name").fill("Main pitch")
+    form.get_by_role("button").click()
+    expect(page.get_by_role("link", name="Main pitch")).to_be_visible()
+    form.get_by_label("Length, m").fill("101,5")
+    form.get_by_role("button").click()
+    page.get_by_role("dialog").get_by_role("button", name="Cancel").click()
+    assert stub.http.get(f"/venues/{name}").json()["field"]["length_m"] == 105
+    assert "trends are gone for good" in press_and_confirm(form.get_by_role("button"))
+    expect(form.get_by_label("Length, m")).to_have_value("101.5")
+    form.get_by_label("Sport").select_option("tennis")
+    with page.expect_navigation():
+        press_and_confirm(form.get_by_role("button"))
+    field = stub.http.get(f"/venues/{name}").json()["field"]
+    assert (field["template"], field["length_m"], field["width_m"]) == ("tennis", 23.77, 10.97)
+
+
+@pytest.mark.parametrize("leave", ["Escape", "Cancel"])
+def test_nothing_happens_to_who_leaves_a_question(stub, visit, leave):
+    name = stub.venue(f"asked-{leave.lower()}")
+    stub.calibrated(name)
+    page = visit(stub.url, f"/ui/venues/{name}")
+    page.get_by_role("button", name="Undo").click()
+    dialog = page.get_by_role("dialog", name="Undo this calibration?")
+    expect(dialog).to_contain_text("The cameras get back the poses from before it, as a new revision.")
+    assert grave(page) == []
+    if leave == "Escape":
+        page.keyboard.press("Escape")
+    else:
+        dialog.get_by_role("button", name="Cancel").click()
+    expect(dialog).to_have_count(0)
+    expect(page.get_by_role("button", name="Undo")).to_be_focused()
+    assert stub.http.get(f"/venues/{name}/history").json()["revisions"][0]["revision"] == 2
+
+
 def test_a_venue_is_deleted_once_its_id_was_typed(stub, visit):
     name = stub.venue("doomed")
     page = visit(stub.url, f"/ui/venues/{name}/settings")
@@ -127,7 +165,7 @@ def test_a_venue_is_deleted_once_its_id_was_typed(stub, visit):
     typed.press("Enter")
     assert stub.http.get(f"/venues/{name}").status_code == 200
     typed.fill("doomed")
-    delete.click()
+    assert "Nobody can restore them" in press_and_confirm(delete)
     page.wait_for_url(f"{stub.url}/")
     assert stub.http.get(f"/venues/{name}").status_code == 404
 

@@ -6,6 +6,7 @@ from playwright.sync_api import expect
 
 from service.store import tables
 from tests.e2e.running import venue
+from tests.pages.browsing import press_and_confirm
 
 
 def moved_by_hand(stub, name):
@@ -23,7 +24,7 @@ def test_poses_of_a_venue_that_was_changed_since_are_not_offered_and_the_way_out
     page = visit(stub.url, path.format(venue=name, job=job))
     expect(page.get_by_text("cannot be accepted any more")).to_be_visible()
     expect(page.get_by_role("button", name="Accept")).to_have_count(0)
-    expect(page.get_by_role("button", name="Reject")).to_have_count(0)
+    expect(page.get_by_role("button", name="Undo")).to_have_count(0)
     way_out = "Calibrate" if behaviour == "reject" else "Revisions"
     expect(page.get_by_text("cannot be accepted any more").get_by_role("link", name=way_out)).to_be_visible()
 
@@ -32,22 +33,87 @@ def test_a_calibration_that_moved_no_camera_offers_nothing_and_speaks_of_no_chan
     name = stub.venue("left-alone", "swapped")
     job = stub.calibrated(name)["id"]
     page = visit(stub.url, f"/ui/jobs/{job}")
-    expect(page.get_by_text("The stored poses were left as they are.")).to_be_visible()
     for address in (f"/ui/jobs/{job}", f"/ui/venues/{name}"):
         page.goto(address)
+        expect(page.get_by_text("In use: revision 1 (set by hand)")).to_be_visible()
         expect(page.get_by_text("changed since")).to_have_count(0)
         expect(page.get_by_role("button", name="Accept")).to_have_count(0)
+
+
+def decide(stub, name, job, steps):
+    """Decide about a job, and about its venue, one after the other."""
+    for step in steps.split():
+        what, _, revision = step.partition("-")
+        if what == "restore":
+            stub.http.post(f"/venues/{name}/restore", json={"revision": int(revision)}).raise_for_status()
+        elif what == "refine":
+            stub.http.post(f"/venues/{name}/cameras/left/adopt-refined").raise_for_status()
+        elif what == "put":
+            moved_by_hand(stub, name)
+        else:
+            stub.http.post(f"/jobs/{job}/{'reject' if what == 'undo' else what}").raise_for_status()
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "steps", "headline", "colour", "in_use", "buttons"),
+    [
+        ("accept", "", "Accepted", "good", "These poses are in use as revision 2", ["Undo"]),
+        ("accept", "undo", "Undone", "plain", "In use: revision 3 (poses of revision 1)", ["Accept again"]),
+        ("accept", "undo accept", "Accepted by hand", "good", "These poses are in use as revision 4", ["Undo"]),
+        ("accept", "undo accept undo", "Undone", "plain", "In use: revision 5 (poses of revision 1)", ["Accept again"]),
+        ("accept", "undo restore-2", "Accepted", "good", "as revision 4 (poses of revision 2)", []),
+        ("accept", "undo restore-2 restore-3 restore-4", "Accepted", "good", "as revision 6 (poses of revision 2)", []),
+        ("accept", "restore-1", "Undone", "plain", "In use: revision 3 (poses of revision 1)", ["Accept again"]),
+        ("accept", "put", "Replaced", "plain", "In use: revision 3 (set by hand)", []),
+        ("accept", "put restore-1", "Replaced", "plain", "In use: revision 4 (poses of revision 1)", ["Accept again"]),
+        ("accept", "put restore-2", "Accepted", "good", "as revision 4 (poses of revision 2)", []),
+        ("refine", "refine", "Replaced", "plain", "In use: revision 3 (refined lens stored)", []),
+        ("reject", "", "Rejected", "bad", "In use: revision 1 (set by hand)", ["Accept anyway"]),
+        ("reject", "accept", "Accepted by hand", "part", "These poses are in use as revision 2", ["Undo"]),
+        ("reject", "accept undo", "Undone", "plain", "In use: revision 3 (poses of revision 1)", ["Accept anyway"]),
+        ("reject", "put", "Rejected", "bad", "In use: revision 2 (set by hand)", []),
+        ("partly", "", "Partly accepted", "part", "are in use as revision 2", ["Undo", "Accept all anyway"]),
+        ("partly", "undo", "Undone", "plain", "In use: revision 3 (poses of revision 1)", ["Accept anyway"]),
+        ("partly", "accept", "Accepted by hand", "part", "These poses are in use as revision 3", ["Undo"]),
+        ("knock", "accept", "Accepted by hand", "part", "These poses are in use as revision 3", ["Undo"]),
+        ("accept", "dry", "Accepted, dry run", "good", "In use: revision 1 (set by hand)", ["Accept"]),
+        ("accept", "dry accept", "Accepted by hand", "good", "These poses are in use as revision 2", ["Undo"]),
+        ("accept", "dry accept undo", "Undone", "plain", "In use: revision 3 (poses of revision 1)", ["Accept again"]),
+    ],
+)  # fmt: skip
+def test_pages_say_what_became_of_a_calibration_and_offer_what_can_be_decided(
+    stub, visit, behaviour, steps, headline, colour, in_use, buttons
+):
+    name = stub.venue(f"sequence-{behaviour}-{steps.replace(' ', '-')}", behaviour)
+    job = stub.calibrated(name, dry_run=steps.startswith("dry"))["id"]
+    decide(stub, name, job, steps.removeprefix("dry"))
+    page = visit(stub.url, f"/ui/venues/{name}")
+    assert_said(page, headline, in_use, buttons)
+    expect(page.locator(".verdict")).to_have_class(f"verdict {colour}")
+    expect(page.locator(".verdict-big")).to_have_text(headline)
+    page.goto(f"/ui/jobs/{job}")
+    assert_said(page, headline, in_use, buttons)
+    expect(page.locator(".title .badge")).to_have_class("badge" if colour == "plain" else f"badge {colour}")
+    expect(page.locator(".title .badge")).to_have_text(headline)
+
+
+def assert_said(page, headline, in_use, buttons):
+    expect(page.get_by_text(in_use)).to_be_visible()
+    decisions = page.locator("button[data-call$='/accept'], button[data-call$='/reject']")
+    assert [words.strip() for words in decisions.all_inner_texts()] == buttons
+    is_lost = headline != "Accepted" and not buttons
+    expect(page.get_by_text("cannot be accepted any more")).to_have_count(int(is_lost))
 
 
 def test_what_was_restored_away_can_be_had_back_as_the_page_says(stub, visit):
     name = stub.venue("had-back")
     stub.calibrated(name)
     page = visit(stub.url, f"/ui/venues/{name}")
-    page.get_by_role("button", name="Restore revision 1").click()
-    expect(page.get_by_text("These poses no longer hold")).to_be_visible()
+    press_and_confirm(page.get_by_role("button", name="Restore revision 1"))
+    expect(page.get_by_text("In use: revision 3 (poses of revision 1)")).to_be_visible()
     # The poses are those that the calibration began with: it can be accepted after all.
-    page.get_by_role("button", name="Accept", exact=True).click()
-    expect(page.get_by_text("These poses hold now")).to_be_visible()
+    press_and_confirm(page.get_by_role("button", name="Accept again"))
+    expect(page.get_by_text("These poses are in use as revision 4")).to_be_visible()
 
 
 def test_a_ridge_that_the_lines_have_is_stored_after_a_question_that_says_what_changes(stub, visit):
@@ -55,20 +121,18 @@ def test_a_ridge_that_the_lines_have_is_stored_after_a_question_that_says_what_c
     job = stub.calibrated(name)["id"]
     page = visit(stub.url, f"/ui/jobs/{job}")
     contradicted = page.get_by_role("region", name="What the lines contradict")
-    asked = []
-    page.on("dialog", lambda dialog: asked.append(dialog.message))
-    contradicted.get_by_role("button", name="Store a ridge 0.332 m high").click()
+    asked = press_and_confirm(contradicted.get_by_role("button", name="Store a ridge 0.332 m high"))
     expect(contradicted.get_by_role("button")).to_have_count(0)
     assert stub.http.get(f"/venues/{name}").json()["field"]["ridge"][0] == [-18.5, 0.0, 0.332]
-    assert asked == [
+    assert asked == (
         "Store a ridge 0.332 m high instead of 0.000 m? The lines are sure of it to ± 5.10 cm. The next calibration "
         "will move left by about 8.10 cm and right by about 7.90 cm. What the cameras remember of "
         "earlier nights ends. Restoring a revision takes it back."
-    ]
+    )
     page.goto(f"{stub.url}/ui/venues/{name}")
     expect(page.get_by_text("ridge 0.000 → 0.332 m")).to_be_visible()
-    page.get_by_role("button", name="Restore revision 2").click()
-    expect(page.get_by_text("restored from 2")).to_be_visible()
+    press_and_confirm(page.get_by_role("button", name="Restore revision 2"))
+    expect(page.get_by_role("cell", name="poses of revision 2")).to_be_visible()
     assert stub.http.get(f"/venues/{name}").json()["field"]["ridge"] is None
 
 
@@ -76,7 +140,7 @@ def test_a_camera_that_was_accepted_by_hand_is_not_offered_again(stub, visit):
     name = stub.venue("once", "partly")
     job = stub.calibrated(name)["id"]
     page = visit(stub.url, f"/ui/jobs/{job}")
-    page.get_by_role("button", name="Accept right anyway").click()
+    press_and_confirm(page.get_by_role("button", name="Accept right anyway"))
     expect(page.get_by_text("as revision 3")).to_be_visible()
     expect(page.get_by_role("button", name="anyway")).to_have_count(0)
 
@@ -105,7 +169,7 @@ def test_what_was_changed_a_moment_ago_is_said_without_a_word_of_requests(stub, 
     job = stub.calibrated(name)["id"]
     page = visit(stub.url, f"/ui/jobs/{job}", forgiven=("409",))
     moved_by_hand(stub, name)
-    page.get_by_role("button", name="Reject").click()
+    press_and_confirm(page.get_by_role("button", name="Undo"))
     said = page.get_by_role("status").filter(has_text="changed since")
     expect(said).to_have_text("The venue has been changed since this job. Load the page again to see how it is now.")
 
@@ -142,10 +206,8 @@ def test_a_knocked_camera_is_accepted_where_it_was_found_by_one_click(stub, visi
     right = page.get_by_role("article", name="right")
     expect(right.get_by_text("turned by 11.2 degrees and moved by 0.30 m")).to_be_visible()
     expect(right.get_by_role("link", name="The camera was knocked")).to_be_visible()
-    asked = []
-    page.on("dialog", lambda dialog: asked.append(dialog.message))
-    right.get_by_role("button", name="Accept right where it was found").click()
+    asked = press_and_confirm(right.get_by_role("button", name="Accept right where it was found"))
     expect(page.get_by_role("button", name="Accept")).to_have_count(0)
-    assert asked == ["Is camera right to stand where it was found?"]
+    assert asked.startswith("Does camera right stand where it was found? Look at the new pose in its frame")
     page.goto(f"{stub.url}/ui/venues/{name}")
     expect(page.get_by_role("link", name="accepted by hand")).to_be_visible()

@@ -97,6 +97,29 @@ def test_what_is_not_explained_is_said_on_a_page(stub, visit):
     expect(page.get_by_role("link", name="To the venues")).to_be_visible()
 
 
+@pytest.mark.parametrize("kind", ["refusals", "problems"])
+def test_all_reasons_are_listed_for_browsers(stub, visit, kind):
+    page = visit(stub.url, f"/{kind}")
+    listed = page.locator("main li a").evaluate_all("all => all.map((one) => one.getAttribute('href'))")
+    assert listed == [f"/{kind}/{one}" for one in (REFUSAL_REASONS if kind == "refusals" else PROBLEM_TYPES)]
+    assert stub.http.get(f"/{kind}").headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("/nowhere", "Nothing is at /nowhere."),
+        ("/ui/venues/nope", "There is no venue of this id: somebody has deleted it, or the address is mistyped."),
+        ("/ui/jobs/nope", "There is no job of this id: somebody has deleted it, or the address is mistyped."),
+    ],
+)
+def test_where_nothing_is_people_find_a_page_without_a_word_of_requests(stub, visit, path, words):
+    page = visit(stub.url, path, forgiven=("404",))
+    expect(page.locator("main p").first).to_have_text(words)
+    expect(page.get_by_role("link", name="To the venues")).to_be_visible()
+    assert stub.http.get(path, headers={"Accept": CHROME}).status_code == 404
+
+
 def test_the_interface_is_drawn_without_internet_has_a_way_back_and_speaks_of_no_key_where_none_is_asked_for(
     stub, visit
 ):

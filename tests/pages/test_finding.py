@@ -110,7 +110,7 @@ def test_a_camera_of_a_venue_is_found_again_and_its_neighbour_stays(stub, visit,
     page.locator("[data-camera=left] input[type=file]").set_input_files(files[0])
     button = page.get_by_role("button", name="Find", exact=True)
     expect(button).to_be_enabled()
-    page.get_by_text("What holds still").click()
+    page.get_by_text("What stays the same").click()
     page.get_by_label("Find their lenses").check()
     button.click()
     page.wait_for_url("**/ui/jobs/*")

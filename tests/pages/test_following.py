@@ -65,6 +65,7 @@ def test_the_page_of_a_venue_shows_alarms_and_what_others_change(stub, open_venu
 
 def test_a_form_that_somebody_fills_in_is_left_alone_and_cannot_undo_what_others_changed(stub, open_venue):
     page = open_venue("edited")
+    page.locator("summary", has_text="Stitched view for other tools").click()
     page.get_by_label("Pan to the right, °", exact=True).fill("7")
     stub.http.patch("/venues/edited", json={"name": "Changed", "view": {"pan_deg": 3}}).raise_for_status()
     expect(page.get_by_role("heading", level=1)).to_have_text("Changed")

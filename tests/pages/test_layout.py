@@ -30,7 +30,7 @@ def test_a_phone_shows_all_of_each_row_with_what_it_is(stub, phone):
     name = stub.venue("small")
     job = stub.calibrated(name)["id"]
     phone.goto(f"/ui/venues/{name}")
-    for section in ("Revisions of the poses", "Poses that hold now"):
+    for section in ("Revisions of the poses", "Download the poses in use"):
         phone.locator("summary", has_text=section).click()
     for part in (
         phone.get_by_role("button", name="Restore revision 1"),
@@ -38,8 +38,8 @@ def test_a_phone_shows_all_of_each_row_with_what_it_is(stub, phone):
         phone.get_by_role("region", name="The last calibrations").get_by_role("link", name=job),
     ):
         assert inside(phone, part)
-    cell = phone.locator("td[data-label='right drift']").first
-    assert cell.evaluate("one => getComputedStyle(one, '::before').content") == '"right drift"'
+    cell = phone.locator("td[data-label='right since set']").first
+    assert cell.evaluate("one => getComputedStyle(one, '::before').content") == '"right since set"'
     phone.goto(f"/ui/jobs?venue={name}")
     assert all(inside(phone, cell) for cell in phone.locator("tbody td").all())
 
@@ -48,7 +48,7 @@ def test_a_phone_folds_what_is_not_needed_first_and_the_address_opens_it(stub, p
     name = stub.venue("folded")
     stub.calibrated(name)
     phone.goto(f"/ui/venues/{name}")
-    restore, cron = phone.get_by_role("button", name="Restore revision 1"), phone.get_by_label("Times, as of cron")
+    restore, cron = phone.get_by_role("button", name="Restore revision 1"), phone.get_by_label("Cron schedule")
     for hidden in (restore, cron):
         expect(hidden).to_be_hidden()
     for shown in ("Accepted", "Cameras", "History"):
@@ -68,7 +68,7 @@ def test_what_a_phone_has_folded_stays_folded_while_the_page_follows_what_happen
     name = stub.venue("followed")
     stub.calibrated(name)
     phone.goto(f"/ui/venues/{name}")
-    phone.locator("summary", has_text="Poses that hold now").click()
+    phone.locator("summary", has_text="Download the poses in use").click()
     stub.calibrated(name, shade=1)
     expect(phone.locator("[data-part=history] tbody tr:has(.badge)")).to_have_count(2)
     expect(phone.get_by_role("button", name="Restore revision 1")).to_be_hidden()
@@ -120,11 +120,11 @@ def test_the_magnifier_begins_on_a_line_of_the_field(real, visit):
 def test_the_stitched_view_says_that_it_is_being_drawn(real, visit):
     page = visit(real)
     page.route("**/stitch/preview?*", lambda route: None)
-    page.goto("/ui/venues/newcomer")
+    page.goto("/ui/venues/newcomer#view")
     page.locator("#view-picture").scroll_into_view_if_needed()
     expect(page.get_by_text("The view is being drawn")).to_be_visible()
     page.unroute_all()
-    page.goto("/ui/venues/newcomer")
+    page.goto("/ui/venues/newcomer#view")
     page.locator("#view-picture").scroll_into_view_if_needed()
     expect(page.get_by_text("The view is being drawn")).to_be_hidden()
 

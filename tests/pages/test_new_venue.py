@@ -8,6 +8,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.pages import newcomer
+from tests.pages.browsing import press_and_confirm
 
 SIGMA = {"fx": 3.5, "fy": 3.5, "k1": 0.002}
 EVENTS = "/jobs/01KAJ3Q6WZ5T3Y8R0N4M2C7B1D/events"
@@ -66,12 +67,12 @@ def test_a_newcomer_comes_to_poses_that_are_right(real):
         assert np.linalg.norm(position - newcomer.TRUTH[camera].position) < 0.05
 
 
-def test_what_was_accepted_is_rejected_by_hand_and_restored(real, visit):
+def test_what_was_accepted_is_undone_and_restored(real, visit):
     page = visit(real, "/ui/venues/newcomer")
     accepted = poses(real)
-    page.get_by_role("button", name="Reject").click()
-    expect(page.get_by_text("These poses no longer hold")).to_be_visible()
+    press_and_confirm(page.get_by_role("button", name="Undo"))
+    expect(page.get_by_text("In use: revision 3 (poses of revision 1)")).to_be_visible()
     assert any(np.linalg.norm(position - accepted[camera]) > 1e-4 for camera, position in poses(real).items())
-    page.get_by_role("button", name="Restore revision 2").click()
-    expect(page.get_by_text("restored from 2")).to_be_visible()
+    press_and_confirm(page.get_by_role("button", name="Restore revision 2"))
+    expect(page.get_by_text("poses of revision 2").first).to_be_visible()
     assert all((position == accepted[camera]).all() for camera, position in poses(real).items())

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.e2e import running
 from tests.e2e.running import SIZE, Service, png, wait_for
-from tests.pages.browsing import differs, grave, look, tab, wait_until
+from tests.pages.browsing import differs, grave, look, press_and_confirm, tab, wait_until
 from tests.pages.stocked import calibrations
 
 DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 800}
@@ -74,16 +74,40 @@ def test_the_list_shows_each_venue_with_its_last_result(stub, ended, years, visi
     expect(row.get_by_role("img", name="Stitch error")).to_be_visible()
 
 
+@pytest.mark.parametrize(
+    ("behaviour", "decision", "says"), [("accept", "reject", "Undone"), ("reject", "accept", "Accepted by hand")]
+)
+def test_the_list_says_what_was_decided_since_the_last_calibration(stub, visit, behaviour, decision, says):
+    name = stub.venue(f"decided-{decision}", behaviour)
+    job = stub.calibrated(name)["id"]
+    stub.http.post(f"/jobs/{job}/{decision}").raise_for_status()
+    page = visit(stub.url)
+    row = page.locator(".venue-row", has=page.locator(f"a[href='/ui/venues/{name}']"))
+    expect(row.locator(".badge")).to_have_text(says)
+    stub.calibrated(name, shade=1, dry_run=True)
+    expect(row.locator(".badge")).to_have_text("Rejected" if behaviour == "reject" else "Accepted, dry run")
+
+
+def test_the_list_of_jobs_begins_with_venue_and_time(stub, visit):
+    job = stub.calibrated(stub.venue("in-a-row"))["id"]
+    page = visit(stub.url, "/ui/jobs?venue=in-a-row")
+    expect(page.locator("thead th")).to_have_text(
+        ["Venue", "Submitted", "Kind", "State", "Took", "Stitch error", "Job"]
+    )
+    page.get_by_role("link", name="Calibration").click()
+    expect(page).to_have_url(f"{stub.url}/ui/jobs/{job}")
+
+
 def test_a_rejected_result_is_accepted_by_hand(stub, ended, visit):
     page = visit(stub.url, "/ui/venues/poor")
     reasons = page.locator(".verdict .reason li")
     expect(reasons).to_have_text([f"{camera}: the lines do not fit" for camera in ("left", "right")])
-    expect(page.get_by_text("The poses from before still hold")).to_be_visible()
+    expect(page.get_by_text("In use: revision 1 (set by hand)")).to_be_visible()
     anyway = page.get_by_role("button", name="Accept anyway")
     # Nobody is invited to it.
     expect(anyway).to_have_class("quiet")
-    anyway.click()
-    expect(page.get_by_text("These poses hold now")).to_be_visible()
+    press_and_confirm(anyway)
+    expect(page.get_by_text("These poses are in use")).to_be_visible()
     assert stub.http.get("/venues/poor").json()["cameras"][0]["pose"]["position"][0] == -0.875
 
 
@@ -91,13 +115,13 @@ def test_a_result_that_is_accepted_in_part_says_of_which_camera_and_the_rest_can
     job = stub.calibrated(stub.venue("part", "partly"))
     page = visit(stub.url, "/ui/venues/part")
     expect(page.locator(".verdict-big")).to_have_text(re.compile("Partly accepted"))
-    expect(page.get_by_text("Those that were accepted hold now")).to_be_visible()
+    expect(page.get_by_text("Those that were accepted are in use")).to_be_visible()
     left, right = (page.get_by_role("article", name=camera) for camera in ("left", "right"))
     expect(left.locator(".badge")).to_have_text("Accepted")
     expect(right.locator(".badge")).to_have_text("Rejected")
     expect(right.get_by_text("the lines do not fit")).to_be_visible()
     assert stub.http.get("/venues/part").json()["cameras"][1]["pose"] != job["result"]["cameras"][1]["pose"]
-    right.get_by_role("button", name="Accept right anyway").click()
+    press_and_confirm(right.get_by_role("button", name="Accept right anyway"))
     expect(page.get_by_text("as revision 3")).to_be_visible()
     assert stub.http.get("/venues/part").json()["cameras"][1]["pose"] == job["result"]["cameras"][1]["pose"]
 
@@ -134,7 +158,7 @@ def test_frames_are_looked_at_before_they_travel(stub, frames, visit):
     page.get_by_label("Seed").fill("11")
     send.click()
     page.wait_for_url("**/ui/jobs/*")
-    expect(page.locator(".title .badge")).to_have_text("Accepted")
+    expect(page.locator(".title .badge")).to_have_text("Accepted, dry run")
     job = stub.job(page.url.rpartition("/")[2])
     options = job["result"]["provenance"]["options"]
     assert (options["dry_run"], options["seed"]) == (True, 11)
@@ -198,7 +222,7 @@ def test_a_running_job_is_followed_and_cancelled(stub, visit):
     expect(page.locator(".stages [aria-current]")).to_have_text("evolution")
     expect(page.locator("progress")).to_have_attribute("value", "0.5")
     expect(page.locator("[data-live=loss] canvas")).to_be_visible()
-    page.get_by_role("button", name="Cancel").click()
+    press_and_confirm(page.get_by_role("button", name="Cancel"))
     expect(page.locator(".title .badge")).to_have_text("Cancelled")
     assert stub.job(job)["status"] == "cancelled"
 
@@ -298,7 +322,7 @@ def test_the_keyboard_reaches_what_a_page_offers(stub, ended, visit):
     for _ in range(40):
         page.keyboard.press("Tab")
         reached.add(page.evaluate("document.activeElement.textContent.trim() || document.activeElement.name"))
-    assert {"Skip to the content", "Venues", "Jobs", "Calibrate", "Reject"} <= reached
+    assert {"Skip to the content", "Venues", "Jobs", "Calibrate", "Undo"} <= reached
 
 
 def test_a_job_that_failed_shows_its_frames_with_what_was_wrong_and_what_was_asked(stub, ended, visit):

@@ -82,10 +82,10 @@ def test_the_magnifier_enlarges_by_as_much_as_is_chosen_and_follows_the_pointer(
     assert differs(enlarged, look(after)) > 0.1
 
 
-@pytest.mark.parametrize("name", ["Stored pose", "New pose", "Mask"])
+@pytest.mark.parametrize("name", ["Stored pose", "New pose", "Detected lines"])
 def test_each_layer_is_drawn_on_each_frame_and_taken_off(venue, name):
     frames = venue.locator(".layers")
-    for other in ("Stored pose", "New pose", "Mask"):
+    for other in ("Stored pose", "New pose", "Detected lines"):
         venue.get_by_label(other, exact=True).uncheck()
     bare = [look(frames.nth(camera)) for camera in (0, 1)]
     venue.get_by_label(name, exact=True).check()
@@ -112,6 +112,7 @@ def test_the_seam_has_a_curve_whose_worst_place_is_red_where_its_uncertainty_doe
 
 
 def test_every_format_is_offered_and_comes_as_a_file(venue):
+    venue.locator("summary", has_text="Download the poses in use").click()
     with venue.expect_download() as saved:
         venue.get_by_role("link", name="opentrackio, all cameras").click()
     assert saved.value.suggested_filename == "newcomer-opentrackio.zip"

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.e2e.intake.cameras import NetworkCamera
 from tests.e2e.running import Service
-from tests.pages.browsing import grave
+from tests.pages.browsing import grave, press_and_confirm
 
 ZONE = "Asia/Tokyo"
 
@@ -29,7 +29,7 @@ def test_a_schedule_is_made_tried_and_ended(fetching, camera, visit):
     page = visit(fetching.url, f"/ui/venues/{fetching.venue('timed')}", zone=ZONE)
     expect(page.get_by_role("button", name="Try it now")).to_have_count(0)
     expect(page.get_by_label("Time zone")).to_have_value(ZONE)
-    page.get_by_label("as of cron").fill("0 3 * * *")
+    page.get_by_label("Cron schedule").fill("0 3 * * *")
     for side in ("left", "right"):
         page.get_by_label(f"Source of {side}").fill(camera.url("/ok"))
     page.get_by_role("button", name="Save schedule").click()
@@ -44,10 +44,10 @@ def test_a_schedule_is_made_tried_and_ended(fetching, camera, visit):
     expect(page.get_by_text("Accepted")).to_be_visible()
     page.goto("/ui/venues/timed")
     assert grave(page) == []
-    page.get_by_label("To the second").check()
+    page.get_by_label("Start exactly on time").check()
     page.get_by_role("button", name="Save schedule").click()
     expect(schedule.get_by_role("definition").nth(1)).to_have_text(re.compile("03:00:00"))
-    page.get_by_role("button", name="End schedule").click()
+    press_and_confirm(page.get_by_role("button", name="End schedule"))
     expect(page.get_by_role("button", name="End schedule")).to_have_count(0)
     assert fetching.http.get("/venues/timed").json()["schedule"] is None
 
@@ -59,7 +59,7 @@ def test_what_is_wrong_with_a_schedule_is_said_beside_it(fetching, camera, visit
     expect(refused).to_contain_text("a schedule needs a source of every camera, and left, right have none")
     for side in ("left", "right"):
         page.get_by_label(f"Source of {side}").fill(camera.url("/ok"))
-    page.get_by_label("as of cron").fill("99 * * * *")
+    page.get_by_label("Cron schedule").fill("99 * * * *")
     page.get_by_role("button", name="Save schedule").click()
     expect(refused).to_contain_text("'99 * * * *' is no schedule")
 

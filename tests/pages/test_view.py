@@ -34,7 +34,7 @@ def settled(page):
 
 
 def test_the_picture_follows_the_knobs_and_the_seam_can_be_seen(stub, pitch, visit):
-    page = visit(stub.url, f"/ui/venues/{pitch}")
+    page = visit(stub.url, f"/ui/venues/{pitch}#view")
     page.locator("#view-picture").scroll_into_view_if_needed()
     usual = settled(page)
     assert usual.std() > 10
@@ -49,13 +49,13 @@ def test_the_picture_follows_the_knobs_and_the_seam_can_be_seen(stub, pitch, vis
     page.get_by_label("Projection").select_option("birds-eye")
     expect(page.get_by_label("Field of view, °", exact=True)).to_be_disabled()
     assert settled(page).shape[0] > 1.5 * panned.shape[0]
-    page.get_by_role("button", name="As it is kept").click()
+    page.get_by_role("button", name="Reset").click()
     assert differs(usual, settled(page)) == 0
     assert grave(page) == []
 
 
 def test_a_view_is_kept_and_its_package_fetched(stub, pitch, visit):
-    page = visit(stub.url, f"/ui/venues/{pitch}")
+    page = visit(stub.url, f"/ui/venues/{pitch}#view")
     page.get_by_label("Projection").select_option("cylinder")
     page.get_by_label("Width of the view, px").fill("640")
     page.get_by_label("Height of the view, px").fill("200")
@@ -74,7 +74,7 @@ def test_a_view_is_kept_and_its_package_fetched(stub, pitch, visit):
         assert json.loads(files.read("view.json"))["view"] == chosen
     assert stub.http.get(f"/venues/{pitch}").json()["view"] is None
     with page.expect_navigation():
-        page.get_by_role("button", name="Keep this view").click()
+        page.get_by_role("button", name="Save", exact=True).click()
     assert stub.http.get(f"/venues/{pitch}").json()["view"] == chosen
     expect(page.get_by_label("Width of the view, px")).to_have_value("640")
     expect(page.get_by_label("Field of view, °", exact=True)).to_have_value("")
@@ -84,11 +84,11 @@ def test_a_view_is_not_kept_over_what_somebody_else_has_changed(stub, visit):
     page = visit(stub.url, forgiven=("412",))
     # A page that hears of the change is right by itself before anybody presses the button.
     page.route("**/events*", lambda route: None)
-    page.goto(f"/ui/venues/{stub.venue('shared')}")
+    page.goto(f"/ui/venues/{stub.venue('shared')}#view")
     expect(page.get_by_text("The first calibration that is accepted brings the frames")).to_be_visible()
     stub.venue("shared", "renamed")
     page.get_by_label("Width of the view, px").fill("640")
-    page.get_by_role("button", name="Keep this view").click()
+    page.get_by_role("button", name="Save", exact=True).click()
     expect(page.locator("#view-refused")).to_have_text(re.compile("Somebody has changed the venue"))
     assert stub.http.get("/venues/shared").json()["view"] is None
 
@@ -96,7 +96,7 @@ def test_a_view_is_not_kept_over_what_somebody_else_has_changed(stub, visit):
 def test_a_view_without_its_frames_says_so(stub, visit):
     job = stub.calibrated(stub.venue("bare"))
     stub.venue("bare", cameras=("left", "third"))
-    page = visit(stub.url, "/ui/venues/bare", forgiven=("404",))
+    page = visit(stub.url, "/ui/venues/bare#view", forgiven=("404",))
     page.locator("#view-picture").scroll_into_view_if_needed()
     expect(page.locator("#view-refused")).to_have_text(
         "The next calibration that is accepted brings a frame of each camera."

@@ -28,8 +28,8 @@ function showCamera(row, camera, isRunning) {
 function show(box, state) {
   const rows = rowsOf(box);
   if (rows.map((row) => row.dataset.camera).join() !== state.cameras.map(({id}) => id).join()) return refresh();
-  box.querySelector("[data-running]").hidden = !state.running;
-  box.querySelector("[data-ended]").hidden = state.running;
+  // Above the pictures while poses are sent, below them afterwards.
+  if (box.querySelector("[data-running]").hidden === state.running) return refresh();
   tell(box, "host", state.host);
   tell(box, "destinations", state.destinations.join(", "));
   const time = box.querySelector("time");

@@ -113,8 +113,33 @@ export function loadAgain() {
   else location.reload();
 }
 
+/** Ask before something happens, and say what will; true: it shall. `does`: what the button says that lets it. */
+export function ask({asks, effect, does, refrain = "Cancel", isDanger = false}) {
+  const box = document.createElement("dialog");
+  const [question, words, form] = [["h2", asks], ["p", effect], ["form", ""]].map(([tag, text]) => Object.assign(document.createElement(tag), {textContent: text}));
+  question.id = "asked-question";
+  words.id = "asked-effect";
+  box.setAttribute("aria-labelledby", question.id);
+  box.setAttribute("aria-describedby", words.id);
+  form.method = "dialog";
+  form.className = "send";
+  const buttons = [[does, "yes", isDanger ? "danger" : ""], [refrain, "", "quiet"]].map(([textContent, value, className]) => Object.assign(document.createElement("button"), {textContent, value, className}));
+  form.append(...buttons);
+  box.append(question, words, form);
+  document.body.append(box);
+  box.showModal();
+  return new Promise((answered) => {
+    box.addEventListener("close", () => {
+      box.remove();
+      answered(box.returnValue === "yes");
+    });
+  });
+}
+
 async function press(button) {
-  if (button.dataset.asks && !confirm(button.dataset.asks)) return;
+  const {asks, effect, refrain} = button.dataset;
+  const does = button.getAttribute("aria-label") || button.textContent.trim();
+  if (asks && !await ask({asks, effect, does, refrain, isDanger: button.matches(".danger")})) return;
   button.disabled = true;
   try {
     const content = button.dataset.content ? JSON.parse(button.dataset.content) : undefined;

@@ -10,6 +10,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.schemas.geometry import Moved
+from service.schemas.history import Cause
 from service.schemas.names import OPEN_STATUSES, JobStatus, Verdict
 from service.store import tables
 from service.store.database import Repository, reading
@@ -87,6 +88,17 @@ class PastCalibrationRepository(Repository):
         )
         with reading(self._engine) as connection:
             return {row.venue: row.id for row in connection.execute(query)}
+
+    def decided(self, venues: Collection[str]) -> dict[str, tuple[Cause, datetime]]:
+        """Return how and when the poses in use came, by venue, where somebody has accepted or undone a calibration."""
+        others = sa.alias(tables.revisions)
+        newest = sa.select(sa.func.max(others.c.number)).where(others.c.venue == r.venue).scalar_subquery()
+        by_hand = r.cause.in_(("accepted", "restored"))
+        query = sa.select(r.venue, r.cause, r.at).where(
+            r.venue.in_(venues), r.number == newest, by_hand, r.job.is_not(None)
+        )
+        with reading(self._engine) as connection:
+            return {row.venue: (row.cause, row.at) for row in connection.execute(query)}
 
 
 def _past(row: Any) -> PastCalibration:

@@ -131,7 +131,7 @@ def test_the_command_line_fetches_a_package_only_if_it_changed(service, esc, nam
     assert esc(*wanted).returncode == 0
     first = (tmp_path / "a.zip").stat().st_mtime_ns
     again = esc(*wanted, "--if-changed")
-    assert (again.returncode, again.stderr) == (0, "a.zip still holds.\n")
+    assert (again.returncode, again.stderr) == (0, "a.zip is up to date.\n")
     assert (tmp_path / "a.zip").stat().st_mtime_ns == first
     assert esc(*wanted, "--format", "opencv", "--if-changed").returncode == 0
     assert "maps.npz" in zipfile.ZipFile(tmp_path / "a.zip").namelist()

@@ -45,7 +45,7 @@ LEFT = ("cameras", 0)
         (
             ("field", "length_m"),
             10500,
-            "field.length_m: expected 400 m or less, came 10500; it is in metres: are these centimetres or millimetres?",
+            "field.length_m: expected 400 m or less, came 10500; it is in metres: are these centimetres",
         ),
         (("alarms",), {"moved_since_last_px": 0}, "alarms.moved_since_last_px: expected more than 0 px, came 0"),
         (("webhooks",), [{"url": "x"}], "webhooks.0.url: expected an address such as https://"),
