@@ -18,6 +18,8 @@ from worker.calibration.records import Calibration, Options
 pytestmark = pytest.mark.slow
 
 ZOOM = 0.015
+BOARD = {"fx": 0.6, "fy": 0.6}
+"""A good board's, px."""
 WIND = ((2e-4, -1e-4, 1e-4), (0.01, 0.0, -0.01))
 
 
@@ -29,7 +31,7 @@ def picture():
 def believed(longer: float) -> Camera:
     """The camera a venue believes in before its lens became that much longer, moved a little by the wind since."""
     was = with_focal_length(plane(), -longer / (1 + longer) * 2000.0)
-    return moved(was, *WIND)
+    return moved(was.with_lens(replace(was.intrinsics, sigma=BOARD)), *WIND)
 
 
 @cache
@@ -47,6 +49,14 @@ def test_a_lens_that_has_not_changed_is_not_doubted():
     assert found.accepted
     assert not found.cameras[0].lens_found
     assert off_m(found) < 3 * found.cameras[0].sigma.position_m < 0.3
+
+
+def test_a_lens_that_nobody_vouches_for_leaves_open_how_far_off_a_camera_stands_that_sees_little():
+    stated = calibrated(0.0, lens_may_drift=False).cameras[0]
+    unstated = moved(plane(), *WIND)
+    (found,) = calibrate(CROWNED, [unstated], {"tele": [picture()]}, white_on_green, Options(seed=1)).cameras
+    assert found.accepted
+    assert stated.sigma.position_m < 0.05 < 0.1 < found.sigma.position_m < 0.3
 
 
 @pytest.mark.parametrize("longer", [ZOOM, -ZOOM])

@@ -1,16 +1,17 @@
 """What is believed of cameras before tonight's lines are asked: movement, lenses, field, and what is remembered.
 
 Dense unknowns x of the least squares (poses of all views, numbers of lenses and field) are sums of independent errors
-z: x = `mixing` z (docs/model.md, 5). A camera without a memory has two: how far it moved since its pose was stored,
-and its lens. One with a memory has a mount that stands where it was put, wind around it in every view, moves of the
-mount before the recent nights and before tonight, a lens, and heat or a zoom ring between one view and the next. The
-stored pose of the last answer has no part in it: it was found with the same lens, and would confirm it.
+z: x = `mixing` z (docs/model.md, 5). A camera without a memory has three: how far it moved and how much it was zoomed
+since its pose was stored, and its lens. One with a memory has a mount that stands where it was put, wind around it in
+every view, moves of the mount before the recent nights and before tonight, a lens, and heat or a zoom ring between one
+view and the next. A stored pose was fitted to lines through the stored lens on the stored field: what is wrong with
+these has moved it as it moves tonight's, and it is no witness of them (`Priors.of_fitted_poses`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,6 @@ from worker.calibration.geometry.parameters import (
     Parameter,
     field_parameters,
     lens_numbers,
-    lens_parameters,
     lens_parameters_without_heat,
 )
 from worker.calibration.memory.camera_memory import WIND, CameraMemory
@@ -40,6 +40,9 @@ MOVEMENT_SCALES: Array = 0.3 * 2.0 ** np.arange(7.0)
 FOCAL_SCALES: Array = 2.0 ** np.arange(8.0)
 """A focal length is off by what is expected of it, or by so many times more; never by less: lines that fit say little
 of it. A zoom ring moves it by far more than that, ..."""
+UNSTATED_ODDS, STATED_ODDS = FOCAL_SCALES**-0.5, FOCAL_SCALES**-3.0
+"""Odds of these scales for a lens before any line. Twice as far off is half as likely where nobody said how far it may
+be off, so that there is no scale by which it surely is not; a sigma that was said is wrong twofold one time in nine."""
 LENS_SCALES: Array = 2.0 ** np.arange(6.0)
 """... and nothing moves the rest of a lens so far."""
 FIELD_SCALES: Array = 2.0 ** np.arange(-3.0, 5.0)
@@ -64,7 +67,8 @@ class Priors:
     """`mixing` (D, A) and `blocks` of A independent errors; `unknowns` of all views.
 
     `movements` (W,): which of the errors are movements of a camera, and `free` (W,) how far it may have moved if
-    nothing is known of it; `changes`: by camera with a memory, see `changes_of`.
+    nothing is known of it; `changes`: by camera with a memory, see `changes_of`. `views_of`: the views of each camera,
+    and `lasting`: the errors of lens and field that have been the same since poses were stored.
     """
 
     unknowns: Unknowns
@@ -73,6 +77,23 @@ class Priors:
     movements: NDArray[np.intp]
     free: Array
     changes: dict[str, NDArray[np.intp]]
+    views_of: Sequence[Sequence[int]]
+    lasting: NDArray[np.intp]
+
+    def of_fitted_poses(self, information: Array) -> Priors:
+        """Return the priors for stored poses that were fitted to lines through the stored lens on the stored field.
+
+        `information` (D, D): of tonight's lines on the dense unknowns. A lens or field that is off by e has moved the
+        stored pose by what makes up for e in the picture, and so a camera that has not moved stands beside it by G e,
+        where G is the pose that least squares would change with it.
+        """
+        mixing, first = self.mixing.copy(), POSE_NUMBERS * self.unknowns.views
+        of_poses = information[:first, :first] + np.diag(np.tile(FREE**-2, self.unknowns.views))
+        response = -np.linalg.solve(of_poses, information[:first, first:]) @ self.mixing[first:, self.lasting]
+        for number, views in enumerate(self.views_of):
+            for view in views:
+                mixing[self.unknowns.pose(view)][:, self.lasting] += response[self.unknowns.pose(number)]
+        return replace(self, mixing=mixing)
 
     def changes_of(self, camera: str) -> NDArray[np.intp]:
         """Which of the errors are changes of a camera's focal length since the first nights of its memory."""
@@ -111,8 +132,7 @@ class _Errors:
         self._cameras, self._solved = here.cameras, solved
         remembered = [number for number, memory in enumerate(memories) if memory for _ in memory.epochs]
         self._owner_of = [*range(len(here.cameras)), *remembered]
-        aged = {number for number, memory in enumerate(memories) if memory}
-        self._unknowns = _unknowns(here, self._owner_of, aged, solved)
+        self._unknowns = _unknowns(here, self._owner_of, solved)
         self._places = {
             (parameter.camera, parameter.name): at
             for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views)
@@ -122,12 +142,16 @@ class _Errors:
         self._blocks: list[list[Group]] = []
         self._movements: list[Group] = []
         self._changes: dict[str, NDArray[np.intp]] = {}
+        self._lasting: list[Group] = []
 
     def believed(self) -> Priors:
         """All of them."""
         moved = np.concatenate([group.which for group in self._movements])
         free = np.tile(FREE, len(moved) // POSE_NUMBERS)
-        return Priors(self._unknowns, np.stack(self._columns, axis=1), self._blocks, moved, free, self._changes)
+        views = [[v for v, owner in enumerate(self._owner_of) if owner == n] for n in range(len(self._cameras))]
+        lasting = np.concatenate([np.empty(0, dtype=np.intp), *(group.which for group in self._lasting)])
+        mixing = np.stack(self._columns, axis=1)
+        return Priors(self._unknowns, mixing, self._blocks, moved, free, self._changes, views, lasting)
 
     def add_solved(self, values: Array) -> None:
         """What the finish has found along with the poses: it stands at `values` (E,) from what was given."""
@@ -140,12 +164,14 @@ class _Errors:
         found = {parameter.name for parameter in self._solved.parameters}
         for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views):
             if isinstance(parameter, FieldParameter) and parameter.name not in found:
-                self._blocks.append([self._number([at], parameter.expected, FIELD_SCALES)])
+                self._lasting.append(self._number([at], parameter.expected, FIELD_SCALES))
+                self._blocks.append([self._lasting[-1]])
 
     def add_camera(self, number: int, before: Camera) -> None:
-        """A camera without a memory: it has moved since it was where it was stored `before`, and has a lens."""
+        """A camera without a memory: moved or zoomed since it was where it was stored `before`, through its lens."""
         moved = self._move([number], MOVED, MOVEMENT_SCALES, change_between(self._cameras[number], before))
-        self._blocks.append([moved, *self._lens(number, np.zeros(len(LENS_NUMBERS)))])
+        self._blocks.append([moved, self._heat([number], FOCAL_SCALES if self._has_fixed_focal(number) else ONCE)])
+        self._blocks.append(self._lens(number, np.zeros(len(LENS_NUMBERS))))
 
     def add_remembered(self, number: int, memory: CameraMemory) -> None:
         """A camera with a memory: its mount and lens, and what has happened between the times of its views."""
@@ -155,7 +181,8 @@ class _Errors:
 
         told = lens_numbers(memory.origin.intrinsics) - lens_numbers(camera.intrinsics)
         mount = self._move([tonight, anchor, *others], MOVED, MOVEMENT_SCALES, change_between(camera, memory.origin))
-        self._blocks.append([mount, *self._lens(number, told)])
+        self._blocks.append([mount])
+        self._blocks.append(self._lens(number, told))
         self._blocks.append([self._heat([anchor, tonight, *recent], ONCE)])
         zoomed = [self._since([tonight, *recent])] if recent else []
         zoomed.append(self._since([tonight]))
@@ -196,14 +223,22 @@ class _Errors:
             for p in self._unknowns.parameters
             if isinstance(p, LensParameter) and p.camera == number and not self._is_solved(p)
         ]
+        is_stated = any(name in self._cameras[number].intrinsics.sigma for name in ("fx", "fy"))
+        odds = STATED_ODDS if is_stated else UNSTATED_ODDS
         groups = []
         for of_focal, scales in ((True, FOCAL_SCALES), (False, LENS_SCALES)):
             its = [(at, expected, value) for at, expected, value, focal in known if focal == of_focal]
             if its:
                 places, expected, means = zip(*its, strict=True)
                 columns = np.eye(self._unknowns.dense)[:, list(places)]
-                groups.append(self._group(columns, np.array(expected), np.array(means), scales))
+                group = self._group(columns, np.array(expected), np.array(means), scales)
+                groups.append(replace(group, odds=odds) if of_focal else group)
+        self._lasting.extend(groups)
         return groups
+
+    def _has_fixed_focal(self, number: int) -> bool:
+        solved = [p for p in self._solved.parameters if isinstance(p, LensParameter) and p.camera == number]
+        return all(p.name != "focal_length_px" for p in solved)
 
     def _is_solved(self, parameter: LensParameter) -> bool:
         return any(
@@ -224,22 +259,19 @@ class _Errors:
         return Group(which, expected, mean, scales)
 
 
-def _unknowns(here: Estimate, owner_of: Sequence[int], aged: Collection[int], solved: Unknowns) -> Unknowns:
+def _unknowns(here: Estimate, owner_of: Sequence[int], solved: Unknowns) -> Unknowns:
     """Everything that may be off: of all views, each of which is of the camera `owner_of` says.
 
-    The focal length of a camera that is remembered (`aged`) has what heat does in a number of each view.
+    What heat and zoom rings do to a focal length is a number of each view.
     """
     views = len(owner_of)
     known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
-    fresh, without_heat = lens_parameters(here.cameras), lens_parameters_without_heat(here.cameras)
-    lenses = [b if b.camera in aged else a for a, b in zip(fresh, without_heat, strict=True)]
-    suspects: list[Parameter] = [*lenses, *field_parameters(here.pitch)]
+    suspects: list[Parameter] = [*lens_parameters_without_heat(here.cameras), *field_parameters(here.pitch)]
     heats = [
         LensParameter(
             _heat_number(views, view), "focal_length_px", HEAT_FOCAL * here.cameras[owner].intrinsics.focal_length_px
         )
         for view, owner in enumerate(owner_of)
-        if owner in aged
     ]
     return Unknowns(
         views,

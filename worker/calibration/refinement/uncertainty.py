@@ -208,6 +208,7 @@ def estimate_uncertainty(
     believed = build_priors(here, stored, memories, solved)
     lines = LineLikelihood(here, measured, memories, believed.unknowns)
     information = lines.information()
+    believed = believed.of_fitted_poses(information.known)
     for _ in range(ASKED_AGAIN):
         changes = believed.mixing @ _posterior(believed, information).value
         information = lines.information_at(changes, information.heights(changes))

@@ -24,13 +24,15 @@ SWEEPS = 3
 @dataclass(frozen=True)
 class Group:
     """Numbers whose errors are of one scale: `which` (n,) of those asked for, `expected` (n,) errors at scale 1 around
-    `mean` (n,), and the `scales` (S,), or (S, n) where they differ within the group, that may be theirs.
+    `mean` (n,), and the `scales` (S,), or (S, n) where they differ within the group, that may be theirs. `odds` (S,) of
+    the scales before any line: with them a group has the mean of its variance in place of the likeliest scale.
     """
 
     which: NDArray[np.intp]
     expected: Array
     mean: Array
     scales: Array
+    odds: Array | None = None
 
     def certainty(self, scale: Array | float) -> Array:
         """Prior information (n,) on the numbers at one of the scales."""
@@ -80,20 +82,32 @@ def _likeliest(
     block: Sequence[Group],
     which: NDArray[np.intp],
 ) -> Array:
-    """The prior information (n,) on the numbers of a block that makes the lines likeliest, all others as they are."""
+    """The prior information (n,) on the numbers of a block that makes the lines likeliest, all others as they are.
+
+    Groups whose scales have odds are known by the mean of their variance over all scales: lines that tell little of a
+    scale would else choose the least one as surely as lines that tell it.
+    """
     rest = np.setdiff1d(np.arange(len(pull)), which)
     of_rest = information[np.ix_(rest, rest)] + np.diag(certainty[rest])
     coupling = information[np.ix_(rest, which)]
     effect = np.linalg.solve(of_rest, coupling) if len(rest) else np.zeros((0, len(which)))
     alone = information[np.ix_(which, which)] - coupling.T @ effect
     drawn = pull[which] - effect.T @ (pull[rest] + certainty[rest] * mean[rest])
+    choices = list(product(*(range(len(group.scales)) for group in block)))
     tried = np.stack(
         [
-            np.concatenate([group.certainty(scale) for group, scale in zip(block, scales, strict=True)])
-            for scales in product(*(group.scales for group in block))
+            np.concatenate([group.certainty(group.scales[at]) for group, at in zip(block, choice, strict=True)])
+            for choice in choices
         ]
     )
-    return np.asarray(tried[np.argmax(_log_evidence(alone, drawn, tried, mean[which]))], dtype=float)
+    evidence = _log_evidence(alone, drawn, tried, mean[which])
+    weighed = [(column, group.odds) for column, group in enumerate(block) if group.odds is not None]
+    log_odds = sum((np.log(odds)[np.array(choices)[:, column]] for column, odds in weighed), np.zeros(len(choices)))
+    chosen = tried[np.argmax(evidence + log_odds)]
+    share = np.exp(evidence + log_odds - np.max(evidence + log_odds))
+    has_odds = np.repeat([group.odds is not None for group in block], [len(group.which) for group in block])
+    mean_variance = share @ (1 / tried) / share.sum()
+    return np.asarray(np.where(has_odds, 1 / mean_variance, chosen), dtype=float)
 
 
 def _log_evidence(information: Array, pull: Array, certainty: Array, mean: Array) -> Array:

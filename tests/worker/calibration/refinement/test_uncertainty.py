@@ -9,7 +9,7 @@ from fields.template import load
 from tests.worker.calibration.synthetic import camera, moved
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
-from worker.calibration.geometry import parameters
+from worker.calibration.refinement import priors
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.visibility import VisibleLines
@@ -72,14 +72,14 @@ def said_of_a_corner(**sigma):
 @pytest.fixture
 def without_heat(monkeypatch):
     """Focal lengths that stay as they were on the day of the photos."""
-    monkeypatch.setattr(parameters, "HEAT_FOCAL", 0.0)
+    monkeypatch.setattr(priors, "HEAT_FOCAL", 1e-9)
 
 
 def test_however_well_a_focal_length_was_measured_heat_may_have_moved_it(monkeypatch):
     warm = said_of_a_corner(fx=0.1)
     assert said_of_a_corner(fx=0.01) == pytest.approx(warm, rel=0.01)
-    heat = parameters.HEAT_FOCAL
-    monkeypatch.setattr(parameters, "HEAT_FOCAL", 0.0)
+    heat = priors.HEAT_FOCAL
+    monkeypatch.setattr(priors, "HEAT_FOCAL", 1e-9)
     cold = said_of_a_corner(fx=0.1)
     # The corner is 47 m away, and a camera with a longer lens seems to stand farther by as large a part of that.
     assert np.sqrt(warm**2 - cold**2) == pytest.approx(47 * heat, rel=0.4)
