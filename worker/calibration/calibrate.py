@@ -89,7 +89,7 @@ def calibrate(
     # Observe.
     observer = FrameObserver.of(pitch, cameras, frames, segment)
     observed = observer.observe(progress, usual)
-    known = [memories.get(camera.id) for camera in cameras]
+    known = [_of_other_frames(memories.get(camera.id), frames[camera.id]) for camera in cameras]
     problem = Problem(pitch, cameras, observed, options, known, recorder=recorder)
 
     # Solve and judge: where the cameras stood if all usable ones pass there, else by search and refinement.
@@ -106,6 +106,13 @@ def calibrate(
         loss = loss_of(problem, judged.pitch, [result.camera for result in judged.cameras])
     found = diagnose(problem, solution, judged, path, loss, frames, progress)
     return found if flattened else replace(found, memories=remember(judged, cameras, frames, memories, taken_at))
+
+
+def _of_other_frames(memory: CameraMemory | None, frames: Sequence[Frame]) -> CameraMemory | None:
+    """Return a memory, or None where these frames are all that it holds: sent again they say nothing new."""
+    if memory is None or memory.jobs > 1:
+        return memory
+    return None if memory.frames == fingerprint_of_frames(frames) else memory
 
 
 def _solve(problem: Problem, observer: FrameObserver, progress: ProgressReporter) -> Solved:
