@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
 from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
-from service.schemas.names import OPTIONS_PART, LensModel
+from service.schemas.names import OPTIONS_PART, LensModel, SigmaSource
 
 DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
 COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
@@ -117,6 +117,12 @@ class Intrinsics(Schema):
         examples=[{"fx": 4.0, "fy": 4.0, "cx": 6.0, "cy": 5.0, "k1": 0.002, "k2": 0.004}],
         json_schema_extra={"propertyNames": {"enum": [*MATRIX_NUMBERS, *COEFFICIENTS["opencv"]]}},
     )
+    sigma_from: Annotated[SigmaSource, OPEN_WORD] | None = Field(
+        None,
+        description="What `sigma` was estimated from, where that is used again: `lines`, for a lens that a search has "
+        "found with the pose. Calibrations ask the same lines, and take such a lens to be unknown: the sigma of a pose "
+        "is as large as that of the search. Absent: photos of a board, or another independent measurement.",
+    )
 
     @model_validator(mode="after")
     def _a_lens(self) -> Self:
@@ -146,7 +152,7 @@ class Intrinsics(Schema):
     @property
     def without_sigma(self) -> Intrinsics:
         """The lens itself, and not how well it is known: lenses that image alike have the same."""
-        return self.model_copy(update={"sigma": None})
+        return self.model_copy(update={"sigma": None, "sigma_from": None})
 
     def with_sigma_of(self, other: Intrinsics) -> Intrinsics:
         """This lens; where the other one is the same, as well known as that."""

@@ -19,6 +19,7 @@ PHOTOS_PART = "photos"
 SITE_PART = "site"
 
 LensModel = Literal["opencv", "fisheye"]
+SigmaSource = Literal["lines"]
 # Of files that poses leave in; `service.formats.table` has what is behind the names.
 FormatName = Literal[
     "json",

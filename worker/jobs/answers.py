@@ -24,6 +24,7 @@ class Intrinsics(TypedDict):
     matrix: list[list[float]]
     distortion: list[float]
     sigma: dict[str, float] | None
+    sigma_from: str | None
 
 
 class Light(TypedDict):

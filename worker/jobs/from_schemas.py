@@ -107,7 +107,8 @@ def pitch_of(field: FieldOfPlay) -> Field:
 def lens_of(lens: Intrinsics, image_size: list[int]) -> Lens:
     """The engine's lens."""
     matrix, distortion = np.array(lens.matrix, dtype=float), np.array(lens.distortion, dtype=float)
-    return LENSES[lens.model](matrix, distortion, (image_size[0], image_size[1]), dict(lens.sigma or {}))
+    size = image_size[0], image_size[1]
+    return LENSES[lens.model](matrix, distortion, size, dict(lens.sigma or {}), lens.sigma_from)
 
 
 def camera_of(camera: PosedCamera) -> Camera:

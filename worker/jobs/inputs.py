@@ -15,7 +15,7 @@ from fields.plans import other_shapes, plan_of, size_of
 from fields.shapes import Shape
 from fields.template import Template
 from service.schemas.lens_map import lens_warnings
-from service.schemas.names import LensModel
+from service.schemas.names import LensModel, SigmaSource
 
 R = TypeVar("R", bound="Record")
 _HINTS: dict[type[Any], dict[str, Any]] = {}
@@ -46,6 +46,7 @@ class Intrinsics(Record):
     matrix: list[list[float]]
     distortion: list[float]
     sigma: dict[str, float] | None
+    sigma_from: SigmaSource | None
 
 
 class Light(Record):

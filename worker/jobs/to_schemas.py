@@ -84,7 +84,11 @@ def lens_to_schema(lens: Lens) -> answers.Intrinsics:
         name: min(max(value, LEAST_SIGMA), LARGEST_SIGMA) for name, value in lens.sigma.items() if not isnan(value)
     }
     return answers.Intrinsics(
-        model=lens.model, matrix=lens.matrix.tolist(), distortion=lens.distortion.tolist(), sigma=sigma or None
+        model=lens.model,
+        matrix=lens.matrix.tolist(),
+        distortion=lens.distortion.tolist(),
+        sigma=sigma or None,
+        sigma_from=lens.sigma_from if sigma else None,
     )
 
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from worker.calibration.geometry.arrays import Array, Plane
 
 LensModel = Literal["opencv", "fisheye"]
+SigmaSource = Literal["lines"]
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 FISHEYE_DISTORTION_LENGTHS = (0, 4)
 WIDEST_FISHEYE_RAD = np.radians(89.0)
@@ -36,13 +37,14 @@ class Lens(ABC):
 
     `matrix` (3, 3) in pixels, `distortion` in OpenCV's order for the model, `size` (width, height); `sigma`: one
     standard deviation of its numbers by name (fx, fy, cx, cy in pixels, aspect = fy/fx, k1 ...), of those of which it
-    is known.
+    is known. `sigma_from`: `lines` where it was found with a pose, by the same lines that calibrate it.
     """
 
     matrix: Array
     distortion: Array
     size: tuple[int, int]
     sigma: Mapping[str, float] = field(default_factory=dict)
+    sigma_from: SigmaSource | None = None
     model: ClassVar[LensModel]
     terms: ClassVar[int]
     """How many coefficients the model has."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot
 
@@ -21,6 +21,9 @@ HEAT_FOCAL = 3e-4
 kelvin, and summer noon and a winter's night are 13 K to either side of the mean."""
 FREE_FOCAL_LENGTH, FREE_RIDGE_M = 0.005, 0.3
 """How far off what is left free may be: a focus ring that was touched, a crown of up to half a metre."""
+FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
+"""How far off the numbers of a lens may be that is found with a pose: part of the focal length, part of the frame's
+width, and k1 and k2 at half the width of the frame."""
 FREE_LENGTH_M, FREE_WIDTH_M = 5.0, 5.0
 """Pitches for matches are 90 to 120 m long and 45 to 90 m wide, and mostly near 105 m and 68 m."""
 
@@ -126,10 +129,12 @@ def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParamete
     """The same on the day of the photos of the board."""
     found: list[LensParameter] = []
     for number, camera in enumerate(cameras):
-        lens, known = camera.intrinsics, camera.intrinsics.sigma
+        lens = camera.intrinsics
+        # Lines that a lens was found by are asked again, and must not vouch for it twice.
+        known = free_lens_sigma(lens) if lens.sigma_from == "lines" else lens.sigma
         pixel = lens.relative_size
         expected = {
-            "focal_length_px": _focal_sigma(lens),
+            "focal_length_px": _focal_sigma(lens, known),
             "principal_point_x_px": known.get("cx", pixel),
             "principal_point_y_px": known.get("cy", pixel),
             "aspect": known.get("aspect", BOARD_ASPECT),
@@ -140,13 +145,24 @@ def lens_parameters_without_heat(cameras: Sequence[Camera]) -> list[LensParamete
     return found
 
 
-def _focal_sigma(lens: Lens) -> float:
+def _focal_sigma(lens: Lens, sigma: Mapping[str, float]) -> float:
     """Of fx, with which fy changes: by what is known of either, the worse of both."""
     fx, fy = float(lens.matrix[0, 0]), float(lens.matrix[1, 1])
-    known = {"fx": 1.0, "fy": fx / fy}
-    return max(
-        (lens.sigma[name] * scale for name, scale in known.items() if name in lens.sigma), default=BOARD_FOCAL * fx
-    )
+    scales = {"fx": 1.0, "fy": fx / fy}
+    return max((sigma[name] * scale for name, scale in scales.items() if name in sigma), default=BOARD_FOCAL * fx)
+
+
+def free_lens_sigma(lens: Lens) -> dict[str, float]:
+    """Return how far off, by the names of `Lens.sigma`, the numbers of a lens may be that nothing but lines tells."""
+    half_width = lens.size[0] / (2 * lens.focal_length_px)
+    centre = FREE_CENTRE * lens.size[0]
+    return {
+        "fx": FREE_FOCAL * lens.focal_length_px,
+        "cx": centre,
+        "cy": centre,
+        "k1": FREE_BEND * half_width**-2,
+        "k2": FREE_BEND * half_width**-4,
+    }
 
 
 def field_parameters(pitch: Field) -> list[FieldParameter]:

@@ -142,6 +142,7 @@ def camera_to_json(camera: Camera) -> dict[str, Any]:
         "distortion": lens.distortion.tolist(),
         "size": list(lens.size),
         "sigma": dict(lens.sigma),
+        "sigma_from": lens.sigma_from,
     }
 
 
@@ -153,6 +154,7 @@ def camera_from_json(told: Mapping[str, Any]) -> Camera:
         np.array(told["distortion"], dtype=float),
         (width, height),
         dict(told["sigma"]),
+        told.get("sigma_from"),
     )
     return Camera(told["id"], lens, Pose(np.array(told["rotation"]), np.array(told["position"])))
 

@@ -15,7 +15,7 @@ from worker.calibration.geometry.camera import Camera, inside
 from worker.calibration.geometry.derivatives import POSE_NUMBERS, pixel_slopes_of_all
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.lens import SIGMA_NAMES
-from worker.calibration.geometry.parameters import LensParameter
+from worker.calibration.geometry.parameters import LensParameter, free_lens_sigma
 from worker.calibration.refinement.refine import Observations, refine
 from worker.calibration.refinement.uncertainty import RefinedPose, Sigma
 from worker.calibration.relocalisation.paint import Paint, share
@@ -30,9 +30,6 @@ HARDLY_SEEN, WELL_SEEN = 0.3, 0.9
 rule; a pose that sees more than the second is left as it is."""
 CLEARLY_MORE = 0.03
 """By how much more a pose has to agree that may lie farther from its lines."""
-FREE_FOCAL, FREE_CENTRE, FREE_BEND = 0.1, 20 / 3840, 0.05
-"""How far off the numbers of a proposed lens may be: part of the focal length, part of the frame's width, and k1 and
-k2 at half the width of the frame."""
 
 
 @dataclass(frozen=True)
@@ -119,23 +116,13 @@ def is_better(one: Candidate, other: Candidate) -> bool:
 
 def free_lens(number: int, camera: Camera) -> list[LensParameter]:
     """All numbers of the lens of a proposed camera, `number` of several, to be found along with its pose."""
-    off_px = FREE_CENTRE * camera.intrinsics.size[0]
-    centre = [LensParameter(number, f"principal_point_{axis}_px", off_px) for axis in ("x", "y")]
-    k2 = LensParameter(number, "k2", FREE_BEND * _half_width(camera) ** -4)
-    return [*free_focal_length_and_k1(number, camera), *centre, k2]
+    sigma = free_lens_sigma(camera.intrinsics)
+    return [LensParameter(number, name, sigma[short]) for name, short in SIGMA_NAMES.items() if short in sigma]
 
 
 def free_focal_length_and_k1(number: int, camera: Camera) -> list[LensParameter]:
     """Focal length and k1 of a proposed camera, to be found along with a pose that is not yet in place."""
-    return [
-        LensParameter(number, "focal_length_px", FREE_FOCAL * camera.intrinsics.focal_length_px),
-        LensParameter(number, "k1", FREE_BEND * _half_width(camera) ** -2),
-    ]
-
-
-def _half_width(camera: Camera) -> float:
-    """Half the width of the frame in focal lengths."""
-    return camera.intrinsics.size[0] / (2 * camera.intrinsics.focal_length_px)
+    return [one for one in free_lens(number, camera) if one.name in ("focal_length_px", "k1")]
 
 
 def _with_sigmas(found: RefinedPose) -> Camera:
@@ -145,7 +132,7 @@ def _with_sigmas(found: RefinedPose) -> Camera:
     deviations = np.sqrt(np.diag(found.refined.covariance)[POSE_NUMBERS:]).tolist()
     known = dict(zip(SIGMA_NAMES.values(), deviations, strict=True))
     known["fy"] = float(np.hypot(known["fx"], known.pop("aspect") * found.camera.intrinsics.focal_length_px))
-    return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known))
+    return found.camera.with_lens(replace(found.camera.intrinsics, sigma=known, sigma_from="lines"))
 
 
 def _shift_sigma_px(field: Field, found: RefinedPose) -> float | None:
