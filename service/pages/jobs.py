@@ -36,18 +36,18 @@ def jobs(
 ) -> Response:
     """Jobs, newest first. A form sends the filters that were left open as empty strings."""
     wanted = JobPage(
-        PER_PAGE + 1, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only
+        PER_PAGE, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only
     )
     found = context.jobs.page(wanted)
-    shown = found[:PER_PAGE]
     return render_page(
         request,
         "jobs.html",
-        jobs=shown,
+        jobs=found.jobs,
+        unreadable=found.unreadable,
         chosen={"venue": venue, "status": status, "kind": kind},
         statuses=get_args(JobStatus),
         kinds=get_args(JobKind),
-        cursor=shown[-1].id if len(found) > PER_PAGE else None,
+        cursor=found.next_cursor,
     )
 
 

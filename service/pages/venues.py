@@ -61,10 +61,14 @@ def venues(
     after: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
 ) -> Response:
     """Every venue, with its last result."""
-    found = context.venues.page(after, PER_PAGE + 1, only)
-    shown, more = found[:PER_PAGE], len(found) > PER_PAGE
+    found = context.venues.page(after, PER_PAGE, only)
     return render_page(
-        request, "venues.html", rows=venue_rows(context, shown), after=shown[-1].id if more else None, first=not after
+        request,
+        "venues.html",
+        rows=venue_rows(context, found.venues),
+        unreadable=found.unreadable,
+        after=found.next_cursor,
+        first=not after,
     )
 
 

@@ -20,6 +20,7 @@ from service.schemas.events.venue_event import FINAL_EVENT
 from service.schemas.names import EVENT_KINDS, EventKind
 from service.store.database import DATABASE_OUTAGES
 from service.store.events.feed import NumberedEvent
+from service.store.unreadable import UnreadableRow
 
 log = structlog.get_logger()
 router = APIRouter(tags=["venues"], route_class=Guarded)
@@ -83,7 +84,7 @@ async def venue_events(
                     return
             if not page.more:
                 await context.venue_watch.until(venue_id, number.__lt__, LONGEST_POLL_INTERVAL_S)
-    except DATABASE_OUTAGES:
+    except (*DATABASE_OUTAGES, UnreadableRow):
         # The client connects again, as after any stream that broke off.
         log.warning("cannot tell of a venue", exc_info=True)
 

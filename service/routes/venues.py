@@ -85,7 +85,15 @@ def _existing_venue(venue_id: VenueIdPath, context: InContext) -> Venue:
     return venue
 
 
+def _existing_venue_id(venue_id: VenueIdPath, context: InContext) -> str:
+    if not context.venues.exists(venue_id):
+        raise no_such_venue(venue_id)
+    return venue_id
+
+
 ExistingVenue = Annotated[Venue, Depends(_existing_venue)]
+# Also of a venue that cannot be read.
+ExistingVenueId = Annotated[str, Depends(_existing_venue_id)]
 
 
 def no_refined_since(venue_id: str) -> str:
@@ -200,12 +208,12 @@ def list_venues(
     fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Venues:
     """List all venues by id, in pages; with a key for some venues, these."""
-    page = context.venues.page(cursor, limit + 1, only, q, state)
-    more, page = len(page) > limit, page[:limit]
+    page = context.venues.page(cursor, limit, only, q, state)
     listed = Venues(
-        venues=[] if fields == "summary" else [venue.with_hidden_callbacks() for venue in page],
-        summaries=_summaries(context, page) if fields == "summary" else None,
-        next_cursor=page[-1].id if more else None,
+        venues=[] if fields == "summary" else [venue.with_hidden_callbacks() for venue in page.venues],
+        summaries=_summaries(context, page.venues) if fields == "summary" else None,
+        unreadable=page.unreadable,
+        next_cursor=page.next_cursor,
     )
     response.headers.update(next_page(request, listed.next_cursor))
     return listed
@@ -248,7 +256,7 @@ def venue_poses(
     responses=TAGGED | {200: {"headers": TAGGED[200]["headers"] | NEXT_PAGE}} | problem_responses(404),
 )
 def venue_history(
-    venue: ExistingVenue,
+    venue_id: ExistingVenueId,
     request: Request,
     context: InContext,
     limit: Annotated[int, Query(ge=1, le=1000)] = 50,
@@ -256,9 +264,8 @@ def venue_history(
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """List every change of the poses with its cause, newest first, and how far each camera moved and has drifted."""
-    page = context.venues.history(venue.id, cursor, limit + 1)
-    more = len(page) > limit
-    shown = History(revisions=page[:limit], next_cursor=page[limit - 1].revision if more else None)
+    page = context.venues.history_page(venue_id, cursor, limit)
+    shown = History(revisions=page.revisions, unreadable=page.unreadable, next_cursor=page.next_cursor)
     body = shown.model_dump_json().encode()
     answer = tagged_response(body, if_none_match, json_response(body))
     answer.headers.update(next_page(request, shown.next_cursor))

@@ -25,9 +25,14 @@ MATRIX_NUMBERS = ("fx", "fy", "aspect", "cx", "cy")
 LARGEST_SIDE = 16384
 # A position and a translation that are less apart say the same: more is not lost by writing them down.
 AGREEING_M = 1e-6
+# From the middle of the field, m: a camera that is 2000 m away along each axis. It is a distance, which position and
+# translation share, so that a pose that is sent in one of them is a valid pose in the other, to the micrometre.
+FARTHEST_M = 3465.0
 Metres = Annotated[Number, Field(ge=-2000, le=2000)]
 Radians = Annotated[Number, Field(ge=-10, le=10)]
-Position = Annotated[list[Metres], Field(min_length=3, max_length=3)]
+Position = Annotated[
+    list[Annotated[Number, Field(ge=-FARTHEST_M - 1, le=FARTHEST_M + 1)]], Field(min_length=3, max_length=3)
+]
 Rotation = Annotated[list[Radians], Field(min_length=3, max_length=3)]
 Row = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Side = Annotated[Integer, Field(ge=32, le=LARGEST_SIDE)]
@@ -45,6 +50,9 @@ class PoseIn(Schema):
     def _one_place(self) -> Self:
         if self.position is None and self.translation is None:
             raise ValueError("give position or translation")
+        away_m = round(math.hypot(*(self.position or self.translation or ())), 6)
+        if away_m > FARTHEST_M:
+            raise ValueError(f"the camera is {away_m:g} m from the middle of the field: {FARTHEST_M:g} m at most")
         if self.position is not None and self.translation is not None:
             apart = math.dist(Pose.from_position(self.rotation, self.position).translation, self.translation)
             if apart > AGREEING_M and math.dist(self.position, self.translation) <= AGREEING_M:

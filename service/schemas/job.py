@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import ConfigDict, Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from service.schemas.actor import Attributed
-from service.schemas.base import OPEN_WORD, Schema, is_none, is_tolerant
+from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant
 from service.schemas.names import OPEN_STATUSES, JobKind, JobStatus
 from service.schemas.results import AnyResult
 
@@ -156,4 +156,5 @@ class Jobs(Schema):
     summaries: list[JobSummary] | None = Field(
         None, exclude_if=is_none, description="With `fields=summary`, where `jobs` is empty; not there otherwise."
     )
+    unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
     next_cursor: str | None = None

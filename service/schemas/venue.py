@@ -5,14 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, ValidationError, model_validator
 
 from service.schemas import source_urls
 from service.schemas.addresses import HIDDEN, SourceUrl
-from service.schemas.base import OPEN_WORD, Id, Name, Number, Schema, is_none
+from service.schemas.base import (
+    OPEN_WORD,
+    TOLERANTLY,
+    UNREADABLE,
+    Id,
+    Name,
+    Number,
+    Schema,
+    Unreadable,
+    is_empty,
+    is_none,
+)
 from service.schemas.events import hidden_urls
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
+from service.schemas.findings import describe_errors
 from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
 from service.schemas.health import Alarm, Alarms, CalibrationEnd
 from service.schemas.lens_limits import assumed_lens_warning
@@ -277,6 +289,16 @@ class Venue(NamedField):
         once = {"cameras": {"__all__": {"pose": {"translation"}}}}
         return VenueIn.model_validate(self.model_dump(exclude=once))
 
+    def faults(self) -> list[str]:
+        """Return in words what of the venue a client could not send: what is stored can be sent back as it is."""
+        document = self.model_dump(mode="json")
+        try:
+            # Words of newer versions are none.
+            VenueIn.model_validate(document, **TOLERANTLY)
+        except ValidationError as error:
+            return describe_errors(error.errors(), None, document)
+        return []
+
     def changed_parts(self, other: Venue) -> list[str]:
         """The parts of the venue that are not as those of another one."""
         return [name for name in type(self).model_fields if getattr(self, name) != getattr(other, name)]
@@ -315,6 +337,18 @@ class ChangedVenue(Venue):
         return cls(**dict(venue), warnings=pose_warnings + venue.lens_warnings)
 
 
+class RestoredVenue(Venue):
+    """A venue as a revision had it, with what that revision could not bring back."""
+
+    warnings: list[str] = Field(
+        [],
+        exclude_if=is_empty,
+        description="What was lost by it; absent where nothing was. Not kept: GET does not show it, and PUT takes it and "
+        "ignores it.",
+        examples=[["the nights that cameras left, right remember are dropped: revision 1 has none any more"]],
+    )
+
+
 class VenueSummary(Schema):
     """A venue in a line: its name and its cameras, what rings, and how its last calibration ended."""
 
@@ -334,4 +368,5 @@ class Venues(Schema):
     summaries: list[VenueSummary] | None = Field(
         None, exclude_if=is_none, description="With `fields=summary`, where `venues` is empty; not there otherwise."
     )
+    unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
     next_cursor: str | None = None

@@ -19,6 +19,7 @@ from service.settings import Settings
 from service.store.events.feed import EventRepository
 from service.store.events.outbox import Delivery, OutboxRepository
 from service.store.jobs.queries import JobRepository
+from service.store.unreadable import UnreadableRow
 from worker.duties import webhook_request
 from worker.duties.clock_watch import ClockWatch
 from worker.duties.thread_pool import BoundedThreadPool
@@ -82,7 +83,11 @@ class WebhookDelivery:
         self._senders.wait_all()
 
     def _attempt(self, delivery: Delivery) -> None:
-        body = self._body(delivery)
+        try:
+            body = self._body(delivery)
+        except UnreadableRow as unreadable:
+            self._deliveries.give_up(delivery, f"the {unreadable}")
+            return
         if body is None:
             self._deliveries.give_up(delivery, "what was to be told is no longer kept")
             return

@@ -14,6 +14,7 @@ from service.schemas.names import OPEN_STATUSES, JobStatus, Verdict
 from service.store import tables
 from service.store.database import Repository, reading
 from service.store.revisions import CALIBRATION_CAUSES
+from service.store.unreadable import read_each, reading_row
 
 j = tables.jobs.c
 r = tables.revisions.c
@@ -58,7 +59,7 @@ class PastCalibrationRepository(Repository):
             .limit(limit)
         )
         with reading(self._engine) as connection:
-            return [_past(row) for row in connection.execute(query)]
+            return read_each(connection.execute(query), _past)[0]
 
     def newest_result(self, venue: str) -> str | None:
         """The job of a venue's newest calibration that has a result, accepted or not."""
@@ -90,7 +91,11 @@ class PastCalibrationRepository(Repository):
 
 
 def _past(row: Any) -> PastCalibration:
-    result = row.result or {}
+    with reading_row("job", row.id):
+        return _past_in(row, row.result or {})
+
+
+def _past_in(row: Any, result: dict[str, Any]) -> PastCalibration:
     return PastCalibration(
         job=row.id,
         status=row.status,
