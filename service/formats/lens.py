@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from service.schemas.geometry import rotate
+from service.schemas.rotation import rotate
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field, model_validator
 from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
 from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
 from service.schemas.names import OPTIONS_PART, LensModel
+from service.schemas.rotation import rotate
 
 DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
 COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
@@ -89,22 +90,6 @@ class Pose(Schema):
         backwards = rotate([-component for component in pose.rotation], pose.translation)
         position = pose.position or [-component for component in backwards]
         return cls(rotation=pose.rotation, position=position, translation=pose.translation)
-
-
-def rotate(rotation: list[float], vector: list[float]) -> list[float]:
-    """A vector turned by a Rodrigues vector (rad): Rodrigues' formula."""
-    angle = math.hypot(*rotation)
-    if angle == 0.0:
-        return list(vector)
-    ax, ay, az = (component / angle for component in rotation)
-    x, y, z = vector
-    cos, sin = math.cos(angle), math.sin(angle)
-    along = (ax * x + ay * y + az * z) * (1 - cos)
-    return [
-        x * cos + (ay * z - az * y) * sin + ax * along,
-        y * cos + (az * x - ax * z) * sin + ay * along,
-        z * cos + (ax * y - ay * x) * sin + az * along,
-    ]
 
 
 class Intrinsics(Schema):

@@ -10,6 +10,7 @@ from service.api.context import Context
 from service.intake import submit
 from service.routes.submissions import frames, job_submission, resubmit
 from service.routes.submissions.job_submission import Sender
+from service.schemas.geometry import Pose
 from service.schemas.options import Options
 from service.schemas.problems import Problem
 from service.schemas.venue import VenueIn
@@ -57,7 +58,7 @@ def refused(context, read, form):
 
 
 def test_a_job_begins_from_the_poses_that_were_found_during_the_upload(context, read, form):
-    moved = read.cameras[0].pose.model_copy(update={"position": [0.0, -60.0, 9.0]})
+    moved = Pose.from_position(read.cameras[0].pose.rotation, [0.0, -60.0, 9.0])
     context.venues.put(read.with_poses({"left": moved}), lambda _: None)
     assert frames.submit(context, read, form, Options, Sender(None, Origin())).status_code == 202
     (job,) = context.jobs.page(JobPage(10, venue="v")).jobs
