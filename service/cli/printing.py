@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         LocateResult,
         Result,
     )
-    from service.schemas.venue import ChangedVenue
+    from service.schemas.venue import ChangedVenue, RestoredVenue
 
 ACCEPTED, FAILED, USAGE, REJECTED, BUSY = 0, 1, 2, 3, 75
 ZIP_START = b"PK"
@@ -58,8 +58,8 @@ def print_json(what: BaseModel | dict[str, str]) -> None:
     print(json.dumps(what, indent=2) if isinstance(what, dict) else what.model_dump_json(indent=2))
 
 
-def print_changed_venue(venue: ChangedVenue) -> None:
-    """Print a venue that was put or patched, as JSON, and what it leaves to be assumed for whoever looks."""
+def print_changed_venue(venue: ChangedVenue | RestoredVenue) -> None:
+    """Print a venue that was changed, as JSON, and what it leaves to be assumed or has lost, for whoever looks."""
     print(venue.model_dump_json(indent=2, exclude={"warnings"}))
     for warning in venue.warnings:
         print_note(f"Warning: {warning}")

@@ -147,13 +147,13 @@ def get_venue(venue: VenueId, url: Url = DEFAULT_URL, api_key: ApiKey = None) ->
 def list_venues(as_json: AsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Print a line per venue: id, name, cameras."""
     with open_client(url, api_key) as client:
-        venues = client.venues()
+        listed = client.venue_list()
     if as_json:
-        from service.schemas.venue import Venues
-
-        print_json(Venues(venues=venues))
+        print_json(listed)
         return
-    for venue in venues:
+    for unreadable in listed.unreadable:
+        print_note(f"Venue {unreadable.id} cannot be read: {unreadable.why}")
+    for venue in listed.venues:
         print(f"{venue.id}\t{venue.name}\t{' '.join(camera.id for camera in venue.cameras)}")
 
 
@@ -326,7 +326,7 @@ def restore_venue(
 ) -> None:
     """Let the poses of a revision hold again, see `esc venue history`."""
     with open_client(url, api_key) as client:
-        print_json(client.restore(venue, revision))
+        print_changed_venue(client.restore(venue, revision))
 
 
 @app.command("find")

@@ -12,6 +12,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import InContext, VenueIdPath
+from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.followed import FOLLOWER_SLOT, LONGEST_S
 from service.routes.contract.guarded import Guarded
@@ -90,4 +91,4 @@ async def venue_events(
 
 
 def _server_sent_event(event: NumberedEvent) -> ServerSentEvent:
-    return ServerSentEvent(data=event.event, event=event.event.type, id=str(event.number))
+    return ServerSentEvent(data=hide_other_actor(event.event), event=event.event.type, id=str(event.number))

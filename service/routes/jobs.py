@@ -13,6 +13,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import ByActor, Context, InContext, JobIdPath
+from service.routes.contract.attribution import hide_other_asker
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.exported import DOCUMENTS, ExportQuery, export_response, with_refined_poses
 from service.routes.contract.guarded import Guarded
@@ -44,7 +45,7 @@ EVENT_AT_LEAST_EVERY_S = 10
 
 def job_response(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
     """The one form a job leaves in: body, ETag, Location of a new one, Retry-After while it is open."""
-    body = job.model_dump_json().encode()
+    body = hide_other_asker(job).model_dump_json().encode()
     answer = tagged_response(body, if_none_match, lambda: Response(body, status, media_type="application/json"))
     if job.open:
         answer.headers["Retry-After"] = str(RETRY_AFTER_S)
@@ -99,8 +100,8 @@ def list_jobs(
     in_lines = fields == "summary"
     found = context.jobs.summaries(wanted) if in_lines else context.jobs.page(wanted)
     shown = Jobs(
-        jobs=found.jobs,
-        summaries=found.summaries if in_lines else None,
+        jobs=[hide_other_asker(job) for job in found.jobs],
+        summaries=[hide_other_asker(line) for line in found.summaries] if in_lines else None,
         unreadable=found.unreadable,
         next_cursor=found.next_cursor,
     )
@@ -248,7 +249,7 @@ async def job_events(job: ExistingJob, context: InContext) -> AsyncIterable[Serv
             log.warning("cannot tell of a job", exc_info=True)
             return
         number = None if state is None else str(state.revision)
-        yield ServerSentEvent(data=job, event="progress" if job.open else "end", id=number)
+        yield ServerSentEvent(data=hide_other_asker(job), event="progress" if job.open else "end", id=number)
         if not job.open:
             return
         await context.job_watch.until(job.id, _is_newer_than(state), EVENT_AT_LEAST_EVERY_S)

@@ -14,6 +14,7 @@ from service.api.auth import require_scope
 from service.api.context import ByActor, Context, InContext, VenueIdPath
 from service.api.problems import validation_problem
 from service.intake import sources
+from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import header_docs, needs_scope, problem_responses
 from service.routes.contract.exported import (
     DOCUMENTS,
@@ -36,7 +37,7 @@ from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
 from service.schemas.names import ID_PATTERN, FormatName, ListFields
 from service.schemas.problems import Problem
 from service.schemas.trend import Trend
-from service.schemas.venue import PATCH_EXAMPLES, Camera, ChangedVenue, Venue, VenueIn, Venues, VenueSummary
+from service.schemas.venue import PATCH_EXAMPLES, Camera, ChangedVenue, RestoredVenue, Venue, VenueIn, Venues, VenueSummary
 from service.settings import Settings
 from service.store.adopted_fields import NoSuchJob, NotAdoptable, NumberRefused
 from service.store.found_venues import CandidateNeeded, CandidateRefused, NoSuchCandidate, NothingFound
@@ -78,7 +79,8 @@ def camera_of(venue: Venue, camera_id: str) -> Camera:
     )
 
 
-def _existing_venue(venue_id: VenueIdPath, context: InContext) -> Venue:
+def existing_venue(venue_id: VenueIdPath, context: InContext) -> Venue:
+    """Return a venue that is there. Raises `UnreadableRow`."""
     venue = context.venues.get(venue_id)
     if venue is None:
         raise no_such_venue(venue_id)
@@ -91,7 +93,7 @@ def _existing_venue_id(venue_id: VenueIdPath, context: InContext) -> str:
     return venue_id
 
 
-ExistingVenue = Annotated[Venue, Depends(_existing_venue)]
+ExistingVenue = Annotated[Venue, Depends(existing_venue)]
 # Also of a venue that cannot be read.
 ExistingVenueId = Annotated[str, Depends(_existing_venue_id)]
 
@@ -265,7 +267,8 @@ def venue_history(
 ) -> Response:
     """List every change of the poses with its cause, newest first, and how far each camera moved and has drifted."""
     page = context.venues.history_page(venue_id, cursor, limit)
-    shown = History(revisions=page.revisions, unreadable=page.unreadable, next_cursor=page.next_cursor)
+    revisions = [hide_other_actor(revision) for revision in page.revisions]
+    shown = History(revisions=revisions, unreadable=page.unreadable, next_cursor=page.next_cursor)
     body = shown.model_dump_json().encode()
     answer = tagged_response(body, if_none_match, json_response(body))
     answer.headers.update(next_page(request, shown.next_cursor))
@@ -316,8 +319,12 @@ def restore_venue(
     context: InContext,
     by: ByActor,
     if_match: Annotated[str | None, Header()] = None,
-) -> Venue:
-    """Let the poses of a revision hold again, with their lenses and their ridge; that is a revision of its own."""
+) -> RestoredVenue:
+    """Let the poses of a revision hold again, with their lenses and their ridge; that is a revision of its own.
+
+    The nights that cameras remember become those of that revision. Only the last four revisions with any have them
+    still: `warnings` names the cameras whose memories begin anew. A venue that cannot be read is readable again.
+    """
 
     def allow(before: Venue | None) -> None:
         if before is None:
@@ -325,13 +332,13 @@ def restore_venue(
         _require_match(if_match, before)
 
     try:
-        restored = context.venues.restore(venue_id, wanted.revision, allow, by)
+        restored, forgetful = context.venues.restore(venue_id, wanted.revision, allow, by)
     except NoSuchRevision:
         raise Problem("revision-not-found", f"GET /venues/{venue_id}/history lists those there are.") from None
     except RevisionUnfit as unfit:
         raise revision_unfit(unfit) from None
     response.headers["ETag"] = etags.quoted(venue_etag(restored))
-    return restored.with_hidden_callbacks()
+    return RestoredVenue(**dict(restored.with_hidden_callbacks()), warnings=_lost_nights(wanted.revision, forgetful))
 
 
 @router.post(
@@ -479,6 +486,17 @@ def delete_venue(
         _require_match(if_match, before)
 
     context.venues.delete(venue_id, allow, by)
+
+
+def _lost_nights(revision: int, cameras: Sequence[str]) -> list[str]:
+    """Return what is to be said where a revision came back without nights that cameras remembered until now."""
+    if not cameras:
+        return []
+    remember = f"camera {cameras[0]} remembers" if len(cameras) == 1 else f"cameras {', '.join(cameras)} remember"
+    return [
+        f"the nights that {remember} are dropped, as none are kept with revision {revision}: until new ones have come, "
+        "each calibration is judged by itself"
+    ]
 
 
 def _no_such_candidate(error: NoSuchCandidate, job_id: str) -> Problem:

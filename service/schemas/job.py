@@ -98,7 +98,9 @@ class Job(Schema):
         None, description="The revision of the venue that its poses became, by themselves or by hand; null: none."
     )
     asked_by: str | None = Field(
-        None, description="`key NAME`: with this API key; `schedule`: that of the venue; null: no key was asked for."
+        None,
+        description="`key NAME`: with this API key; `schedule`: that of the venue; `another key`: to a key for some "
+        "venues, any but itself; null: no key was asked for.",
     )
     options: dict[str, Any] = Field(
         {}, description="As they were asked, what was left out filled in, the seed too; without `callback_url`."

@@ -31,6 +31,7 @@ from service.store.memories import (
     keep_memories,
     memories_at,
     newest_memories,
+    revisions_with_memories,
     without_those_that_changed,
 )
 from service.store.revisions import (
@@ -167,21 +168,33 @@ class VenueRepository(Repository):
 
     def restore(
         self, venue_id: str, number: int, allow: Callable[[Venue | None], None], by: Actor | None = None
-    ) -> Venue:
+    ) -> tuple[Venue, list[str]]:
         """Let a revision hold again unless `allow` raises at the sight of the venue, which need not be readable.
 
-        Raises `NoSuchRevision` and `RevisionUnfit`. Nothing is written if it holds anyway.
+        Gives the venue, and the cameras whose memories are dropped because none are kept with that revision. Raises
+        `NoSuchRevision` and `RevisionUnfit`. Nothing is written if it holds anyway.
         """
         with changing_venue(self._engine, venue_id, allow, find_replaceable) as (connection, before):
             with update_quality(connection, venue_id) as quality:
-                restored = restore_state(connection, quality, before, number, by)
+                restored, forgetful = restore_state(connection, quality, before, number, by)
                 update_alarms(connection, quality, restored)
-            return restored
+            return restored, forgetful
+
+    def with_memories(self, venue_id: str) -> set[int]:
+        """Return the revisions of a venue that `restore` brings back with the nights that cameras remembered."""
+        with reading(self._engine) as connection:
+            return revisions_with_memories(connection, venue_id)
 
     def restorable(self, venue: Venue, numbers: Collection[int]) -> set[int]:
         """Return the revisions of a venue that `restore` would not refuse: of these cameras and this pitch."""
         with reading(self._engine) as connection:
             return revisions_that_fit(connection, venue, numbers)
+
+    def repairing(self, venue_id: str, numbers: Collection[int]) -> set[int]:
+        """Return the revisions of these by which `restore` makes a venue that cannot be read readable again."""
+        with reading(self._engine) as connection:
+            stored = find_replaceable(connection, venue_id)
+            return set() if stored is None else revisions_that_fit(connection, stored.venue, numbers)
 
     def update_alarms(self, venue_id: str) -> None:
         """Begin and end the alarms of a venue that go by the time."""
@@ -237,15 +250,15 @@ class VenueRepository(Repository):
             stored = find_stored(connection, venue_id)
             return None if stored is None else (stored.venue, _credentials(connection, venue_id, stored))
 
+    def readable(self, venue_id: str) -> Venue | None:
+        """Return one venue; None: there is none, or it cannot be read."""
+        with reading(self._engine) as connection:
+            return find_readable(connection, venue_id)
+
     def exists(self, venue_id: str) -> bool:
         """Return whether there is a venue of this id, readable or not."""
         with reading(self._engine) as connection:
             return connection.scalar(sa.select(v.id).where(v.id == venue_id)) is not None
-
-    def salvaged(self, venue_id: str) -> StoredVenue | None:
-        """Return a venue, and what can be salvaged of one that cannot be read; None: there is none."""
-        with reading(self._engine) as connection:
-            return find_replaceable(connection, venue_id)
 
     def history(self, venue_id: str, before: int | None, limit: int) -> list[Revision]:
         """Return up to `limit` revisions of a venue that can be read, newest first, those before number `before`."""
@@ -280,6 +293,14 @@ def find_replaceable(connection: sa.Connection, venue_id: str) -> StoredVenue | 
                 return StoredVenue(stored_venue(document, row.additions), document, error.why)
         bare = Venue(id=venue_id, field=FieldOfPlay.model_validate({}), cameras=[])
         return StoredVenue(bare, {"cameras": []}, error.why)
+
+
+def find_readable(connection: sa.Connection, venue_id: str) -> Venue | None:
+    """Return one venue; None: there is none, or it cannot be read, which must not stop what can do without it."""
+    try:
+        return find_venue(connection, venue_id)
+    except UnreadableRow:
+        return None
 
 
 def _row_of(connection: sa.Connection, venue_id: str) -> Any:
@@ -442,22 +463,26 @@ def restore_state(
     number: int,
     by: Actor | None,
     rejected_job: str | None = None,
-) -> Venue:
-    """Let a revision of a venue hold again with its memories, inside the caller's serialised transaction."""
-    before = stored.venue
+) -> tuple[Venue, list[str]]:
+    """Let a revision of a venue hold again with its memories, inside the caller's serialised transaction.
+
+    Gives the venue, and the cameras that have a memory before and none after it.
+    """
+    before, forgetful = stored.venue, list[str]()
     then, revision = state_at(connection, before, number)
     if stored.unreadable or not then.has_same_calibration_input_as(before):
         save_venue(connection, then, quality.now, stored)
         if then.field.size != before.field.size:
             add_venue_event(connection, then, "venue.changed", ["field"], by)
         memories = memories_at(connection, then.id, number)
+        forgetful = [camera for camera in newest_memories(connection, then.id) if camera not in memories]
         px = revision.stitch_error_px
         restored = add_revision(
             connection, quality, then, "restored", rejected_job, revision, px, by, field_before=before.field
         )
         keep_memories(connection, then.id, restored, memories)
         quality.row.stitch_error_px = revision.stitch_error_px
-    return then
+    return then, forgetful
 
 
 def _credentials(connection: sa.Connection, venue_id: str, stored: StoredVenue | None) -> dict[str, str]:

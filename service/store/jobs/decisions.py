@@ -24,8 +24,8 @@ from service.store.trends import note_night
 from service.store.venues import (
     apply_result,
     find_replaceable,
+    find_readable,
     find_stored,
-    find_venue,
     restore_state,
     venue_lock,
     with_result,
@@ -68,10 +68,10 @@ class DecisionRepository(Repository):
             if found is None:
                 return OpenDecisions(frozenset(), reject=False)
             began_with, result = found
-            venue, newest = find_venue(connection, began_with.id), newest_revision(connection, began_with.id)
-            if venue is None or newest is None:
-                return OpenDecisions(frozenset(), reject=False)
-            taken = _was_taken(job_id, newest)
+            newest = newest_revision(connection, began_with.id)
+            taken, venue = _was_taken(job_id, newest), find_readable(connection, began_with.id)
+            if venue is None:
+                return OpenDecisions(frozenset(), reject=taken)
             if not _untouched(venue, began_with, result, taken=taken):
                 return OpenDecisions(frozenset(), taken, is_outdated=not taken)
             refused_for = with_result(venue, result).faults()
@@ -134,7 +134,7 @@ class DecisionRepository(Repository):
                 assert stored is not None
                 before = revision_before(connection, began_with.id, job_id)
                 with update_quality(connection, began_with.id) as quality:
-                    restored = restore_state(connection, quality, stored, before, by, job_id)
+                    restored, _ = restore_state(connection, quality, stored, before, by, job_id)
                     update_alarms(connection, quality, restored)
                 _touch(connection, job_id)
 
