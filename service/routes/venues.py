@@ -44,6 +44,7 @@ from service.store.found_venues import CandidateNeeded, CandidateRefused, NoSuch
 from service.store.jobs.decisions import VenueHasChanged
 from service.store.refined import NoRefinedPose
 from service.store.revisions import NoSuchRevision, RevisionUnfit
+from service.store.venues import find_replaceable
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # While a job is open.
@@ -151,7 +152,7 @@ def put_venue(
             raise Problem("venue-changed", "The venue is already there.", got=_quoted_tag(tag))
         return wanted.with_callbacks_of(before), sources.secrets_of(wanted, venue.secrets, before, known)
 
-    stored, new = context.venues.change(venue_id, change, by)
+    stored, new = context.venues.change(venue_id, change, by, find_replaceable)
     response.headers["ETag"] = etags.quoted(venue_etag(stored))
     response.status_code = 201 if new else 200
     return _changed_venue([camera.pose for camera in venue.cameras], stored.with_hidden_callbacks())

@@ -88,6 +88,9 @@ class VenuePage:
     next_cursor: str | None
 
 
+Find = Callable[[sa.Connection, str], StoredVenue | None]
+
+
 class VenueRefused(Exception):  # noqa: N818
     """A venue was not written because a client could not send it as it would be; the message says why."""
 
@@ -145,21 +148,23 @@ class VenueRepository(Repository):
             allow(before)
             return venue, credentials(before, known)
 
-        return self.change(venue.id, put, by)[1]
+        return self.change(venue.id, put, by, find_replaceable)[1]
 
     def change(
         self,
         venue_id: str,
         change: Callable[[Venue | None, dict[str, str]], tuple[Venue, dict[str, str]]],
         by: Actor | None = None,
+        find: Find | None = None,
     ) -> tuple[Venue, bool]:
         """Store what `change` makes of a venue and of the credentials of its sources, unless it raises at the sight.
 
+        `find`: `find_replaceable` of a change that leaves nothing of what was; else what cannot be read stays as it is.
         Gives the venue, and says whether it is new.
         """
         with writing(self._engine) as connection:
             advisory_lock(connection, venue_lock(venue_id))
-            stored = find_replaceable(connection, venue_id)
+            stored = (find or find_stored)(connection, venue_id)
             before = None if stored is None else stored.venue
             venue, credentials = change(before, _credentials(connection, venue_id, stored))
             _keep(connection, venue_id, credentials)
@@ -310,9 +315,6 @@ def _row_of(connection: sa.Connection, venue_id: str) -> Any:
 def _venue_in(row: Any) -> Venue:
     with reading_row("venue", row.id):
         return stored_venue(row.document, row.additions)
-
-
-Find = Callable[[sa.Connection, str], StoredVenue | None]
 
 
 @contextmanager
