@@ -61,7 +61,9 @@ def unreadable_problem(error: UnreadableRow) -> Problem:
 
 def poses_refused(error: VenueRefused) -> Problem:
     """Answer who wants a venue to be as no client could send it."""
-    return Problem("poses-refused", f"{error}. Nothing was changed. Calibrate again; if it is the ridge, without fit_ridge.")
+    return Problem(
+        "poses-refused", f"{error}. Nothing was changed. Calibrate again; if it is the ridge, without fit_ridge."
+    )
 
 
 def not_json(request: Request) -> Problem:

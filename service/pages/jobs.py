@@ -37,9 +37,7 @@ def jobs(
     cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
 ) -> Response:
     """Jobs, newest first. A form sends the filters that were left open as empty strings."""
-    wanted = JobPage(
-        PER_PAGE, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only
-    )
+    wanted = JobPage(PER_PAGE, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only)
     found = context.jobs.page(wanted)
     return render_page(
         request,

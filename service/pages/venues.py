@@ -15,10 +15,10 @@ from service.api.context import InContext, VenueIdPath
 from service.pages.live import CLOCKS, STATUSES, live_card
 from service.pages.page_rendering import Page, render_page
 from service.pages.sparkline import Sparkline, sparkline
+from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
-from service.routes.contract.attribution import hide_other_actor
 from service.routes.venues import ExistingVenueId, existing_venue, venue_etag
 from service.schemas.health import Alarm, VenueHealth
 from service.schemas.history import Revision

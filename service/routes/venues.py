@@ -37,7 +37,16 @@ from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
 from service.schemas.names import ID_PATTERN, FormatName, ListFields
 from service.schemas.problems import Problem
 from service.schemas.trend import Trend
-from service.schemas.venue import PATCH_EXAMPLES, Camera, ChangedVenue, RestoredVenue, Venue, VenueIn, Venues, VenueSummary
+from service.schemas.venue import (
+    PATCH_EXAMPLES,
+    Camera,
+    ChangedVenue,
+    RestoredVenue,
+    Venue,
+    VenueIn,
+    Venues,
+    VenueSummary,
+)
 from service.settings import Settings
 from service.store.adopted_fields import NoSuchJob, NotAdoptable, NumberRefused
 from service.store.found_venues import CandidateNeeded, CandidateRefused, NoSuchCandidate, NothingFound

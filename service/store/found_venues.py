@@ -17,7 +17,7 @@ from service.store.database import Repository, advisory_lock, reading, writing
 from service.store.jobs.decisions import VenueHasChanged
 from service.store.jobs.queries import FoundSite, found_site
 from service.store.revisions import newest_revision
-from service.store.venues import find_stored, find_readable, store_venue, venue_lock
+from service.store.venues import find_readable, find_stored, store_venue, venue_lock
 
 
 class NothingFound(Exception):  # noqa: N818

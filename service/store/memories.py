@@ -8,7 +8,7 @@ its nights back too. A venue without a row has no memories yet, as one of an ear
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 

@@ -156,7 +156,9 @@ def documents_as_of_revisions(connection: sa.Connection, venue_id: str, document
     query = sa.select(r.cameras, r.ridge).where(r.venue == venue_id).order_by(r.number.desc()).limit(MOST_SALVAGED)
     for row in connection.execute(query):
         with suppress(*MISSHAPEN):
-            then = {camera["id"]: {"pose": camera["pose"], "intrinsics": camera["intrinsics"]} for camera in row.cameras}
+            then = {
+                camera["id"]: {"pose": camera["pose"], "intrinsics": camera["intrinsics"]} for camera in row.cameras
+            }
             cameras = [camera | then[camera["id"]] for camera in document["cameras"]]
             yield document | {"cameras": cameras, "field": document["field"] | {"ridge": row.ridge}}
 

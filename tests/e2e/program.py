@@ -121,6 +121,8 @@ def main() -> None:
             "options": task["options"],
         },
     }
+    if behaviour == "impossible":
+        common["cameras"][0]["pose"] = pose_at([1.6, 0.1, -0.2], [5000.0, -50.0, 8.0])
     if task["kind"] == "field":
         field = task["venue"]["field"] | {"length_m": 104.25}
         done(common | {"field": field, "measures": MEASURES}, pictures[2:])

@@ -55,8 +55,12 @@ def test_what_no_client_could_send_is_not_stored(wrong, said):
 
 
 @pytest.mark.parametrize(
-    "lost", [{"pose": standing_at([5000.0, -49.0, 8.0])}, {"pose": standing_at([0.0, -49.0, -8.0])},
-             {"result": {"ridge": [[-18.5, 0.0, -0.001], [18.5, 0.0, -0.001]]}}]
+    "lost",
+    [
+        {"pose": standing_at([5000.0, -49.0, 8.0])},
+        {"pose": standing_at([0.0, -49.0, -8.0])},
+        {"result": {"ridge": [[-18.5, 0.0, -0.001], [18.5, 0.0, -0.001]]}},
+    ],
 )
 def test_a_camera_that_was_refused_may_be_anywhere(lost):
     assert fault(**lost, accepted=False) is None

@@ -23,8 +23,8 @@ from service.store.statistics.venue_quality import update_quality
 from service.store.trends import note_night
 from service.store.venues import (
     apply_result,
-    find_replaceable,
     find_readable,
+    find_replaceable,
     find_stored,
     restore_state,
     venue_lock,

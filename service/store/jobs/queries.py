@@ -287,9 +287,7 @@ def _calls_back(options: Any) -> bool:
     return isinstance(options, dict) and options.get("callback_url") is not None
 
 
-def _job_values(
-    row: Any, position: int | None, callback: CallbackState | None, revision: int | None
-) -> dict[str, Any]:
+def _job_values(row: Any, position: int | None, callback: CallbackState | None, revision: int | None) -> dict[str, Any]:
     columns = ("id", "kind", "venue", "status", "progress", "attempt", "error", "asked_by")
     moments = ("created_at", "started_at", "finished_at")
     return {name: getattr(row, name) for name in (*columns, *moments)} | {

@@ -143,7 +143,9 @@ def test_frames_that_are_submitted_again_are_copied_by_the_store(context, read, 
     with monkeypatch.context() as patch:
         patch.setattr(context.blobs, "get", lambda path: pytest.fail(f"{path} was downloaded"))
         assert resubmit.submit(context, first, Origin()).status_code == 202
-    old, new = (context.submissions.of(job.id).frames for job in (first, context.jobs.page(JobPage(1, venue="v")).jobs[0]))
+    old, new = (
+        context.submissions.of(job.id).frames for job in (first, context.jobs.page(JobPage(1, venue="v")).jobs[0])
+    )
     assert old.keys() == new.keys()
     for camera, paths in new.items():
         assert [context.blobs.get(path) for path in paths] == [png()] == [context.blobs.get(old[camera][0])]

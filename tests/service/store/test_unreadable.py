@@ -66,7 +66,11 @@ def test_lists_name_a_venue_that_cannot_be_read_and_show_the_others(service, bro
     rest = service.ask("GET", "/venues?limit=1&cursor=broken").json()
     assert (rest["venues"][0]["id"], "unreadable" in rest) == ("good", False)
     start = service.ask("GET", "/", headers={"Accept": "text/html"})
-    assert (start.status_code, "broken</a> cannot be read" in start.text, "/ui/venues/good" in start.text) == (200, True, True)
+    assert (start.status_code, "broken</a> cannot be read" in start.text, "/ui/venues/good" in start.text) == (
+        200,
+        True,
+        True,
+    )
 
 
 @in_both_homes
@@ -75,8 +79,14 @@ def test_alone_it_is_a_problem_that_says_what_to_do(service, broken):
     assert (answer.status_code, answer.json()["type"]) == (409, "/problems/unreadable")
     for way in ("/restore", "PUT /venues/broken", "DELETE"):
         assert way in answer.json()["detail"]
-    assert service.ask("PATCH", broken, json={}, headers={"Content-Type": "application/merge-patch+json"}).status_code == 409
-    assert [one["cause"] for one in service.ask("GET", f"{broken}/history").json()["revisions"]] == ["calibrated", "put"]
+    assert (
+        service.ask("PATCH", broken, json={}, headers={"Content-Type": "application/merge-patch+json"}).status_code
+        == 409
+    )
+    assert [one["cause"] for one in service.ask("GET", f"{broken}/history").json()["revisions"]] == [
+        "calibrated",
+        "put",
+    ]
     page = service.ask("GET", "/ui/venues/broken")
     assert (page.status_code, "Restore revision 2" in page.text, "Delete the venue" in page.text) == (409, True, True)
     assert 'esc_unreadable_rows{kind="venue"} 1.0' in service.ask("GET", "/metrics").text
@@ -84,9 +94,7 @@ def test_alone_it_is_a_problem_that_says_what_to_do(service, broken):
 
 @in_both_homes
 @pytest.mark.parametrize("spoilt", ["ridge", "everything"])
-@pytest.mark.parametrize(
-    ("way_out", "status"), [("restore", 200), ("put", 200), ("delete", 204)]
-)
+@pytest.mark.parametrize(("way_out", "status"), [("restore", 200), ("put", 200), ("delete", 204)])
 def test_it_is_restored_put_and_deleted(stock, service, broken, spoilt, way_out, status):
     if spoilt == "everything":
         overwrite(stock, tables.venues, "broken", lambda _: {"cameras": [3], "field": "grass"})

@@ -7,7 +7,14 @@ from itertools import count
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule, run_state_machine_as_test
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
 
 from service.schemas.job import JobError
 from tests.e2e.running import venue
@@ -19,7 +26,24 @@ from worker.result_checks import fault_in
 
 pytestmark = pytest.mark.slow
 
-HOSTILE = [0.0, -0.0, 5e-324, -0.001, 3.0, 3.001, 8.0, -50.0, 100.0, 2000.0, -2000.0, 3465.0, 3466.0, 5000.0, 1e308, -1e308]
+HOSTILE = [
+    0.0,
+    -0.0,
+    5e-324,
+    -0.001,
+    3.0,
+    3.001,
+    8.0,
+    -50.0,
+    100.0,
+    2000.0,
+    -2000.0,
+    3465.0,
+    3466.0,
+    5000.0,
+    1e308,
+    -1e308,
+]
 NUMBERS = st.sampled_from([*HOSTILE, math.nan, math.inf]) | st.floats(-4000, 4000)
 USUAL = st.sampled_from([1.6, 0.1, -0.2, 8.0, -50.0, 0.2])
 VECTORS = st.lists(USUAL | NUMBERS, min_size=3, max_size=3)
@@ -124,7 +148,11 @@ class Venues(RuleBasedStateMachine):
 def test_a_venue_stays_readable(stock):
     service = InProcess(stock.settings)
     stays = settings(
-        max_examples=12, stateful_step_count=12, suppress_health_check=list(HealthCheck), derandomize=True, print_blob=False
+        max_examples=12,
+        stateful_step_count=12,
+        suppress_health_check=list(HealthCheck),
+        derandomize=True,
+        print_blob=False,
     )
     run_state_machine_as_test(lambda: Venues(stock, service), settings=stays)
     service.close()

@@ -133,6 +133,20 @@ def test_a_venue_that_is_being_calibrated_is_put_off_and_not_forgotten(home_of_s
     assert home.venues.health("v").schedule.last_error is None
 
 
+def test_a_venue_that_cannot_be_read_says_so_and_fires_again_at_its_next_time(home_of_schedules, duty):
+    home = home_of_schedules
+    for name in ("broken", "v"):
+        put(home, name)
+    all_due(home)
+    with home.engine.begin() as connection:
+        is_broken = tables.venues.c.id == "broken"
+        connection.execute(sa.update(tables.venues).where(is_broken).values(document={"id": "broken"}))
+    look(duty)
+    assert [job.venue for job in waiting(home)] == ["v"]
+    state = home.venues.health("broken").schedule
+    assert (state.next_at > home.schedules.now(), "cannot be read" in state.last_error) == (True, True)
+
+
 @in_both_homes
 def test_a_camera_that_gives_no_frame_is_a_job_that_failed(home_of_schedules, duty, monkeypatch):
     home = home_of_schedules
