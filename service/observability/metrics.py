@@ -37,7 +37,7 @@ from service.store.statistics.job_outcome import (
 from service.store.statistics.snapshot import StatisticsSnapshot, VenueGauges
 from service.store.statistics.source_timings import FETCH, FRAME, NONE
 from service.store.trends import CameraTrend
-from service.store.unreadable import unreadable_rows
+from service.store.unreadable import RowKind, unreadable_rows
 from service.store.workers import WorkerHeartbeat
 
 # Name, meaning and figure; a figure that is not known is no sample.
@@ -171,8 +171,9 @@ def _unreadable() -> Iterator[Metric]:
         "Stored rows that this process met within the last hour and could not read; its log names them.",
         labels=["kind"],
     )
-    for kind, count in unreadable_rows().items():
-        rows.add_metric([kind], count)
+    counts = unreadable_rows()
+    for kind in get_args(RowKind):
+        rows.add_metric([kind], counts[kind])
     yield rows
 
 

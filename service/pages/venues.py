@@ -89,7 +89,7 @@ def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
 
 @router.get("/ui/venues/{venue_id}", openapi_extra=needs_scope("read"))
 def venue(venue_id: ExistingVenueId, request: Request, context: InContext) -> Response:
-    """One venue: its last result in pictures and numbers, and how it came to it; the ways out where it is unreadable."""
+    """One venue: its last result and how it came to it, or the ways out where it cannot be read."""
     try:
         return _venue_page(venue_id, request, context)
     except UnreadableRow as unreadable:

@@ -343,8 +343,7 @@ class RestoredVenue(Venue):
     warnings: list[str] = Field(
         [],
         exclude_if=is_empty,
-        description="What was lost by it; absent where nothing was. Not kept: GET does not show it, and PUT takes it and "
-        "ignores it.",
+        description="What was lost by it; absent where nothing was. Not kept: GET does not show it, PUT ignores it.",
         examples=[["the nights that cameras left, right remember are dropped: revision 1 has none any more"]],
     )
 

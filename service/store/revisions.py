@@ -47,7 +47,7 @@ Changes = Sequence[tuple[int, dict[str, dict[str, float]]]]
 
 @dataclass(frozen=True)
 class RevisionPage:
-    """Revisions of a page, newest first, those of it that cannot be read, and the number that the next page is before."""
+    """Revisions of a page, newest first, those that cannot be read, and the number that the next page is before."""
 
     revisions: list[Revision]
     unreadable: list[Unreadable]
