@@ -14,7 +14,7 @@ from service.schemas.geometry import AGREEING_M, FARTHEST_M
 from service.schemas.results import Result
 from service.schemas.rotation import rotate
 from service.store.jobs.task import Task
-from service.store.venues import with_result
+from service.store.venues import faults_of, with_result
 from worker.protocol import Message
 
 POSE = {"rotation", "position", "translation"}
@@ -30,9 +30,9 @@ def _fault_of_accepted(message: Message, task: Task) -> str | None:
     """Return what no venue can have of the poses, lenses and ridge that a calibration accepts."""
     if task.venue is None or not isinstance(message.result, Result) or not message.result.accepted_cameras:
         return None
-    before = task.venue.faults()
+    before = faults_of(task.venue)
     found = with_result(task.venue, message.result, message.result.accepted_cameras)
-    return next((fault for fault in found.faults() if fault not in before), None)
+    return next((fault for fault in faults_of(found) if fault not in before), None)
 
 
 def _faults(value: Any, place: str) -> Iterator[str]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from service.schemas import source_urls
 from service.schemas.addresses import HIDDEN, SourceUrl
 from service.schemas.base import (
     OPEN_WORD,
-    TOLERANTLY,
     UNREADABLE,
     Id,
     Name,
@@ -24,7 +23,6 @@ from service.schemas.base import (
 from service.schemas.events import hidden_urls
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
-from service.schemas.findings import describe_errors
 from service.schemas.geometry import Light, Pose, PosedCamera, PoseIn, UnposedCamera
 from service.schemas.health import Alarm, Alarms, CalibrationEnd
 from service.schemas.lens_limits import assumed_lens_warning
@@ -288,16 +286,6 @@ class Venue(NamedField):
         """The venue as one sends it."""
         once = {"cameras": {"__all__": {"pose": {"translation"}}}}
         return VenueIn.model_validate(self.model_dump(exclude=once))
-
-    def faults(self) -> list[str]:
-        """Return in words what of the venue a client could not send: what is stored can be sent back as it is."""
-        document = self.model_dump(mode="json")
-        try:
-            # Words of newer versions are none.
-            VenueIn.model_validate(document, **TOLERANTLY)
-        except ValidationError as error:
-            return describe_errors(error.errors(), None, document)
-        return []
 
     def changed_parts(self, other: Venue) -> list[str]:
         """The parts of the venue that are not as those of another one."""

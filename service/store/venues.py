@@ -9,17 +9,19 @@ from datetime import datetime, timedelta
 from typing import Any, Literal
 
 import sqlalchemy as sa
+from pydantic import ValidationError
 
 from service.schemas.actor import Actor
 from service.schemas.addresses import HIDDEN
-from service.schemas.base import Unreadable
+from service.schemas.base import TOLERANTLY, Unreadable
 from service.schemas.field import FieldOfPlay
+from service.schemas.findings import describe_errors
 from service.schemas.health import VenueHealth
 from service.schemas.history import Cause, Revision
 from service.schemas.names import OPEN_STATUSES
 from service.schemas.results import Result
 from service.schemas.source_urls import SourceSecrets, secrets_of
-from service.schemas.venue import Venue
+from service.schemas.venue import Venue, VenueIn
 from service.store import live_alarms, tables
 from service.store.alarms import health_of, update_alarms
 from service.store.database import Repository, advisory_lock, clock, reading, writing
@@ -344,15 +346,27 @@ def find_venue(connection: sa.Connection, venue_id: str) -> Venue | None:
     return None if stored is None else stored.venue
 
 
+def faults_of(venue: Venue) -> list[str]:
+    """Return in words what of a venue a client could not send: what is stored can be sent back as it is."""
+    document = venue.model_dump(mode="json")
+    try:
+        # Words of newer versions are none.
+        VenueIn.model_validate(document, **TOLERANTLY)
+    except ValidationError as error:
+        return describe_errors(error.errors(), None, document)
+    return []
+
+
 def save_venue(connection: sa.Connection, venue: Venue, now: datetime, before: StoredVenue | None) -> None:
     """Create or replace a venue, inside the caller's serialised transaction; `before`: what is stored of it so far.
 
     Raises `VenueRefused` for one that a client could not send: whoever reads it, or sends it back, would be refused.
     """
-    faults = venue.faults()
+    faults = faults_of(venue)
     if faults and before is not None:
         # What another release has let pass does not keep this one from changing the rest.
-        faults = [fault for fault in faults if fault not in before.venue.faults()]
+        known = faults_of(before.venue)
+        faults = [fault for fault in faults if fault not in known]
     if faults:
         raise VenueRefused("; ".join(faults[:MOST_FAULTS]))
     document, additions = venue_columns(venue)

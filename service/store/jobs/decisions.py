@@ -23,6 +23,7 @@ from service.store.statistics.venue_quality import update_quality
 from service.store.trends import note_night
 from service.store.venues import (
     apply_result,
+    faults_of,
     find_readable,
     find_replaceable,
     find_stored,
@@ -74,7 +75,7 @@ class DecisionRepository(Repository):
                 return OpenDecisions(frozenset(), reject=taken)
             if not _untouched(venue, began_with, result, taken=taken):
                 return OpenDecisions(frozenset(), taken, is_outdated=not taken)
-            refused_for = with_result(venue, result).faults()
+            refused_for = faults_of(with_result(venue, result))
             return OpenDecisions(frozenset() if refused_for else _not_taken(venue, result), reject=taken)
 
     def cancel(self, job_id: str, by: Actor | None = None) -> None:

@@ -55,7 +55,7 @@ LEFT = ("cameras", 0)
         (
             (*LEFT, "pose", "position", 1),
             -4949.0,
-            "cameras.left.pose.position.1: expected -2000.0 or more, came -4949.0; it is in metres, and these look "
+            "cameras.left.pose.position.1: expected -3466.0 or more, came -4949.0; it is in metres, and these look "
             "like centimetres or millimetres",
         ),
         ((*LEFT, "pose"), "there", "cameras.left.pose: expected an object, came 'there'"),
