@@ -50,7 +50,7 @@ from service.schemas.names import (
     LensChoice,
     StitchFormat,
 )
-from service.schemas.venue import ChangedVenue, Venue, VenueIn, Venues
+from service.schemas.venue import ChangedVenue, RestoredVenue, Venue, VenueIn, Venues
 
 if TYPE_CHECKING:
     from datetime import date
@@ -119,13 +119,18 @@ class AsyncClient:
         return _read(Venue, await self._ask("GET", f"/venues/{venue_id}"))
 
     async def venues(self) -> list[Venue]:
-        """All venues."""
+        """Return all venues that the service can read, see `venue_list`."""
+        return (await self.venue_list()).venues
+
+    async def venue_list(self) -> Venues:
+        """Return all venues on one page, those that are stored and cannot be read as well."""
         page = _read(Venues, await self._ask("GET", "/venues"))
-        found = page.venues
+        found, unreadable = page.venues, page.unreadable
         while page.next_cursor is not None:
             page = _read(Venues, await self._ask("GET", "/venues", params={"cursor": page.next_cursor}))
             found += page.venues
-        return found
+            unreadable += page.unreadable
+        return Venues(venues=found, unreadable=unreadable)
 
     async def delete_venue(self, venue_id: str) -> None:
         """Forget a venue."""
@@ -153,10 +158,10 @@ class AsyncClient:
         answer = await self._ask("GET", f"/venues/{venue_id}/cameras/{camera}/trend", params=params)
         return _read(Trend, answer)
 
-    async def restore(self, venue_id: str, revision: int) -> Venue:
-        """Put the poses of a revision to use again."""
+    async def restore(self, venue_id: str, revision: int) -> RestoredVenue:
+        """Put the poses of a revision to use again, and say what was lost by it."""
         answer = await self._ask("POST", f"/venues/{venue_id}/restore", json={"revision": revision})
-        return _read(Venue, answer)
+        return _read(RestoredVenue, answer)
 
     async def adopt_refined(self, venue_id: str, camera: str) -> Venue:
         """Store the refined pose and lens of a camera that the last accepted calibration found."""
@@ -456,6 +461,7 @@ class Client:
     tagged_venue = Call(AsyncClient.tagged_venue)
     venue = Call(AsyncClient.venue)
     venues = Call(AsyncClient.venues)
+    venue_list = Call(AsyncClient.venue_list)
     delete_venue = Call(AsyncClient.delete_venue)
     venue_health = Call(AsyncClient.venue_health)
     history = Call(AsyncClient.history)

@@ -40,6 +40,7 @@ from worker.job_files import FileUnavailableError, JobFiles
 from worker.job_process import POLL_S, JobProcess
 from worker.lease import JobTimeoutError, Lease, LeaseLostError, Leases
 from worker.protocol import Files, Message
+from worker.result_checks import fault_in
 from worker.spans import Spans
 
 # How long the database may be away, beyond the time the job has anyway, before its end is lost.
@@ -277,6 +278,9 @@ class Worker:
                 if message is None:
                     lease.check()
                 elif message.last:
+                    if (fault := fault_in(message, task)) is not None:
+                        detail = f"Its program reports what cannot be stored: {fault}. Nothing was stored."
+                        return Message(error=_error("job-crashed", detail)), {}
                     return message, child.pictures
                 elif message.warning is not None:
                     log.warning("said by its program", what=message.warning)

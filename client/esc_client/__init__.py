@@ -24,7 +24,7 @@ from service.schemas.options import Options
 from service.schemas.results import CameraResult, FindResult, Result
 from service.schemas.schedule import Schedule
 from service.schemas.trend import Trend
-from service.schemas.venue import Camera, CameraIn, ChangedVenue, Venue, VenueIn
+from service.schemas.venue import Camera, CameraIn, ChangedVenue, RestoredVenue, Venue, VenueIn, Venues
 from service.schemas.view import ViewChoice
 
 __version__ = version("esc-client")
@@ -54,6 +54,7 @@ __all__ = [
     "PosesEvent",
     "Progress",
     "Refused",
+    "RestoredVenue",
     "Result",
     "Revision",
     "Schedule",
@@ -64,6 +65,7 @@ __all__ = [
     "VenueEvent",
     "VenueHealth",
     "VenueIn",
+    "Venues",
     "ViewChoice",
     "Webhook",
     "__version__",

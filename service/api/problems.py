@@ -18,6 +18,8 @@ from starlette.routing import compile_path
 from service.schemas.findings import describe_errors
 from service.schemas.merge_patch import MEDIA_TYPE as MERGE_PATCH
 from service.schemas.problems import MEDIA_TYPE, PROBLEM_TYPES, Problem
+from service.store.unreadable import UnreadableRow
+from service.store.venues import VenueRefused
 
 MOST_ERRORS = 100
 log = structlog.get_logger()
@@ -44,6 +46,24 @@ def validation_problem(
     if len(everything) == len(found):
         return Problem("invalid-request", told[0], errors=findings)
     return Problem("invalid-request", told[0], errors=findings, errors_left_off=len(everything) - len(found))
+
+
+def unreadable_problem(error: UnreadableRow) -> Problem:
+    """Answer who asks for a row that cannot be read."""
+    here = f"/{error.kind}s/{error.id}"
+    ways_out = {
+        "venue": f"POST {here}/restore with a revision of GET {here}/history, PUT {here} anew, or DELETE it.",
+        "job": f"DELETE {here}, and send its frames again.",
+    }
+    what_to_do = ways_out.get(error.kind, "Restore another revision of the venue, or PUT it anew.")
+    return Problem("unreadable", f"The {error}. {what_to_do}", what=error.kind, id=error.id)
+
+
+def poses_refused(error: VenueRefused) -> Problem:
+    """Answer who wants a venue to be as no client could send it."""
+    return Problem(
+        "poses-refused", f"{error}. Nothing was changed. Calibrate again; if it is the ridge, without fit_ridge."
+    )
 
 
 def not_json(request: Request) -> Problem:
@@ -78,6 +98,14 @@ def install_handlers(app: FastAPI) -> None:
     @app.exception_handler(ClientDisconnect)
     async def gone(_: Request, __: Exception) -> Response:
         return problem_response(Problem("malformed-request", "The request broke off."))
+
+    @app.exception_handler(UnreadableRow)
+    async def unreadable(_: Request, error: UnreadableRow) -> Response:
+        return problem_response(unreadable_problem(error))
+
+    @app.exception_handler(VenueRefused)
+    async def refused(_: Request, error: VenueRefused) -> Response:
+        return problem_response(poses_refused(error))
 
     @app.exception_handler(Exception)
     async def unexpected(_: Request, error: Exception) -> Response:

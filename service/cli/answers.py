@@ -40,10 +40,11 @@ def print_answer(answer: BaseModel, *, as_json: bool, with_outcome: bool = True)
     from service.schemas.health import VenueHealth
     from service.schemas.job import Job
     from service.schemas.results import FieldResult, FindResult, Result
-    from service.schemas.venue import ChangedVenue, Venue
+    from service.schemas.venue import ChangedVenue, RestoredVenue, Venue
 
     if as_json or not sys.stdout.isatty():
-        print(answer.model_dump_json(indent=2, exclude={"warnings"} if isinstance(answer, ChangedVenue) else None))
+        has_warnings = isinstance(answer, ChangedVenue | RestoredVenue)
+        print(answer.model_dump_json(indent=2, exclude={"warnings"} if has_warnings else None))
     else:
         match answer:
             case Venue():
@@ -55,7 +56,7 @@ def print_answer(answer: BaseModel, *, as_json: bool, with_outcome: bool = True)
             case VenueHealth():
                 _print_health(answer)
     match answer:
-        case ChangedVenue():
+        case ChangedVenue() | RestoredVenue():
             for warning in answer.warnings:
                 print_note(f"Warning: {warning}")
         case Job() if with_outcome:

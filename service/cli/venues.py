@@ -148,13 +148,13 @@ def get_venue(venue: VenueId, as_json: AnswerAsJson = False, url: Url = DEFAULT_
 def list_venues(as_json: AsJson = False, url: Url = DEFAULT_URL, api_key: ApiKey = None) -> None:
     """Print a line per venue: id, name, cameras."""
     with open_client(url, api_key) as client:
-        venues = client.venues()
+        listed = client.venue_list()
     if as_json:
-        from service.schemas.venue import Venues
-
-        print_json(Venues(venues=venues))
+        print_json(listed)
         return
-    rows = [(venue.id, venue.name, " ".join(camera.id for camera in venue.cameras)) for venue in venues]
+    for unreadable in listed.unreadable:
+        print_note(f"Venue {unreadable.id} cannot be read: {unreadable.why}")
+    rows = [(venue.id, venue.name, " ".join(camera.id for camera in venue.cameras)) for venue in listed.venues]
     print_rows(["VENUE", "NAME", "CAMERAS"], rows)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from service.schemas.geometry import rotate
 from service.schemas.problems import Problem
+from service.schemas.rotation import rotate
 from service.schemas.venue import Camera
 
 # OpenCV's order.

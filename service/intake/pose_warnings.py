@@ -15,7 +15,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from service.schemas.field import FieldOfPlay
-from service.schemas.geometry import Pose, PosedCamera, PoseIn, rotate
+from service.schemas.geometry import Pose, PosedCamera, PoseIn
+from service.schemas.rotation import rotate
 from service.schemas.venue import Venue
 from service.store.movement import visible_m
 

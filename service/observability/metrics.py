@@ -37,6 +37,7 @@ from service.store.statistics.job_outcome import (
 from service.store.statistics.snapshot import StatisticsSnapshot, VenueGauges
 from service.store.statistics.source_timings import FETCH, FRAME, NONE
 from service.store.trends import CameraTrend
+from service.store.unreadable import RowKind, unreadable_rows
 from service.store.workers import WorkerHeartbeat
 
 # Name, meaning and figure; a figure that is not known is no sample.
@@ -133,6 +134,7 @@ class _Stored(Collector):
             "esc_build", "The version.", {"version": build.version(), "commit": build.commit() or ""}
         )
         yield from self._room()
+        yield from _unreadable()
         try:
             figures = self._look()
         except DATABASE_OUTAGES:
@@ -161,6 +163,18 @@ class _Stored(Collector):
         if free is not None:
             yield _gauge("esc_disk_free_bytes", "Free where database and files grow.", free)
             yield _gauge("esc_disk_needed_bytes", "With less free, uploads are refused.", self._disk.min_free_bytes)
+
+
+def _unreadable() -> Iterator[Metric]:
+    rows = GaugeMetricFamily(
+        "esc_unreadable_rows",
+        "Stored rows that this process met within the last hour and could not read; its log names them.",
+        labels=["kind"],
+    )
+    counts = unreadable_rows()
+    for kind in get_args(RowKind):
+        rows.add_metric([kind], counts[kind])
+    yield rows
 
 
 def _queue(figures: StatisticsSnapshot) -> Iterator[Metric]:

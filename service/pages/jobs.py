@@ -10,12 +10,14 @@ from service.api.context import InContext, JobIdPath
 from service.pages.outcome import outcome_of, poses_in_use
 from service.pages.page_rendering import Page, render_page
 from service.pages.venues import sizes_of
+from service.routes.contract.attribution import hide_other_asker
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
 from service.schemas.job import Job
 from service.schemas.names import ID_PATTERN, JOB_ID_PATTERN, FormatName, JobKind, JobStatus
 from service.schemas.problems import Problem
 from service.store.jobs.queries import JobPage
+from service.store.jobs.task import UnreadableJob
 from service.store.repositories import Repositories
 
 PER_PAGE = 50
@@ -36,19 +38,17 @@ def jobs(
     cursor: Annotated[str | None, Query(pattern=JOB_ID_PATTERN)] = None,
 ) -> Response:
     """Jobs, newest first. A form sends the filters that were left open as empty strings."""
-    wanted = JobPage(
-        PER_PAGE + 1, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only
-    )
+    wanted = JobPage(PER_PAGE, before=cursor, venue=venue or None, status=status or None, kind=kind or None, only=only)
     found = context.jobs.page(wanted)
-    shown = found[:PER_PAGE]
     return render_page(
         request,
         "jobs.html",
-        jobs=shown,
+        jobs=[hide_other_asker(one) for one in found.jobs],
+        unreadable=found.unreadable,
         chosen={"venue": venue, "status": status, "kind": kind},
         statuses=get_args(JobStatus),
         kinds=get_args(JobKind),
-        cursor=shown[-1].id if len(found) > PER_PAGE else None,
+        cursor=found.next_cursor,
     )
 
 
@@ -62,22 +62,25 @@ def job(job_id: JobIdPath, request: Request, context: InContext) -> Response:
     return render_page(
         request,
         "job.html",
-        job=found,
+        job=hide_other_asker(found),
         stages=STAGES,
         formats=get_args(FormatName),
         outcome=outcome_of(context, found, poses_in_use(context, found.venue)),
-        sizes=sizes_of(context.venues.get(found.venue) if found.venue else None),
+        sizes=sizes_of(context.venues.readable(found.venue) if found.venue else None),
         adoptable=context.adopted_fields.adoptable(job_id),
         can_take=found.kind == "find" and context.found_venues.is_adoptable(job_id),
-        is_stored=found.venue is not None and context.venues.get(found.venue) is not None,
+        is_stored=found.venue is not None and context.venues.exists(found.venue),
         can_be_repeated=can_be_resubmitted(context, found),
     )
 
 
 def can_be_resubmitted(context: Repositories, job: Job) -> bool:
     """Whether the frames of a job are kept and are still frames of its venue, which nothing else is computed for."""
-    before = context.submissions.of(job.id)
+    try:
+        before = context.submissions.of(job.id)
+    except UnreadableJob:
+        return False
     if before is None or before.venue is None:
         return before is not None
-    now = context.venues.get(before.venue.id)
+    now = context.venues.readable(before.venue.id)
     return now is not None and now.accepts_frames_of(before.venue) and not context.past_calibrations.active([now.id])

@@ -18,6 +18,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.responses import HTMLResponse, RedirectResponse
 
 from service.api.auth import COOKIE, SCOPES, page_token
+from service.api.problems import unreadable_problem
 from service.api.root_path import with_root_path
 from service.pages import formatting
 from service.pages.assets import address
@@ -28,6 +29,7 @@ from service.schemas.names import Scope
 from service.schemas.problems import PROBLEM_TYPES, REFUSAL_REASONS, Problem
 from service.store.database import DATABASE_OUTAGES
 from service.store.keys import Key
+from service.store.unreadable import UnreadableRow
 
 SIGN_IN = "/ui/sign-in"
 # Scripts, styles and pictures are files of this service; nothing inline, nobody frames it.
@@ -95,6 +97,8 @@ class Page(Guarded):
                 return await handle(request)
             except Problem as problem:
                 return problem_page(request, problem)
+            except UnreadableRow as error:
+                return problem_page(request, unreadable_problem(error))
             except RequestValidationError:
                 return problem_page(request, Problem("not-found", "The address is not one of this service's."))
             except DATABASE_OUTAGES:

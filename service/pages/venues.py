@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from http import HTTPStatus
 from typing import Annotated, Any, Literal, get_args
 
 from fastapi import APIRouter, Query, Request, Response
@@ -15,10 +16,11 @@ from service.pages.live import CLOCKS, STATUSES, live_card
 from service.pages.outcome import CAME_BY, outcome_of, poses_in_use
 from service.pages.page_rendering import Page, render_page
 from service.pages.sparkline import Sparkline, sparkline
+from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.restricted import OnlyVenues, lists_by_venue
-from service.routes.venues import ExistingVenue, venue_etag
+from service.routes.venues import ExistingVenueId, existing_venue, venue_etag
 from service.schemas.health import Alarm, VenueHealth
 from service.schemas.history import Cause, Revision
 from service.schemas.job import Job
@@ -27,6 +29,7 @@ from service.schemas.venue import Venue
 from service.schemas.view import ViewChoice
 from service.store.repositories import Repositories
 from service.store.statistics.venue_summary import CalibrationSummary
+from service.store.unreadable import UnreadableRow
 
 PER_PAGE = 50
 # What a chart shows, and a table beside it.
@@ -69,10 +72,14 @@ def venues(
     after: Annotated[str | None, Query(pattern=ID_PATTERN)] = None,
 ) -> Response:
     """Every venue, with its last result."""
-    found = context.venues.page(after, PER_PAGE + 1, only)
-    shown, more = found[:PER_PAGE], len(found) > PER_PAGE
+    found = context.venues.page(after, PER_PAGE, only)
     return render_page(
-        request, "venues.html", rows=venue_rows(context, shown), after=shown[-1].id if more else None, first=not after
+        request,
+        "venues.html",
+        rows=venue_rows(context, found.venues),
+        unreadable=found.unreadable,
+        after=found.next_cursor,
+        first=not after,
     )
 
 
@@ -95,14 +102,30 @@ def venue_rows(context: Repositories, venues: list[Venue]) -> list[VenueRow]:
 
 
 @router.get("/ui/venues/{venue_id}", openapi_extra=needs_scope("read"))
-def venue(stored: ExistingVenue, request: Request, context: InContext) -> Response:
-    """One venue: its last result in pictures and numbers, and how it came to it."""
-    venue_id = stored.id
+def venue(venue_id: ExistingVenueId, request: Request, context: InContext) -> Response:
+    """One venue: its last result and how it came to it, or the ways out where it cannot be read."""
+    try:
+        return _venue_page(venue_id, request, context)
+    except UnreadableRow as unreadable:
+        revisions = context.venues.history(venue_id, None, IN_TABLE)
+        return render_page(
+            request,
+            "unreadable.html",
+            HTTPStatus.CONFLICT,
+            venue_id=venue_id,
+            unreadable=unreadable,
+            revisions=[hide_other_actor(one) for one in revisions],
+            restorable=context.venues.repairing(venue_id, [one.revision for one in revisions]),
+        )
+
+
+def _venue_page(venue_id: str, request: Request, context: InContext) -> Response:
+    stored = existing_venue(venue_id, context)
     # First: what happens from here on may be shown already, and is told of once more.
     seen = context.events.newest([venue_id]).get(venue_id, 0)
     ends = context.past_calibrations.of(venue_id, IN_TABLE)
     newest = context.past_calibrations.newest_result(venue_id)
-    job = context.jobs.get(newest) if newest else None
+    job = context.jobs.several([newest]).get(newest) if newest else None
     revisions = context.venues.history(venue_id, None, IN_TABLE)
     health = context.venues.health(venue_id)
     in_use = poses_in_use(context, venue_id)
@@ -114,7 +137,8 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         venue=stored,
         ends=ends,
         job=job,
-        revisions=revisions,
+        revisions=[hide_other_actor(one) for one in revisions],
+        remembering=context.venues.with_memories(venue_id),
         health=health,
         in_use=in_use,
         outcome=outcome_of(context, job, in_use),
@@ -125,7 +149,7 @@ def venue(stored: ExistingVenue, request: Request, context: InContext) -> Respon
         restorable=context.venues.restorable(stored, [one.revision for one in revisions]),
         kept_jobs=kept_jobs(context, revisions, health),
         trends=[context.trends.of(stored, camera.id, a_year_ago) for camera in stored.cameras],
-        active=context.jobs.get(active) if active else None,
+        active=context.jobs.several([active]).get(active) if active else None,
         live_poses=live_card(context, venue_id),
         live_statuses=STATUSES,
         live_clocks=CLOCKS,

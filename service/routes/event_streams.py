@@ -12,6 +12,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import InContext, VenueIdPath
+from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.followed import FOLLOWER_SLOT, LONGEST_S
 from service.routes.contract.guarded import Guarded
@@ -20,6 +21,7 @@ from service.schemas.events.venue_event import FINAL_EVENT
 from service.schemas.names import EVENT_KINDS, EventKind
 from service.store.database import DATABASE_OUTAGES
 from service.store.events.feed import NumberedEvent
+from service.store.unreadable import UnreadableRow
 
 log = structlog.get_logger()
 router = APIRouter(tags=["venues"], route_class=Guarded)
@@ -83,10 +85,10 @@ async def venue_events(
                     return
             if not page.more:
                 await context.venue_watch.until(venue_id, number.__lt__, LONGEST_POLL_INTERVAL_S)
-    except DATABASE_OUTAGES:
+    except (*DATABASE_OUTAGES, UnreadableRow):
         # The client connects again, as after any stream that broke off.
         log.warning("cannot tell of a venue", exc_info=True)
 
 
 def _server_sent_event(event: NumberedEvent) -> ServerSentEvent:
-    return ServerSentEvent(data=event.event, event=event.event.type, id=str(event.number))
+    return ServerSentEvent(data=hide_other_actor(event.event), event=event.event.type, id=str(event.number))

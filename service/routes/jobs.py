@@ -13,6 +13,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import ByActor, Context, InContext, JobIdPath
+from service.routes.contract.attribution import hide_other_asker
 from service.routes.contract.documented import needs_scope, problem_responses
 from service.routes.contract.exported import DOCUMENTS, ExportQuery, export_response, with_refined_poses
 from service.routes.contract.guarded import Guarded
@@ -44,7 +45,7 @@ EVENT_AT_LEAST_EVERY_S = 10
 
 def job_response(job: Job, *, status: int = 200, if_none_match: str | None = None) -> Response:
     """The one form a job leaves in: body, ETag, Location of a new one, Retry-After while it is open."""
-    body = job.model_dump_json().encode()
+    body = hide_other_asker(job).model_dump_json().encode()
     answer = tagged_response(body, if_none_match, lambda: Response(body, status, media_type="application/json"))
     if job.open:
         answer.headers["Retry-After"] = str(RETRY_AFTER_S)
@@ -68,7 +69,16 @@ async def _existing_job(job_id: JobIdPath, context: InContext) -> Job:
     return job
 
 
+def _existing_state(job_id: JobIdPath, context: InContext) -> JobState:
+    state = context.jobs.states([job_id]).get(job_id)
+    if state is None:
+        raise no_such_job(context.settings)
+    return state
+
+
 ExistingJob = Annotated[Job, Depends(_existing_job)]
+# Also of a job that cannot be read.
+ExistingState = Annotated[JobState, Depends(_existing_state)]
 
 
 @router.get("", openapi_extra=needs_scope("read"), responses={200: {"headers": NEXT_PAGE}})
@@ -86,14 +96,14 @@ def list_jobs(
     fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Jobs:
     """List jobs, newest first, in pages; with a key for some venues, theirs."""
-    wanted = JobPage(limit + 1, before=cursor, venue=venue, status=status, kind=kind, only=only)
-    summaries = context.jobs.summaries(wanted) if fields == "summary" else None
-    jobs = context.jobs.page(wanted) if summaries is None else []
-    listed = summaries or jobs
+    wanted = JobPage(limit, before=cursor, venue=venue, status=status, kind=kind, only=only)
+    in_lines = fields == "summary"
+    found = context.jobs.summaries(wanted) if in_lines else context.jobs.page(wanted)
     shown = Jobs(
-        jobs=jobs[:limit],
-        summaries=None if summaries is None else summaries[:limit],
-        next_cursor=listed[limit - 1].id if len(listed) > limit else None,
+        jobs=[hide_other_asker(job) for job in found.jobs],
+        summaries=[hide_other_asker(line) for line in found.summaries] if in_lines else None,
+        unreadable=found.unreadable,
+        next_cursor=found.next_cursor,
     )
     response.headers.update(next_page(request, shown.next_cursor))
     return shown
@@ -121,22 +131,22 @@ async def get_job(
 @router.post(
     "/{job_id}/cancel", openapi_extra=needs_scope("calibrate"), response_model=Job, responses=problem_responses(404)
 )
-def cancel_job(job: ExistingJob, context: InContext, by: ByActor) -> Response:
+async def cancel_job(state: ExistingState, job_id: JobIdPath, context: InContext, by: ByActor) -> Response:  # noqa: ARG001
     """End a job that is still open: queued at once, running within two seconds. Others stay as they are."""
-    context.decisions.cancel(job.id, by)
-    return job_response(context.jobs.get(job.id) or job)
+    await run_in_threadpool(context.decisions.cancel, job_id, by)
+    return job_response(await _existing_job(job_id, context))
 
 
 @router.delete("/{job_id}", openapi_extra=needs_scope("admin"), status_code=204, responses=problem_responses(404, 409))
-def delete_job(job: ExistingJob, context: InContext) -> None:
+def delete_job(state: ExistingState, job_id: JobIdPath, context: InContext) -> None:
     """Forget a job that has ended, with its frames and its pictures. Poses that it brought to its venue stay."""
-    if job.open:
-        raise Problem("job-open", f"Cancel it first: POST /jobs/{job.id}/cancel.", job=job.id)
+    if state.status in OPEN_STATUSES:
+        raise Problem("job-open", f"Cancel it first: POST /jobs/{job_id}/cancel.", job=job_id)
     # The queue first: without the row nobody would ever ask it to forget.
-    context.queue.forget([job.id])
+    context.queue.forget([job_id])
     # Swept once more, as a worker that was at the job until now may write another picture.
-    context.expiry.delete_jobs([job.id], context.expiry.now() + STRAGGLING)
-    for folder in (frame_folder(job.id), pictures_folder(job.id)):
+    context.expiry.delete_jobs([job_id], context.expiry.now() + STRAGGLING)
+    for folder in (frame_folder(job_id), pictures_folder(job_id)):
         try:
             context.blobs.delete_under(folder)
         except BLOB_OUTAGES:
@@ -147,7 +157,7 @@ def delete_job(job: ExistingJob, context: InContext) -> None:
     "/{job_id}/accept",
     openapi_extra=needs_scope("calibrate"),
     response_model=Job,
-    responses=problem_responses(404, 409),
+    responses=problem_responses(404, 409, 422),
 )
 def accept_job(
     job: ExistingJob,
@@ -239,7 +249,7 @@ async def job_events(job: ExistingJob, context: InContext) -> AsyncIterable[Serv
             log.warning("cannot tell of a job", exc_info=True)
             return
         number = None if state is None else str(state.revision)
-        yield ServerSentEvent(data=job, event="progress" if job.open else "end", id=number)
+        yield ServerSentEvent(data=hide_other_asker(job), event="progress" if job.open else "end", id=number)
         if not job.open:
             return
         await context.job_watch.until(job.id, _is_newer_than(state), EVENT_AT_LEAST_EVERY_S)

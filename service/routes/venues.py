@@ -14,6 +14,7 @@ from service.api.auth import require_scope
 from service.api.context import ByActor, Context, InContext, VenueIdPath
 from service.api.problems import validation_problem
 from service.intake import sources
+from service.routes.contract.attribution import hide_other_actor
 from service.routes.contract.documented import header_docs, needs_scope, problem_responses
 from service.routes.contract.exported import (
     DOCUMENTS,
@@ -36,13 +37,23 @@ from service.schemas.merge_patch import MEDIA_TYPE, apply_merge_patch
 from service.schemas.names import ID_PATTERN, FormatName, ListFields
 from service.schemas.problems import Problem
 from service.schemas.trend import Trend
-from service.schemas.venue import PATCH_EXAMPLES, Camera, ChangedVenue, Venue, VenueIn, Venues, VenueSummary
+from service.schemas.venue import (
+    PATCH_EXAMPLES,
+    Camera,
+    ChangedVenue,
+    RestoredVenue,
+    Venue,
+    VenueIn,
+    Venues,
+    VenueSummary,
+)
 from service.settings import Settings
 from service.store.adopted_fields import NoSuchJob, NotAdoptable, NumberRefused
 from service.store.found_venues import CandidateNeeded, CandidateRefused, NoSuchCandidate, NothingFound
 from service.store.jobs.decisions import VenueHasChanged
 from service.store.refined import NoRefinedPose
 from service.store.revisions import NoSuchRevision, RevisionUnfit
+from service.store.venues import find_replaceable
 
 router = APIRouter(prefix="/venues", tags=["venues"], route_class=Guarded)
 # While a job is open.
@@ -78,14 +89,23 @@ def camera_of(venue: Venue, camera_id: str) -> Camera:
     )
 
 
-def _existing_venue(venue_id: VenueIdPath, context: InContext) -> Venue:
+def existing_venue(venue_id: VenueIdPath, context: InContext) -> Venue:
+    """Return a venue that is there. Raises `UnreadableRow`."""
     venue = context.venues.get(venue_id)
     if venue is None:
         raise no_such_venue(venue_id)
     return venue
 
 
-ExistingVenue = Annotated[Venue, Depends(_existing_venue)]
+def _existing_venue_id(venue_id: VenueIdPath, context: InContext) -> str:
+    if not context.venues.exists(venue_id):
+        raise no_such_venue(venue_id)
+    return venue_id
+
+
+ExistingVenue = Annotated[Venue, Depends(existing_venue)]
+# Also of a venue that cannot be read.
+ExistingVenueId = Annotated[str, Depends(_existing_venue_id)]
 
 
 def no_refined_since(venue_id: str) -> str:
@@ -141,7 +161,7 @@ def put_venue(
             raise Problem("venue-changed", "The venue is already there.", got=_quoted_tag(tag))
         return wanted.with_callbacks_of(before), sources.secrets_of(wanted, venue.secrets, before, known)
 
-    stored, new = context.venues.change(venue_id, change, by)
+    stored, new = context.venues.change(venue_id, change, by, find_replaceable)
     response.headers["ETag"] = etags.quoted(venue_etag(stored))
     response.status_code = 201 if new else 200
     return _changed_venue([camera.pose for camera in venue.cameras], stored.with_hidden_callbacks())
@@ -200,12 +220,12 @@ def list_venues(
     fields: Annotated[ListFields, Query(description="`summary`: a line of each, in `summaries`.")] = "all",
 ) -> Venues:
     """List all venues by id, in pages; with a key for some venues, these."""
-    page = context.venues.page(cursor, limit + 1, only, q, state)
-    more, page = len(page) > limit, page[:limit]
+    page = context.venues.page(cursor, limit, only, q, state)
     listed = Venues(
-        venues=[] if fields == "summary" else [venue.with_hidden_callbacks() for venue in page],
-        summaries=_summaries(context, page) if fields == "summary" else None,
-        next_cursor=page[-1].id if more else None,
+        venues=[] if fields == "summary" else [venue.with_hidden_callbacks() for venue in page.venues],
+        summaries=_summaries(context, page.venues) if fields == "summary" else None,
+        unreadable=page.unreadable,
+        next_cursor=page.next_cursor,
     )
     response.headers.update(next_page(request, listed.next_cursor))
     return listed
@@ -248,7 +268,7 @@ def venue_poses(
     responses=TAGGED | {200: {"headers": TAGGED[200]["headers"] | NEXT_PAGE}} | problem_responses(404),
 )
 def venue_history(
-    venue: ExistingVenue,
+    venue_id: ExistingVenueId,
     request: Request,
     context: InContext,
     limit: Annotated[int, Query(ge=1, le=1000)] = 50,
@@ -256,9 +276,9 @@ def venue_history(
     if_none_match: IfNoneMatch = None,
 ) -> Response:
     """List every change of the poses with its cause, newest first, and how far each camera moved and has drifted."""
-    page = context.venues.history(venue.id, cursor, limit + 1)
-    more = len(page) > limit
-    shown = History(revisions=page[:limit], next_cursor=page[limit - 1].revision if more else None)
+    page = context.venues.history_page(venue_id, cursor, limit)
+    revisions = [hide_other_actor(revision) for revision in page.revisions]
+    shown = History(revisions=revisions, unreadable=page.unreadable, next_cursor=page.next_cursor)
     body = shown.model_dump_json().encode()
     answer = tagged_response(body, if_none_match, json_response(body))
     answer.headers.update(next_page(request, shown.next_cursor))
@@ -309,8 +329,12 @@ def restore_venue(
     context: InContext,
     by: ByActor,
     if_match: Annotated[str | None, Header()] = None,
-) -> Venue:
-    """Let the poses of a revision hold again, with their lenses and their ridge; that is a revision of its own."""
+) -> RestoredVenue:
+    """Let the poses of a revision hold again, with their lenses and their ridge; that is a revision of its own.
+
+    The nights that cameras remember become those of that revision. Only the last four revisions with any have them
+    still: `warnings` names the cameras whose memories begin anew. A venue that cannot be read is readable again.
+    """
 
     def allow(before: Venue | None) -> None:
         if before is None:
@@ -318,13 +342,13 @@ def restore_venue(
         _require_match(if_match, before)
 
     try:
-        restored = context.venues.restore(venue_id, wanted.revision, allow, by)
+        restored, forgetful = context.venues.restore(venue_id, wanted.revision, allow, by)
     except NoSuchRevision:
         raise Problem("revision-not-found", f"GET /venues/{venue_id}/history lists those there are.") from None
     except RevisionUnfit as unfit:
         raise revision_unfit(unfit) from None
     response.headers["ETag"] = etags.quoted(venue_etag(restored))
-    return restored.with_hidden_callbacks()
+    return RestoredVenue(**dict(restored.with_hidden_callbacks()), warnings=_lost_nights(wanted.revision, forgetful))
 
 
 @router.post(
@@ -472,6 +496,17 @@ def delete_venue(
         _require_match(if_match, before)
 
     context.venues.delete(venue_id, allow, by)
+
+
+def _lost_nights(revision: int, cameras: Sequence[str]) -> list[str]:
+    """Return what is to be said where a revision came back without nights that cameras remembered until now."""
+    if not cameras:
+        return []
+    remember = f"camera {cameras[0]} remembers" if len(cameras) == 1 else f"cameras {', '.join(cameras)} remember"
+    return [
+        f"the nights that {remember} are dropped, as none are kept with revision {revision}: until new ones have come, "
+        "each calibration is judged by itself"
+    ]
 
 
 def _no_such_candidate(error: NoSuchCandidate, job_id: str) -> Problem:

@@ -8,6 +8,8 @@ from pydantic import Field
 
 from service.schemas.base import Schema
 
+# To whoever may not know which.
+ANOTHER_KEY = "another key"
 # Of what happens to a venue.
 BY = "Who did it; null: the service by itself, or before 0.2.0."
 
@@ -17,7 +19,7 @@ class Actor(Schema):
 
     name: str = Field(
         description="`key NAME`: with this API key, on the page too; `schedule`: that of the venue; `anyone`: the "
-        "service asks for no keys."
+        "service asks for no keys; `another key`: to a key for some venues, any but itself."
     )
     address: str | None = Field(
         description="IP address of the client, behind a trusted proxy the one that it names; null: there was none, or "

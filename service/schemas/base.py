@@ -76,6 +76,21 @@ class Schema(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class Unreadable(Schema):
+    """An entry of a list that the service has stored and cannot read, and why."""
+
+    id: str
+    why: str = Field(examples=["field: the ridge must be 0 to 3 m high, not -0.001 m"])
+
+
+UNREADABLE = "Entries of this page that are stored and cannot be read; absent where there are none."
+
+
+def is_empty(value: object) -> bool:
+    """Return True for a list that is left out of an answer unless it has entries."""
+    return value == []
+
+
 def is_none(value: object) -> bool:
     """Whether a field is left out that is only there when it says something."""
     return value is None

@@ -250,7 +250,7 @@ class FieldOfPlay(Schema):
         if max(abs(x1), abs(x2)) >= self.length_m / 2 or abs(y1) >= self.width_m / 2:
             raise ValueError("the ridge must lie inside the pitch")
         if not 0 <= z1 <= 3:
-            raise ValueError("the ridge must be 0 to 3 m high")
+            raise ValueError(f"the ridge must be 0 to 3 m high, not {z1:g} m")
         return self
 
     def number(self, name: FieldNumber) -> float:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field, model_validator
 from service.schemas.base import OPEN_WORD, Id, Integer, Number, Schema
 from service.schemas.lens_limits import LARGEST_COEFFICIENT, LARGEST_SIGMA, LEAST_SIGMA
 from service.schemas.names import OPTIONS_PART, LensModel, SigmaSource
+from service.schemas.rotation import rotate
 
 DISTORTION_LENGTHS: dict[LensModel, tuple[int, ...]] = {"opencv": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}
 COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
@@ -25,9 +26,14 @@ MATRIX_NUMBERS = ("fx", "fy", "aspect", "cx", "cy")
 LARGEST_SIDE = 16384
 # A position and a translation that are less apart say the same: more is not lost by writing them down.
 AGREEING_M = 1e-6
+# From the middle of the field, m: a camera that is 2000 m away along each axis. It is a distance, which position and
+# translation share, so that a pose that is sent in one of them is a valid pose in the other, to the micrometre.
+FARTHEST_M = 3465.0
 Metres = Annotated[Number, Field(ge=-2000, le=2000)]
 Radians = Annotated[Number, Field(ge=-10, le=10)]
-Position = Annotated[list[Metres], Field(min_length=3, max_length=3)]
+Position = Annotated[
+    list[Annotated[Number, Field(ge=-FARTHEST_M - 1, le=FARTHEST_M + 1)]], Field(min_length=3, max_length=3)
+]
 Rotation = Annotated[list[Radians], Field(min_length=3, max_length=3)]
 Row = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Side = Annotated[Integer, Field(ge=32, le=LARGEST_SIDE)]
@@ -45,6 +51,9 @@ class PoseIn(Schema):
     def _one_place(self) -> Self:
         if self.position is None and self.translation is None:
             raise ValueError("give position or translation")
+        away_m = round(math.hypot(*(self.position or self.translation or ())), 6)
+        if away_m > FARTHEST_M:
+            raise ValueError(f"the camera is {away_m:g} m from the middle of the field: {FARTHEST_M:g} m at most")
         if self.position is not None and self.translation is not None:
             apart = math.dist(Pose.from_position(self.rotation, self.position).translation, self.translation)
             if apart > AGREEING_M and math.dist(self.position, self.translation) <= AGREEING_M:
@@ -81,22 +90,6 @@ class Pose(Schema):
         backwards = rotate([-component for component in pose.rotation], pose.translation)
         position = pose.position or [-component for component in backwards]
         return cls(rotation=pose.rotation, position=position, translation=pose.translation)
-
-
-def rotate(rotation: list[float], vector: list[float]) -> list[float]:
-    """A vector turned by a Rodrigues vector (rad): Rodrigues' formula."""
-    angle = math.hypot(*rotation)
-    if angle == 0.0:
-        return list(vector)
-    ax, ay, az = (component / angle for component in rotation)
-    x, y, z = vector
-    cos, sin = math.cos(angle), math.sin(angle)
-    along = (ax * x + ay * y + az * z) * (1 - cos)
-    return [
-        x * cos + (ay * z - az * y) * sin + ax * along,
-        y * cos + (az * x - ax * z) * sin + ay * along,
-        z * cos + (ax * y - ay * x) * sin + az * along,
-    ]
 
 
 class Intrinsics(Schema):

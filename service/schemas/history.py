@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, StringConstraints
 
 from service.schemas.actor import BY, Actor
-from service.schemas.base import OPEN_WORD, Id, Integer, Schema
+from service.schemas.base import OPEN_WORD, UNREADABLE, Id, Integer, Schema, Unreadable, is_empty
 from service.schemas.geometry import Movement, Pose, Row
 from service.schemas.names import JOB_ID_PATTERN, FieldNumber
 
@@ -84,6 +84,7 @@ class History(Schema):
     """A page of revisions, newest first. `next_cursor`: null on the last page."""
 
     revisions: list[Revision]
+    unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
     next_cursor: int | None = None
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import ConfigDict, Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from service.schemas.actor import Attributed
-from service.schemas.base import OPEN_WORD, Schema, is_none, is_tolerant
+from service.schemas.base import OPEN_WORD, UNREADABLE, Schema, Unreadable, is_empty, is_none, is_tolerant
 from service.schemas.names import OPEN_STATUSES, JobKind, JobStatus
 from service.schemas.results import AnyResult
 
@@ -98,7 +98,9 @@ class Job(Schema):
         None, description="The revision of the venue that its poses became, by themselves or by hand; null: none."
     )
     asked_by: str | None = Field(
-        None, description="`key NAME`: with this API key; `schedule`: that of the venue; null: no key was asked for."
+        None,
+        description="`key NAME`: with this API key; `schedule`: that of the venue; `another key`: to a key for some "
+        "venues, any but itself; null: no key was asked for.",
     )
     options: dict[str, Any] = Field(
         {}, description="As they were asked, what was left out filled in, the seed too; without `callback_url`."
@@ -156,4 +158,5 @@ class Jobs(Schema):
     summaries: list[JobSummary] | None = Field(
         None, exclude_if=is_none, description="With `fields=summary`, where `jobs` is empty; not there otherwise."
     )
+    unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
     next_cursor: str | None = None

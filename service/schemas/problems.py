@@ -53,6 +53,8 @@ PROBLEM_TYPES: dict[str, ProblemType] = {
     "venue-id-mismatch": ProblemType(422, "The venue's id differs from the address"),
     "venue-changed": ProblemType(412, "The venue is not the one the request expects"),
     "venue-replaced": ProblemType(409, "The venue was changed during the upload"),
+    "unreadable": ProblemType(409, "What is stored of this cannot be read"),
+    "poses-refused": ProblemType(422, "No venue can have these poses"),
     "venue-stored": ProblemType(409, "The venue is stored already"),
     "no-such-camera": ProblemType(404, "The venue has no camera of this id"),
     "venue-busy": ProblemType(409, "The venue has an active job"),

@@ -9,7 +9,17 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from service.schemas import source_urls
 from service.schemas.addresses import HIDDEN, SourceUrl
-from service.schemas.base import OPEN_WORD, Id, Name, Number, Schema, is_none
+from service.schemas.base import (
+    OPEN_WORD,
+    UNREADABLE,
+    Id,
+    Name,
+    Number,
+    Schema,
+    Unreadable,
+    is_empty,
+    is_none,
+)
 from service.schemas.events import hidden_urls
 from service.schemas.events.webhooks import WEBHOOK_EXAMPLE, Webhook
 from service.schemas.field import FieldOfPlay
@@ -324,6 +334,17 @@ class ChangedVenue(Venue):
         return cls(**dict(venue), warnings=pose_warnings + venue.lens_warnings)
 
 
+class RestoredVenue(Venue):
+    """A venue as a revision had it, with what that revision could not bring back."""
+
+    warnings: list[str] = Field(
+        [],
+        exclude_if=is_empty,
+        description="What was lost by it; absent where nothing was. Not kept: GET does not show it, PUT ignores it.",
+        examples=[["the nights that cameras left, right remember are dropped: revision 1 has none any more"]],
+    )
+
+
 class VenueSummary(Schema):
     """A venue in a line: its name and its cameras, what rings, and how its last calibration ended."""
 
@@ -343,4 +364,5 @@ class Venues(Schema):
     summaries: list[VenueSummary] | None = Field(
         None, exclude_if=is_none, description="With `fields=summary`, where `venues` is empty; not there otherwise."
     )
+    unreadable: list[Unreadable] = Field([], exclude_if=is_empty, description=UNREADABLE)
     next_cursor: str | None = None

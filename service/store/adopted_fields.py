@@ -34,7 +34,7 @@ from service.store.revisions import (
 )
 from service.store.statistics.venue_quality import update_quality
 from service.store.trends import forget_trends
-from service.store.venues import StoredVenue, changing_venue, find_venue, save_venue, with_result
+from service.store.venues import StoredVenue, changing_venue, find_readable, save_venue, with_result
 
 
 class NoSuchJob(Exception):  # noqa: N818
@@ -67,7 +67,7 @@ class AdoptedFieldRepository(Repository):
         """Return the numbers that a job offers now, by name, and in words why `adopt` would refuse one."""
         with reading(self._engine) as connection:
             found = found_poses(connection, job_id)
-            venue = None if found is None else find_venue(connection, found[0].id)
+            venue = None if found is None else find_readable(connection, found[0].id)
             if found is None or venue is None or not found[1].adoptable:
                 return {}
             left = _left_by(connection, job_id, *found)

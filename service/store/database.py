@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import select
 import sqlite3
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -53,6 +55,18 @@ PATIENCE = {
 }
 
 
+def _parse_json(text: str) -> Any:
+    """Return the value of a column, or its text where that is no JSON: a row must not break the query that meets it."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+# NaN is none: SQLite would store what neither its own functions nor other programs can read.
+JSON: dict[str, Any] = {"json_serializer": partial(json.dumps, allow_nan=False), "json_deserializer": _parse_json}
+
+
 class UnsupportedDatabase(Exception):  # noqa: N818
     """This program, or this machine, cannot run the service on this database; the message says what to do."""
 
@@ -74,7 +88,7 @@ def connect(url: str) -> sa.Engine:
             "the job queue needs 3.42 with it. Use Python 3.11, a Python with a newer SQLite, or PostgreSQL."
         )
     file.parent.mkdir(parents=True, exist_ok=True)
-    engine = sa.create_engine(url, pool_timeout=POOL_TIMEOUT_S)
+    engine = sa.create_engine(url, pool_timeout=POOL_TIMEOUT_S, **JSON)
     engine.dialect.statement_compiler = _Hinting
     sa.event.listen(engine, "connect", _set_up_sqlite)
     sa.event.listen(engine, "begin", _begin_sqlite)
@@ -101,7 +115,7 @@ def postgresql(url: str, limits: str = LIMITS) -> sa.Engine:
     options = [SESSION, limits, *([given] if isinstance(given, str) else given)]
     query = PATIENCE | parsed.query | {"options": " ".join(options)}
     target = parsed.set(drivername="postgresql+psycopg", query=query)
-    engine = sa.create_engine(target, pool_timeout=POOL_TIMEOUT_S)
+    engine = sa.create_engine(target, pool_timeout=POOL_TIMEOUT_S, **JSON)
     sa.event.listen(engine, "begin", _lift_limits)
     sa.event.listen(engine, "checkout", _require_open)
     return engine

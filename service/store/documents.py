@@ -70,17 +70,17 @@ def result_columns(result: BaseModel) -> tuple[Document, Document | None]:
 
 
 def stored_venue(document: Document, additions: Document | None) -> Venue:
-    """The venue of two columns, whatever release wrote them."""
+    """Return the venue of two columns, whatever release wrote them. Read it inside `reading_row`."""
     return Venue.model_validate(join_additions(document, additions), **TOLERANTLY)
 
 
 def stored_result(document: Document, additions: Document | None) -> Result:
-    """The result of a calibration of two columns, whatever release wrote them."""
+    """Return the result of a calibration of two columns, whatever release wrote them. Read it inside `reading_row`."""
     return Result.model_validate(join_additions(document, additions), **TOLERANTLY)
 
 
 def stored_alarm(row: Any) -> Alarm:
-    """The alarm of a row, whose rule may be one of a newer version."""
+    """Return the alarm of a row, whose rule may be one of a newer version."""
     values = {"rule": row.rule, "camera": row.camera or None, "since": row.since, "why": row.why}
     return Alarm.model_validate(values, **TOLERANTLY)
 

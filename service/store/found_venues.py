@@ -17,7 +17,7 @@ from service.store.database import Repository, advisory_lock, reading, writing
 from service.store.jobs.decisions import VenueHasChanged
 from service.store.jobs.queries import FoundSite, found_site
 from service.store.revisions import newest_revision
-from service.store.venues import find_stored, find_venue, store_venue, venue_lock
+from service.store.venues import find_readable, find_stored, store_venue, venue_lock
 
 
 class NothingFound(Exception):  # noqa: N818
@@ -51,7 +51,7 @@ class FoundVenueRepository(Repository):
             found = found_site(connection, job_id)
             if found is None:
                 return False
-            now_stored = find_venue(connection, found.site.id)
+            now_stored = find_readable(connection, found.site.id)
             if found.began_with is None or now_stored is None:
                 return found.began_with is None and now_stored is None
             return _is_untouched(now_stored, found.began_with, found.site.sought)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import partial
 from typing import Any
 
 import sqlalchemy as sa
@@ -20,6 +21,7 @@ from service.store import live_alarms, tables
 from service.store.database import Repository, advisory_lock, clock, reading, writing
 from service.store.documents import to_document
 from service.store.statistics.counters import INSERT
+from service.store.unreadable import read_or, read_values
 from service.store.venues import find_venue, venue_lock
 
 RUNNING_WITHIN, LATELY = timedelta(seconds=5), timedelta(days=1)
@@ -59,13 +61,13 @@ class LiveRepository(Repository):
         """The newest report of each of these venues that is there."""
         v = tables.venues.c
         query = (
-            sa.select(v.id, r.reported_at, r.document)
+            sa.select(v.id.label("venue"), r.reported_at, r.document)
             .select_from(tables.venues.outerjoin(tables.live_reports, r.venue == v.id))
             .where(v.id.in_(venue_ids))
         )
         with reading(self._engine) as connection:
             now = clock(connection)
-            return {row.id: _state(row, now) for row in connection.execute(query)}
+            return {row.venue: _state(row, now) for row in connection.execute(query)}
 
     def reported_lately(self, venue_id: str) -> LiveState | None:
         """The newest report of a venue if it is not older than a day."""
@@ -113,9 +115,10 @@ def _keep_newest(connection: sa.Connection, venue_id: str, report: LiveReport, n
 def _add_to_minute(connection: sa.Connection, venue_id: str, report: LiveReport, now: datetime) -> None:
     minute = now.replace(second=0, microsecond=0)
     stored = connection.scalar(sa.select(m.cameras).where(m.venue == venue_id, m.minute == minute))
-    cameras = dict(stored or {})
+    cameras = dict(stored) if isinstance(stored, dict) else {}
+    known = read_values(LiveMinuteCamera, cameras, "live", venue_id)
     for camera in report.cameras:
-        before = LiveMinuteCamera.model_validate(cameras.get(camera.id, {}), **TOLERANTLY)
+        before = known.get(camera.id, LiveMinuteCamera())
         cameras[camera.id] = to_document(before.with_report(camera))
     insert = INSERT[connection.dialect.name](tables.live_minutes)
     values = insert.values(venue=venue_id, minute=minute, cameras=cameras)
@@ -125,13 +128,18 @@ def _add_to_minute(connection: sa.Connection, venue_id: str, report: LiveReport,
 def _state(row: Any, now: datetime) -> LiveState:
     if row.reported_at is None:
         return LiveState()
+    # The next report replaces one that cannot be read.
+    return read_or(LiveState(), "live", row.venue, partial(_reported, row, now))
+
+
+def _reported(row: Any, now: datetime) -> LiveState:
     running = now - row.reported_at <= RUNNING_WITHIN and not row.document.get("stopped", False)
     values = row.document | {"reported_at": row.reported_at, "running": running}
     return LiveState.model_validate(values, **TOLERANTLY)
 
 
 def _minute(row: Any) -> LiveMinute:
-    return LiveMinute.model_validate({"at": row.minute, "cameras": row.cameras}, **TOLERANTLY)
+    return LiveMinute(at=row.minute, cameras=read_values(LiveMinuteCamera, row.cameras, "live", row.venue))
 
 
 def _gauges(row: Any, minutes: list[LiveMinute], now: datetime) -> LiveGauges:

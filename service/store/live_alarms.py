@@ -13,11 +13,12 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas.base import TOLERANTLY, Schema
+from service.schemas.base import Schema
 from service.schemas.health import AlarmRule
 from service.schemas.live import LiveCameraIn, LiveReport
 from service.store import tables
 from service.store.documents import to_document
+from service.store.unreadable import read_or, read_values
 
 NOT_MEASURED_FOR, LATE_FOR, SILENT_FOR = timedelta(seconds=10), timedelta(minutes=1), timedelta(seconds=30)
 LATE_MS = 1000.0
@@ -86,8 +87,14 @@ def watch_of(connection: sa.Connection, venue_id: str) -> LiveWatch | None:
 
 def watch_in(row: Any) -> LiveWatch:
     """Return what is watched of a venue by its row of `live_reports`."""
-    cameras = {camera: WatchedCamera.model_validate(one, **TOLERANTLY) for camera, one in row.watched.items()}
-    return LiveWatch(row.document["host"], row.reported_at, row.document.get("stopped", False), cameras)
+    cameras = read_values(WatchedCamera, row.watched, "live", row.venue)
+    host, stopped = read_or(("", True), "live", row.venue, lambda: _sender(row.document))
+    return LiveWatch(host, row.reported_at, stopped, cameras)
+
+
+def _sender(document: Any) -> tuple[str, bool]:
+    """Return the host of the process that sends live poses, and whether it has stopped."""
+    return document["host"], document.get("stopped", False)
 
 
 def watch_after(before: LiveWatch | None, report: LiveReport, now: datetime) -> LiveWatch:

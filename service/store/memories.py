@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import sqlalchemy as sa
 import structlog
+from pydantic import TypeAdapter
 
 from service.schemas.venue import Venue
 from service.store import tables
+from service.store.unreadable import read_or
 
 # A memory as the engine has written it; and those of a venue, by camera.
 Memory = dict[str, Any]
@@ -24,6 +27,7 @@ Memories = Mapping[str, Memory]
 KEPT = 4
 # As JSON. 32 cameras that remember as much as they can have this; what is larger is not what the engine writes.
 LARGEST_BYTES = 8 * 1024 * 1024
+MEMORIES: TypeAdapter[Memories] = TypeAdapter(dict[str, Memory])
 m = tables.memories.c
 log = structlog.get_logger()
 
@@ -31,13 +35,18 @@ log = structlog.get_logger()
 def newest_memories(connection: sa.Connection, venue_id: str) -> Memories:
     """The memories that hold now, {} if there are none."""
     query = sa.select(m.document).where(m.venue == venue_id).order_by(m.revision.desc()).limit(1)
-    return connection.scalar(query) or {}
+    return _memories_in(venue_id, connection.scalar(query))
 
 
 def memories_at(connection: sa.Connection, venue_id: str, revision: int) -> Memories:
     """The memories that came with a revision, {} if none did or if they are kept no more."""
     query = sa.select(m.document).where(m.venue == venue_id, m.revision == revision)
-    return connection.scalar(query) or {}
+    return _memories_in(venue_id, connection.scalar(query))
+
+
+def revisions_with_memories(connection: sa.Connection, venue_id: str) -> set[int]:
+    """Return the revisions of a venue whose memories are kept."""
+    return set(connection.scalars(sa.select(m.revision).where(m.venue == venue_id)))
 
 
 def keep_memories(connection: sa.Connection, venue_id: str, revision: int, memories: Memories) -> None:
@@ -60,6 +69,11 @@ def without_those_that_changed(memories: Memories, before: Venue, after: Venue) 
     stood = {camera.id: camera for camera in before.poses_and_lenses}
     same = {camera.id for camera in after.poses_and_lenses if stood.get(camera.id) == camera}
     return {camera: memory for camera, memory in memories.items() if camera in same}
+
+
+def _memories_in(venue_id: str, document: Any) -> Memories:
+    """Return the memories of a column, {} where it has none or cannot be read: they begin anew."""
+    return read_or({}, "memory", venue_id, partial(MEMORIES.validate_python, document or {}))
 
 
 def _unless_too_large(venue_id: str, memories: Memories) -> Memories:

@@ -6,7 +6,9 @@ computes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass
 from datetime import datetime
 from types import SimpleNamespace
 from typing import Any, get_args
@@ -14,7 +16,7 @@ from typing import Any, get_args
 import sqlalchemy as sa
 
 from service.schemas.actor import Actor
-from service.schemas.base import TOLERANTLY
+from service.schemas.base import TOLERANTLY, Unreadable
 from service.schemas.events.venue_event import Poses
 from service.schemas.field import FieldOfPlay
 from service.schemas.geometry import Movement, PosedCamera
@@ -23,10 +25,11 @@ from service.schemas.names import FieldNumber
 from service.schemas.venue import Camera, Venue
 from service.store import tables
 from service.store.actors import actor_in, columns_of
-from service.store.documents import to_document
+from service.store.documents import Document, to_document
 from service.store.events.event_log import add_event
 from service.store.statistics.venue_quality import VenueQuality
 from service.store.trends import begin_anchors, go_back
+from service.store.unreadable import MISSHAPEN, UnreadableRow, read_each, reading_row
 
 r = tables.revisions.c
 # Whose poses hold, or held.
@@ -36,8 +39,19 @@ JOB_CAUSES: tuple[Cause, ...] = (*CALIBRATION_CAUSES, "found")
 PLACED_CAUSES: tuple[Cause, ...] = ("put", "found")
 FIELD_NUMBERS: tuple[FieldNumber, ...] = get_args(FieldNumber)
 NUMBERS_BESIDE_RIDGE: tuple[FieldNumber, ...] = ("length_m", "width_m")
+# Revisions that are tried, the newest: more are read only for a person who asks.
+MOST_SALVAGED = 100
 # Numbers of a field that revisions have changed: `NumberChange` by name, with the number of the revision.
 Changes = Sequence[tuple[int, dict[str, dict[str, float]]]]
+
+
+@dataclass(frozen=True)
+class RevisionPage:
+    """Revisions of a page, newest first, those that cannot be read, and the number that the next page is before."""
+
+    revisions: list[Revision]
+    unreadable: list[Unreadable]
+    next_cursor: int | None
 
 
 class NoSuchRevision(Exception):  # noqa: N818
@@ -66,7 +80,8 @@ def add_revision(
     """
     before, at = _newest_row_by(connection, quality), quality.now
     number = 1 if before is None else before.number + 1
-    movements = _movements(connection, venue, number, before, cause, restored)
+    last = _cameras_or_none(before)
+    movements = _movements(connection, venue, number, before, last, cause, restored)
     row = {
         "venue": venue.id,
         "number": number,
@@ -83,7 +98,7 @@ def add_revision(
     }
     connection.execute(sa.insert(tables.revisions).values(**row))
     quality.newest_revision = SimpleNamespace(**row)
-    changed = _changed(venue, _cameras(before))
+    changed = _changed(venue, last)
     if restored is not None:
         go_back(connection, venue, restored.revision)
     elif cause in (*PLACED_CAUSES, "adopted"):
@@ -123,12 +138,29 @@ def revision_at(connection: sa.Connection, venue_id: str, number: int) -> dateti
     return at
 
 
-def revisions_of(connection: sa.Connection, venue_id: str, before: int | None, limit: int) -> list[Revision]:
-    """Up to `limit` revisions, newest first, those before number `before`."""
-    query = sa.select(tables.revisions).where(r.venue == venue_id).order_by(r.number.desc()).limit(limit)
+def revisions_of(connection: sa.Connection, venue_id: str, before: int | None, limit: int) -> RevisionPage:
+    """Return up to `limit` revisions, newest first, those before number `before`."""
+    query = sa.select(tables.revisions).where(r.venue == venue_id).order_by(r.number.desc()).limit(limit + 1)
     if before is not None:
         query = query.where(r.number < before)
-    return [_revision(row) for row in connection.execute(query)]
+    rows = connection.execute(query).all()
+    revisions, unreadable = read_each(rows[:limit], _revision)
+    return RevisionPage(revisions, unreadable, rows[limit - 1].number if len(rows) > limit else None)
+
+
+def documents_as_of_revisions(connection: sa.Connection, venue_id: str, document: Any) -> Iterator[Document]:
+    """Yield the document of a venue with the poses, lenses and ridge of its revisions, the newest first.
+
+    Revisions that do not go with it are passed over.
+    """
+    query = sa.select(r.cameras, r.ridge).where(r.venue == venue_id).order_by(r.number.desc()).limit(MOST_SALVAGED)
+    for row in connection.execute(query):
+        with suppress(*MISSHAPEN):
+            then = {
+                camera["id"]: {"pose": camera["pose"], "intrinsics": camera["intrinsics"]} for camera in row.cameras
+            }
+            cameras = [camera | then[camera["id"]] for camera in document["cameras"]]
+            yield document | {"cameras": cameras, "field": document["field"] | {"ridge": row.ridge}}
 
 
 def origin_of(connection: sa.Connection, venue_id: str, revision: Revision) -> Revision:
@@ -137,7 +169,7 @@ def origin_of(connection: sa.Connection, venue_id: str, revision: Revision) -> R
     Of one that has expired its last restoration stands for it.
     """
     while revision.restored_from is not None:
-        restored = revisions_of(connection, venue_id, revision.restored_from + 1, 1)
+        restored = revisions_of(connection, venue_id, revision.restored_from + 1, 1).revisions
         if not restored or restored[0].revision != revision.restored_from:
             break
         revision = restored[0]
@@ -187,13 +219,13 @@ def revisions_that_fit(connection: sa.Connection, venue: Venue, numbers: Collect
 def _fits(venue: Venue, row: Any, changes: Changes) -> bool:
     try:
         _state_of(venue, row, changes)
-    except RevisionUnfit:
+    except (RevisionUnfit, UnreadableRow):
         return False
     return True
 
 
 def _state_of(venue: Venue, row: Any, changes: Changes) -> Venue:
-    cameras = [PosedCamera.model_validate(camera, **TOLERANTLY) for camera in row.cameras]
+    cameras = list(_cameras(row).values())
     then, now = ({camera.id: camera.image_size for camera in some} for some in (cameras, venue.cameras))
     if then != now:
         raise RevisionUnfit(f"It has the cameras {_in_words(then)}, and the venue now has {_in_words(now)}.")
@@ -247,10 +279,15 @@ def _with_state(
 
 
 def _movements(
-    connection: sa.Connection, venue: Venue, number: int, before: Any, cause: Cause, restored: Revision | None
+    connection: sa.Connection,
+    venue: Venue,
+    number: int,
+    before: Any,
+    last: dict[str, PosedCamera],
+    cause: Cause,
+    restored: Revision | None,
 ) -> dict[str, Movement]:
-    last = _cameras(before)
-    since = {camera: movement["drift_since"] for camera, movement in before.movements.items()} if before else {}
+    since = {camera: before.movements[camera]["drift_since"] for camera in last}
     if restored is not None:
         since = {camera.id: camera.drift_since for camera in restored.cameras}
     for camera in venue.cameras:
@@ -298,17 +335,36 @@ def _newest_row(connection: sa.Connection, venue_id: str) -> Any:
 
 
 def _cameras_at(connection: sa.Connection, venue_id: str, number: int) -> dict[str, PosedCamera]:
-    query = sa.select(r.cameras).where(r.venue == venue_id, r.number == number)
-    return _cameras(connection.execute(query).one())
+    query = sa.select(tables.revisions).where(r.venue == venue_id, r.number == number)
+    return _cameras_or_none(connection.execute(query).one_or_none())
+
+
+def _cameras_or_none(row: Any) -> dict[str, PosedCamera]:
+    """Return how the cameras stood at a revision, {} where there is none or it cannot be read: what comes goes on."""
+    try:
+        return {} if row is None else _cameras(row)
+    except UnreadableRow:
+        return {}
 
 
 def _cameras(row: Any) -> dict[str, PosedCamera]:
-    if row is None:
-        return {}
-    return {camera["id"]: PosedCamera.model_validate(camera, **TOLERANTLY) for camera in row.cameras}
+    with _reading(row):
+        cameras = [PosedCamera.model_validate(camera, **TOLERANTLY) for camera in row.cameras]
+        for camera in cameras:
+            Movement.model_validate(row.movements[camera.id], **TOLERANTLY)
+        return {camera.id: camera for camera in cameras}
+
+
+def _reading(row: Any) -> AbstractContextManager[None]:
+    return reading_row("revision", f"{row.venue}/{row.number}")
 
 
 def _revision(row: Any) -> Revision:
+    with _reading(row):
+        return Revision.model_validate(_revision_values(row), **TOLERANTLY)
+
+
+def _revision_values(row: Any) -> dict[str, Any]:
     names = ("at", "cause", "job", "restored_from", "stitch_error_px", "ridge")
     cameras = [{"id": camera["id"], "pose": camera["pose"], **row.movements[camera["id"]]} for camera in row.cameras]
     values = {
@@ -317,7 +373,7 @@ def _revision(row: Any) -> Revision:
         "by": actor_in(row),
         "field_numbers": row.field_numbers or {},
     }
-    return Revision.model_validate(values | {name: getattr(row, name) for name in names}, **TOLERANTLY)
+    return values | {name: getattr(row, name) for name in names}
 
 
 def _in_words(sizes: dict[str, list[int]]) -> str:

@@ -14,7 +14,6 @@ from typing import Any
 import sqlalchemy as sa
 
 from service.control_charts import Baseline
-from service.schemas.base import TOLERANTLY
 from service.schemas.geometry import PosedCamera
 from service.schemas.results import CameraResult
 from service.schemas.trend import Anchor, Displacement, Trend, TrendState
@@ -23,6 +22,7 @@ from service.store import tables
 from service.store.database import Repository, reading
 from service.store.documents import to_document
 from service.store.trend_charts import ALARM_M, CameraCharts, state_of
+from service.store.unreadable import read_or, read_values
 
 KEPT_ROWS = 1100
 """Of each camera: three years of nights."""
@@ -66,10 +66,10 @@ def alarm_m_of(venue: Venue) -> float:
 def anchors_of(connection: sa.Connection, venue_id: str) -> dict[str, Anchor]:
     """What to compare cameras with, by camera, of those that have had a pose accepted since they were put."""
     newest = _newest_anchors(connection, venue_id)
+    posed = {camera: row.posed for camera, row in newest.items() if row.posed is not None}
     return {
-        camera: Anchor(revision=row.revision, posed=PosedCamera.model_validate(row.posed, **TOLERANTLY))
-        for camera, row in newest.items()
-        if row.posed is not None
+        camera: Anchor(revision=newest[camera].revision, posed=anchor)
+        for camera, anchor in read_values(PosedCamera, posed, "trend", venue_id).items()
     }
 
 
@@ -275,7 +275,7 @@ def _trend(venue: Venue, camera: str, anchor: Any, rows: Sequence[Any], since: d
 
 
 def _baselines(anchor: Any) -> Mapping[str, Baseline]:
-    return {quantity: Baseline(**numbers) for quantity, numbers in anchor.baselines.items()}
+    return read_or({}, "trend", anchor.venue, lambda: {key: Baseline(**one) for key, one in anchor.baselines.items()})
 
 
 def _rows(connection: sa.Connection, venue_id: str, cameras: Collection[str]) -> dict[str, list[Any]]:

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 from service import child_process
+from service.schemas.rotation import rotate
 
 JPEG = b"\xff\xd8\xff\xd9"
 # Where cameras end, of the way from the middle of the pitch to where they were. Their translation shrinks alike.
@@ -120,6 +121,8 @@ def main() -> None:
             "options": task["options"],
         },
     }
+    if behaviour == "impossible":
+        common["cameras"][0]["pose"] = pose_at([1.6, 0.1, -0.2], [5000.0, -50.0, 8.0])
     if task["kind"] == "field":
         field = task["venue"]["field"] | {"length_m": 104.25}
         done(common | {"field": field, "measures": MEASURES}, pictures[2:])
@@ -211,7 +214,7 @@ def refined(camera: dict, memories: dict) -> dict:
     x, y, z = pose["position"]
     return {
         "refined": {
-            "pose": {"rotation": pose["rotation"], "position": [x, y, z + 0.02], "translation": pose["translation"]},
+            "pose": pose_at(pose["rotation"], [x, y, z + 0.02]),
             "intrinsics": {
                 "matrix": [[1.001 * fx, skew, cx], [0, 1.001 * fy, cy], last],
                 "distortion": [0, 0, 0, 0],
@@ -256,17 +259,25 @@ def contradicted(field: dict) -> dict:
 def found(camera: dict, anchor: dict | None, *, accepted: bool, nearer: float = NEARER, turned: float = 0) -> dict:
     pose = camera["pose"]
     first, *others = pose["rotation"]
-    moved = {place: [nearer * component for component in pose[place]] for place in ("position", "translation")}
+    position = [nearer * component for component in pose["position"]]
     return {
         "id": camera["id"],
         "accepted": accepted,
         "rejected_because": None if accepted else "the lines do not fit",
-        "pose": pose | moved | {"rotation": [first + turned, *others]},
+        "pose": pose_at([first + turned, *others], position),
         "sigma": None,
         "moved": {"rotation_deg": 0, "position_m": 6.4, "pixels": 1.0},
         "iou": 0.9,
         "residual_px": 1.0,
         "displacement": DISPLACEMENT | {"anchor": anchor and anchor["revision"]},
+    }
+
+
+def pose_at(rotation: list[float], position: list[float]) -> dict:
+    return {
+        "rotation": rotation,
+        "position": position,
+        "translation": [-component for component in rotate(rotation, position)],
     }
 
 

@@ -111,7 +111,7 @@ def test_the_queue_takes_no_more_than_its_limit_however_many_come_at_once(stock,
 
     with ThreadPoolExecutor(crowd) as pool:
         assert sum(pool.map(submit, range(crowd))) == LIMIT
-    assert [job.status for job in stock.jobs.page(JobPage(100))] == ["queued"] * LIMIT
+    assert [job.status for job in stock.jobs.page(JobPage(100)).jobs] == ["queued"] * LIMIT
 
 
 @on_servers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from service.store.unreadable import UnreadableRow
 from service.store.venues import VenueRepository
 
 POLL_S = 5.0
@@ -19,5 +20,9 @@ class AlarmTimer:
         """Settle the alarms of the venues that are due; return the seconds until the next poll."""
         due = self._venues.with_alarms_due(BATCH)
         for venue in due:
-            self._venues.update_alarms(venue)
+            try:
+                self._venues.update_alarms(venue)
+            except UnreadableRow:
+                # Logged where it was read. The others must not wait for it.
+                self._venues.postpone_alarms(venue)
         return 0.0 if len(due) == BATCH else POLL_S

@@ -27,6 +27,7 @@ from service.settings import Settings
 from service.store.jobs.submission import QueueFull, SubmissionRefused, SubmissionRepository, VenueBusy, VenueReplaced
 from service.store.jobs.task import SCHEDULE, Origin
 from service.store.schedules import Due, Firing, ScheduleRepository
+from service.store.unreadable import UnreadableRow
 from service.store.venues import VenueRepository
 from worker.duties.clock_watch import ClockWatch
 from worker.duties.reachability import HostReachability
@@ -116,11 +117,13 @@ class Scheduler:
 
     def _fire(self, firing: Firing, *, slow: bool) -> None:
         with structlog.contextvars.bound_contextvars(venue=firing.venue_id):
-            venue = self._venues.get(firing.venue_id)
-            if venue is None or venue.schedule is None:
-                return
             try:
+                venue = self._venues.get(firing.venue_id)
+                if venue is None or venue.schedule is None:
+                    return
                 job = self._job(firing, venue, venue.schedule, slow=slow)
+            except UnreadableRow as unreadable:
+                self._schedules.done(firing, self._schedules.now(), None, f"The {unreadable}.")
             except TooSlowError:
                 self._schedules.postpone(firing, self._schedules.now(), "Its cameras are slow or silent.")
                 log.info("schedule goes to the slow lane")

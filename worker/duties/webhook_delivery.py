@@ -21,6 +21,7 @@ from service.settings import Settings
 from service.store.events.feed import EventRepository
 from service.store.events.outbox import Delivery, OutboxRepository
 from service.store.jobs.queries import JobRepository
+from service.store.unreadable import UnreadableRow
 from worker.duties import webhook_request
 from worker.duties.clock_watch import ClockWatch
 from worker.duties.thread_pool import BoundedThreadPool
@@ -84,12 +85,16 @@ class WebhookDelivery:
         self._senders.wait_all()
 
     def _attempt(self, delivery: Delivery) -> None:
-        told = self._event(delivery)
+        unreadable = None
+        try:
+            told = self._event(delivery)
+        except UnreadableRow as error:
+            told, unreadable = None, error
         with structlog.contextvars.bound_contextvars(
             **_names(delivery, told), receiver=delivery.receiver, attempt=delivery.attempt
         ):
             if told is None:
-                self._give_up(delivery, "what was to be told is no longer kept")
+                self._give_up(delivery, f"the {unreadable}" if unreadable else "what was to be told is no longer kept")
                 return
             try:
                 answer = self._send(delivery, told.model_dump_json().encode())

@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 from service.api.body_limit import is_form
 from service.api.problems import not_json
 from service.routes.contract import restricted
+from service.routes.contract.attribution import caller_key
 from service.routes.contract.documented import KEY_SCHEME, problem_responses
 from service.schemas.names import Scope
 
@@ -42,6 +43,7 @@ class Guarded(APIRoute):
 
         async def guarded(request: Request) -> Response:
             request.state.key = key = await request.app.state.context.authenticator.admit(request, needed)
+            caller_key.set(key)
             if key is not None:
                 request.state.origin = replace(request.state.origin, asked_by=f"key {key.name}")
                 await restricted.check(request, key, lists=lists)

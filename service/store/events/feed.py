@@ -18,6 +18,7 @@ from service.store.actors import actor_in
 from service.store.database import Repository, reading
 from service.store.jobs.queries import jobs_of
 from service.store.revisions import newest_revision
+from service.store.unreadable import read_each, reading_row
 from service.store.venues import find_venue
 
 e = tables.events.c
@@ -100,13 +101,15 @@ class EventRepository(Repository):
 
 
 def _numbered_events(connection: sa.Connection, rows: Sequence[Any]) -> list[NumberedEvent]:
-    """Those of jobs that were deleted meanwhile are left out."""
+    """Return the events of rows; those that cannot be read, or whose jobs were deleted meanwhile, are left out."""
     jobs = jobs_of(connection, {row.job for row in rows if row.job})
-    return [NumberedEvent(row.id, _event(row, jobs)) for row in rows if row.job is None or row.job in jobs]
+    kept = [row for row in rows if row.job is None or row.job in jobs]
+    return read_each(kept, lambda row: NumberedEvent(row.id, _event(row, jobs)))[0]
 
 
 def _event(row: Any, jobs: Mapping[str, Job]) -> Event:
     # A job that ended is read now; one that was queued is told as it was then, unless an earlier release wrote the row.
     data = jobs[row.job].model_copy(update={"callback": None}) if row.data is None else row.data
     values = {"type": row.type, "timestamp": row.at, "data": data, "by": actor_in(row)}
-    return EVENT.validate_python(values, **TOLERANTLY)
+    with reading_row("event", str(row.id)):
+        return EVENT.validate_python(values, **TOLERANTLY)

@@ -32,7 +32,7 @@ from service.store.silence import unheard_for
 from service.store.statistics.camera_history import last_accepted_views
 from service.store.statistics.venue_quality import VenueQuality, update_quality
 from service.store.trends import anchors_of
-from service.store.venues import apply_result, find_stored, find_venue, venue_lock
+from service.store.venues import apply_result, find_readable, find_stored, venue_lock
 
 # Job, priority and kind, into the queue in the caller's transaction.
 Enqueue = Callable[[sa.Connection, str, int, JobKind], None]
@@ -253,7 +253,7 @@ def end_without_result(connection: sa.Connection, job_id: str, still: Still, err
         advisory_lock(connection, venue_lock(row.venue))
     if not _locked(connection, still):
         return False
-    venue = find_venue(connection, row.venue) if brought_none else None
+    venue = find_readable(connection, row.venue) if brought_none else None
     with nullcontext() if row.venue is None else update_quality(connection, row.venue) as quality:
         if venue is not None and quality is not None:
             # Alarms are counted before ends wherever both are, so that no two transactions wait for each other.

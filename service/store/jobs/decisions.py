@@ -21,7 +21,16 @@ from service.store.memories import Memories, newest_memories
 from service.store.revisions import CALIBRATION_CAUSES, newest_revision, revision_before, revision_of_job
 from service.store.statistics.venue_quality import update_quality
 from service.store.trends import note_night
-from service.store.venues import apply_result, find_stored, find_venue, restore_state, venue_lock, with_result
+from service.store.venues import (
+    apply_result,
+    faults_of,
+    find_readable,
+    find_replaceable,
+    find_stored,
+    restore_state,
+    venue_lock,
+    with_result,
+)
 
 j = tables.jobs.c
 
@@ -60,13 +69,14 @@ class DecisionRepository(Repository):
             if found is None:
                 return OpenDecisions(frozenset(), reject=False)
             began_with, result = found
-            venue, newest = find_venue(connection, began_with.id), newest_revision(connection, began_with.id)
-            if venue is None or newest is None:
-                return OpenDecisions(frozenset(), reject=False)
-            taken = _was_taken(job_id, newest)
+            newest = newest_revision(connection, began_with.id)
+            taken, venue = _was_taken(job_id, newest), find_readable(connection, began_with.id)
+            if venue is None:
+                return OpenDecisions(frozenset(), reject=taken)
             if not _untouched(venue, began_with, result, taken=taken):
                 return OpenDecisions(frozenset(), taken, is_outdated=not taken)
-            return OpenDecisions(_not_taken(venue, result), reject=taken)
+            refused_for = faults_of(with_result(venue, result))
+            return OpenDecisions(frozenset() if refused_for else _not_taken(venue, result), reject=taken)
 
     def cancel(self, job_id: str, by: Actor | None = None) -> None:
         """End a job that is still open; its worker notices."""
@@ -82,7 +92,7 @@ class DecisionRepository(Repository):
 
         If they hold by themselves, a person now says so too: the trends of the cameras begin anew with them.
         `cameras`: only theirs, None: those of all. Raises `VenueHasChanged` if the venue is neither as the calibration
-        began with it nor as it left it, `NoPoses` if it found none.
+        began with it nor as it left it, `NoPoses` if it found none, `VenueRefused` if no venue can have them.
         """
         with writing(self._engine) as connection:
             began_with, result, newest = _found(connection, job_id)
@@ -121,11 +131,11 @@ class DecisionRepository(Repository):
             if newest.job != job_id or newest.cause == "adopted":
                 raise VenueHasChanged(newest)
             if newest.cause in CALIBRATION_CAUSES:
-                stored = find_stored(connection, began_with.id)
+                stored = find_replaceable(connection, began_with.id)
                 assert stored is not None
                 before = revision_before(connection, began_with.id, job_id)
                 with update_quality(connection, began_with.id) as quality:
-                    restored = restore_state(connection, quality, stored, before, by, job_id)
+                    restored, _ = restore_state(connection, quality, stored, before, by, job_id)
                     update_alarms(connection, quality, restored)
                 _touch(connection, job_id)
 

@@ -6,6 +6,7 @@ Whoever ends a job of a venue is serialised about the venue from the beginning.
 from __future__ import annotations
 
 from datetime import datetime
+from functools import partial
 from typing import Any
 
 import sqlalchemy as sa
@@ -26,6 +27,7 @@ from service.store.jobs.task import stored_options
 from service.store.statistics import counters
 from service.store.statistics.job_outcome import JobOutcome
 from service.store.statistics.venue_quality import VenueQuality
+from service.store.unreadable import read_or
 
 # What must still hold of a row when it is written.
 Still = list[sa.ColumnElement[bool]]
@@ -65,13 +67,18 @@ def end_job(
     if isinstance(options, Options) and quality is not None:
         quality.ended(status, result, dry_run=options.dry_run)
     if row.venue is not None:
-        told = [Webhook.model_validate(webhook, **TOLERANTLY) for webhook in row.webhooks or ()]
+        nobody: list[Webhook] = []
+        told = read_or(nobody, "venue", row.venue, partial(_webhooks_in, row.webhooks))
         add_job_event(connection, row.venue, told, f"job.{status}", job_id, now, by)
     if options.callback_url is not None:
         add_delivery(connection, job_id, options.callback_url, now)
     ending = JobOutcome(row.kind, status, result, error, row.created_at, row.started_at, now, row.attempt)
     counters.add(connection, ending.tallies())
     return True
+
+
+def _webhooks_in(documents: Any) -> list[Webhook]:
+    return [Webhook.model_validate(webhook, **TOLERANTLY) for webhook in documents or ()]
 
 
 def still_open(job_id: str) -> Still:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import PurePath
@@ -10,7 +10,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas.base import TOLERANTLY
+from service.schemas.base import TOLERANTLY, Unreadable
 from service.schemas.find import SoughtSite
 from service.schemas.job import CallbackState, Job, JobSummary
 from service.schemas.names import JobKind, JobStatus
@@ -24,6 +24,7 @@ from service.store.events.outbox import deliveries_of
 from service.store.jobs.files import picture_address, picture_file, picture_folder
 from service.store.jobs.task import Origin
 from service.store.revisions import revisions_of_jobs
+from service.store.unreadable import read_each, reading_row
 from service.store.venues import with_result
 
 j = tables.jobs.c
@@ -89,8 +90,8 @@ class JobPage:
     only: Collection[str] | None = None
 
     def query(self, *columns: Any) -> sa.Select[Any]:
-        """Return the query for these columns of the page's jobs."""
-        query = sa.select(*columns).order_by(j.id.desc()).limit(self.limit)
+        """Return the query for these columns of the page's jobs, and of one more."""
+        query = sa.select(*columns).order_by(j.id.desc()).limit(self.limit + 1)
         if self.venue is not None:
             query = query.with_hint(*tables.BY_VENUE)
         for column, value in ((j.venue, self.venue), (j.status, self.status), (j.kind, self.kind)):
@@ -103,11 +104,21 @@ class JobPage:
         return query
 
 
+@dataclass(frozen=True)
+class FoundJobs:
+    """Jobs of a page, newest first, or a line of each; those of it that cannot be read; the last id of a full page."""
+
+    jobs: list[Job]
+    summaries: list[JobSummary]
+    unreadable: list[Unreadable]
+    next_cursor: str | None
+
+
 class JobRepository(Repository):
     """The jobs in the database."""
 
     def get(self, job_id: str) -> Job | None:
-        """One job as clients see it."""
+        """Return one job as clients see it; None: there is none. Raises `UnreadableRow`."""
         with reading(self._engine) as connection:
             try:
                 return read_job(connection, job_id)
@@ -119,12 +130,14 @@ class JobRepository(Repository):
         with reading(self._engine) as connection:
             return jobs_of(connection, job_ids)
 
-    def page(self, wanted: JobPage) -> list[Job]:
+    def page(self, wanted: JobPage) -> FoundJobs:
         """Return the jobs of a page, newest first."""
         with reading(self._engine) as connection:
-            return _jobs(connection, connection.execute(wanted.query(tables.jobs)).all())
+            rows, next_cursor = _rows_of(connection, wanted, tables.jobs)
+            jobs, unreadable = _jobs(connection, rows)
+            return FoundJobs(jobs, [], unreadable, next_cursor)
 
-    def summaries(self, wanted: JobPage) -> list[JobSummary]:
+    def summaries(self, wanted: JobPage) -> FoundJobs:
         """Return a line for each job of a page, newest first, without reading their results."""
         found = {
             "verdict": j.result["verdict"].as_string().label("verdict"),
@@ -132,8 +145,9 @@ class JobRepository(Repository):
         }
         columns = [found[name] if name in found else j[name] for name in JobSummary.model_fields]
         with reading(self._engine) as connection:
-            rows = connection.execute(wanted.query(*columns))
-            return [JobSummary.model_validate(dict(row._mapping), **TOLERANTLY) for row in rows]
+            rows, next_cursor = _rows_of(connection, wanted, *columns)
+        summaries, unreadable = read_each(rows, _summary)
+        return FoundJobs([], summaries, unreadable, next_cursor)
 
     def venue_of(self, job_id: str) -> str | None:
         """The id of the venue of a job; None: it belongs to none, or there is no such job."""
@@ -191,24 +205,26 @@ class JobRepository(Repository):
 
 
 def read_job(connection: sa.Connection, job_id: str) -> Job:
-    """One job as clients see it, which is there."""
-    return _jobs(connection, [connection.execute(ONE, {"job_id": job_id}).one()])[0]
+    """Return one job as clients see it, which is there. Raises `UnreadableRow`."""
+    row = connection.execute(ONE, {"job_id": job_id}).one()
+    return _reader(connection, [row])(row)
 
 
 def jobs_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, Job]:
-    """Those of several jobs that are there, as clients see them."""
+    """Return those of several jobs that are there and can be read, as clients see them."""
     rows = connection.execute(sa.select(tables.jobs).where(j.id.in_(job_ids))).all() if job_ids else []
-    return {job.id: job for job in _jobs(connection, rows)}
+    return {job.id: job for job in _jobs(connection, rows)[0]}
 
 
 def found_poses(connection: sa.Connection, job_id: str) -> tuple[Venue, Result] | None:
     """What a calibration began with and what it found; None: it found no poses (yet), or the job is no calibration."""
     done = [j.id == job_id, j.kind == "calibration", j.result.is_not(None)]
-    query = sa.select(j.venue_document, j.venue_additions, j.result, j.result_additions)
+    query = sa.select(j.id, j.venue_document, j.venue_additions, j.result, j.result_additions)
     row = connection.execute(query.where(*done)).one_or_none()
     if row is None:
         return None
-    return stored_venue(row.venue_document, row.venue_additions), stored_result(row.result, row.result_additions)
+    with reading_row("job", job_id):
+        return stored_venue(row.venue_document, row.venue_additions), stored_result(row.result, row.result_additions)
 
 
 def found_site(connection: sa.Connection, job_id: str) -> FoundSite | None:
@@ -216,12 +232,13 @@ def found_site(connection: sa.Connection, job_id: str) -> FoundSite | None:
     row = connection.execute(ONE, {"job_id": job_id}).one_or_none()
     if row is None or row.kind != "find" or not row.result:
         return None
-    result = FindResult.model_validate(join_additions(row.result, row.result_additions), **TOLERANTLY)
-    if row.site is not None:
-        return FoundSite(None, SoughtSite.model_validate(row.site, **TOLERANTLY), result)
-    venue = stored_venue(row.venue_document, row.venue_additions)
-    options = FindOptions.model_validate(row.options, **TOLERANTLY)
-    return FoundSite(venue, SoughtSite.of(venue, options, row.frames), result)
+    with reading_row("job", job_id):
+        result = FindResult.model_validate(join_additions(row.result, row.result_additions), **TOLERANTLY)
+        if row.site is not None:
+            return FoundSite(None, SoughtSite.model_validate(row.site, **TOLERANTLY), result)
+        venue = stored_venue(row.venue_document, row.venue_additions)
+        options = FindOptions.model_validate(row.options, **TOLERANTLY)
+        return FoundSite(venue, SoughtSite.of(venue, options, row.frames), result)
 
 
 def job_input_values(row: Any) -> dict[str, Any]:
@@ -237,31 +254,52 @@ def job_input_values(row: Any) -> dict[str, Any]:
     }
 
 
-def _jobs(connection: sa.Connection, rows: Sequence[Any]) -> list[Job]:
-    """What is known of them beside their rows is read of all at once."""
+def _rows_of(connection: sa.Connection, wanted: JobPage, *columns: Any) -> tuple[Sequence[Any], str | None]:
+    """Return the rows of a page, and the id that the next page is before; None: there is none."""
+    rows = connection.execute(wanted.query(*columns)).all()
+    return rows[: wanted.limit], rows[wanted.limit - 1].id if len(rows) > wanted.limit else None
+
+
+def _summary(row: Any) -> JobSummary:
+    with reading_row("job", row.id):
+        return JobSummary.model_validate(dict(row._mapping), **TOLERANTLY)
+
+
+def _jobs(connection: sa.Connection, rows: Sequence[Any]) -> tuple[list[Job], list[Unreadable]]:
+    return read_each(rows, _reader(connection, rows))
+
+
+def _reader(connection: sa.Connection, rows: Sequence[Any]) -> Callable[[Any], Job]:
+    """Return what makes a job of one of these rows; what is known of them beside their rows is read of all at once."""
     positions = _positions(connection, [row.id for row in rows if row.status == "queued"])
-    callbacks = deliveries_of(connection, [row.id for row in rows if row.finished_at and row.options["callback_url"]])
+    callbacks = deliveries_of(connection, [row.id for row in rows if row.finished_at and _calls_back(row.options)])
     taken = revisions_of_jobs(connection, [row.id for row in rows if row.kind in BRING_POSES and row.result])
-    return [_job(row, positions.get(row.id), callbacks.get(row.id), taken.get(row.id)) for row in rows]
+
+    def read(row: Any) -> Job:
+        with reading_row("job", row.id):
+            values = _job_values(row, positions.get(row.id), callbacks.get(row.id), taken.get(row.id))
+            return Job.model_validate(values, **TOLERANTLY)
+
+    return read
 
 
-def _job(row: Any, position: int | None, callback: CallbackState | None, revision: int | None) -> Job:
+def _calls_back(options: Any) -> bool:
+    return isinstance(options, dict) and options.get("callback_url") is not None
+
+
+def _job_values(row: Any, position: int | None, callback: CallbackState | None, revision: int | None) -> dict[str, Any]:
     columns = ("id", "kind", "venue", "status", "progress", "attempt", "error", "asked_by")
     moments = ("created_at", "started_at", "finished_at")
-    return Job.model_validate(
-        {name: getattr(row, name) for name in (*columns, *moments)}
-        | {
-            "queue_position": position,
-            "result": row.result and join_additions(row.result, row.result_additions),
-            "callback": callback,
-            # An address may be a secret, and how far its telling has come is said by `callback`.
-            "options": {name: value for name, value in row.options.items() if name != "callback_url"},
-            "frames": _frames(row),
-            "venue_revision": revision,
-            "links": _links(row),
-        },
-        **TOLERANTLY,
-    )
+    return {name: getattr(row, name) for name in (*columns, *moments)} | {
+        "queue_position": position,
+        "result": row.result and join_additions(row.result, row.result_additions),
+        "callback": callback,
+        # An address may be a secret, and how far its telling has come is said by `callback`.
+        "options": {name: value for name, value in row.options.items() if name != "callback_url"},
+        "frames": _frames(row),
+        "venue_revision": revision,
+        "links": _links(row),
+    }
 
 
 def _frames(row: Any) -> dict[str, list[str]]:

@@ -6,9 +6,10 @@ from datetime import datetime
 
 import sqlalchemy as sa
 
-from service.schemas.base import TOLERANTLY, Schema
+from service.schemas.base import Schema
 from service.schemas.results import View
 from service.store import tables
+from service.store.unreadable import read_values
 
 q = tables.venue_quality.c
 
@@ -32,7 +33,7 @@ class CameraHistory(Schema):
 def camera_histories(connection: sa.Connection, venue_id: str) -> dict[str, CameraHistory]:
     """Return the history of every camera that was ever calibrated, and maybe of some that the venue no longer has."""
     courses = connection.scalar(sa.select(q.cameras).where(q.venue == venue_id)) or {}
-    return {camera: CameraHistory.model_validate(course, **TOLERANTLY) for camera, course in courses.items()}
+    return read_values(CameraHistory, courses, "statistics", venue_id)
 
 
 def last_accepted_views(connection: sa.Connection, venue_id: str) -> dict[str, View]:

@@ -15,6 +15,7 @@ from service.schemas.names import OPEN_STATUSES, JobStatus, Verdict
 from service.store import tables
 from service.store.database import Repository, reading
 from service.store.revisions import CALIBRATION_CAUSES
+from service.store.unreadable import read_each, reading_row
 
 j = tables.jobs.c
 r = tables.revisions.c
@@ -59,7 +60,7 @@ class PastCalibrationRepository(Repository):
             .limit(limit)
         )
         with reading(self._engine) as connection:
-            return [_past(row) for row in connection.execute(query)]
+            return read_each(connection.execute(query), _past)[0]
 
     def newest_result(self, venue: str) -> str | None:
         """The job of a venue's newest calibration that has a result, accepted or not."""
@@ -102,7 +103,11 @@ class PastCalibrationRepository(Repository):
 
 
 def _past(row: Any) -> PastCalibration:
-    result = row.result or {}
+    with reading_row("job", row.id):
+        return _past_in(row, row.result or {})
+
+
+def _past_in(row: Any, result: dict[str, Any]) -> PastCalibration:
     return PastCalibration(
         job=row.id,
         status=row.status,

@@ -14,7 +14,6 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from service.schemas.base import TOLERANTLY
 from service.schemas.health import CalibrationEnd
 from service.schemas.names import JobStatus
 from service.schemas.results import AnyResult, Result
@@ -22,7 +21,8 @@ from service.store import tables
 from service.store.database import clock
 from service.store.documents import to_document
 from service.store.statistics.camera_history import CameraHistory
-from service.store.statistics.venue_summary import IN_CURVE, CalibrationSummary
+from service.store.statistics.venue_summary import IN_CURVE, CalibrationSummary, summary_in
+from service.store.unreadable import read_values
 
 q = tables.venue_quality.c
 v = tables.venues.c
@@ -137,9 +137,7 @@ def _known(row: Any) -> QualityRow:
         accepted_at=row.accepted_at,
         drift_px=row.drift_px,
         rejected_in_a_row=row.rejected_in_a_row,
-        courses={
-            camera: CameraHistory.model_validate(course, **TOLERANTLY) for camera, course in (row.cameras or {}).items()
-        },
-        glance=None if row.glance is None else CalibrationSummary.model_validate(row.glance, **TOLERANTLY),
+        courses=read_values(CameraHistory, row.cameras, "statistics", row.venue),
+        glance=summary_in(row),
         alarm_due_at=row.alarm_due_at,
     )

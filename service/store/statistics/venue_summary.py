@@ -6,6 +6,8 @@ It is put together when a calibration ends: a list of fifty venues would else re
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
+from typing import Any
 
 import sqlalchemy as sa
 from pydantic import Field
@@ -15,6 +17,7 @@ from service.schemas.health import Alarm, CalibrationEnd
 from service.store import tables
 from service.store.database import Repository, reading
 from service.store.documents import stored_alarm
+from service.store.unreadable import read_or
 
 IN_CURVE = 40
 q = tables.venue_quality.c
@@ -29,6 +32,14 @@ class CalibrationSummary(Schema):
     limit_px: float | None = None
 
 
+def summary_in(row: Any) -> CalibrationSummary | None:
+    """Return the summary in a row of `venue_quality`; None: there is none, or it cannot be read and begins anew."""
+    if row.glance is None:
+        return None
+    read = partial(CalibrationSummary.model_validate, row.glance, **TOLERANTLY)
+    return read_or(None, "statistics", row.venue, read)
+
+
 class VenueSummaryRepository(Repository):
     """The calibration summaries and active alarms of venues."""
 
@@ -36,10 +47,8 @@ class VenueSummaryRepository(Repository):
         """Return the summaries of venues that were ever calibrated, by venue."""
         query = sa.select(q.venue, q.glance).where(q.venue.in_(venues), q.glance.is_not(None))
         with reading(self._engine) as connection:
-            return {
-                row.venue: CalibrationSummary.model_validate(row.glance, **TOLERANTLY)
-                for row in connection.execute(query)
-            }
+            found = {row.venue: summary_in(row) for row in connection.execute(query)}
+        return {venue: summary for venue, summary in found.items() if summary is not None}
 
     def alarms(self, venues: Collection[str]) -> dict[str, list[Alarm]]:
         """Return the active alarms of venues, the oldest first, by venue."""

@@ -174,3 +174,47 @@ def test_an_exchanged_key_stays_good_for_the_grace_and_no_longer(tmp_path):
     assert {key.name: key.expired for key in keys_in(tmp_path).all()} == {"cron": False, "cron-old": True}
     assert esc("rotate", "nobody").returncode == 1
     assert esc("rotate", "cron", "--grace", "soon").returncode == 2
+
+
+def test_a_key_for_one_venue_learns_of_no_other_key_and_of_no_address(shared):
+    """Changes of others are told as those of another key, its own as they are; the owner sees all."""
+    own = shared.customer.patch(
+        f"/venues/{OURS}", content=b'{"name": "accept"}', headers={"Content-Type": "application/merge-patch+json"}
+    )
+    assert own.status_code == 200
+    job = shared.jobs[OURS]["id"]
+    told = {
+        path: shared.customer.get(path).text
+        for path in (
+            f"/venues/{OURS}/history",
+            "/jobs",
+            "/jobs?fields=summary",
+            f"/jobs/{job}",
+            f"/ui/jobs/{job}",
+            "/ui/jobs",
+        )
+    }
+    told["page"] = shared.customer.get(f"/ui/venues/{OURS}").text
+    told["events"] = first_events(shared.customer, OURS)
+    told["job events"] = shared.customer.get(f"/jobs/{job}/events").text
+    for path, text in told.items():
+        assert "key owner" not in text, path
+    others = [one["by"] for one in json.loads(told[f"/venues/{OURS}/history"])["revisions"]]
+    assert {"name": "another key", "address": None, "request_id": None} in others
+    assert {one["name"] for one in others} <= {"another key", "key customer"}
+    assert "another key" in told["events"]
+    assert "key customer" in told["events"]
+    by = shared.http.get(f"/venues/{OURS}/history").json()["revisions"][-1]["by"]
+    assert (by["name"], by["address"]) == ("key owner", "127.0.0.1")
+    assert shared.http.get(f"/jobs/{job}").json()["asked_by"] == "key owner"
+
+
+def first_events(client, venue_id):
+    """The stream of a venue from its beginning, up to the change that the customer made."""
+    read = ""
+    with client.stream("GET", f"/venues/{venue_id}/events", headers={"Last-Event-ID": "0"}) as stream:
+        for line in stream.iter_lines():
+            read += line
+            if "venue.changed" in read and "key customer" in read:
+                break
+    return read

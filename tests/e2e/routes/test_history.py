@@ -73,6 +73,14 @@ def test_a_rejected_result_is_accepted_by_hand_and_rejected_again(service, name)
     assert [r["cause"] for r in history(service, name).json()["revisions"]] == ["restored", "accepted", "put"]
 
 
+def test_a_pose_that_no_client_could_send_fails_its_job_at_once_in_words(service, name):
+    job = service.calibrated(service.venue(name, "impossible"))
+    assert (job["status"], job["attempt"], job["result"]) == ("failed", 1, None)
+    assert "position" in job["error"]["detail"]
+    assert "Nothing was stored." in job["error"]["detail"]
+    assert positions(service, name) == [-1.0, -1.0]
+
+
 def test_deciding_too_late_or_about_nothing_is_refused(service, name):
     job = service.calibrated(service.venue(name))["id"]
     service.calibrated(name, shade=1)

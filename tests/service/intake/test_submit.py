@@ -10,6 +10,7 @@ from service.api.context import Context
 from service.intake import submit
 from service.routes.submissions import frames, job_submission, resubmit
 from service.routes.submissions.job_submission import Sender
+from service.schemas.geometry import Pose
 from service.schemas.options import Options
 from service.schemas.problems import Problem
 from service.schemas.venue import VenueIn
@@ -57,10 +58,10 @@ def refused(context, read, form):
 
 
 def test_a_job_begins_from_the_poses_that_were_found_during_the_upload(context, read, form):
-    moved = read.cameras[0].pose.model_copy(update={"position": [0.0, -60.0, 9.0]})
+    moved = Pose.from_position(read.cameras[0].pose.rotation, [0.0, -60.0, 9.0])
     context.venues.put(read.with_poses({"left": moved}), lambda _: None)
     assert frames.submit(context, read, form, Options, Sender(None, Origin())).status_code == 202
-    (job,) = context.jobs.page(JobPage(10, venue="v"))
+    (job,) = context.jobs.page(JobPage(10, venue="v")).jobs
     assert context.attempts.begin(job.id).venue == context.venues.get("v")
 
 
@@ -137,12 +138,14 @@ def test_what_is_already_a_job_is_answered_with_it_though_the_queue_is_full(cont
 
 def test_frames_that_are_submitted_again_are_copied_by_the_store(context, read, form, monkeypatch):
     frames.submit(context, read, form, Options, Sender(None, Origin()))
-    (first,) = context.jobs.page(JobPage(10, venue="v"))
+    (first,) = context.jobs.page(JobPage(10, venue="v")).jobs
     context.decisions.cancel(first.id)
     with monkeypatch.context() as patch:
         patch.setattr(context.blobs, "get", lambda path: pytest.fail(f"{path} was downloaded"))
         assert resubmit.submit(context, first, Origin()).status_code == 202
-    old, new = (context.submissions.of(job.id).frames for job in (first, context.jobs.page(JobPage(1, venue="v"))[0]))
+    old, new = (
+        context.submissions.of(job.id).frames for job in (first, context.jobs.page(JobPage(1, venue="v")).jobs[0])
+    )
     assert old.keys() == new.keys()
     for camera, paths in new.items():
         assert [context.blobs.get(path) for path in paths] == [png()] == [context.blobs.get(old[camera][0])]
@@ -176,7 +179,7 @@ def test_frames_that_were_fetched_once_are_not_what_the_cameras_show_now(context
     with pytest.raises(VenueBusy):
         fetched("schedule-1")
     # Once more of the same frames is the job that computes them.
-    (second, _) = context.jobs.page(JobPage(10, venue="v"))
+    (second, _) = context.jobs.page(JobPage(10, venue="v")).jobs
     assert resubmit.submit(context, second, Origin()).status_code == 200
 
 
@@ -202,11 +205,11 @@ def test_a_password_goes_to_the_source_that_it_was_put_with(context, read, monke
 
 def test_frames_that_are_gone_from_the_store_become_no_job(context, read, form):
     frames.submit(context, read, form, Options, Sender(None, Origin()))
-    (first,) = context.jobs.page(JobPage(10, venue="v"))
+    (first,) = context.jobs.page(JobPage(10, venue="v")).jobs
     context.decisions.cancel(first.id)
     (left, *_) = context.submissions.of(first.id).frames["left"]
     context.blobs.delete_under(left.rpartition("/")[0])
     with pytest.raises(Problem, match="send new ones"):
         resubmit.submit(context, first, Origin())
-    assert len(context.jobs.page(JobPage(10, venue="v"))) == 1
+    assert len(context.jobs.page(JobPage(10, venue="v")).jobs) == 1
     assert {path.split("/")[1] for path in files(context.settings.home_blob_url)} == {first.id}

@@ -57,7 +57,7 @@ LEFT = ("cameras", 0)
         (
             (*LEFT, "pose", "position", 1),
             -4949.0,
-            "cameras.left.pose.position.1: expected -2000 m or more, came -4949.0; it is in metres: are these "
+            "cameras.left.pose.position.1: expected -3466 m or more, came -4949.0; it is in metres: are these "
             "centimetres or millimetres?",
         ),
         ((*LEFT, "pose"), "there", "cameras.left.pose: expected an object, came 'there'"),

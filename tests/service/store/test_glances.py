@@ -52,7 +52,7 @@ def test_the_list_asks_as_often_for_many_venues_as_for_one(stock):
         stock.venues.put(stock.venue(name).model_copy(update={"alarms": rules}), anyway)
         stock.calibrated(name, accepted=name == "w")
     active = stock.submitted("w")
-    venues = stock.venues.page(None, 10)
+    venues = stock.venues.page(None, 10).venues
     asked = []
     sa.event.listen(stock.engine, "before_cursor_execute", lambda *arguments: asked.append(arguments[2]))
     one = venue_rows(stock, venues[1:2])

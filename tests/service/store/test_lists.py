@@ -84,7 +84,7 @@ def test_a_list_asks_no_question_for_each_of_its_jobs(stock):
         stock.calibrated(name, callback_url="https://example.com/")
         stock.submitted(name)
     with work_of(stock.engine) as work:
-        jobs = stock.jobs.page(JobPage(10))
+        jobs = stock.jobs.page(JobPage(10)).jobs
     assert len(work) == 4
     alone = [stock.jobs.get(job.id) for job in jobs]
     assert jobs == alone

@@ -10,6 +10,7 @@ from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
+from service.schemas.geometry import Pose
 from service.schemas.options import Board, IntrinsicsOptions, LocateOptions, Options
 from service.schemas.results import Result
 from service.schemas.venue import VENUE_EXAMPLE, VenueIn
@@ -30,7 +31,7 @@ NOON = datetime(2026, 11, 21, 12, tzinfo=UTC)
 VENUE = VenueIn.model_validate(VENUE_EXAMPLE).to_venue()
 DONE, WAITING = "01KAJ3Q6WZ5T3Y8R0N4M2C7B1D", "01KAJ3Q6WZ5T3Y8R0N4M2C7B1E"
 RECEIVER = "https://example.com/"
-FIRST_POSE = VENUE.cameras[0].pose.model_copy(update={"position": [-1.5, -49.5, 7.9]})
+FIRST_POSE = Pose.from_position(VENUE.cameras[0].pose.rotation, [-1.5, -49.5, 7.9])
 FRAMES = {"left": [f"frames/{WAITING}/left/0"]}
 RESULT = {
     "verdict": "accepted",
@@ -238,7 +239,7 @@ def test_an_upgraded_database_takes_new_rows(upgraded, revision):
         task = stores.attempts.begin(job.id)
         assert (task.venue, task.options) == (submission.venue, submission.options)
     # Numbers go on where those of the old rows ended.
-    moved = VENUE.cameras[0].pose.model_copy(update={"position": [0.0, -50.0, 9.0]})
+    moved = Pose.from_position(VENUE.cameras[0].pose.rotation, [0.0, -50.0, 9.0])
     stores.venues.put(VENUE.with_poses({"left": moved}), lambda _: None)
     held = stores.venues.history(VENUE.id, None, 10)
     assert [(revision.revision, revision.cause) for revision in held] == [(3, "put"), (2, "calibrated"), (1, "put")]

@@ -41,7 +41,7 @@ def test_frames_go_after_two_days_and_pictures_after_two_weeks(stock, retention)
     young = stock.ended("a", ago(days=1))
     retention.round(NOW)
     assert stock.files() == {f"pictures/{old}", f"pictures/{young}", f"frames/{young}"}
-    assert {job.id for job in stock.jobs.page(JobPage(10, venue="a"))} == {failed, old, older, young}
+    assert {job.id for job in stock.jobs.page(JobPage(10, venue="a")).jobs} == {failed, old, older, young}
 
 
 def test_frames_of_pictures_that_nobody_has_looked_at_stay_as_long_as_pictures(stock, retention):
@@ -121,7 +121,7 @@ def test_nothing_of_a_deleted_venue_is_kept_for_ever(stock, retention):
     stock.ended("a", ago(days=500))
     stock.venues.delete("a", lambda *_: None)
     retention.round(NOW)
-    assert (stock.jobs.page(JobPage(10, venue="a")), stock.files()) == ([], set())
+    assert (stock.jobs.page(JobPage(10, venue="a")).jobs, stock.files()) == ([], set())
 
 
 def test_open_jobs_are_never_touched_however_old(stock, retention, forgotten):
@@ -250,7 +250,7 @@ def test_two_rounds_at_once_do_no_harm(stock, retention):
     # What one could not delete because the other just did is looked at again.
     retention.round(NOW + TRY_AGAIN_AFTER)
     assert len(stock.files()) == 1
-    assert len(stock.jobs.page(JobPage(10, venue="a"))) == 2
+    assert len(stock.jobs.page(JobPage(10, venue="a")).jobs) == 2
     assert stock.expiry.leftovers(NOW + timedelta(days=1), 10) == []
 
 

@@ -77,7 +77,7 @@ def look(duty, times=1):
 
 
 def waiting(home):
-    return home.jobs.page(JobPage(100, status="queued"))
+    return home.jobs.page(JobPage(100, status="queued")).jobs
 
 
 @in_both_homes
@@ -133,6 +133,20 @@ def test_a_venue_that_is_being_calibrated_is_put_off_and_not_forgotten(home_of_s
     assert home.venues.health("v").schedule.last_error is None
 
 
+def test_a_venue_that_cannot_be_read_says_so_and_fires_again_at_its_next_time(home_of_schedules, duty):
+    home = home_of_schedules
+    for name in ("broken", "v"):
+        put(home, name)
+    all_due(home)
+    with home.engine.begin() as connection:
+        is_broken = tables.venues.c.id == "broken"
+        connection.execute(sa.update(tables.venues).where(is_broken).values(document={"id": "broken"}))
+    look(duty)
+    assert [job.venue for job in waiting(home)] == ["v"]
+    state = home.venues.health("broken").schedule
+    assert (state.next_at > home.schedules.now(), "cannot be read" in state.last_error) == (True, True)
+
+
 @in_both_homes
 def test_a_camera_that_gives_no_frame_is_a_job_that_failed(home_of_schedules, duty, monkeypatch):
     home = home_of_schedules
@@ -148,7 +162,7 @@ def test_a_camera_that_gives_no_frame_is_a_job_that_failed(home_of_schedules, du
     for minutes in (3, 2):
         all_due(home, minutes)
         look(duty)
-    last, first = home.jobs.page(JobPage(10, venue="v"))
+    last, first = home.jobs.page(JobPage(10, venue="v")).jobs
     assert (last.status, last.error.type, last.error.camera) == ("failed", "/problems/source-failed", "left")
     assert last.error.detail == home.venues.health("v").schedule.last_error == gone.detail
     assert home.venues.health("v").schedule.last_job == last.id != first.id
@@ -177,7 +191,7 @@ def test_a_time_that_failed_and_is_fired_again_is_the_same_job(home_of_schedules
     with home.engine.begin() as connection:
         connection.execute(sa.update(tables.schedules).values(look_at=tables.schedules.c.due_at))
     look(duty)
-    (job,) = home.jobs.page(JobPage(10, venue="v"))
+    (job,) = home.jobs.page(JobPage(10, venue="v")).jobs
     assert home.venues.health("v").schedule.last_job == job.id
 
 
@@ -299,7 +313,7 @@ def test_venues_whose_cameras_answer_do_not_wait_for_silent_ones(home_of_schedul
     given_up.set()
     while look_at_figures(home.engine, 1).schedules_late_s[1]:
         duty.poll()
-    assert sorted(job.venue for job in home.jobs.page(JobPage(100, status="failed"))) == sorted(silent)
+    assert sorted(job.venue for job in home.jobs.page(JobPage(100, status="failed")).jobs) == sorted(silent)
 
 
 @contextmanager

@@ -250,7 +250,7 @@ def test_the_job_says_how_far_the_telling_has_come(stock, receiver, clock):
     look(callbacks(home, clock))
     told = home.jobs.get(waiting).callback
     assert (told.state, told.attempts, told.next_attempt_at) == ("delivered", 2, None)
-    assert [job.callback for job in home.jobs.page(JobPage(10))] == [told]
+    assert [job.callback for job in home.jobs.page(JobPage(10)).jobs] == [told]
 
 
 @in_both_homes
@@ -455,7 +455,7 @@ def test_a_name_that_nobody_looks_up_holds_up_a_sender_for_seconds(stock, receiv
     resolver.set()
     assert time.monotonic() - begun < 30
     assert home.callbacks() == {"waiting": 1}
-    (told,) = home.jobs.page(JobPage(1))
+    (told,) = home.jobs.page(JobPage(1)).jobs
     assert told.callback.last_error == "lame.example cannot be looked up within 0.2 s"
 
 

@@ -9,10 +9,10 @@ from fields.template import load
 from tests.worker.calibration.synthetic import camera, moved
 from worker.calibration.detection.evidence import Evidence
 from worker.calibration.detection.line_measurement import Measurements
-from worker.calibration.refinement import priors
 from worker.calibration.geometry.field import Field
 from worker.calibration.geometry.ground import Ground
 from worker.calibration.geometry.visibility import VisibleLines
+from worker.calibration.refinement import priors
 from worker.calibration.refinement.estimate import Estimate, gauss_newton_step
 from worker.calibration.refinement.uncertainty import estimate_uncertainty
 from worker.calibration.refinement.unknowns import Unknowns

@@ -1,0 +1,21 @@
+"""Rotations without any library, for what must start at once."""
+
+from __future__ import annotations
+
+import math
+
+
+def rotate(rotation: list[float], vector: list[float]) -> list[float]:
+    """A vector turned by a Rodrigues vector (rad): Rodrigues' formula."""
+    angle = math.hypot(*rotation)
+    if angle == 0.0:
+        return list(vector)
+    ax, ay, az = (component / angle for component in rotation)
+    x, y, z = vector
+    cos, sin = math.cos(angle), math.sin(angle)
+    along = (ax * x + ay * y + az * z) * (1 - cos)
+    return [
+        x * cos + (ay * z - az * y) * sin + ax * along,
+        y * cos + (az * x - ax * z) * sin + ay * along,
+        z * cos + (ax * y - ay * x) * sin + az * along,
+    ]
