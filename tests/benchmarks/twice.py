@@ -1,0 +1,182 @@
+"""`make bench-truth ONLY=twice`: whether an answer vouches for the lens that it was found with.
+
+    python -m tests.benchmarks.twice --only measured
+    python -m tests.benchmarks.twice --only rendered --focals 4000
+
+A venue begins with what a search found through the lens that somebody gave, which may be too long. From there: its
+first jobs, a change of the field that forgets them (`patch`), a restore that drops them (`restore`), and the refined
+pose and lens of its last job stored in place of its own (`adopt`). Wrong is what is found or accepted beyond three of
+its sigmas, or 30 cm. Sections: `measured`, lines without pictures; `rendered`, pictures, the network, and a search for
+the camera.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from models import MODEL_PATH
+from tests.benchmarks.lenses import FARTHEST_M, FOCAL_LENGTHS, PITCH, SIGMAS, VIEWS, Seen, _lens, _seen, camera_of_view
+from tests.benchmarks.nights.simulated import SHARED_PX, Installation, Painted, SimulatedSight
+from tests.benchmarks.nights.single import LEAST_WRONG_M
+from tests.benchmarks.truth import apart
+from tests.demo.render import outdated
+from worker.calibration.calibrate import calibrate
+from worker.calibration.find_cameras import find_cameras
+from worker.calibration.gate.quality import CameraResult
+from worker.calibration.geometry.camera import Camera, Frame
+from worker.calibration.geometry.field import Field
+from worker.calibration.memory.camera_memory import CameraMemory
+from worker.calibration.records import Options
+from worker.calibration.refinement.refine import refine
+from worker.calibration.relocalisation.sought import SoughtCamera, SoughtLens
+
+TOO_LONG = (0.0, 0.003, 0.01, 0.02)
+"""By which part the focal length that is given is longer than the real one."""
+STEPS = ("find", "job", "job", "job", "patch", "restore", "adopt", "adopt")
+REPAINTED = replace(PITCH, line_width=0.121)
+"""A field whose lines are said to be a millimetre wider: what was remembered is of another field."""
+WIND_M, WIND_DEG, FOUND_M, FOUND_DEG = 0.005, 0.01, 0.02, 0.03
+NOISE = 2.5
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a step answered: its error and sigma (m), and whether it was accepted."""
+
+    error_m: float
+    sigma_m: float
+    accepted: bool
+
+    @classmethod
+    def of(cls, result: CameraResult, real: Camera) -> Answer:
+        """The answer of a job about a camera that is really there."""
+        sigma_m = np.inf if result.sigma is None else result.sigma.position_m
+        return cls(apart(result.camera, real)[0], sigma_m, result.accepted)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it was taken, and is farther off than it says, or than anything may be."""
+        beyond = self.error_m > SIGMAS * self.sigma_m + LEAST_WRONG_M
+        return self.accepted and (beyond or self.error_m > FARTHEST_M)
+
+
+def main() -> None:
+    """Run what is asked for and print it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    sections = {"measured": _measured, "rendered": _rendered}
+    parser.add_argument("--only", nargs="+", choices=sections, default=list(sections))
+    parser.add_argument("--focals", nargs="+", type=float, default=list(FOCAL_LENGTHS))
+    options = parser.parse_args()
+    for name in options.only:
+        print(f"\n## {name}\n", flush=True)
+        for line in _table(options.focals, sections[name]):
+            print(line, flush=True)
+
+
+def _table(focals: Sequence[float], life: Callable[[float, str, float], list[Answer]]) -> Iterator[str]:
+    yield "| given focal length too long by | step | answers | accepted | wrong | error, cm, most accepted | over sigma |"
+    yield "|---|---|---|---|---|---|---|"
+    for too_long in TOO_LONG:
+        lives = [life(focal, view, too_long) for focal in focals for view in VIEWS]
+        for step in dict.fromkeys(STEPS):
+            answers = [one for life in lives for one, name in zip(life, STEPS, strict=False) if name == step]
+            taken = [one for one in answers if one.accepted]
+            most = max((one.error_m for one in taken), default=0.0)
+            ratio = max((one.error_m / one.sigma_m for one in taken), default=0.0)
+            wrong = sum(one.wrong for one in answers)
+            yield f"| {too_long:.1%} | {step} | {len(answers)} | {len(taken)} | {wrong} | {100 * most:.1f} | {ratio:.1f} |"
+
+
+def _given(real: Camera, too_long: float) -> Camera:
+    return real.with_lens(_lens(real.intrinsics, {"focal": 1 / (1 + too_long) - 1}))
+
+
+def _measured(focal: float, view: str, too_long: float) -> list[Answer]:
+    rng = np.random.default_rng([41, int(focal), list(VIEWS).index(view)])
+    real = camera_of_view(focal, view, rng)
+    painted = Painted.drawn(PITCH, rng)
+    shared = SHARED_PX * rng.normal(size=(1, len(painted.lines)))
+
+    def tonight() -> SimulatedSight:
+        swayed = real.with_pose(outdated(real.pose, WIND_M, WIND_DEG, rng))
+        return SimulatedSight.of_night(painted, [swayed], shared, rng)
+
+    def night(field: Field, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
+        venue = Installation(field, [stored], [memory])
+        (result,) = venue.night(tonight())
+        return result, venue.memories[0]
+
+    begun = _given(real, too_long)
+    # As a search does it: from near the pose that suits the lens it is given, until nothing moves.
+    direction = real.pose.position - [*VIEWS[view][0], 0.0]
+    aside = outdated(replace(real.pose, position=real.pose.position + too_long * direction), FOUND_M, FOUND_DEG, rng)
+    found, sight = begun.with_pose(aside), tonight()
+    for _ in range(3):
+        (found,) = refine(PITCH, [found], sight, 0.5, stored=[found]).cameras
+    (result,) = Installation(PITCH, [found]).night(sight)
+    return [Answer.of(result, real), *_later(found, real, night)] if result.accepted else [Answer.of(result, real)]
+
+
+def _rendered(focal: float, view: str, too_long: float) -> list[Answer]:
+    seen: Seen = _seen(focal, view, 0)
+    (real,), rng = seen.scene.real, np.random.default_rng([43, int(focal), list(VIEWS).index(view)])
+    (frame,) = seen.scene.frames[real.id]
+    given = _given(real, too_long)
+
+    def tonight() -> Frame:
+        noisy = frame + np.float32(NOISE) * rng.standard_normal(frame.shape, dtype=np.float32)
+        return np.clip(noisy + 0.5, 0, 255).astype(np.uint8)
+
+    def night(field: Field, stored: Camera, memory: CameraMemory | None) -> tuple[CameraResult, CameraMemory | None]:
+        memories = {} if memory is None else {real.id: memory}
+        said = calibrate(field, [stored], {real.id: [tonight()]}, seen.segmenter, Options(), memories=memories)
+        return said.cameras[0], said.memories.get(real.id, memory)
+
+    sought = SoughtCamera(real.id, [SoughtLens.known(given.intrinsics)])
+    found = find_cameras(PITCH, [sought], [], {real.id: [tonight()]}, seen.segmenter, 0).cameras[0]
+    if not found.candidates or found.candidates[0].sigma is None:
+        return [Answer(np.inf, np.inf, accepted=False)]
+    best = found.candidates[0]
+    there = _on_this_side(best.camera, real)
+    answer = Answer(apart(there, real)[0], best.sigma.position_m, found.accepted)
+    return [answer, *_later(there, real, night)] if found.accepted else [answer]
+
+
+def _on_this_side(found: Camera, real: Camera) -> Camera:
+    """The found camera, or its twin: a football field looks the same from both sides."""
+    from worker.calibration.relocalisation.relocalise import twin
+
+    return min(found, twin(found), key=lambda one: apart(one, real)[0])
+
+
+def _later(
+    found: Camera,
+    real: Camera,
+    night: Callable[[Field, Camera, CameraMemory | None], tuple[CameraResult, CameraMemory | None]],
+) -> Iterator[Answer]:
+    """What comes after a venue was stored as it was found."""
+    stored, memory = found, None
+    refined = None
+    for step in STEPS[1:]:
+        if step in ("patch", "restore"):
+            memory = None
+        if step == "adopt" and refined is not None:
+            # As the service does it: a lens that is stored does not bring the certainty that the lines gave it.
+            lens = replace(refined.intrinsics, sigma=found.intrinsics.sigma)
+            stored, refined = refined.with_lens(lens), None
+        result, memory = night(REPAINTED if step == "patch" else PITCH, stored, memory)
+        if result.accepted:
+            stored = result.camera
+            refined = result.refined.camera if step == "restore" and result.refined else None
+        yield Answer.of(result, real)
+
+
+if __name__ == "__main__":
+    cv2.setNumThreads(1)
+    assert MODEL_PATH.exists()
+    main()
