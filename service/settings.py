@@ -117,6 +117,12 @@ class Settings(BaseSettings):
     )
     max_frame_mb: float = Field(48, gt=0, description="Size of one frame or photo.")
     max_frame_pixels: int = Field(64_000_000, gt=0, description="Pixels of one frame, checked before it is decoded.")
+    max_job_pixels: int = Field(
+        600_000_000,
+        gt=0,
+        description="Pixels of all frames of one job together, which are kept decoded, 3 bytes each. 600 million are "
+        "72 frames of 4K.",
+    )
     max_frames_per_camera: int = Field(16, ge=1, description="Frames of one camera in one job, which are fused.")
     stall_timeout_s: float = Field(
         20,
