@@ -21,7 +21,7 @@ Picture = NDArray[np.uint8]
 
 END = b"\xff\xd9"
 PADDING = b"\0\r\n"
-"""Bytes before the end of the picture that are none of it: encoders in hardware fill their memory, others end a line."""
+"""Bytes before the end of the picture that are none of it: hardware fills its memory, others end a line."""
 DAMAGE = re.compile(r"Corrupt JPEG data|Premature end of JPEG|Inconsistent progression")
 """Of libjpeg's messages (jerror.h) those about the picture. The others are about oddities that change no pixel, such as
 a version of JFIF, or about kinds of files that simplejpeg cannot read and OpenCV can."""

@@ -61,7 +61,7 @@ def test_the_frames_of_a_job_have_so_many_pixels_together():
     budget = image_checks.PixelBudget(settings)
     for _ in range(3):
         image_checks.check(CAMERA, encoded("png"), settings, budget)
-    with pytest.raises(Problem, match="With this picture of camera left .* in one job") as refused:
+    with pytest.raises(Problem, match=r"With this picture of camera left .* in one job") as refused:
         image_checks.check(CAMERA, encoded("png"), settings, budget)
     assert (refused.value.kind, refused.value.parts["camera"]) == ("too-many-pixels", "left")
 
