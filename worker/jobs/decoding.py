@@ -16,6 +16,8 @@ from worker.jobs.jpeg import DamagedPictureError, decode_by_opencv, decode_jpeg
 ANIMATION = {b"acTL", b"fcTL", b"fdAT"}
 """Chunks of a PNG (edition 3, 11.3.4) by which OpenCV shows an animation where other viewers show its picture."""
 BIT_DEPTH_AT = 24
+LARGEST_ARRAY = 1 << 40
+"""Bytes, more than any machine has; what a damaged header says may be beyond what NumPy counts with."""
 SENSOR_BITS = (10, 12, 14)
 """Of the sensors whose values are written into files of 16 bits as they are, in their dark end."""
 
@@ -35,6 +37,7 @@ def decode_image(
     is_jpeg = file.startswith(JPEG_START)
     picture = decode_jpeg(file, grey=grey) if is_jpeg else _decode_png(subject, file, grey, remark)
     if picture is None:
+        _require_memory(file)
         raise DamagedPictureError("it cannot be decoded")
     return picture
 
@@ -80,6 +83,14 @@ def _decode_png(subject: str, file: bytes, grey: bool, remark: Callable[[str], N
             f"{subject}: the brightest value is {brightest} of 65535, so its file of 16 bits was read as one of {bits}"
         )
     return np.asarray(deep >> (bits - 8), dtype=np.uint8)
+
+
+def _require_memory(file: bytes) -> None:
+    """Raise `MemoryError` where a picture was not decoded for lack of it, which OpenCV does not tell from damage."""
+    if file.startswith(PNG_START) and len(file) > BIT_DEPTH_AT:
+        width, height = struct.unpack_from(">II", file, 16)
+        # Values of 16 bits, three of each pixel, which is the most that is decoded at once.
+        np.empty(min(6 * width * height, LARGEST_ARRAY), np.uint8)
 
 
 def _without_animation(png: bytes) -> Iterator[bytes]:

@@ -25,7 +25,7 @@ def as_opencv_reads(file, flags=cv2.IMREAD_COLOR_BGR):
 @pytest.mark.parametrize("cropped", [(0, 0), (7, 9)])
 def test_whole_pictures_of_all_encoders_are_read_to_the_pixels_that_opencv_reads(cropped):
     scene = SCENE[: SCENE.shape[0] - cropped[0], : SCENE.shape[1] - cropped[1]]
-    for name, file in whole_files(scene):
+    for name, file in whole_files(scene, (60, 95)):
         assert np.array_equal(decode_image(name, file), as_opencv_reads(file)), name
         grey = as_opencv_reads(file, cv2.IMREAD_GRAYSCALE)
         assert np.array_equal(decode_image(name, file, grey=True), grey), name
@@ -45,7 +45,7 @@ def unseen_damages(whole, kind, count):
 def test_a_jpeg_that_is_damaged_in_its_scan_is_not_decoded(kind):
     whole = cv2.imencode(".jpg", SCENE, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
     # Exchanged pieces may leave as many blocks as there were, which libjpeg has no warning for.
-    assert unseen_damages(whole, kind, 20) <= (1 if kind == "exchanged" else 0)
+    assert unseen_damages(whole, kind, 10) <= (1 if kind == "exchanged" else 0)
 
 
 @pytest.mark.long
