@@ -120,7 +120,7 @@ class Settings(BaseSettings):
     max_job_pixels: int = Field(
         500_000_000,
         gt=0,
-        description="Pixels of all frames of one job together, which are kept decoded. 500 million are 60 frames of 4K.",
+        description="Pixels of all frames of one job together, kept decoded; 500 million are 60 frames of 4K.",
     )
     job_memory_mb: float = Field(
         6000,

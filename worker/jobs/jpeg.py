@@ -22,9 +22,9 @@ Picture = NDArray[np.uint8]
 END = b"\xff\xd9"
 PADDING = b"\0\r\n"
 """Bytes before the end of the picture that are none of it: hardware fills its memory, others end a line."""
-DAMAGE = re.compile(r"Corrupt JPEG data|Premature end of JPEG|Inconsistent progression")
-"""Of libjpeg's messages (jerror.h) those about the picture. The others are about oddities that change no pixel, such as
-a version of JFIF, or about kinds of files that simplejpeg cannot read and OpenCV can."""
+ODDITY = re.compile(r"unknown JFIF|Unknown Adobe|ICC|Invalid SOS parameters|determine subsampling")
+"""Of libjpeg's messages (jerror.h) those that are not about pixels, and the one of files that simplejpeg cannot read
+and OpenCV can. Of all others OpenCV makes the part of a picture that came before."""
 BLOCKS = {
     "Gray": (8, 8),
     "444": (8, 8),
@@ -64,7 +64,7 @@ def _decode_strictly(file: bytes, grey: bool) -> Picture | None:
         return np.asarray(picture[..., 0] if grey else picture, dtype=np.uint8)
     except ValueError as warning:
         words = str(warning)
-    if not DAMAGE.search(words):
+    if ODDITY.search(words):
         return decode_by_opencv(file, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR_BGR)
     coded = file[: max(file.rfind(END), 0)]
     if "extraneous bytes before marker 0xd9" in words and coded[-1:] in PADDING:
