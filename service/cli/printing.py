@@ -129,6 +129,8 @@ def job_exit_code(job: Job) -> int:
 
 def calibration_exit_code(result: Result) -> int:
     """The exit code for what a calibration found."""
+    for warning in result.warnings:
+        print_note(f"Warning: {warning}")
     if result.accepted:
         return ACCEPTED
     if result.verdict == "partly":
