@@ -1,10 +1,10 @@
 """A JPEG as pixels, or why it is damaged: in its scan, too, where OpenCV shows what is left and says nothing.
 
 simplejpeg decodes with libjpeg-turbo, as OpenCV does and to the same pixels, and stops at the first warning. A damage
-that leaves as many blocks as there were leads to none, hardly one in a hundred of a frame of 4K, and one
-in ten of pieces that are exchanged in one of 1080p; the pixels tell more than half of these. Blocks are coded as differences to the block before: what is lost in one makes all that
-follow too bright, too dark or too colourful, and where that begins, a step runs along the edges of blocks for just
-one row's length.
+that leaves as many blocks as there were leads to none: hardly one in a hundred of a frame of 4K, one in ten where
+pieces of a frame of 1080p are exchanged. The pixels tell more than half of these. Blocks are coded as differences to
+the block before: what is lost in one makes all that follow too bright, too dark or too colourful, and where that
+begins, a step runs along the edges of blocks for just one row's length.
 """
 
 from __future__ import annotations
