@@ -11,7 +11,7 @@ import time
 
 from service import confinement
 
-PARENT = "ESC_PARENT"
+PARENT, MEMORY = "ESC_PARENT", "ESC_JOB_MEMORY_MB"
 PR_SET_PDEATHSIG = 1
 # The machine and its languages, and what interpreters, libraries and the runtimes of networks read.
 HARMLESS = {"PATH", "HOME", "USER", "TMPDIR", "TZ", "LANG"}
@@ -21,6 +21,11 @@ HARMLESS_FROM = ("LC_", "LD_", "PYTHON", "SSL_CERT_", "CUDA_", "NVIDIA_", "ORT_"
 def for_child() -> dict[str, str]:
     """What the parent adds to the environment of a child that shall end with it."""
     return {PARENT: str(os.getpid())}
+
+
+def memory_limit_mb() -> float | None:
+    """Return how much memory this decoder may take; None if its parent has not said."""
+    return float(os.environ[MEMORY]) if MEMORY in os.environ else None
 
 
 def without_secrets(*also: str) -> dict[str, str]:
@@ -62,6 +67,21 @@ def begin_decoder() -> None:
     """
     end_with_parent()
     confinement.confine()
+    _limit_memory()
+
+
+def _limit_memory() -> None:
+    """Have allocations fail beyond what this process may take: it ends in words before the machine runs short.
+
+    RLIMIT_DATA counts what may be written and is this process's own. RLIMIT_AS counts what is only reserved, too: the
+    arenas of malloc by threads, and libraries and models that are mapped from files.
+    """
+    most_mb = memory_limit_mb()
+    if most_mb is not None and sys.platform == "linux":
+        import resource
+
+        most = int(most_mb * 1e6)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
 def _watch(parent: int) -> None:

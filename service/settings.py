@@ -118,6 +118,17 @@ class Settings(BaseSettings):
     )
     max_frame_mb: float = Field(48, gt=0, description="Size of one frame or photo.")
     max_frame_pixels: int = Field(64_000_000, gt=0, description="Pixels of one frame, checked before it is decoded.")
+    max_job_pixels: int = Field(
+        500_000_000,
+        gt=0,
+        description="Pixels of all frames of one job together, kept decoded; 500 million are 60 frames of 4K.",
+    )
+    job_memory_mb: float = Field(
+        6000,
+        gt=0,
+        description="Memory of one program that decodes frames, on Linux and with `ESC_PROVIDER` other than `cuda`: "
+        "one that needs more ends in words, and takes nothing from the others. `ESC_MAX_JOB_PIXELS` need 4500.",
+    )
     max_frames_per_camera: int = Field(16, ge=1, description="Frames of one camera in one job, which are fused.")
     stall_timeout_s: float = Field(
         20,
@@ -360,7 +371,10 @@ class Settings(BaseSettings):
         """What a process that computes needs in its environment before NumPy and OpenCV are loaded."""
         # Arrays as small as a population's gain nothing from BLAS threads; ONNX Runtime and OpenCV get `threads`.
         single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        return {**single, "OPENCV_IO_MAX_IMAGE_PIXELS": str(self.max_frame_pixels)}
+        of_pixels = {"OPENCV_IO_MAX_IMAGE_PIXELS": str(self.max_frame_pixels)}
+        # Drivers of GPUs map the memory of the device, and reserve more than they use.
+        limit = {} if self.provider == "cuda" else {"ESC_JOB_MEMORY_MB": f"{self.job_memory_mb:g}"}
+        return {**single, **of_pixels, **limit}
 
     @property
     def listens_beyond_this_machine(self) -> bool:

@@ -98,8 +98,9 @@ class JobProcess:
             code = self._process.wait(EXIT_S)
         except subprocess.TimeoutExpired:
             return "Its process closed its output and went on with no result; see the worker's log."
-        if code == -signal.SIGKILL:
-            return "Its process was killed, most likely for lack of memory."
+        # Native code that gets no memory aborts.
+        if code in (-signal.SIGKILL, -signal.SIGABRT):
+            return "Its process was killed, most likely for lack of memory; ESC_JOB_MEMORY_MB says what one may take."
         if code < 0:
             return f"Its process died of {signal.Signals(-code).name}; see the worker's log."
         return f"Its process ended with code {code} and no result; see the worker's log."

@@ -168,6 +168,9 @@ def _print_result(result: BaseModel) -> None:
     """Print for whoever looks what a result is, and why it was rejected."""
     from service.schemas.results import FieldResult, FindResult, IntrinsicsResult, LocateResult, Result
 
+    if isinstance(result, Result):
+        for warning in result.warnings:
+            print_note(f"Warning: {warning}")
     match result:
         case Result(verdict="partly"):
             accepted = ", ".join(result.accepted_cameras)

@@ -66,7 +66,7 @@ def snapshot(
     api_key: ApiKey = None,
 ) -> None:
     """Save what the cameras show now, fetched by the service from their sources; prints CAMERA=FILE for each."""
-    from service.intake.image_checks import PNG_START
+    from service.schemas.file_kinds import PNG_START
 
     with open_client(url, api_key) as client:
         cameras = [camera] if camera else [one.id for one in client.venue(venue).cameras]

@@ -86,7 +86,8 @@ def _checked_files(place: SoughtSite, frames: list[str], settings: Settings) -> 
     if all(camera.pose is not None for camera in place.cameras):
         fail("All cameras of the site have poses already: `esc run` calibrates them", USAGE)
     with report_job_failures():
-        for several in files.values():
-            for data in several:
-                image_checks.check_photo("frame", data, settings)
+        budget = image_checks.PixelBudget(settings)
+        for sought in place.cameras:
+            for data in files.get(sought.id, ()):
+                image_checks.check(sought, data, settings, budget)
     return files

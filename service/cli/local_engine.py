@@ -29,9 +29,10 @@ def checked_files(stored: Venue, frames: Sequence[str], settings: Settings) -> d
     files = {camera: [path.read_bytes() for path in paths] for camera, paths in parse_frame_files(frames).items()}
     with report_job_failures():
         image_checks.check_cameras(stored, {camera: len(several) for camera, several in files.items()}, settings)
+        budget = image_checks.PixelBudget(settings)
         for camera in stored.cameras:
             for data in files[camera.id]:
-                image_checks.check(camera, data, settings)
+                image_checks.check(camera, data, settings, budget)
     return files
 
 

@@ -10,20 +10,20 @@ from __future__ import annotations
 import re
 import struct
 import zlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from service.schemas.file_kinds import JPEG_START, PNG_START, jpeg_begins_at, kind_of_file
 from service.schemas.find import SoughtCameraIn, SoughtSite
+from service.schemas.frame_sizes import is_resized, other_shape, other_size
 from service.schemas.problems import Problem
 from service.schemas.venue import Camera, Venue
 
 if TYPE_CHECKING:
     from service.settings import Settings
 
-JPEG_START = b"\xff\xd8\xff"
-PNG_START = b"\x89PNG\r\n\x1a\n"
 # A marker inside entropy-coded data: FF and neither a stuffed 00, nor a restart (D0 to D7), nor a fill byte FF.
 JPEG_MARKER = re.compile(rb"\xff([^\x00\xd0-\xd7\xff])")
 JPEG_END, JPEG_SCAN = 0xD9, 0xDA
@@ -67,25 +67,45 @@ def check_cameras(
             )
 
 
-def check(camera: Camera | SoughtCameraIn, data: bytes, settings: Settings) -> None:
-    """One frame: an entire JPEG or PNG of the camera's size, where that is known."""
+class PixelBudget:
+    """The pixels that all frames of one upload may have together: a job keeps them decoded, all at once."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._most, self._pixels = settings.max_job_pixels, 0
+
+    def spend(self, size: Sequence[int], **part: Any) -> None:
+        """Count a frame. Raises a `Problem` where it is one too many."""
+        self._pixels += size[0] * size[1]
+        if self._pixels > self._most:
+            raise Problem(
+                "too-many-pixels",
+                f"With this picture of {in_words(part)} the frames have {self._pixels / 1e6:.0f} million pixels "
+                f"together; {self._most / 1e6:.0f} million are allowed in one job (ESC_MAX_JOB_PIXELS). Send fewer "
+                "frames of each camera, or smaller ones.",
+                **part,
+                expected=self._most,
+                got=list(size),
+            )
+
+
+def check(
+    camera: Camera | SoughtCameraIn, data: bytes, settings: Settings, budget: PixelBudget, *, of_any_size: bool = True
+) -> None:
+    """One frame: an entire JPEG or PNG of the camera's size, where that is known, within the budget of its job.
+
+    `of_any_size`: frames of its shape will do, which are resized; points are clicked in pixels of its size.
+    """
     size = _size_of_whole_picture(data, settings, camera=camera.id)
     wanted = camera.image_size
-    if wanted is not None and size != wanted:
-        exchanged = tuple(size) == tuple(reversed(wanted))
-        asked = " The frame has them the other way round: are width and height of the venue's image_size exchanged?"
-        raise Problem(
-            "frame-size",
-            f"Send camera {camera.id} in {wanted[0]}x{wanted[1]} pixels, the size of its intrinsics."
-            + (asked if exchanged else ""),
-            camera=camera.id,
-            expected=wanted,
-            got=size,
-        )
+    if wanted is not None and size != wanted and not (of_any_size and is_resized(size, wanted)):
+        words = other_shape(camera.id, size, wanted) if of_any_size else other_size(camera.id, size, wanted)
+        raise Problem("frame-size", words, camera=camera.id, expected=wanted, got=size)
+    # A frame of another size is resized to that of its camera.
+    budget.spend(wanted or size, camera=camera.id)
 
 
 def check_photo(name: str, data: bytes, settings: Settings) -> None:
-    """One photo of a board: an entire JPEG or PNG of any size."""
+    """One photo of a board: an entire JPEG or PNG of any size. Photos are decoded one by one, and none is kept."""
     _size_of_whole_picture(data, settings, photo=name)
 
 
@@ -94,25 +114,30 @@ def check_length(length: int, settings: Settings, **part: Any) -> None:
     if length > settings.max_frame_mb * 1e6:
         raise Problem(
             "frame-too-large",
-            f"Send {_in_words(part)} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
+            f"Send {in_words(part)} in at most {settings.max_frame_mb:g} MB, for instance as JPEG of quality 95.",
             **part,
         )
 
 
-def _in_words(part: Mapping[str, Any]) -> str:
+def in_words(part: Mapping[str, Any]) -> str:
+    """Return whose a file is, by what kind and name."""
     return " ".join(f"{kind} {name}" for kind, name in part.items())
 
 
 def _size_of_whole_picture(data: bytes, settings: Settings, **parts: Any) -> list[int]:
     """Width and height of a picture that is all there; `parts` name it in a problem."""
-    subject = _in_words(parts)
+    subject = in_words(parts)
     if not data:
         raise Problem("empty-frame", f"The file of {subject} is empty; was it still being written?", **parts)
     check_length(len(data), settings, **parts)
-    if not data.startswith((JPEG_START, PNG_START)):
-        raise Problem("not-an-image", f"Send {subject} as JPEG or PNG.", **parts)
+    begin = jpeg_begins_at(data)
+    is_jpeg = data[begin : begin + 3] == JPEG_START
+    if not is_jpeg and data[: len(PNG_START)] != PNG_START:
+        kind = kind_of_file(data)
+        came = "" if kind is None else f" What came is {kind}."
+        raise Problem("not-an-image", f"Send {subject} as JPEG or PNG.{came}", **parts)
     try:
-        outline = _jpeg(data) if data.startswith(JPEG_START) else _png(data)
+        outline = _jpeg(data, begin) if is_jpeg else _png(data)
     except TooManyParts as error:
         raise Problem("broken-image", f"The file of {subject} has {error}; encode it again.", **parts) from None
     except (struct.error, IndexError, ValueError):
@@ -146,10 +171,10 @@ class Outline:
     whole: bool
 
 
-def _jpeg(data: bytes) -> Outline:
+def _jpeg(data: bytes, begin: int) -> Outline:
     """Walk the segments to the end-of-image marker; whatever follows it is the camera's business."""
-    position, size = 2, None
-    for number, (position, marker) in enumerate(_jpeg_segments(data)):
+    position, size = begin + 2, None
+    for number, (position, marker) in enumerate(_jpeg_segments(data, begin)):
         if number >= MOST_SEGMENTS:
             raise TooManyParts(f"more than {MOST_SEGMENTS} segments")
         if marker in JPEG_FRAMES:
@@ -164,9 +189,9 @@ def _jpeg(data: bytes) -> Outline:
     return Outline(size, data[position : position + 2] == b"\xff\xd9")
 
 
-def _jpeg_segments(data: bytes) -> Iterator[tuple[int, int]]:
+def _jpeg_segments(data: bytes, begin: int) -> Iterator[tuple[int, int]]:
     """Position and code of each marker, up to end-of-image after a scan or to the end of the data."""
-    position, scanned = 2, False
+    position, scanned = begin + 2, False
     while position + 2 <= len(data):
         if data[position] != 0xFF:
             raise ValueError("no marker where one must be")

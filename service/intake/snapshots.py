@@ -74,7 +74,8 @@ class Snapshots:
                 )
                 answers = self._ask(task, credentials)
                 self._count_fetches(cameras, answers, task)
-                return {camera.id: self._checked(camera, answers.get(camera.id), task) for camera in cameras}
+                budget = image_checks.PixelBudget(self._settings)
+                return {camera.id: self._checked(camera, answers.get(camera.id), task, budget) for camera in cameras}
         finally:
             self._turns.release()
 
@@ -121,7 +122,9 @@ class Snapshots:
             if (answer := _understood(line))
         }
 
-    def _checked(self, camera: Camera, answer: SourceAnswer | None, task: SourceTask) -> list[bytes]:
+    def _checked(
+        self, camera: Camera, answer: SourceAnswer | None, task: SourceTask, budget: image_checks.PixelBudget
+    ) -> list[bytes]:
         if answer is None or answer.why is not None:
             why = answer.why if answer else f"it gave no frame within {task.seconds:g} s"
             problem = SourceLate if answer is None or answer.seconds >= LATE * task.seconds else Problem
@@ -133,7 +136,7 @@ class Snapshots:
             )
         files = [frame_file(task, camera.id, number).read_bytes() for number in range(task.frames)]
         for data in files:
-            image_checks.check(camera, data, self._settings)
+            image_checks.check(camera, data, self._settings, budget)
         return files
 
 

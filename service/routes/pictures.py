@@ -8,10 +8,10 @@ from fastapi import APIRouter, Path, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import Context, InContext
-from service.intake.image_checks import PNG_START
 from service.routes.contract.documented import BINARY, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
 from service.routes.jobs import ExistingJob
+from service.schemas.file_kinds import PNG_START
 from service.schemas.job import Job
 from service.schemas.names import ID_PATTERN
 from service.schemas.problems import Problem

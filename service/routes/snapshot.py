@@ -8,11 +8,11 @@ from fastapi import APIRouter, Path, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import InContext, VenueIdPath
-from service.intake.image_checks import PNG_START
 from service.routes.contract.documented import BINARY, needs_scope, problem_responses
 from service.routes.contract.guarded import Guarded
 from service.routes.contract.missing import no_such_venue
 from service.routes.venues import camera_of
+from service.schemas.file_kinds import PNG_START
 from service.schemas.names import ID_PATTERN
 
 router = APIRouter(tags=["venues"], route_class=Guarded)

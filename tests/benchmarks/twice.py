@@ -79,7 +79,7 @@ def main() -> None:
 
 
 def _table(focals: Sequence[float], life: Callable[[float, str, float], list[Answer]]) -> Iterator[str]:
-    yield "| given focal length too long by | step | answers | accepted | wrong | error, cm, most accepted | over sigma |"
+    yield "| focal length too long by | step | answers | accepted | wrong | error of accepted, cm, most | over sigma |"
     yield "|---|---|---|---|---|---|---|"
     for too_long in TOO_LONG:
         lives = [life(focal, view, too_long) for focal in focals for view in VIEWS]
@@ -89,7 +89,8 @@ def _table(focals: Sequence[float], life: Callable[[float, str, float], list[Ans
             most = max((one.error_m for one in taken), default=0.0)
             ratio = max((one.error_m / one.sigma_m for one in taken), default=0.0)
             wrong = sum(one.wrong for one in answers)
-            yield f"| {too_long:.1%} | {step} | {len(answers)} | {len(taken)} | {wrong} | {100 * most:.1f} | {ratio:.1f} |"
+            counts = f"{len(answers)} | {len(taken)} | {wrong}"
+            yield f"| {too_long:.1%} | {step} | {counts} | {100 * most:.1f} | {ratio:.1f} |"
 
 
 def _given(real: Camera, too_long: float) -> Camera:

@@ -93,8 +93,8 @@ def solve(
             recorder=recorder,
         ),
         lambda given, found: _drawn(venue, given, found, options),
-        lambda found, spent, provenance: _allowed(
-            venue, options, _result(venue, found, options, spent, provenance, memories, nights)
+        lambda found, spent, provenance, warnings: _allowed(
+            venue, options, _result(venue, found, options, spent, provenance, warnings, memories, nights)
         ),
         lambda found: {camera: memory.to_json() for camera, memory in found.memories.items()},
     )
@@ -148,6 +148,7 @@ def _result(
     options: Options,
     spent: engine.StageTimings,
     provenance: Provenance,
+    warnings: Sequence[str],
     memories: Mapping[str, CameraMemory],
     nights: NightHistory,
 ) -> Result:
@@ -176,7 +177,7 @@ def _result(
         ridge=ridge.tolist() if options.fit_ridge and ridge is not None else None,
         diagnosis=[_suspicion(one) for one in found.suspicions],
         adoptable=_adoptable(venue, found),
-        warnings=venue.lens_warnings,
+        warnings=[*venue.lens_warnings, *warnings],
         stitch_error_px=finite_or_none(found.stitch_error_px),
         stitch_error_before_px=finite_or_none(found.stitch_error_before_px),
         stitch_error_limit_px=Gate().largest_stitch_error_px,

@@ -40,7 +40,7 @@ def solve(
         report,
         lambda given, step: fit_field(given.pitch, given.cameras, given.frames, given.network, seed, step),
         _draw,
-        lambda found, spent, provenance: _result(venue.field, found, spent, provenance),
+        lambda found, spent, provenance, warnings: _result(venue.field, found, spent, provenance, warnings),
     )
 
 
@@ -57,7 +57,9 @@ def _draw(given: EngineInputs, found: FieldFit) -> JobPictures:
     return JobPictures(pictures)
 
 
-def _result(given: FieldOfPlay, found: FieldFit, spent: StageTimings, provenance: Provenance) -> FieldResult:
+def _result(
+    given: FieldOfPlay, found: FieldFit, spent: StageTimings, provenance: Provenance, warnings: Sequence[str]
+) -> FieldResult:
     return FieldResult(
         accepted=found.accepted,
         rejected_because=found.rejected_because,
@@ -65,6 +67,7 @@ def _result(given: FieldOfPlay, found: FieldFit, spent: StageTimings, provenance
         measures=[_measure_to_schema(measure) for measure in found.measures],
         cameras=[camera_to_schema(camera) for camera in found.cameras],
         stitch_error_px=finite_or_none(found.stitch_error_px),
+        warnings=list(warnings),
         timings_s=round_to_ms(spent.seconds),
         cpu_s=round_to_ms(spent.core_seconds),
         provenance=provenance,

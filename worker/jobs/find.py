@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import cast
 
@@ -32,12 +32,10 @@ from worker.calibration.relocalisation.sought import (
 from worker.calibration.rendering.overlays import candidate_picture
 from worker.compute_resources import ComputeResources
 from worker.jobs.answers import Progress, Provenance
+from worker.jobs.decoding import decode_frame, decode_frame_of_any_size
 from worker.jobs.from_schemas import (
-    JobFailedError,
     Picture,
     camera_of,
-    decode_frame,
-    decode_image,
     encode_jpeg,
     ignored_areas_of,
     lens_of,
@@ -72,7 +70,12 @@ def solve(
     """Find the cameras of a site that have no pose, from the files of their frames, and draw each candidate."""
     segmenter = load_segmenter(means)
     cv2.setNumThreads(means.threads)
-    frames = {camera.id: _decoded(camera, files[camera.id]) for camera in site.cameras if camera.id in files}
+    remarks: dict[str, list[str]] = {camera.id: [] for camera in site.cameras}
+    frames = {
+        camera.id: _decode(camera, files[camera.id], remarks[camera.id].append)
+        for camera in site.cameras
+        if camera.id in files
+    }
     pitch = pitch_of(site.field)
     sought = [sought_camera(one, _size(frames[one.id][0])) for one in site.cameras if one.pose is None]
     known = [_known(camera) for camera in site.cameras if camera.pose is not None]
@@ -85,21 +88,16 @@ def solve(
         for camera in found.cameras
         for name, picture in _pictures(pitch, found.pitch, camera, frames[camera.id][0]).items()
     }
-    return Solution(
-        _result(found, pitch, site, sought, provenance_of(means, segmenter, seed, {"seed": seed})), pictures
-    )
+    provenance = provenance_of(means, segmenter, seed, {"seed": seed})
+    return Solution(_result(found, pitch, site, sought, provenance, remarks), pictures)
 
 
-def _decoded(camera: SoughtCameraIn, files: Sequence[bytes]) -> list[Picture]:
-    """The frames of a camera, all of one size."""
-    size = camera.image_size
-    if size is None:
-        first = decode_image(files[0], cv2.IMREAD_COLOR_BGR)
-        if first is None:
-            detail = f"A frame of camera {camera.id} cannot be decoded; grab it again."
-            raise JobFailedError("broken-image", detail, camera.id)
-        size = [first.shape[1], first.shape[0]]
-    return [decode_frame(camera.id, size, file) for file in files]
+def _decode(camera: SoughtCameraIn, files: Sequence[bytes], remark: Callable[[str], None]) -> list[Picture]:
+    """The frames of a camera, all of one size: the camera's, or if nobody has said one, that of the first."""
+    if camera.image_size is not None:
+        return [decode_frame(camera.id, camera.image_size, file, remark) for file in files]
+    first = decode_frame_of_any_size(camera.id, files[0], remark)
+    return [first, *(decode_frame(camera.id, first.shape[1::-1], file, remark) for file in files[1:])]
 
 
 def _size(frame: Picture) -> tuple[int, int]:
@@ -144,20 +142,24 @@ def _pictures(given: Field, found: Field, camera: FoundCamera, frame: Picture) -
 
 
 def _result(
-    found: FoundCameras, given: Field, site: SoughtSite, sought: Sequence[SoughtCamera], provenance: Provenance
+    found: FoundCameras,
+    given: Field,
+    site: SoughtSite,
+    sought: Sequence[SoughtCamera],
+    provenance: Provenance,
+    of_frames: Mapping[str, Iterable[str]],
 ) -> FindResult:
     doubts = {
         camera.id: lens_doubts(camera.intrinsics, camera.image_size)
         for camera in site.cameras
         if camera.intrinsics is not None and camera.image_size is not None
     }
+    remarks = {one.id: [*doubts.get(one.id, []), *dict.fromkeys(of_frames[one.id])] for one in sought}
     refusals = [f"camera {one.id}: {one.refusal.words}" for one in found.cameras if one.refusal is not None]
     return FindResult(
         accepted=not refusals,
         rejected_because="; ".join(refusals) or None,
-        cameras=[
-            _camera(one, its.size, doubts.get(one.id, [])) for one, its in zip(found.cameras, sought, strict=True)
-        ],
+        cameras=[_camera(one, its.size, remarks[one.id]) for one, its in zip(found.cameras, sought, strict=True)],
         ridge=ridge_to_schema(found.pitch) if given.ridge is None else None,
         stitch_error_px=finite_or_none(found.stitch_error_px),
         timings_s=round_to_ms(found.timings.seconds),
@@ -166,13 +168,13 @@ def _result(
     )
 
 
-def _camera(found: FoundCamera, size: tuple[int, int], doubts: Sequence[str]) -> FoundCameraResult:
+def _camera(found: FoundCamera, size: tuple[int, int], remarks: Sequence[str]) -> FoundCameraResult:
     return FoundCameraResult(
         id=found.id,
         accepted=found.accepted,
         reason=None if found.refusal is None else found.refusal.reason,
         rejected_because=None if found.refusal is None else found.refusal.words,
-        remarks=[*doubts, *found.remarks],
+        remarks=[*remarks, *found.remarks],
         image_size=list(size),
         candidates=[_candidate(one) for one in found.candidates],
     )

@@ -16,7 +16,8 @@ from worker.calibration.geometry.field import Field
 from worker.calibration.records import EngineResult, StageTimings
 from worker.compute_resources import ComputeResources
 from worker.jobs.answers import Progress, Provenance
-from worker.jobs.from_schemas import Picture, camera_with_ignored_areas, decode_frame, pitch_of
+from worker.jobs.decoding import decode_frame
+from worker.jobs.from_schemas import Picture, camera_with_ignored_areas, pitch_of
 from worker.jobs.to_schemas import (
     PREVIEW_FRACTION,
     R,
@@ -28,6 +29,7 @@ from worker.jobs.to_schemas import (
 )
 
 if TYPE_CHECKING:
+    from service.schemas.venue import Camera as VenueCamera
     from service.schemas.venue import Venue
     from worker.jobs import inputs
 
@@ -61,19 +63,19 @@ def solve(
     report: Callable[[Progress], None],
     engine: Callable[[EngineInputs, Callable[[records.Progress], None]], A],
     draw: Callable[[EngineInputs, A], JobPictures],
-    tell: Callable[[A, StageTimings, Provenance], R],
+    tell: Callable[[A, StageTimings, Provenance, Sequence[str]], R],
     remember: Callable[[A], Mapping[str, dict[str, Any]]] = lambda _: {},
 ) -> Solution[R]:
     """Call the `engine` with what a venue and the files of its cameras hold, `draw` its answer and `tell` it.
 
-    `options`: what was asked for, to be told of with the result, `seed` among it. `remember`: the memories that the
-    answer leaves, by camera. With or without a server around it.
+    `options`: what was asked for, to be told of with the result, `seed` among it. What is told, too, is what had to be
+    changed in frames. `remember`: the memories that the answer leaves, by camera. With or without a server around it.
     """
     segmenter = load_segmenter(means)
     cv2.setNumThreads(means.threads)
     spent = StageTimings()
     with spent.timed("decode"):
-        frames = _decode(venue, files, means.threads)
+        frames, warnings = _decode(venue, files, means.threads)
     cameras = [camera_with_ignored_areas(camera, camera.ignore) for camera in venue.cameras]
     given = EngineInputs(pitch_of(venue.field), cameras, frames, segmenter)
     with engine_failures():
@@ -82,16 +84,23 @@ def solve(
     spent.add(answer.timings)
     with spent.timed("preview"):
         drawn = draw(given, answer)
-    result = tell(answer, spent, provenance_of(means, segmenter, options.get("seed") or 0, options))
+    provenance = provenance_of(means, segmenter, options.get("seed") or 0, options)
+    result = tell(answer, spent, provenance, warnings)
     return Solution(result, drawn.pictures, drawn.later, remember(answer))
 
 
-def _decode(venue: Venue | inputs.Venue, files: Mapping[str, Sequence[bytes]], threads: int) -> Frames:
-    """The frames of each camera, several at once: OpenCV decodes one on one core."""
-    numbered = [(camera, file) for camera in venue.cameras for file in files[camera.id]]
+def _decode(
+    venue: Venue | inputs.Venue, files: Mapping[str, Sequence[bytes]], threads: int
+) -> tuple[Frames, Sequence[str]]:
+    """The frames of each camera, several at once: one is decoded on one core. And what is to be told of them, once."""
+    remarks: list[str] = []
+
+    def decode(camera: VenueCamera | inputs.Camera, file: bytes) -> Picture:
+        return decode_frame(camera.id, camera.image_size, file, remarks.append)
+
     with ThreadPoolExecutor(threads) as pool:
-        decoded = list(pool.map(lambda given: decode_frame(given[0].id, given[0].image_size, given[1]), numbered))
-    frames: dict[str, list[Picture]] = {camera.id: [] for camera in venue.cameras}
-    for (camera, _), frame in zip(numbered, decoded, strict=True):
-        frames[camera.id].append(frame)
-    return frames
+        decoding = {
+            camera.id: [pool.submit(decode, camera, file) for file in files[camera.id]] for camera in venue.cameras
+        }
+        frames = {camera: [one.result() for one in several] for camera, several in decoding.items()}
+    return frames, sorted({*remarks})

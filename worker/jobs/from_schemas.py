@@ -1,4 +1,4 @@
-"""What a job or a drawing is given, as the engine takes it: files become pictures, the wire the engine's types.
+"""What a job or a drawing is given, as the engine takes it: the wire's types become the engine's.
 
 The wire's models and the plain records that are parts of them (`worker.jobs.inputs`) are read alike.
 """
@@ -58,31 +58,6 @@ class JobFailedError(Exception):
     def because(self, why: str) -> JobFailedError:
         """The same, with its likeliest cause."""
         return JobFailedError(self.kind, f"{self._detail} {why[0].upper()}{why[1:]}.", self._camera)
-
-
-def decode_image(file: bytes, flags: int) -> Picture | None:
-    """A picture from a file's bytes, None where it has none; a camera's EXIF orientation is not obeyed."""
-    try:
-        picture = cv2.imdecode(np.frombuffer(file, dtype=np.uint8), flags | cv2.IMREAD_IGNORE_ORIENTATION)
-    except cv2.error:
-        return None
-    return None if picture is None else np.asarray(picture, dtype=np.uint8)
-
-
-def decode_frame(camera: str, image_size: list[int], file: bytes) -> Picture:
-    """A BGR frame (height, width, 3) of the size of the intrinsics."""
-    frame = decode_image(file, cv2.IMREAD_COLOR_BGR)
-    if frame is None:
-        raise JobFailedError("broken-image", f"A frame of camera {camera} cannot be decoded; grab it again.", camera)
-    height, width = frame.shape[:2]
-    if [width, height] != image_size:
-        raise JobFailedError(
-            "frame-size",
-            f"A frame of camera {camera} decodes to {width}x{height} pixels; its intrinsics are for "
-            f"{image_size[0]}x{image_size[1]}.",
-            camera,
-        )
-    return frame
 
 
 def encode_jpeg(picture: Picture, quality: int = JPEG_QUALITY) -> bytes:

@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 
-import cv2
-
 from service.schemas import options as wire
 from service.schemas.options import IntrinsicsOptions
 from service.schemas.results import CoverageResult, IntrinsicsResult, LensTrial, PhotoResult
@@ -15,7 +13,9 @@ from worker.calibration.onboarding.boards import Board, Charuco, find_board, oth
 from worker.calibration.onboarding.lens_calibration import LensCalibration, Photo, UndeterminedLensError, calibrate_lens
 from worker.calibration.rendering.inspection import coverage_picture
 from worker.jobs.answers import Progress
-from worker.jobs.from_schemas import JobFailedError, Picture, decode_image, encode_jpeg
+from worker.jobs.decoding import decode_image
+from worker.jobs.from_schemas import JobFailedError, Picture, encode_jpeg
+from worker.jobs.jpeg import DamagedPictureError
 from worker.jobs.to_schemas import Solution, finite_or_none, lens_to_schema, round_to_ms
 
 DETECTION_FRACTION = 0.8
@@ -62,10 +62,11 @@ def _look(name: str, file: bytes, board: Board) -> Photo:
 
 
 def _grey(name: str, file: bytes) -> Picture:
-    grey = decode_image(file, cv2.IMREAD_GRAYSCALE)
-    if grey is None:
-        raise JobFailedError("broken-image", f"Photo {name} cannot be decoded; leave it out or take it again.")
-    return grey
+    try:
+        return decode_image(f"photo {name}", file, grey=True)
+    except DamagedPictureError as damage:
+        detail = f"Photo {name} is of no use: {damage}; leave it out or take it again."
+        raise JobFailedError("broken-image", detail) from None
 
 
 def _require_the_right_board(files: Mapping[str, bytes], board: Board) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from fields.landmarks import UnknownLandmark
 from service.schemas import geometry, results
 from service.schemas.field import FieldOfPlay
+from service.schemas.frame_sizes import other_size
 from service.schemas.options import ClickedPoint, LocateOptions
 from service.schemas.results import LocateResult, LocateSigma, PointResult
 from service.schemas.venue import Venue
@@ -25,7 +26,8 @@ from worker.calibration.onboarding.first_pose_verdict import FirstPose
 from worker.calibration.onboarding.freed_lens import LensGain
 from worker.calibration.rendering.inspection import clicks_picture
 from worker.jobs.answers import Progress
-from worker.jobs.from_schemas import JobFailedError, decode_frame, encode_jpeg, lens_of, pitch_of
+from worker.jobs.decoding import decode_frame_of_any_size
+from worker.jobs.from_schemas import JobFailedError, Picture, encode_jpeg, lens_of, pitch_of
 from worker.jobs.to_schemas import Solution, finite_or_none, lens_to_schema, pose_to_schema, round_to_ms
 
 SAME_STAND_M, SAME_VIEW_DEG = 2.0, 3.0
@@ -57,7 +59,7 @@ def locate(
     """The first pose of a camera that may belong to no venue yet. `stored`: the poses that are known, by camera."""
     begun = time.perf_counter()
     pitch = pitch_of(field)
-    picture = None if frame is None else decode_frame(camera, list(lens.size), frame)
+    picture = None if frame is None else _clicked_frame(camera, lens.size, frame)
     clicks = clicks_of(camera, pitch, points)
     report(Progress(stage="fit", fraction=0.0))
     found = pose_of(camera, pitch, lens, clicks)
@@ -66,6 +68,14 @@ def locate(
     drawn = encode_jpeg(clicks_picture(pitch, clicks, found, picture))
     timings = {"fit": fitted - begun, "picture": time.perf_counter() - fitted}
     return Solution(result_of(found, points, timings), {"points": drawn})
+
+
+def _clicked_frame(camera: str, size: tuple[int, int], file: bytes) -> Picture:
+    """The frame that points were clicked in: of another size their pixels would be other ones."""
+    frame = decode_frame_of_any_size(camera, file)
+    if frame.shape[1::-1] != size:
+        raise JobFailedError("frame-size", other_size(camera, frame.shape[1::-1], size), camera)
+    return frame
 
 
 def pose_of(camera: str, pitch: Field, lens: Lens, clicks: Clicks) -> FirstPose:

@@ -51,6 +51,11 @@ def main() -> None:
     except JobFailedError as failure:
         parent.told({"error": failure.error})
         return
+    except Exception as error:
+        if not _is_lack_of_memory(error):
+            raise
+        parent.told({"error": _without_memory().error})
+        return
     last = {
         "result": _document(solution.result),
         "pictures": {name: len(picture) for name, picture in solution.pictures.items()},
@@ -58,6 +63,20 @@ def main() -> None:
         "memories": dict(solution.memories),
     }
     parent.told(last, *solution.pictures.values())
+
+
+def _is_lack_of_memory(error: Exception) -> bool:
+    """Whether something failed since no memory was left: NumPy, OpenCV and ONNX Runtime each say it in their way."""
+    if isinstance(error, MemoryError) or (isinstance(error, cv2.error) and error.code == cv2.Error.StsNoMem):
+        return True
+    return "bad_alloc" in str(error) or "allocate memory" in str(error)
+
+
+def _without_memory() -> JobFailedError:
+    most_mb = child_process.memory_limit_mb()
+    allowed = "there is" if most_mb is None else f"the {most_mb:g} MB that one job may take (ESC_JOB_MEMORY_MB)"
+    detail = f"The frames need more memory than {allowed}. Send fewer frames of each camera, or smaller ones."
+    return JobFailedError("job-crashed", detail)
 
 
 def read_request(stream: IO[bytes]) -> tuple[dict[str, Any], dict[str, list[bytes]]]:

@@ -26,7 +26,8 @@ from service.schemas.programs.drawing import (
 from worker.calibration.diagnostics.markings import OPPOSITE, Direction, MarkingReport
 from worker.calibration.geometry.camera import Camera
 from worker.calibration.geometry.field import Field
-from worker.jobs.from_schemas import camera_with_ignored_areas, decode_frame, light_of, pitch_of
+from worker.jobs.decoding import decode_frame
+from worker.jobs.from_schemas import camera_with_ignored_areas, light_of, pitch_of
 from worker.jobs.pictures import PictureInputs, draw
 
 

@@ -118,6 +118,7 @@ def _submission(
         # All of them before the first is read: a size costs nothing.
         image_checks.check_length(upload.size or 0, context.settings, **{part: name})
     cameras = {camera.id: camera for camera in about.cameras} if about else {}
+    budget = image_checks.PixelBudget(context.settings)
     for name, several in files.items():
         content.update(f"\n{name}".encode())
         for upload in several:
@@ -125,7 +126,8 @@ def _submission(
                 if about is None:
                     image_checks.check_photo(name, data, context.settings)
                 else:
-                    image_checks.check(cameras[name], data, context.settings)
+                    resize = kind != "locate"
+                    image_checks.check(cameras[name], data, context.settings, budget, of_any_size=resize)
                 content.update(hashlib.sha256(data).digest())
             del data
     # A photo may be called anything.

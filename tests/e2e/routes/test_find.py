@@ -202,7 +202,7 @@ def test_a_search_is_cancelled_and_its_frames_are_listed(service, name):
         ({"place": site("v"), "dry_run": True}, (422, "invalid-request")),
         ({"place": site("v"), "files": upload()[:1]}, (422, "missing-camera")),
         ({"place": site("v"), "files": upload(cameras=("left", "right", "top"))}, (422, "unknown-camera")),
-        ({"place": site("v", left={"image_size": [128, 96]})}, (422, "frame-size")),
+        ({"place": site("v", left={"image_size": [128, 90]})}, (422, "frame-size")),
         ({"place": site("v"), "files": [("left", ("a.png", png()[:-20])), *upload()[1:]]}, (422, "truncated-image")),
     ],
 )

@@ -1,3 +1,4 @@
+import re
 import time
 import zlib
 from contextlib import suppress
@@ -29,8 +30,8 @@ def encoded(kind: str) -> bytes:
     return cv2.imencode(suffix, NOISE, options)[1].tobytes()
 
 
-def check(data: bytes) -> None:
-    image_checks.check(CAMERA, data, SETTINGS)
+def check(data: bytes, **how) -> None:
+    image_checks.check(CAMERA, data, SETTINGS, image_checks.PixelBudget(SETTINGS), **how)
 
 
 @pytest.mark.parametrize("kind", ENCODINGS)
@@ -44,6 +45,53 @@ def test_a_frame_with_width_and_height_exchanged_is_asked_whether_the_venue_has_
     with pytest.raises(Problem, match="in 48x32 pixels") as problem:
         check(frame)
     assert ("image_size exchanged?" in problem.value.detail) == asked
+    assert asked or "such as 24x16. A frame of 48x48 is of another shape" in problem.value.detail
+
+
+@pytest.mark.parametrize("size", [(24, 16), (96, 64), (144, 96)])
+def test_a_frame_of_the_same_shape_passes_but_where_points_were_clicked_in_it(size):
+    frame = cv2.imencode(".png", np.zeros((size[1], size[0], 3), dtype=np.uint8))[1].tobytes()
+    check(frame)
+    with pytest.raises(Problem, match=f"in which points are clicked; this frame has {size[0]}x{size[1]}"):
+        check(frame, of_any_size=False)
+
+
+def test_the_frames_of_a_job_have_so_many_pixels_together():
+    settings = SETTINGS.model_copy(update={"max_job_pixels": 3 * 48 * 32})
+    budget = image_checks.PixelBudget(settings)
+    for _ in range(3):
+        image_checks.check(CAMERA, encoded("png"), settings, budget)
+    with pytest.raises(Problem, match=r"With this picture of camera left .* in one job") as refused:
+        image_checks.check(CAMERA, encoded("png"), settings, budget)
+    assert (refused.value.kind, refused.value.parts["camera"]) == ("too-many-pixels", "left")
+
+
+OTHER_KINDS = {
+    "HEIC": b"\0\0\0\x24ftypheic" + bytes(60),
+    "AVIF": b"\0\0\0\x20ftypavif" + bytes(60),
+    "a video (MP4)": b"\0\0\0\x20ftypisom" + bytes(60),
+    "WebP": b"RIFF\x24\0\0\0WEBPVP8 " + bytes(60),
+    "TIFF": b"II*\0" + bytes(60),
+    "GIF": b"GIF89a" + bytes(60),
+    "SVG": b" <svg xmlns='x'/>",
+    "a web page": b"\r\n<!DOCTYPE html><title>Login</title>",
+}
+
+
+@pytest.mark.parametrize("kind", OTHER_KINDS)
+def test_a_file_of_another_kind_is_told_by_name(kind):
+    with pytest.raises(Problem, match=re.escape(f"as JPEG or PNG. What came is {kind}")) as refused:
+        check(OTHER_KINDS[kind])
+    assert refused.value.kind == "not-an-image"
+
+
+@pytest.mark.parametrize("before", [b"\r\n", b"\xff\xd8", b"\r\n\xff\xd8"])
+def test_what_some_cameras_send_before_a_jpeg_does_not_matter(before):
+    whole = before + encoded("baseline")
+    check(whole)
+    for length in range(len(before), len(whole)):
+        with pytest.raises(Problem):
+            check(whole[:length])
 
 
 @pytest.mark.parametrize("kind", ENCODINGS)

@@ -388,10 +388,20 @@ def test_a_frame_that_cannot_be_decoded_fails_by_the_name_of_its_camera(venue, f
     assert (failure.value.error["type"], failure.value.error["camera"]) == ("/problems/broken-image", "right")
 
 
-def test_a_frame_of_another_size_fails_with_both_sizes(venue, files, asked, means):
+def test_a_frame_of_another_shape_fails_with_both_sizes(venue, files, asked, means):
     files["right"] = [cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()]
-    with pytest.raises(from_schemas.JobFailedError, match=r"right decodes to 64x48 pixels; .* 320x180"):
+    with pytest.raises(
+        from_schemas.JobFailedError, match=r"right in 320x180 pixels, .* A frame of 64x48 is of another"
+    ):
         solve(venue, files, Options(), means, lambda _: None)
+
+
+def test_frames_of_another_size_and_the_same_shape_are_resized_which_is_told_once(venue, files, asked, means):
+    files["right"] = 2 * [cv2.imencode(".png", np.zeros((90, 160, 3), np.uint8))[1].tobytes()]
+    result = solve(venue, files, Options(), means, lambda _: None).result
+    assert [frame.shape for frame in asked["frames"]["right"]] == 2 * [(180, 320, 3)]
+    assert [one for one in result.warnings if "right sent 160x90 pixels, and its lens is for 320x180" in one] != []
+    assert len(result.warnings) == len(set(result.warnings))
 
 
 def test_what_the_engine_cannot_calibrate_fails_with_its_words(venue, files, asked, means, monkeypatch):

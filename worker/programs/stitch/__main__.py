@@ -20,16 +20,16 @@ from service.schemas.programs.stitching import StitchRequest
 from worker.calibration.rendering.layers import seam_layer
 from worker.calibration.stitching.panorama import Contribution, Panorama, panorama
 from worker.calibration.stitching.views import chosen_view
+from worker.jobs.decoding import decode_frame
 from worker.jobs.from_schemas import (
     Picture,
     camera_of,
     choice_of,
-    decode_frame,
-    decode_image,
     encode_jpeg,
     light_of,
     pitch_of,
 )
+from worker.jobs.jpeg import decode_by_opencv
 from worker.programs.stitch.package import package
 from worker.programs.stitch.scaled import in_scaled, scaled_size
 
@@ -81,7 +81,7 @@ def _read(part: Contribution, file: bytes) -> tuple[Contribution, Picture]:
     width, height = part.frame_size
     if width % 2 or height % 2 or scaled_size(part)[0] > width // 2:
         return part, decode_frame(part.camera, [width, height], file)
-    half = decode_image(file, cv2.IMREAD_REDUCED_COLOR_2)
+    half = decode_by_opencv(file, cv2.IMREAD_REDUCED_COLOR_2)
     if half is None or half.shape[:2] != (height // 2, width // 2):
         return part, decode_frame(part.camera, [width, height], file)
     size = width // 2, height // 2

@@ -1,0 +1,57 @@
+"""What a file is by its first bytes, to tell its sender what came where a picture was expected."""
+
+from __future__ import annotations
+
+JPEG_START = b"\xff\xd8\xff"
+JPEG_BEGIN = b"\xff\xd8"
+PNG_START = b"\x89PNG\r\n\x1a\n"
+# ISO/IEC 14496-12, the brand of the box `ftyp`.
+BRANDS = {
+    b"avif": "AVIF",
+    b"avis": "AVIF",
+    **dict.fromkeys((b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"), "HEIC"),
+}
+HEIC_HINT = "HEIC (phones take JPEG instead when set to Most compatible)"
+STARTS = {
+    b"GIF8": "GIF",
+    b"BM": "BMP",
+    b"II*\0": "TIFF",
+    b"MM\0*": "TIFF",
+    b"%PDF": "PDF",
+    b"\xff\x0a": "JPEG XL",
+    b"\0\0\0\x0cJXL ": "JPEG XL",
+    b"\0\0\0\x0cjP  ": "JPEG 2000",
+    b"\xff\x4f\xff\x51": "JPEG 2000",
+    b"\x1a\x45\xdf\xa3": "a video (Matroska or WebM)",
+    b"\0\0\0\x01": "a video (raw H.264 or H.265)",
+}
+# Of the file: a page may begin with comments and line breaks.
+LOOKED_AT = 512
+
+
+def kind_of_file(data: bytes) -> str | None:
+    """Return in a word or two what a file is that is neither JPEG nor PNG; None if it is not known."""
+    head = bytes(data[:LOOKED_AT])
+    if head[4:8] == b"ftyp":
+        brand = BRANDS.get(head[8:12], "a video (MP4)")
+        return HEIC_HINT if brand == "HEIC" else brand
+    if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
+        return "WebP"
+    for start, kind in STARTS.items():
+        if head.startswith(start):
+            return kind
+    text = head.lstrip().lower()
+    if text.startswith((b"<!doctype html", b"<html")):
+        return "a web page (a login page?)"
+    return "SVG" if text.startswith(b"<svg") else "XML" if text.startswith(b"<?xml") else None
+
+
+def jpeg_begins_at(data: bytes) -> int:
+    """Return where the picture of a file begins that viewers show as JPEG, 0 of all others.
+
+    Some cameras send a line break before the file, or say twice that it begins; decoders take neither.
+    """
+    position = 2 if data[:2] == b"\r\n" else 0
+    if data[position : position + 3] != JPEG_START:
+        return 0
+    return position + 2 if data[position + 2 : position + 4] == JPEG_BEGIN else position
