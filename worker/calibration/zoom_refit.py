@@ -60,27 +60,24 @@ def _refitted(problem: Problem, number: int, result: CameraResult, progress: Pro
         if zoom is None or likelier is None:
             return None
         changed_px = likelier.intrinsics.focal_length_px - stored.intrinsics.focal_length_px
+        found = _refined_with_lens(problem, number, likelier, progress)
         if abs(zoom.value) >= CONVERGED_SIGMAS * zoom.sigma:
-            # Until it has converged it may be off by all that it has changed.
-            found = _refined_with_lens(problem, number, likelier, abs(changed_px), progress)
             continue
-        found = _refined_with_lens(problem, number, likelier, zoom.sigma, progress)
         if abs(changed_px) < LEAST_SIGMAS * zoom.sigma:
             # With another focal length the lines say less of it than they did before.
             return None
         change = replace(zoom, value=changed_px)
         moved = Refusal("zoomed", f"{zoom_in_words(stored, change)}: {WHAT_TO_DO}")
         refusal = None if problem.options.lens_may_drift else moved
-        return replace(found, zoom=change, refusal=refusal, lens_found=True) if found.accepted else None
+        if not found.accepted:
+            return None
+        lens = replace(found.camera.intrinsics, sigma={**stored.intrinsics.sigma, "fx": zoom.sigma})
+        return replace(found, camera=found.camera.with_lens(lens), zoom=change, refusal=refusal, lens_found=True)
     return None
 
 
-def _refined_with_lens(
-    problem: Problem, number: int, begun: Camera, sigma_px: float, progress: ProgressReporter
-) -> CameraResult:
-    """Refine a camera by itself from `begun` and with its lens, whose focal length is known to `sigma_px`."""
-    stored = problem.cameras[number]
-    lens = replace(begun.intrinsics, sigma={**stored.intrinsics.sigma, "fx": sigma_px})
-    alone = replace(single_camera_problem(problem, number), cameras=[replace(stored, intrinsics=lens)])
-    refined = refine_poses(alone, [replace(begun, intrinsics=lens)], alone.observed.observations, progress)
+def _refined_with_lens(problem: Problem, number: int, begun: Camera, progress: ProgressReporter) -> CameraResult:
+    """Refine a camera by itself from `begun` and with its lens; its stored pose stays that of the stored lens."""
+    alone = single_camera_problem(problem, number)
+    refined = refine_poses(alone, [begun], alone.observed.observations, progress)
     return judge_each(alone, refined, progress)[0]

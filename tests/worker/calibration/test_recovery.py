@@ -195,13 +195,13 @@ def test_a_frame_without_lines_is_looked_at_once_more_and_not_searched(monkeypat
 
 
 def test_what_hardly_agrees_with_the_lines_is_not_refined(monkeypatch):
-    """Two lines that cross are seen from many places, and agree with none of them."""
-    refined = []
+    """Strokes of paint in all directions are seen from nowhere."""
+    refined, rng = [], np.random.default_rng(2)
     monkeypatch.setattr(candidate, "refine", lambda *given, **_: refined.append(given))
-    stored, crossed = outdated()[0], np.full_like(frames()["left"][0], (60, 130, 70))
-    cv2.line(crossed, (100, 100), (900, 420), (235, 240, 235), 4)
-    cv2.line(crossed, (100, 430), (900, 200), (235, 240, 235), 4)
-    (found,) = run([stored], {"left": (crossed,)}, seed=3).cameras
+    stored, strokes = outdated()[0], np.full_like(frames()["left"][0], (60, 130, 70))
+    for x, y, across, down in rng.integers((0, 0, -60, -60), (960, 540, 60, 60), (90, 4)).tolist():
+        cv2.line(strokes, (x, y), (x + across, y + down), (235, 240, 235), 4)
+    (found,) = run([stored], {"left": (strokes,)}, seed=3).cameras
     assert not found.accepted
     assert refined == []
 

@@ -5,7 +5,7 @@ z: x = `mixing` z (docs/model.md, 5). A camera without a memory has three: how f
 since its pose was stored, and its lens. One with a memory has a mount that stands where it was put, wind around it in
 every view, moves of the mount before the recent nights and before tonight, a lens, and heat or a zoom ring between one
 view and the next. A stored pose was fitted to lines through the stored lens on the stored field: what is wrong with
-these has moved it as it moves tonight's, and it is no witness of them (`Priors.of_fitted_poses`).
+these has moved it as it moves tonight's, and it is no witness of them (`_Errors.add_lasting`).
 """
 
 from __future__ import annotations
@@ -67,8 +67,7 @@ class Priors:
     """`mixing` (D, A) and `blocks` of A independent errors; `unknowns` of all views.
 
     `movements` (W,): which of the errors are movements of a camera, and `free` (W,) how far it may have moved if
-    nothing is known of it; `changes`: by camera with a memory, see `changes_of`. `views_of`: the views of each camera,
-    and `lasting`: the errors of lens and field that have been the same since poses were stored.
+    nothing is known of it; `changes`: by camera with a memory, see `changes_of`.
     """
 
     unknowns: Unknowns
@@ -77,23 +76,6 @@ class Priors:
     movements: NDArray[np.intp]
     free: Array
     changes: dict[str, NDArray[np.intp]]
-    views_of: Sequence[Sequence[int]]
-    lasting: NDArray[np.intp]
-
-    def of_fitted_poses(self, information: Array) -> Priors:
-        """Return the priors for stored poses that were fitted to lines through the stored lens on the stored field.
-
-        `information` (D, D): of tonight's lines on the dense unknowns. A lens or field that is off by e has moved the
-        stored pose by what makes up for e in the picture, and so a camera that has not moved stands beside it by G e,
-        where G is the pose that least squares would change with it.
-        """
-        mixing, first = self.mixing.copy(), POSE_NUMBERS * self.unknowns.views
-        of_poses = information[:first, :first] + np.diag(np.tile(FREE**-2, self.unknowns.views))
-        response = -np.linalg.solve(of_poses, information[:first, first:]) @ self.mixing[first:, self.lasting]
-        for number, views in enumerate(self.views_of):
-            for view in views:
-                mixing[self.unknowns.pose(view)][:, self.lasting] += response[self.unknowns.pose(number)]
-        return replace(self, mixing=mixing)
 
     def changes_of(self, camera: str) -> NDArray[np.intp]:
         """Which of the errors are changes of a camera's focal length since the first nights of its memory."""
@@ -111,28 +93,47 @@ class Priors:
 
 
 def build_priors(
-    here: Estimate, stored: Sequence[Camera], memories: Sequence[CameraMemory | None], solved: Unknowns
+    here: Estimate,
+    stored: Sequence[Camera],
+    memories: Sequence[CameraMemory | None],
+    unknowns: Unknowns,
+    solved: Unknowns,
+    information: Array,
 ) -> Priors:
-    """What is believed of the cameras of an estimate, found with `solved` unknown, beside where they were `stored`."""
-    errors = _Errors(here, memories, solved)
+    """What is believed of the cameras of an estimate, found with `solved` unknown, beside where they were `stored`.
+
+    `unknowns`: those of `unknowns_of`, and `information` (D, D) of the lines on them.
+    """
+    errors = _Errors(here, memories, unknowns, solved, information)
     errors.add_solved(here.values)
+    errors.add_field()
     for number, (before, memory) in enumerate(zip(stored, memories, strict=True)):
         if memory is None:
             errors.add_camera(number, before)
         else:
             errors.add_remembered(number, memory)
-    errors.add_field()
     return errors.believed()
 
 
 class _Errors:
-    """Independent errors as they are added: their columns (D,) of `mixing`, and the blocks of groups they are in."""
+    """Independent errors as they are added: their columns (D,) of `mixing`, and the blocks of groups they are in.
 
-    def __init__(self, here: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> None:
-        self._cameras, self._solved = here.cameras, solved
-        remembered = [number for number, memory in enumerate(memories) if memory for _ in memory.epochs]
-        self._owner_of = [*range(len(here.cameras)), *remembered]
-        self._unknowns = _unknowns(here, self._owner_of, solved)
+    `_response` (6 V, E): how least squares changes the poses of all views when numbers of lenses and field change.
+    """
+
+    def __init__(
+        self,
+        here: Estimate,
+        memories: Sequence[CameraMemory | None],
+        unknowns: Unknowns,
+        solved: Unknowns,
+        information: Array,
+    ) -> None:
+        self._cameras, self._solved, self._unknowns = here.cameras, solved, unknowns
+        self._owner_of = _owners(memories)
+        self._first = POSE_NUMBERS * unknowns.views
+        of_poses = information[: self._first, : self._first] + np.diag(np.tile(FREE**-2, unknowns.views))
+        self._response = -np.linalg.solve(of_poses, information[: self._first, self._first :])
         self._places = {
             (parameter.camera, parameter.name): at
             for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views)
@@ -148,30 +149,27 @@ class _Errors:
         """All of them."""
         moved = np.concatenate([group.which for group in self._movements])
         free = np.tile(FREE, len(moved) // POSE_NUMBERS)
-        views = [[v for v, owner in enumerate(self._owner_of) if owner == n] for n in range(len(self._cameras))]
-        lasting = np.concatenate([np.empty(0, dtype=np.intp), *(group.which for group in self._lasting)])
-        mixing = np.stack(self._columns, axis=1)
-        return Priors(self._unknowns, mixing, self._blocks, moved, free, self._changes, views, lasting)
+        return Priors(self._unknowns, np.stack(self._columns, axis=1), self._blocks, moved, free, self._changes)
 
     def add_solved(self, values: Array) -> None:
         """What the finish has found along with the poses: it stands at `values` (E,) from what was given."""
         first = POSE_NUMBERS * self._unknowns.views
         for at, (parameter, value) in enumerate(zip(self._solved.parameters, values.tolist(), strict=True), first):
-            self._blocks.append([self._number([at], parameter.expected, ONCE, mean=-value)])
+            self._blocks.append([self.add_lasting(self._number([at], parameter.expected, ONCE, mean=-value))])
 
     def add_field(self) -> None:
         """The measures of the field that were not solved for."""
         found = {parameter.name for parameter in self._solved.parameters}
         for at, parameter in enumerate(self._unknowns.parameters, POSE_NUMBERS * self._unknowns.views):
             if isinstance(parameter, FieldParameter) and parameter.name not in found:
-                self._lasting.append(self._number([at], parameter.expected, FIELD_SCALES))
-                self._blocks.append([self._lasting[-1]])
+                self._blocks.append([self.add_lasting(self._number([at], parameter.expected, FIELD_SCALES))])
 
     def add_camera(self, number: int, before: Camera) -> None:
         """A camera without a memory: moved or zoomed since it was where it was stored `before`, through its lens."""
-        moved = self._move([number], MOVED, MOVEMENT_SCALES, change_between(self._cameras[number], before))
+        camera = self._cameras[number]
+        self._blocks.append(self._lens(number, lens_numbers(before.intrinsics) - lens_numbers(camera.intrinsics)))
+        moved = self._move([number], MOVED, MOVEMENT_SCALES, self._from_stored(number, before))
         self._blocks.append([moved, self._heat([number], FOCAL_SCALES if self._has_fixed_focal(number) else ONCE)])
-        self._blocks.append(self._lens(number, np.zeros(len(LENS_NUMBERS))))
 
     def add_remembered(self, number: int, memory: CameraMemory) -> None:
         """A camera with a memory: its mount and lens, and what has happened between the times of its views."""
@@ -180,9 +178,9 @@ class _Errors:
         recent, earlier = (others[:1], others[1:]) if memory.recent else ([], others)
 
         told = lens_numbers(memory.origin.intrinsics) - lens_numbers(camera.intrinsics)
-        mount = self._move([tonight, anchor, *others], MOVED, MOVEMENT_SCALES, change_between(camera, memory.origin))
-        self._blocks.append([mount])
         self._blocks.append(self._lens(number, told))
+        from_origin = self._from_stored(number, memory.origin)
+        self._blocks.append([self._move([tonight, anchor, *others], MOVED, MOVEMENT_SCALES, from_origin)])
         self._blocks.append([self._heat([anchor, tonight, *recent], ONCE)])
         zoomed = [self._since([tonight, *recent])] if recent else []
         zoomed.append(self._since([tonight]))
@@ -233,8 +231,35 @@ class _Errors:
                 columns = np.eye(self._unknowns.dense)[:, list(places)]
                 group = self._group(columns, np.array(expected), np.array(means), scales)
                 groups.append(replace(group, odds=odds) if of_focal else group)
-        self._lasting.extend(groups)
-        return groups
+        return [self.add_lasting(group) for group in groups]
+
+    def add_lasting(self, group: Group) -> Group:
+        """An error of lens or field that has been the same since poses were stored.
+
+        Those were fitted to lines with it. It has moved them by what makes up for it in the picture, and so a camera
+        that has not moved stands beside its stored pose by as much.
+        """
+        for column in group.which:
+            response = self._response @ self._columns[column][self._first :]
+            whole = self._columns[column].copy()
+            for view, owner in enumerate(self._owner_of):
+                whole[self._unknowns.pose(view)] += response[self._unknowns.pose(owner)]
+            self._columns[column] = whole
+        self._lasting.append(group)
+        return group
+
+    def _from_stored(self, number: int, stored: Camera) -> Array:
+        """The movement (6,) of a camera to a stored pose that was fitted through its lens on the stored field."""
+        means = sum(
+            (
+                self._columns[column] * mean
+                for group in self._lasting
+                for column, mean in zip(group.which, group.mean, strict=True)
+            ),
+            np.zeros(self._unknowns.dense),
+        )
+        moved: Array = change_between(self._cameras[number], stored) - means[self._unknowns.pose(number)]
+        return moved
 
     def _has_fixed_focal(self, number: int) -> bool:
         solved = [p for p in self._solved.parameters if isinstance(p, LensParameter) and p.camera == number]
@@ -259,11 +284,17 @@ class _Errors:
         return Group(which, expected, mean, scales)
 
 
-def _unknowns(here: Estimate, owner_of: Sequence[int], solved: Unknowns) -> Unknowns:
-    """Everything that may be off: of all views, each of which is of the camera `owner_of` says.
+def _owners(memories: Sequence[CameraMemory | None]) -> list[int]:
+    """The number of the camera of each view: of tonight's, and of those that are remembered."""
+    return [*range(len(memories)), *(n for n, memory in enumerate(memories) if memory for _ in memory.epochs)]
+
+
+def unknowns_of(here: Estimate, memories: Sequence[CameraMemory | None], solved: Unknowns) -> Unknowns:
+    """Everything that may be off, of all views, found with `solved` unknown.
 
     What heat and zoom rings do to a focal length is a number of each view.
     """
+    owner_of = _owners(memories)
     views = len(owner_of)
     known = {(getattr(p, "camera", None), p.name) for p in solved.parameters}
     suspects: list[Parameter] = [*lens_parameters_without_heat(here.cameras), *field_parameters(here.pitch)]

@@ -34,7 +34,7 @@ from worker.calibration.refinement.cross_check import CrossCheck, CrossChecks
 from worker.calibration.refinement.estimate import Estimate
 from worker.calibration.refinement.information import LineLikelihood, MarginalInformation
 from worker.calibration.refinement.least_squares import FEWEST_MEASUREMENTS, rms_px
-from worker.calibration.refinement.priors import Priors, build_priors
+from worker.calibration.refinement.priors import Priors, build_priors, unknowns_of
 from worker.calibration.refinement.unknowns import Unknowns
 from worker.calibration.refinement.variance_components import Posterior, posterior
 
@@ -205,10 +205,10 @@ def estimate_uncertainty(
         memory if memory is not None and len(found) >= FEWEST_MEASUREMENTS else None
         for memory, found in zip(memories, measured, strict=True)
     ]
-    believed = build_priors(here, stored, memories, solved)
-    lines = LineLikelihood(here, measured, memories, believed.unknowns)
+    unknowns = unknowns_of(here, memories, solved)
+    lines = LineLikelihood(here, measured, memories, unknowns)
     information = lines.information()
-    believed = believed.of_fitted_poses(information.known)
+    believed = build_priors(here, stored, memories, unknowns, solved, information.known)
     for _ in range(ASKED_AGAIN):
         changes = believed.mixing @ _posterior(believed, information).value
         information = lines.information_at(changes, information.heights(changes))
