@@ -1,5 +1,6 @@
 """A frame of an RTSP stream, from cameras that speak it over real sockets."""
 
+import re
 import socket
 import subprocess
 import sys
@@ -99,9 +100,16 @@ def test_a_frame_of_a_stream_is_what_the_camera_sees(camera, tmp_path, way):
         assert not [given for _, given in seen.asked if given.startswith("Basic")]
 
 
-def test_an_encrypted_stream_is_taken_from_a_camera_that_signed_its_own_certificate(camera, tmp_path):
+def test_a_camera_that_signed_its_own_certificate_is_taken_from_by_the_pin_that_its_refusal_shows(camera, tmp_path):
     seen = camera(certificate=certificate(tmp_path, "camera.example"))
-    assert taken(tmp_path, f"rtsps://***@{seen.host}/live", RIGHT)
+    said = refused(tmp_path, f"rtsps://***@{seen.host}/live", RIGHT)
+    pin = re.search("#tls_sha256=[0-9a-f]{64}", said)[0]
+    assert "cannot be verified (self-signed certificate)" in said
+    assert seen.asked == []
+    assert taken(tmp_path, f"rtsps://***@{seen.host}/live{pin}", RIGHT)
+    asked = len(seen.asked)
+    assert pin in refused(tmp_path, f"rtsps://***@{seen.host}/live#tls_sha256={'0' * 64}", RIGHT)
+    assert len(seen.asked) == asked
 
 
 def test_a_stream_that_is_refused_says_what_to_look_at(camera, tmp_path):
@@ -131,7 +139,7 @@ def test_a_camera_that_leads_elsewhere_is_not_followed_and_its_password_stays_wi
 def test_nobody_else_on_the_machine_speaks_to_the_camera_through_the_relay(camera):
     seen = camera()
     target = httpx.URL(f"rtsp://{seen.host}/live")
-    with Relay(target, ["127.0.0.1"], target.port, RIGHT) as relay:
+    with Relay(target, ["127.0.0.1"], RIGHT) as relay:
         there = httpx.URL(relay.url)
         with socket.create_connection((there.host, there.port)) as guess:
             guess.sendall(f"OPTIONS rtsp://127.0.0.1:{there.port}/live RTSP/1.0\r\nCSeq: 1\r\n\r\n".encode())
