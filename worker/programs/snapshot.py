@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
 
 import httpx
 import structlog
@@ -26,8 +27,14 @@ from worker.sources.errors import CameraError
 from worker.sources.http_camera import fetch_picture
 from worker.sources.rtsp_relay import FFMPEG_OPTIONS, Relay
 
-# The first frames of a stream may be put together from halves.
+if TYPE_CHECKING:
+    import cv2
+
+# From the first whole frame on. Encoders make that one coarser than what follows, which refines it.
 FRAMES_PASSED_BY = 5
+# FFmpeg shows frames of these after a key frame or a finished intra refresh (recovery point) alone. Of other codecs it
+# shows at once what changes on a grey ground, up to the first key frame.
+SHOWN_WHOLE = ("h264", "avc1", "hevc", "hev1", "hvc1")
 JPEG_QUALITY = 95
 log = structlog.get_logger()
 
@@ -107,8 +114,7 @@ def _frame_of_stream(relay: Relay, task: SourceTask) -> bytes:
             raise CameraError(
                 f"it has {width}x{height} pixels, more than the {task.most_pixels} of ESC_MAX_FRAME_PIXELS"
             )
-        for _ in range(FRAMES_PASSED_BY):
-            stream.grab()
+        _pass_by_first_frames(stream)
         whole, frame = stream.read()
         if not whole:
             raise CameraError(relay.why or "the stream ended before a whole frame came")
@@ -116,6 +122,16 @@ def _frame_of_stream(relay: Relay, task: SourceTask) -> bytes:
         stream.release()
     _, data = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return data.tobytes()
+
+
+def _pass_by_first_frames(stream: cv2.VideoCapture) -> None:
+    import cv2
+
+    codec = int(stream.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little").decode("latin-1").lower()
+    is_whole, passed = codec in SHOWN_WHOLE, 0
+    while passed < FRAMES_PASSED_BY and stream.grab():
+        is_whole = is_whole or int(stream.get(cv2.CAP_PROP_FRAME_TYPE)) == ord("I")
+        passed += is_whole
 
 
 if __name__ == "__main__":

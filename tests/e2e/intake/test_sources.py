@@ -157,7 +157,7 @@ def test_a_password_does_not_follow_a_source_to_another_host(service, camera, na
     ("path", "kind", "says"),
     [
         ("/gone", "source-failed", "404"),
-        ("/basic", "source-failed", "check user and password"),
+        ("/basic", "source-failed", "check address, user and password"),
         ("/elsewhere", "source-failed", "it answered 302 and leads to another address"),
         ("/endless", "source-failed", "ESC_MAX_FRAME_MB"),
         ("/mjpeg-short", "source-failed", "ended before the first was whole"),
