@@ -70,7 +70,7 @@ class StubCamera:
             return "BASIC" in self._dialect["knows"] and proof[6:] == b64encode(f"{USER}:{PASSWORD}".encode()).decode()
         fields = dict(re.findall(r'(\w+)="?([^",]*)"?', proof.removeprefix("Digest ")))
         name = fields.get("algorithm", "MD5").upper()
-        if name not in self._dialect["knows"]:
+        if not proof or name not in self._dialect["knows"]:
             return False
 
         def hashed(*parts: str) -> str:

@@ -21,7 +21,7 @@ from service.schemas.venue import VenueIn
 from service.settings import Settings
 from tests.e2e.running import venue
 from tests.worker.certificates import certificate
-from tests.worker.sources.streaming_camera import ASKS, SIZE, Film, StreamingCamera
+from tests.worker.sources.streaming_camera import ASKS, SIZE, Film, Stranger, StreamingCamera
 from worker.sources.rtsp_relay import Relay
 
 pytestmark = pytest.mark.slow
@@ -41,32 +41,6 @@ def camera():
     yield camera
     for one in cameras:
         one.close()
-
-
-class Stranger:
-    """A host that a camera leads to: keeps what is said to it."""
-
-    def __init__(self) -> None:
-        self.heard: list[bytes] = []
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.host = "{}:{}".format(*self._listener.getsockname())
-        threading.Thread(target=self._listen, daemon=True).start()
-
-    def _listen(self) -> None:
-        while True:
-            try:
-                connection, _ = self._listener.accept()
-            except OSError:
-                return
-            self.heard.append(b"a connection")
-            with connection:
-                connection.sendall(b'RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\nWWW-Authenticate: Basic realm="x"\r\n\r\n')
-                connection.settimeout(5)
-                while data := connection.recv(4096):
-                    self.heard.append(data)
-
-    def close(self) -> None:
-        self._listener.close()
 
 
 @pytest.fixture

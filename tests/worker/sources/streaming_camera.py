@@ -35,6 +35,32 @@ class Film:
     pictures: list[list[bytes]]
 
 
+class Stranger:
+    """A host that a camera leads to: keeps what is said to it."""
+
+    def __init__(self) -> None:
+        self.heard: list[bytes] = []
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.host = "{}:{}".format(*self._listener.getsockname())
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        while True:
+            try:
+                connection, _ = self._listener.accept()
+            except OSError:
+                return
+            self.heard.append(b"a connection")
+            with connection:
+                connection.sendall(b'RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\nWWW-Authenticate: Basic realm="x"\r\n\r\n')
+                connection.settimeout(5)
+                while data := connection.recv(4096):
+                    self.heard.append(data)
+
+    def close(self) -> None:
+        self._listener.close()
+
+
 class StreamingCamera:
     """A stream by RTSP (RFC 2326), interleaved in one TCP connection, for user:pass word.
 
