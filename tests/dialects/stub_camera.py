@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import re
 import socket
+import ssl
 import threading
 from base64 import b64encode
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -21,8 +23,13 @@ HASHES = {"MD5": "md5", "SHA-256": "sha256", "SHA-512-256": "sha512_256"}
 class StubCamera:
     """Answers each request as its dialect says; `proofs`: what came with requests to prove their user."""
 
-    def __init__(self, dialect: dict[str, Any], host: str = "127.0.0.1") -> None:
+    def __init__(self, dialect: dict[str, Any], host: str = "127.0.0.1", certificate: Path | None = None) -> None:
         self.proofs: list[str] = []
+        self.requests: list[str] = []
+        self._tls = None
+        if certificate is not None:
+            self._tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            self._tls.load_cert_chain(certificate)
         self._dialect = dialect
         self._listener = socket.create_server((host, 0))
         self.port = self._listener.getsockname()[1]
@@ -38,6 +45,8 @@ class StubCamera:
                 threading.Thread(target=self._converse, args=(connection,), daemon=True).start()
 
     def _converse(self, connection: socket.socket) -> None:
+        with suppress(OSError):
+            connection = self._tls.wrap_socket(connection, server_side=True) if self._tls else connection
         with connection, suppress(OSError), connection.makefile("rb") as lines:
             while head := b"".join(iter(lines.readline, b"\r\n")).decode():
                 connection.sendall(self._answer(head))
@@ -45,6 +54,7 @@ class StubCamera:
                     return
 
     def _answer(self, head: str) -> bytes:
+        self.requests.append(head)
         cseq = "".join(re.findall("CSeq: (.*)\r", head))
         proof = "".join(re.findall("Authorization: (.*)\r", head))
         asks = self._dialect.get("asks", [])

@@ -59,7 +59,7 @@ async def _connect(target: httpx.URL, address: str, pin: str | None) -> Connecti
         raise CameraError(f"it does not agree on an encryption (TLS): {error.reason or error}") from None
     seen = _fingerprint(writer)
     if pin is not None and seen != pin:
-        writer.close()
+        writer.transport.abort()
         raise CameraError(
             f"its certificate has the SHA-256 {seen}, its address is pinned to {pin}. If the camera was replaced or "
             f"made a new certificate, end its address in #tls_sha256={seen}"
@@ -78,7 +78,7 @@ async def _unverified(target: httpx.URL, address: str, why: str) -> str:
     """Return what to say of a certificate that no authority vouches for. Nothing is sent to that camera."""
     _, writer = await _open_tls(target, address, _no_authority())
     seen = _fingerprint(writer)
-    writer.close()
+    writer.transport.abort()
     return (
         f"its certificate cannot be verified ({why}). Cameras mostly sign their own: compare its SHA-256 {seen} with "
         f"what the camera shows, and end its address in #tls_sha256={seen}"
